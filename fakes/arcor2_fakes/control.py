@@ -57,16 +57,16 @@ class ControlServer:
         self._sessions: set[_Session] = set()
 
     def command(self, name: str, handler: Handler) -> None:
-        """Registers what ``{"do": name, ...}`` calls."""
+        """Register what ``{"do": name, ...}`` calls."""
         self._commands[name] = handler
 
     def source(self, name: str, read: Callable[[], Any]) -> None:
-        """Registers something that may be asked for as a command and subscribed to, such as the truth."""
+        """Register something that may be asked for as a command and subscribed to, such as the truth."""
         self._sources[name] = read
         self._commands[name] = read
 
     def publish(self, name: str) -> None:
-        """Pushes the source `name` to those that subscribed to it with rate 0."""
+        """Push the source `name` to those that subscribed to it with rate 0."""
         for session in tuple(self._sessions):
             session.changed(name)
 
@@ -77,13 +77,13 @@ class ControlServer:
         return f"{host}:{port}"
 
     async def start(self) -> str:
-        """Listens and returns the address. Raises `OSError` when the port is taken."""
+        """Listen and returns the address. Raises `OSError` when the port is taken."""
         self._server = await asyncio.start_server(self._serve, *self._bind, limit=MAX_LINE)
         self._bind = (self._bind[0], self._server.sockets[0].getsockname()[1])
         return self.address
 
     async def close(self) -> None:
-        """Closes the port and every session."""
+        """Close the port and every session."""
         if self._server is not None:
             self._server.close()
         sessions = tuple(self._sessions)
@@ -211,7 +211,7 @@ class _Session:
 
 
 def _described(name: str, handler: Handler) -> dict[str, Any]:
-    """Give a command's name, what it takes: ``name``, ``[name]`` or ``name=default``, and its first line of text."""
+    """Return a command's name, what it takes: ``name``, ``[name]`` or ``name=default``, and its first line of text."""
     takes = []
     for each in inspect.signature(handler).parameters.values():
         if each.default is each.empty:
@@ -244,7 +244,7 @@ class ControlClient:
 
     @classmethod
     async def connect(cls, address: str, within: float = 2.0) -> Self:
-        """Raises `ControlError` when nobody listens there, `ValueError` for an address that is none."""
+        """Raise `ControlError` when nobody listens there, `ValueError` for an address that is none."""
         host, port = parse_address(address)
         try:
             async with asyncio.timeout(within):
@@ -270,16 +270,16 @@ class ControlClient:
             del self._waiting[number]
 
     async def subscribe(self, listener: Callable[[Any], None], to: str = "truth", rate: float = 0.0) -> None:
-        """Calls `listener` with each pushed value, in the event loop; `rate` in Hz, 0 means on change."""
+        """Call `listener` with each pushed value, in the event loop; `rate` in Hz, 0 means on change."""
         self._listeners[to] = listener
         await self.do("subscribe", to=to, rate=rate)
 
     async def wait_closed(self) -> None:
-        """Returns when the fake has gone or `close` was called."""
+        """Return when the fake has gone or `close` was called."""
         await self._closed.wait()
 
     async def close(self) -> None:
-        """Closes the channel; does nothing the second time."""
+        """Close the channel; does nothing the second time."""
         self._task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await asyncio.shield(asyncio.gather(self._task, return_exceptions=True))
@@ -341,7 +341,7 @@ class BlockingControlClient:
             raise ControlError(f"{command}: {self.address}: {e}") from e
 
     def wait_until(self, holds: Callable[[Any], bool], within: float = 5.0, command: str = "truth") -> Any:
-        """Asks until the answer satisfies `holds`; returns it. Raises `ControlError`, with the last answer, if late."""
+        """Ask until the answer satisfies `holds`; returns it. Raises `ControlError`, with the last answer, if late."""
         deadline = time.monotonic() + within
         while not holds(data := self.do(command)):
             if time.monotonic() > deadline:
@@ -350,7 +350,7 @@ class BlockingControlClient:
         return data
 
     def close(self) -> None:
-        """Closes the channel."""
+        """Close the channel."""
         self._socket.close()
 
     def __enter__(self) -> Self:

@@ -35,19 +35,19 @@ class OwnTime:
         return self._elapsed + min(self._loop.time() - self._read, _HELD_UP)
 
     def run(self) -> None:
-        """Lets it run from now on, in the running event loop."""
+        """Let it run from now on, in the running event loop."""
         self._elapsed, self._read = self(), self._loop.time()
         self._loop.call_later(_TICK, self.run)
 
 
 def announce(**addresses: object) -> None:
-    """Prints the one line on standard output: ``ready {json}``."""
+    """Print the one line on standard output: ``ready {json}``."""
     sys.stdout.write(f"ready {msgspec.json.encode(addresses).decode()}\n")
     sys.stdout.flush()
 
 
 async def until_told_to_end() -> None:
-    """Returns on SIGTERM, SIGINT, or when the parent process has gone. To be called within `run`.
+    """Return on SIGTERM, SIGINT, or when the parent process has gone. To be called within `run`.
 
     The parent is watched by its id, not by PR_SET_PDEATHSIG: that one fires when the *thread* that started us ends.
     """
@@ -62,7 +62,7 @@ async def until_told_to_end() -> None:
 
 
 def run(main: Callable[[], Awaitable[None]], name: str, *, ahead: bool = True) -> int:
-    """Runs a fake to its end and gives the exit status: 0, or 1 with one line on standard error (a port is taken).
+    """Run a fake to its end and return the exit status: 0, or 1 with one line on standard error (a port is taken).
 
     `ahead`: it goes before other processes, where we may ask for that; not for one that computes much.
     """

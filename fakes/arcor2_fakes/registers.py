@@ -1,16 +1,16 @@
 """A fake that is a handful of registers: its process, its wire (Modbus, a text line, HTTP), faults and truth.
 
-A fake of a device of one's own is a class with `words`, `write` and `heard`; `serve` does the rest. The codecs stand
-here; a text or HTTP protocol of another kind is spoken by giving `answer` another function.
+The fake of a new device derives from `Device` and is run by `serve_device`. A device of another kind is a class with
+`words`, `write` and `heard`, run by `serve`; another text or HTTP protocol is another function `answer`.
 """
 
 from __future__ import annotations
 
 import argparse
-import asyncio
 import json
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -37,7 +37,7 @@ class Registers(Protocol):
     """All that was ever written: address, values."""
 
     def words(self) -> list[int]:
-        """Give what is read, 16 bit each, at this moment."""
+        """Return what is read, 16 bit each, at this moment."""
         ...
 
     def write(self, address: int, values: list[int]) -> None:
@@ -47,6 +47,89 @@ class Registers(Protocol):
     def heard(self) -> None:
         """Note that the host spoke."""
         ...
+
+
+NOBODY, HOST, PANEL = 0, 1, 2
+"""Values of the register `owner`."""
+COMMAND, WATCHDOG = 0, 2
+"""Register that are written: a command with its arguments, and the time without a request after which it stops, ms."""
+
+
+class Device:
+    """A device of the starters: a command register, a watchdog of the host, and an operator panel.
+
+    A subclass overrides `command` and, where it needs them, `power_on`, `advance` and `let_go`.
+    """
+
+    names: tuple[str, ...] = ("state", "value", "count", "fault", "owner")
+    """The registers that are read, in order; each is an attribute."""
+
+    def __init__(self) -> None:
+        self.written: list[list[int]] = []
+        self.state = self.fault = 0
+        self.__dict__ |= dict.fromkeys(self.names, 0)
+        self.owner, self.watchdog = NOBODY, 0.0
+        self.began = self.spoke = time.monotonic()
+        self.power_on()
+
+    def power_on(self) -> None:
+        """Set what the device has besides its registers."""
+
+    def advance(self, now: float) -> None:
+        """Move on to the time `now` (monotonic, s)."""
+
+    def command(self, number: int, *values: int) -> None:
+        """Obey a command. Raises Refusal."""
+        raise NotImplementedError
+
+    def let_go(self) -> None:
+        """Stop: the host has released control, or its watchdog has expired."""
+        self.state = 0
+
+    @property
+    def busy(self) -> bool:
+        """Return whether it works."""
+        return self.state == 1
+
+    def heard(self) -> None:
+        """Note a request of the host."""
+        self.words()  # a watchdog that has expired before stays expired
+        self.spoke = time.monotonic()
+
+    def words(self) -> list[int]:
+        """Return the registers that are read."""
+        now = time.monotonic()
+        self.advance(now)
+        if self.owner == HOST and now - self.spoke > self.watchdog:
+            self.owner = NOBODY
+            self.let_go()
+        return [getattr(self, name) for name in self.names]
+
+    def write(self, address: int, values: list[int]) -> None:
+        """Take what the host writes."""
+        if self.owner == PANEL:
+            raise Refusal("the panel has control")
+        self.written.append([address, *values])
+        if address == WATCHDOG:
+            self.watchdog, self.owner = values[0] / 1000, HOST if values[0] else NOBODY
+            if not values[0]:
+                self.let_go()
+        elif self.owner != HOST or address != COMMAND:
+            raise Refusal("nobody has control")
+        else:
+            self.command(*values)
+
+    def rest(self) -> None:
+        """Start again as after power on: for tests that share one process."""
+        self.__init__()  # type: ignore[misc]
+
+    def panel(self, on: bool) -> None:
+        """Take or release control at the operator panel."""
+        self.owner = PANEL if on else NOBODY
+
+    def truth(self) -> dict[str, Any]:
+        """Return the real state, for tests."""
+        return dict(zip(self.names, self.words(), strict=True)) | {"busy": self.busy}
 
 
 def answer_line(device: Registers, line: bytes) -> bytes:
@@ -88,7 +171,7 @@ def answer_http(device: Registers, request: bytes) -> bytes:
 
 
 def http_length(buffer: bytes) -> int | None:
-    """Give the length of the first whole HTTP request of a buffer, None while it is not whole."""
+    """Return the length of the first whole HTTP request of a buffer, None while it is not whole."""
     end = buffer.find(b"\r\n\r\n")
     if end < 0:
         return None
@@ -100,7 +183,7 @@ def http_length(buffer: bytes) -> int | None:
 
 
 def line_length(buffer: bytes) -> int | None:
-    """Give the length of the first line of a buffer with its CR, None while there is no whole one."""
+    """Return the length of the first line of a buffer with its CR, None while there is no whole one."""
     end = buffer.find(b"\r")
     return None if end < 0 else end + 1
 
@@ -108,7 +191,7 @@ def line_length(buffer: bytes) -> int | None:
 def cut(
     device: Registers, answer: Answer, length: Callable[[bytes], int | None], send: Callable[[bytes], Any], end: bytes
 ) -> Callable[[bytes], None]:
-    """Give what takes bytes as they come, and answers each whole request."""
+    """Return what takes bytes as they come, and answers each whole request."""
     buffer = bytearray()
 
     def received(data: bytes) -> None:
@@ -124,28 +207,13 @@ def cut(
     return received
 
 
-class _ModbusOnto(asyncio.Transport):
-    """What pymodbus takes for its transport."""
-
-    def __init__(self, connection: Connection) -> None:
-        super().__init__()
-        self._connection = connection
-
-    def write(self, data: bytes | bytearray | memoryview) -> None:
-        self._connection.send(bytes(data))
-
-    def close(self) -> None:
-        self._connection.close()
-
-    def is_closing(self) -> bool:
-        return not self._connection.alive
-
-
 def modbus_wire(device: Registers, host: str, port: int) -> TcpWire:
-    """Give a Modbus TCP port: `words` are its input registers, `write` takes its holding registers."""
+    """Return a Modbus TCP port: `words` are its input registers, `write` takes its holding registers."""
     from pymodbus.constants import ExcCodes
     from pymodbus.server import ModbusTcpServer
     from pymodbus.simulator import DataType, SimData, SimDevice
+
+    from arcor2_fakes.modbus import tcp_wire
 
     size = len(device.words())
 
@@ -172,17 +240,11 @@ def modbus_wire(device: Registers, host: str, port: int) -> TcpWire:
     inputs = [SimData(0, values=[0] * size, datatype=DataType.REGISTERS)]
     server = ModbusTcpServer(SimDevice(1, simdata=(bits, bits, holding, inputs), action=access))
 
-    def opened(connection: Connection) -> None:
-        protocol = server.handle_new_connection()
-        protocol.connection_made(_ModbusOnto(connection))
-        connection.received = protocol.data_received
-        connection.closed = lambda: protocol.connection_lost(None)
-
-    return TcpWire("wire", host, port, opened)
+    return tcp_wire(server, host, port, "wire")
 
 
 def http_wire(device: Registers, answer: Answer, host: str, port: int) -> TcpWire:
-    """Give an HTTP port."""
+    """Return an HTTP port."""
 
     def opened(connection: Connection) -> None:
         connection.received = cut(device, answer, http_length, connection.send, b"")
@@ -191,7 +253,7 @@ def http_wire(device: Registers, answer: Answer, host: str, port: int) -> TcpWir
 
 
 def text_line(device: Registers, answer: Answer, host: str, port: int, link: Path | None) -> Line:
-    """Give a text line: a pty that `link` points to, whose own path changes when it is unplugged, or a TCP port."""
+    """Return a text line: a pty that `link` points to, whose own path changes when it is unplugged, or a TCP port."""
     received = cut(device, answer, line_length, lambda frame: line.send(frame), b"\r")
     line: Line = TcpLine(received, host, port) if link is None else PtyLine(received, link)
     return line
@@ -205,7 +267,7 @@ def serve(
     commands: Callable[[Any], dict[str, Callable[..., Any]]] = lambda _: {},
     answer: Answer | None = None,
 ) -> int:
-    """Run the fake of a device until it is told to end; gives the exit status.
+    """Run the fake of a device until it is told to end; return the exit status.
 
     bus: modbus, serial, tcp or http. truth: what is really so, for tests. commands: what the world does to the device,
     by the name under which the control channel calls it. answer: the codec of a text or HTTP protocol of one's own.
@@ -258,3 +320,21 @@ def serve(
             folder.cleanup()
 
     return run(body, name)
+
+
+def serve_device(name: str, make: Callable[[], Device], bus: str, *commands: str) -> int:
+    """Run the fake of a Device until it is told to end; return the exit status.
+
+    Args:
+        name: Name of the device.
+        make: Returns the device.
+        bus: modbus, serial, tcp or http.
+        commands: Names of the methods that the control channel may call, besides `panel` and `rest`.
+    """
+    return serve(
+        name,
+        make,
+        lambda device: device.truth(),
+        bus,
+        lambda device: {command: getattr(device, command) for command in ("panel", "rest", *commands)},
+    )

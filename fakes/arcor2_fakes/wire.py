@@ -54,7 +54,7 @@ class Faults:
         return frame
 
     def set(self, fault: str, seconds: float = 1.0) -> None:
-        """Applies one of `FAULTS`; reset and refuse belong to the transport and change nothing here."""
+        """Apply one of `FAULTS`; reset and refuse belong to the transport and change nothing here."""
         if fault not in (*FAULTS, CHECKSUM):
             raise ValueError(f"no fault {fault!r}; there are {', '.join(FAULTS)}")
         if fault == "silence":
@@ -78,12 +78,12 @@ class Faulty(Protocol):
     """A wire as the control channel sees it: a TCP port here, a pty or a hub elsewhere."""
 
     async def fault(self, kind: str, seconds: float = 1.0) -> None:
-        """Applies one of `FAULTS`."""
+        """Apply one of `FAULTS`."""
         ...
 
 
 def register_faults(control: ControlServer, wires: dict[str, Faulty], checked: Container[str] = ()) -> None:
-    """Makes each fault a command: ``{"do": "slow", "wire": "rtde", "seconds": 2}``; without a wire: to all.
+    """Make each fault a command: ``{"do": "slow", "wire": "rtde", "seconds": 2}``; without a wire: to all.
 
     `checked` names the wires whose frames end in a checksum; they can be told to send wrong ones.
     """
@@ -122,25 +122,25 @@ class Connection(asyncio.Protocol):
         self._transport: asyncio.Transport
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Called by the event loop."""
+        """Handle the event of the loop."""
         self._transport = cast("asyncio.Transport", transport)
         self.alive = True
         self.wire.connections.add(self)
         self.wire.opened(self)
 
     def data_received(self, data: bytes) -> None:
-        """Called by the event loop. A cut cable carries nothing in either direction."""
+        """Handle the event of the loop. A cut cable carries nothing in either direction."""
         if not self.wire.faults.silent:
             self.received(data)
 
     def connection_lost(self, _exc: Exception | None) -> None:
-        """Called by the event loop."""
+        """Handle the event of the loop."""
         self.alive = False
         self.wire.connections.discard(self)
         self.closed()
 
     def send(self, frame: bytes) -> bool:
-        """Sends one frame, or what the wire's faults make of it. False if it was lost."""
+        """Send one frame, or what the wire's faults make of it. False if it was lost."""
         faults = self.wire.faults
         if not self.alive or self._torn or self._transport.get_write_buffer_size() > _MAX_UNSENT:
             return False
@@ -160,12 +160,12 @@ class Connection(asyncio.Protocol):
         return True
 
     def close(self) -> None:
-        """Closes when everything is sent."""
+        """Close when everything is sent."""
         if self.alive:
             self._transport.close()
 
     def reset(self) -> None:
-        """Sends RST."""
+        """Send RST."""
         if self.alive:
             raw: socket.socket = self._transport.get_extra_info("socket")
             with contextlib.suppress(OSError):
@@ -173,7 +173,7 @@ class Connection(asyncio.Protocol):
             self._transport.abort()
 
     def heal(self) -> None:
-        """Sends what is late; drops a connection that half a frame went out on, for there is no way back into step."""
+        """Send what is late; drops a connection that half a frame went out on, for there is no way back into step."""
         if self._torn:
             self.reset()
         elif self.alive:
@@ -208,7 +208,7 @@ class TcpWire:
         return f"{self._host}:{self._port}"
 
     async def listen(self) -> str:
-        """Opens the port and returns the address. Raises `OSError` when it is taken."""
+        """Open the port and returns the address. Raises `OSError` when it is taken."""
         if self._server is None:
             loop = asyncio.get_running_loop()
             self._server = await loop.create_server(lambda: Connection(self), self._host, self._port)
@@ -216,18 +216,18 @@ class TcpWire:
         return self.address
 
     def refuse(self) -> None:
-        """Closes the listening port; connections stay."""
+        """Close the listening port; connections stay."""
         if self._server is not None:
             self._server.close()
             self._server = None
 
     def reset(self) -> None:
-        """Sends RST on every connection."""
+        """Send RST on every connection."""
         for connection in tuple(self.connections):
             connection.reset()
 
     async def fault(self, kind: str, seconds: float = 1.0) -> None:
-        """Applies one of `FAULTS`."""
+        """Apply one of `FAULTS`."""
         self.faults.set(kind, seconds)
         if kind == "reset":
             self.reset()
@@ -239,7 +239,7 @@ class TcpWire:
             await self.listen()
 
     def close(self) -> None:
-        """Closes the port and every connection."""
+        """Close the port and every connection."""
         self.refuse()
         for connection in tuple(self.connections):
             connection.close()

@@ -9,16 +9,15 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter, validators
 
 from arcor2_fakes.barcode_reader.reader import HEALTH, Framing, Health, Reader
-from arcor2_fakes.control import ControlServer, parse_address
-from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.control import parse_address
 from arcor2_fakes.serial_line import Line, PtyLine, TcpLine
-from arcor2_fakes.wire import register_faults
+from arcor2_fakes.serving import Fake, serve
 
 app = App(name="arcor2_fakes.barcode_reader", help="Fake barcode reader on a pty or TCP.", version_flags=[])
 
 
 def truth(reader: Reader, line: Line) -> dict[str, Any]:
-    """Give what is really so in the reader, whatever the line says."""
+    """Return the real state of the reader."""
     return {
         "code": reader.code,
         "reading": reader.reading,
@@ -30,8 +29,8 @@ def truth(reader: Reader, line: Line) -> dict[str, Any]:
     }
 
 
-def register_commands(control: ControlServer, reader: Reader) -> None:
-    """Make what the world and a test can do to the reader known to the control channel."""
+def register_commands(fake: Fake, reader: Reader) -> None:
+    """Register what tests and the cell can do to the reader."""
 
     def health(value: Health) -> None:
         if value not in HEALTH:
@@ -43,9 +42,7 @@ def register_commands(control: ControlServer, reader: Reader) -> None:
             raise ValueError("seconds is 0 to 60")
         reader.delay_next(seconds)
 
-    control.command("present", lambda code: reader.present(code))
-    control.command("health", health)
-    control.command("late", late)
+    fake.commands(present=lambda code: reader.present(code), health=health, late=late)
 
 
 @app.default
@@ -70,60 +67,36 @@ def main(
         timeout: how long the reader tries to read, s.
         seed: decides how long each reading takes.
     """
-    try:
-        control_address = parse_address(control)
-        tcp_address = None if tcp is None else parse_address(tcp)
-    except ValueError as e:
-        sys.stderr.write(f"barcode_reader: {e}\n")
-        return 2
 
-    async def body() -> None:
+    async def body(fake: Fake) -> None:
         reader = Reader(
             lambda frame: line.send(frame), framing=Framing(line_feed=crlf, stx=stx), seed=seed, timeout=timeout
         )
-        line: Line = PtyLine(reader.feed, link) if tcp_address is None else TcpLine(reader.feed, *tcp_address)
-
-        async def plug() -> str:
-            await line.plug()
-            return line.port
-
-        async def unplug() -> None:
-            await line.unplug()
-            reader.drop_input()
+        line: Line = PtyLine(reader.feed, link) if tcp is None else TcpLine(reader.feed, *parse_address(tcp))
 
         async def renew(crlf: bool = crlf, stx: bool = stx) -> None:
-            """Be as it is when the process starts, or with another framing: for tests that share one."""
+            """Return to the state after the start, or with another framing, for tests that share a process."""
             reader.as_delivered()
             reader.framing = Framing(line_feed=crlf, stx=stx)
             await line.fault("heal")
             await line.unplug()
             await line.plug()
 
-        channel = ControlServer(*control_address)
-        channel.command("renew", renew)
-        register_commands(channel, reader)
-
         async def power_cycle() -> None:
-            """Be switched off and on: the port goes and comes, what was being read is forgotten."""
-            reader.close()
-            await unplug()
-            await line.plug()
-
-        register_faults(channel, {"serial": line})
-        channel.command("power_cycle", power_cycle)
-        channel.command("plug", plug)
-        channel.command("unplug", unplug)
-        channel.source("truth", lambda: truth(reader, line))
-        await line.plug()
-        try:
-            announce(name="barcode_reader", port=line.port, control=await channel.start())
-            await until_told_to_end()
-        finally:
+            """Switch off and on: the port goes and comes, a reading is forgotten."""
             reader.close()
             await line.unplug()
-            await channel.close()
+            reader.drop_input()
+            await line.plug()
 
-    return run(body, "barcode_reader")
+        register_commands(fake, reader)
+        fake.commands(renew=renew, power_cycle=power_cycle)
+        fake.line(line, reader.drop_input)
+        fake.truth(lambda: truth(reader, line))
+        fake.at_end(reader.close)
+        await fake.run(port=line)
+
+    return serve("barcode_reader", control, body, tcp)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ class Framing(msgspec.Struct, frozen=True):
     stx: bool = False
 
     def wrap(self, text: str) -> bytes:
-        """Give an answer as it goes on the line."""
+        """Return an answer as it goes on the line."""
         body = text.encode("ascii")
         if self.stx:
             body = b"\x02" + body + b"\x03"
@@ -40,7 +40,7 @@ class BadCode(ValueError):
 
 
 def check_code(code: str) -> str:
-    """Give the code back if a reader can send it.
+    """Return the code back if a reader can send it.
 
     Raises:
         BadCode: it is empty, too long, not printable ASCII, or a word of the protocol.

@@ -99,7 +99,7 @@ class Cell:
 
 
 async def first_of(*waits: Any) -> Any:
-    """Give the result of whichever ends first; the others are cancelled."""
+    """Return the result of whichever ends first; the others are cancelled."""
     tasks = [asyncio.ensure_future(wait) for wait in waits]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)

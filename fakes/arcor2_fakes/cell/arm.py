@@ -46,7 +46,7 @@ TUBES: Final = {
 
 
 def things(model: str, base_link: Matrix, q: Sequence[float], tip: Matrix) -> dict[str, dict[str, Any]]:
-    """Give the links and the gripper as a fake camera takes them, by name.
+    """Return the links and the gripper as a fake camera takes them, by name.
 
     `base_link` in the world; `q` in rad; `tip` on the flange, up to which the gripper reaches.
     """
@@ -73,13 +73,13 @@ def things(model: str, base_link: Matrix, q: Sequence[float], tip: Matrix) -> di
 
 
 def pose_of(matrix: Matrix) -> dict[str, Any]:
-    """Give a transform as the fakes write a pose."""
+    """Return a transform as the fakes write a pose."""
     w, x, y, z = mat2quat(matrix[:3, :3])
     return {"position": [float(v) for v in matrix[:3, 3]], "orientation": [float(v) for v in (x, y, z, w)]}
 
 
 def _frames(model: str, base_link: Matrix, q: Sequence[float]) -> list[Matrix]:
-    """Give the foot's frame and of each joint the frame that turns with it, z along its axis."""
+    """Return the foot's frame and of each joint the frame that turns with it, z along its axis."""
     length = MODELS[model]
     frames = [base_link]
     frame = base_link @ _about_z(np.pi)  # the controller's base is turned by half a turn

@@ -143,7 +143,7 @@ class RobotFeed:
         self._arrived.set()
 
     async def next(self) -> Robot:
-        """Give the next sample. Raises `DeviceGone` if the robot sends something else."""
+        """Return the next sample. Raises `DeviceGone` if the robot sends something else."""
         while not self._samples:
             if self._problem is not None:
                 raise self._problem

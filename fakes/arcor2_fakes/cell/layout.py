@@ -79,11 +79,11 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("orientation is no unit quaternion x, y, z, w")
 
     def matrix(self) -> Matrix:
-        """Give the pose as a transform. Not to be changed: it is kept."""
+        """Return the pose as a transform. Not to be changed: it is kept."""
         return _matrices(self)[0]
 
     def inverse(self) -> Matrix:
-        """Give the inverse transform. Not to be changed: it is kept."""
+        """Return the inverse transform. Not to be changed: it is kept."""
         return _matrices(self)[1]
 
 
@@ -245,7 +245,7 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("boards come from a feeder or on a belt: one of the two")
 
     def needs(self) -> list[str]:
-        """Give which devices beside robot, tester and reader the cell needs."""
+        """Return which devices beside robot, tester and reader the cell needs."""
         needed = {
             "conveyor": self.belt is not None,
             "io": bool(self.tower) or (self.belt is not None and bool(self.belt.barriers)),
@@ -271,7 +271,7 @@ def read_layout(path: Path) -> Layout:
 
 
 def from_rotation_vector(pose: tuple[float, float, float, float, float, float]) -> Matrix:
-    """Give the transform of a controller's pose: position and rotation vector."""
+    """Return the transform of a controller's pose: position and rotation vector."""
     angle = math.hypot(*pose[3:])
     rotation = np.eye(3) if angle < 1e-12 else axangle2mat(pose[3:], angle)
     return _transform(pose[:3], rotation)

@@ -20,7 +20,7 @@ MOVED = 0.0005
 
 
 def fixed(camera: Camera) -> list[dict[str, Any]]:
-    """Give the things that never move."""
+    """Return the things that never move."""
     found = [
         {"name": thing.name, "pose": _pose(thing.pose), "size": thing.size, "color": thing.color}
         for thing in camera.things
@@ -40,7 +40,7 @@ def fixed(camera: Camera) -> list[dict[str, Any]]:
 
 
 def board(camera: Camera, code: str, world_from_board: Matrix, labelled: bool) -> dict[str, Any]:
-    """Give a board; its pose is that of its top, where it is gripped."""
+    """Return a board; its pose is that of its top, where it is gripped."""
     pose = pose_of(world_from_board @ _down(camera.board[2] / 2.0))
     return {"name": code, "pose": pose, "size": camera.board, "color": LABELLED if labelled else GREEN}
 
@@ -48,7 +48,7 @@ def board(camera: Camera, code: str, world_from_board: Matrix, labelled: bool) -
 def changes(
     before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]]
 ) -> tuple[bool, dict[str, dict[str, Any]]]:
-    """Give whether other things stand there or look different now, and else the poses of those that were moved."""
+    """Return whether other things stand there or look different now, and else the poses of those that were moved."""
     if {name: _look(thing) for name, thing in before.items()} != {name: _look(thing) for name, thing in after.items()}:
         return True, {}
     return False, {name: thing["pose"] for name, thing in after.items() if _far(before[name]["pose"], thing["pose"])}

@@ -23,15 +23,15 @@ class Supply(Protocol):
         ...
 
     def top(self) -> Thing | None:
-        """Give the board at the pick place."""
+        """Return the board at the pick place."""
         ...
 
     def under(self, world_from_gripped: Matrix) -> tuple[Thing, Matrix] | None:
-        """Give the board that jaws there get hold of, and its pose."""
+        """Return the board that jaws there get hold of, and its pose."""
         ...
 
     def seen_by(self, window: Place) -> Thing | None:
-        """Give the board that lies in a reader's view."""
+        """Return the board that lies in a reader's view."""
         ...
 
     def take(self, thing: Thing) -> None:
@@ -47,7 +47,7 @@ class Supply(Protocol):
         ...
 
     def pose(self, thing: Thing) -> Matrix | None:
-        """Give where a board lies; nothing for one that is still to come."""
+        """Return where a board lies; nothing for one that is still to come."""
         ...
 
 
@@ -67,16 +67,16 @@ class Magazine:
         return []
 
     def top(self) -> Thing | None:
-        """Give the board at the pick place."""
+        """Return the board at the pick place."""
         return self._things[0] if self._things and self._now >= self._refilled_at else None
 
     def under(self, world_from_gripped: Matrix) -> tuple[Thing, Matrix] | None:
-        """Give the top board when the jaws are at it."""
+        """Return the top board when the jaws are at it."""
         top = self.top()
         return (top, self._feeder.pose.matrix()) if top is not None and self.accepts(world_from_gripped) else None
 
     def seen_by(self, window: Place) -> Thing | None:
-        """Give the top board when the pick place is in view."""
+        """Return the top board when the pick place is in view."""
         return self.top() if window.holds(self._feeder.pose.matrix()) else None
 
     def take(self, thing: Thing) -> None:
@@ -98,7 +98,7 @@ class Magazine:
         return None
 
     def pose(self, thing: Thing) -> Matrix | None:  # noqa: ARG002 - all at one place
-        """Give the pick place."""
+        """Return the pick place."""
         return self._feeder.pose.matrix()
 
 
@@ -138,7 +138,7 @@ class BoardBelt:
         return happened
 
     def places(self) -> list[tuple[Thing, float]]:
-        """Give the boards on the belt and where each is, m before the stop, negative."""
+        """Return the boards on the belt and where each is, m before the stop, negative."""
         return list(self._on)
 
     def interrupts(self, at: float) -> bool:
@@ -152,11 +152,11 @@ class BoardBelt:
         return pose
 
     def top(self) -> Thing | None:
-        """Give the board that lies at the stop."""
+        """Return the board that lies at the stop."""
         return self._on[0][0] if self._on and self._on[0][1] >= -_TOUCHING else None
 
     def under(self, world_from_gripped: Matrix) -> tuple[Thing, Matrix] | None:
-        """Give the board that the jaws are at, wherever it has come to lie."""
+        """Return the board that the jaws are at, wherever it has come to lie."""
         local = self._belt.pose.inverse() @ world_from_gripped
         for thing, s in self._on:
             if self._belt.tolerance.allows(local, s):
@@ -164,7 +164,7 @@ class BoardBelt:
         return None
 
     def seen_by(self, window: Place) -> Thing | None:
-        """Give the board in view."""
+        """Return the board in view."""
         return next((thing for thing, s in self._on if window.holds(self._pose(s))), None)
 
     def take(self, thing: Thing) -> None:
@@ -187,5 +187,5 @@ class BoardBelt:
         return None
 
     def pose(self, thing: Thing) -> Matrix | None:
-        """Give where a board lies on the belt."""
+        """Return where a board lies on the belt."""
         return next((self._pose(s) for other, s in self._on if other is thing), None)

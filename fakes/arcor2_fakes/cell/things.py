@@ -23,7 +23,7 @@ class Robot(msgspec.Struct, frozen=True):
     q: tuple[float, ...] = ()
 
     def base_from_flange(self) -> Matrix:
-        """Give the flange, which stands where it stands whatever TCP somebody has set."""
+        """Return the flange, which stands where it stands whatever TCP somebody has set."""
         flange: Matrix = from_rotation_vector(self.tcp_pose) @ np.linalg.inv(from_rotation_vector(self.tcp_offset))
         return flange
 
@@ -36,7 +36,7 @@ class Printed(msgspec.Struct, frozen=True):
 
     @property
     def code(self) -> str:
-        """Give what its bar code says, or nothing."""
+        """Return what its bar code says, or nothing."""
         return next((str(field["text"]) for field in self.fields if field.get("barcode")), "")
 
 

@@ -296,7 +296,7 @@ class World:
     # ------------------------------------------------------------------------------------------------ truth
 
     def truth(self) -> dict[str, Any]:
-        """Give what is so."""
+        """Return what is so."""
         counts = Counter(thing.place for thing in self._things)
         tip = self._world_from_tip
         return {
@@ -326,7 +326,7 @@ class World:
         }
 
     def pose(self, thing: Thing) -> Matrix | None:
-        """Give where a board is; nothing for one that is still to come or was taken away."""
+        """Return where a board is; nothing for one that is still to come or was taken away."""
         if thing is self._held:
             held: Matrix = self._tip() @ self._tip_from_board
             return held
@@ -345,7 +345,7 @@ class World:
         return None if pose is None else (float(pose[0, 3]), float(pose[1, 3]), float(pose[2, 3]))
 
     def seen(self) -> dict[str, dict[str, Any]]:
-        """Give what stands before the camera by name, as a fake camera takes it; nothing where there is none."""
+        """Return what stands before the camera by name, as a fake camera takes it; nothing where there is none."""
         camera = self._layout.camera
         if camera is None:
             return {}
@@ -365,7 +365,7 @@ class World:
         return found
 
     def _stations(self) -> dict[str, Any]:
-        """Give what only some cells have."""
+        """Return what only some cells have."""
         found: dict[str, Any] = {"robot_base": msgspec.to_builtins(self._layout.robot.base)}
         if self._layout.camera is not None:
             found["camera"] = msgspec.to_builtins(self._layout.camera.pose)

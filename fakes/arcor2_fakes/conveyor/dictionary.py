@@ -37,7 +37,7 @@ class Dictionary:
         self.entries: dict[tuple[int, int], Entry] = {}
 
     def read(self, index: int, subindex: int) -> bytes:
-        """Give the value's bytes. Raises Abort."""
+        """Return the value's bytes. Raises Abort."""
         entry = self._entry(index, subindex)
         value = entry.read()
         return value.encode() if isinstance(value, str) else struct.pack("<" + entry.form, value)

@@ -38,7 +38,7 @@ class Adapter:
         connection.closed = lambda: hub.adapters.discard(self)
 
     def deliver(self, identifier: int, data: bytes) -> None:
-        """Give the client a frame from the bus."""
+        """Return the client a frame from the bus."""
         if self.open:
             self._connection.send(f"t{identifier:03X}{len(data)}{data.hex().upper()}".encode() + OK)
 

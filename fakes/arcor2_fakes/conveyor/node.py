@@ -197,11 +197,11 @@ class Node:
 
     # -------------------------------------------------------------------------------- truth
     def motion(self) -> dict[str, float]:
-        """Give where the belt is and how fast it goes, in counts: for a world that asks a hundred times a second."""
+        """Return where the belt is and how fast it goes, in counts: for a world that asks a hundred times a second."""
         return {"belt": self.drive.belt, "velocity": self.drive.velocity}
 
     def truth(self) -> dict[str, Any]:
-        """Give what is really so, whatever the wire says."""
+        """Return what is really so, whatever the wire says."""
         drive = self.drive
         return {
             "state": drive.state.name.lower(),

@@ -30,7 +30,7 @@ class Client:
         self._say("hi")
 
     def deliver(self, identifier: int, data: bytes) -> None:
-        """Give the client a frame from the bus."""
+        """Return the client a frame from the bus."""
         if self.open:
             self._say(f"frame {identifier:03X} {time.time():.6f} {data.hex().upper()}")
 
@@ -70,7 +70,7 @@ class Client:
 
 
 class Server:
-    """Listens beside the hub's own port."""
+    """Listen beside the hub's own port."""
 
     def __init__(self, hub: Hub, host: str, port: int, bus: str = "can0") -> None:
         self.hub, self.bus = hub, bus

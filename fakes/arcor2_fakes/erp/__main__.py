@@ -20,7 +20,7 @@ app = App(name="arcor2_fakes.erp", help="Fake production planning service (ERP) 
 
 
 def truth(planning: Planning, port: Port) -> dict[str, Any]:
-    """Give what the service really knows, whatever its answers say."""
+    """Return what the service really knows, whatever its answers say."""
     return {
         "orders": msgspec.to_builtins(list(planning.orders.values())),
         "results": list(planning.results),

@@ -56,7 +56,7 @@ class Requests:
         self._came = b""
 
     def feed(self, data: bytes) -> Iterator[Request]:
-        """Give the requests that are complete now. Raises BadRequest."""
+        """Return the requests that are complete now. Raises BadRequest."""
         self._came += data
         while (request := self._next()) is not None:
             yield request
@@ -85,7 +85,7 @@ class Requests:
 
 
 def answer(status: int, body: Any, headers: dict[str, str] | None = None) -> bytes:
-    """Give an answer with a JSON body."""
+    """Return an answer with a JSON body."""
     data = msgspec.json.encode(body)
     lines = [
         f"HTTP/1.1 {status} {REASONS[status]}",

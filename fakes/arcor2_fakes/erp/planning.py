@@ -33,7 +33,7 @@ class Order(msgspec.Struct):
     closed: bool = False
 
     def told(self) -> dict[str, Any]:
-        """Give it as the wire tells it."""
+        """Return it as the wire tells it."""
         return {"id": self.id, "product": self.product, "quantity": self.quantity}
 
 

@@ -15,7 +15,7 @@ from arcor2_fakes.erp.planning import Planning, Problem
 from arcor2_fakes.wire import Connection, TcpWire
 
 LONGEST_OFF: Final = 60.0
-"""s a power cycle may take."""
+"""Time a power cycle may take, s."""
 
 
 class TlsWire(TcpWire):

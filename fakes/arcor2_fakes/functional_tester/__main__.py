@@ -8,13 +8,11 @@ from typing import Annotated, Any
 import msgspec
 from cyclopts import App, Parameter, validators
 
-from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.functional_tester.board import Board
 from arcor2_fakes.functional_tester.modbus import ModbusPort
 from arcor2_fakes.functional_tester.registers import RegisterMap
 from arcor2_fakes.functional_tester.station import Command, Fault, Station
-from arcor2_fakes.process import announce, run, until_told_to_end
-from arcor2_fakes.wire import register_faults
+from arcor2_fakes.serving import Fake, serve
 
 _MODES = {"produce": 1, "maintenance": 2, "manual": 3}
 
@@ -24,7 +22,7 @@ Positive = Annotated[float, Parameter(validator=validators.Number(gt=0))]
 
 
 def truth(station: Station, registers: RegisterMap, port: ModbusPort) -> dict[str, Any]:
-    """Give what is really so in the station, whatever the wire says."""
+    """Return the real state of the station."""
     station.advance()
     results = [msgspec.to_builtins(result) for result in station.results]
     passed = sum(result.result == "pass" for result in station.results)
@@ -46,8 +44,8 @@ def truth(station: Station, registers: RegisterMap, port: ModbusPort) -> dict[st
     }
 
 
-def register_commands(control: ControlServer, station: Station, registers: RegisterMap, port: ModbusPort) -> None:
-    """Make what the world and a test can do to the station known to the control channel."""
+def register_commands(fake: Fake, station: Station, registers: RegisterMap, port: ModbusPort) -> None:
+    """Register what tests and the cell can do to the station."""
 
     def put_board(code: str, defect: str | None = None) -> None:
         board = msgspec.convert({"code": code, "defect": defect}, Board)
@@ -77,24 +75,25 @@ def register_commands(control: ControlServer, station: Station, registers: Regis
         registers.power_on()
         port.wire.reset()
 
-    control.command("power_cycle", power_cycle)
-
     async def renew() -> None:
-        """Be as it is when the process starts: for tests that share one."""
+        """Return to the state after the start, for tests that share a process."""
         station.as_delivered()
         registers.power_on()
         await port.wire.fault("heal")
         port.wire.reset()
         port.frames.clear()
 
-    control.command("renew", renew)
-    control.command("put_board", put_board)
-    control.command("take_board", take_board)
-    control.command("fault", fault)
-    control.command("emergency_stop", lambda pressed=True: station.press_emergency_stop(pressed=bool(pressed)))
-    control.command("push_door", lambda opening: station.push_door(opening=bool(opening)))
-    control.command("command", command)
-    control.command("mode", mode)
+    fake.commands(
+        power_cycle=power_cycle,
+        renew=renew,
+        put_board=put_board,
+        take_board=take_board,
+        fault=fault,
+        emergency_stop=lambda pressed=True: station.press_emergency_stop(pressed=bool(pressed)),
+        push_door=lambda opening: station.push_door(opening=bool(opening)),
+        command=command,
+        mode=mode,
+    )
 
 
 def _fault(code: int) -> Fault:
@@ -124,29 +123,17 @@ def main(
         test_time: how long a test takes, s.
         time_scale: how many times faster than real the station moves.
     """
-    try:
-        control_host, control_port = parse_address(control)
-    except ValueError as e:
-        sys.stderr.write(f"functional_tester: {e}\n")
-        return 2
 
-    async def body() -> None:
+    async def body(fake: Fake) -> None:
         station = Station(seed=seed, test_time=test_time, time_scale=time_scale)
         registers = RegisterMap(station)
         modbus = ModbusPort(host, port, station, registers)
-        channel = ControlServer(control_host, control_port)
-        register_commands(channel, station, registers, modbus)
-        register_faults(channel, {"modbus": modbus.wire})
-        channel.source("truth", lambda: truth(station, registers, modbus))
-        await modbus.wire.listen()
-        try:
-            announce(name="functional_tester", modbus=modbus.wire.address, control=await channel.start())
-            await until_told_to_end()
-        finally:
-            modbus.wire.close()
-            await channel.close()
+        register_commands(fake, station, registers, modbus)
+        fake.wires(modbus=modbus.wire)
+        fake.truth(lambda: truth(station, registers, modbus))
+        await fake.run(modbus=modbus.wire)
 
-    return run(body, "functional_tester")
+    return serve("functional_tester", control, body)
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ class RegisterMap:
         self._written = False
 
     def device(self) -> SimDevice:
-        """Give the device for the Modbus server; its registers live as long as the server."""
+        """Return the device for the Modbus server; its registers live as long as the server."""
         return SimDevice(
             UNIT_ID,
             simdata=(
@@ -144,7 +144,7 @@ class RegisterMap:
 
 
 def _float(value: float) -> tuple[int, int]:
-    """Give a 32-bit float as two registers, high word first."""
+    """Return a 32-bit float as two registers, high word first."""
     high, low = struct.unpack(">HH", struct.pack(">f", value))
     return high, low
 

@@ -9,18 +9,17 @@ from typing import Annotated, Any
 import msgspec
 from cyclopts import App, Parameter, validators
 
-from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.control import parse_address
 from arcor2_fakes.label_printer.printer import LabelPrinter
-from arcor2_fakes.process import announce, run, until_told_to_end
 from arcor2_fakes.serial_line import Line, PtyLine, TcpLine
-from arcor2_fakes.wire import register_faults
+from arcor2_fakes.serving import Fake, serve
 
 app = App(name="arcor2_fakes.label_printer", help="Fake ZPL label printer on a pty or TCP.", version_flags=[])
 FULL_ROLL = 10_000
 
 
 def truth(printer: LabelPrinter, line: Line) -> dict[str, Any]:
-    """Give what has really come out of the printer, whatever the line says."""
+    """Return the real state of the printer, and the labels that came out."""
     return {
         "labels": msgspec.to_builtins(list(printer.labels)),
         "counter": printer.counter,
@@ -36,8 +35,8 @@ def truth(printer: LabelPrinter, line: Line) -> dict[str, Any]:
     }
 
 
-def register_commands(control: ControlServer, printer: LabelPrinter) -> None:
-    """Make what the world and a test can do to the printer known to the control channel."""
+def register_commands(fake: Fake, printer: LabelPrinter) -> None:
+    """Register what tests and the cell can do to the printer."""
 
     def switch(name: str) -> Any:
         def apply(on: bool) -> None:
@@ -54,12 +53,13 @@ def register_commands(control: ControlServer, printer: LabelPrinter) -> None:
         printer.hold()
         printer.go_on()
 
-    for name in ("head_open", "ribbon_out", "hot", "mute", "forgetful"):
-        control.command(name, switch(name))
-    control.command("pause", lambda on=True: printer.pause(bool(on)))
-    control.command("media", media)
-    control.command("renew", lambda: printer.renew(FULL_ROLL))
-    control.command("power_cycle", printer.power_cycle)
+    fake.commands(**{name: switch(name) for name in ("head_open", "ribbon_out", "hot", "mute", "forgetful")})
+    fake.commands(
+        pause=lambda on=True: printer.pause(bool(on)),
+        media=media,
+        renew=lambda: printer.renew(FULL_ROLL),
+        power_cycle=printer.power_cycle,
+    )
 
 
 @app.default
@@ -80,49 +80,25 @@ def main(
         control: HOST:PORT of the control channel; port 0 takes a free one.
         duration: how long a label takes, s.
         labels: how many are on the roll.
-        mute: answer nothing while out of media or with the head open; else tell it by the flags of ~HS.
+        mute: answer nothing while out of media or with the head open; else report it by the flags of ~HS.
     """
-    try:
-        control_address = parse_address(control)
-        tcp_address = None if tcp is None else parse_address(tcp)
-    except ValueError as e:
-        sys.stderr.write(f"label_printer: {e}\n")
-        return 2
 
-    async def body() -> None:
-        channel = ControlServer(*control_address)
+    async def body(fake: Fake) -> None:
         printer = LabelPrinter(
             lambda frame: line.send(frame),
-            lambda: channel.publish("truth"),
+            lambda: fake.channel.publish("truth"),
             duration=duration,
             mute=mute,
             labels=labels,
         )
-        line: Line = PtyLine(printer.feed, link) if tcp_address is None else TcpLine(printer.feed, *tcp_address)
+        line: Line = PtyLine(printer.feed, link) if tcp is None else TcpLine(printer.feed, *parse_address(tcp))
+        register_commands(fake, printer)
+        fake.line(line, printer.drop_input, "data")
+        fake.truth(lambda: truth(printer, line))
+        fake.at_end(printer.close)
+        await fake.run(port=line)
 
-        async def plug() -> str:
-            await line.plug()
-            return line.port
-
-        async def unplug() -> None:
-            await line.unplug()
-            printer.drop_input()
-
-        register_commands(channel, printer)
-        register_faults(channel, {"data": line})
-        channel.command("plug", plug)
-        channel.command("unplug", unplug)
-        channel.source("truth", lambda: truth(printer, line))
-        await line.plug()
-        try:
-            announce(name="label_printer", port=line.port, control=await channel.start())
-            await until_told_to_end()
-        finally:
-            printer.close()
-            await line.unplug()
-            await channel.close()
-
-    return run(body, "label_printer")
+    return serve("label_printer", control, body, tcp)
 
 
 if __name__ == "__main__":

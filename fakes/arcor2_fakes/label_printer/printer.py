@@ -56,7 +56,7 @@ class LabelPrinter:
 
     @property
     def partial(self) -> bool:
-        """Tell whether half a format is in the printer."""
+        """Return whether half a format is in the printer."""
         return self._stream.partial
 
     @property

@@ -42,7 +42,7 @@ class Stream:
 
     @property
     def partial(self) -> bool:
-        """Tell whether a format has begun and not ended."""
+        """Return whether a format has begun and not ended."""
         return self._format is not None
 
     def clear(self) -> None:
@@ -51,7 +51,7 @@ class Stream:
         self._rest.clear()
 
     def feed(self, data: bytes) -> list[str | Format]:
-        """Give what is complete now, in order."""
+        """Return what is complete now, in order."""
         found: list[str | Format] = []
         for byte in data:
             self._rest.append(byte)
@@ -113,7 +113,7 @@ def _numbers(argument: str, count: int) -> list[int]:
 
 
 def _data(text: str, escape: str, barcode: bool) -> str:
-    """Give what is printed: hexadecimal escapes replaced, then, in Code 128, the invocation codes."""
+    """Return what is printed: hexadecimal escapes replaced, then, in Code 128, the invocation codes."""
     raw = bytearray()
     position = 0
     while position < len(text):

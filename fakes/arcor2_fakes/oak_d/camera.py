@@ -99,7 +99,7 @@ class Camera:
 
     @property
     def watchers(self) -> list[Client]:
-        """Give those that watch."""
+        """Return those that watch."""
         return [client for client in self._clients if client.color is not None]
 
     def _asked(self, client: Client, kind: Kind, header: dict[str, Any]) -> None:
@@ -139,7 +139,7 @@ class Camera:
 
     # ------------------------------------------------------------------------------------------------ frames
     def clock(self) -> float:
-        """Give the camera's own clock, s since it was switched on."""
+        """Return the camera's own clock, s since it was switched on."""
         return time.monotonic() - self._booted
 
     def start(self) -> None:
@@ -215,7 +215,7 @@ class Camera:
         self._news.set()
 
     def truth(self) -> dict[str, Any]:
-        """Give what is really so."""
+        """Return what is really so."""
         return {
             "things": msgspec.to_builtins(self.scene.things),
             "camera": msgspec.to_builtins(self.scene.camera),

@@ -30,7 +30,7 @@ class Lens:
         self.distortion: Final = (0.08, -0.14, 0.0004, -0.0006, 0.05)
 
     def rays(self) -> Floats:
-        """Give the direction (x, y, 1) of every pixel's ray in the optical frame, height × width × 3."""
+        """Return the direction (x, y, 1) of every pixel's ray in the optical frame, height × width × 3."""
         k1, k2, p1, p2, k3 = self.distortion
         u, v = np.meshgrid(np.arange(self.width), np.arange(self.height))
         xd, yd = (u - self.cx) / self.fx, (v - self.cy) / self.fy
@@ -45,7 +45,7 @@ class Lens:
         return np.stack([x, y, np.ones_like(x)], axis=-1).astype(np.float32)
 
     def bounds(self, camera_from_solid: npt.NDArray[np.float64], vertices: Floats) -> tuple[slice, slice] | None:
-        """Give rows and columns in which a solid can be seen; None when it cannot."""
+        """Return rows and columns in which a solid can be seen; None when it cannot."""
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         corners = np.array(
             [[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]] for i, j, k in np.ndindex(2, 2, 2)]
@@ -66,7 +66,7 @@ class Lens:
         return None if left >= right or top >= bottom else (slice(top, bottom), slice(left, right))
 
     def eeprom(self, serial: str) -> dict[str, Any]:
-        """Give the calibration as a device's EEPROM has it."""
+        """Return the calibration as a device's EEPROM has it."""
         nowhere = {"x": 0.0, "y": 0.0, "z": 0.0}
         alone = {
             "lengthUnit": 1,

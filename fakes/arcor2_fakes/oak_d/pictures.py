@@ -26,7 +26,7 @@ class Pictures:
         self.rendered = 0
 
     def take(self, scene: Scene, number: int, exposure: float, covered: bool) -> tuple[Callable[[str], bytes], bytes]:
-        """Give the colour picture in a form that is asked for (bgr, jpeg), and the depth picture.
+        """Return the colour picture in a form that is asked for (bgr, jpeg), and the depth picture.
 
         Raises ValueError when something of the scene cannot be rendered.
         """

@@ -53,14 +53,14 @@ def load_mesh(path: str) -> Solid:
 
 
 def box(size: tuple[float, float, float]) -> Solid:
-    """Give a box about its middle, 12 triangles."""
+    """Return a box about its middle, 12 triangles."""
     mesh = o3d.geometry.TriangleMesh.create_box(*size)
     vertices = np.asarray(mesh.vertices) - np.asarray(size) / 2.0
     return Solid(vertices.astype(np.float32), np.asarray(mesh.triangles, dtype=np.uint32))
 
 
 def round_body(radius: float, length: float, ball: bool) -> Solid:
-    """Give a cylinder about z, its middle at the origin, with half balls beyond both ends or flat."""
+    """Return a cylinder about z, its middle at the origin, with half balls beyond both ends or flat."""
     tilts = np.linspace(0.0, np.pi / 2.0, RINGS + 1) if ball else np.array([0.0])
     upper = [(length / 2.0 + radius * np.sin(tilt), radius * np.cos(tilt)) for tilt in tilts]
     if not ball:
@@ -85,7 +85,7 @@ def _dictionary(name: str) -> Any:
 
 
 def solid_of(thing: Thing) -> Solid:
-    """Give the triangles of a thing. Raises ValueError for a mesh or a marker that is none."""
+    """Return the triangles of a thing. Raises ValueError for a mesh or a marker that is none."""
     if thing.mesh is not None:
         return load_mesh(thing.mesh)
     if (form := thing.capsule or thing.cylinder) is not None:
@@ -127,7 +127,7 @@ class Renderer:
         self._behind: tuple[tuple[Pose, float, frozenset[Thing]], View] | None = None
 
     def view(self, camera: Pose, table_height: float, things: tuple[Thing, ...]) -> View:
-        """Give what is seen from the camera's pose. Raises ValueError for a thing that cannot be drawn."""
+        """Return what is seen from the camera's pose. Raises ValueError for a thing that cannot be drawn."""
         world_from_camera = camera.matrix()
         table = _Part(box(TABLE), Pose((0.0, 0.0, table_height - TABLE[2] / 2.0)).matrix(), TABLE_COLOR)
         still = frozenset(things) & frozenset(self._last)
@@ -213,7 +213,7 @@ class _Cast:
 
 
 def _shades(vertices: Floats, triangles: npt.NDArray[np.uint32]) -> npt.NDArray[np.float64]:
-    """Give how bright each triangle is."""
+    """Return how bright each triangle is."""
     a, b, c = (vertices[triangles[:, i]].astype(np.float64) for i in range(3))
     normals = np.cross(b - a, c - a)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)

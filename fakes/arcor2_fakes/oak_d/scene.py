@@ -36,7 +36,7 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("orientation is no unit quaternion x, y, z, w")
 
     def matrix(self) -> Matrix:
-        """Give the pose as a transform."""
+        """Return the pose as a transform."""
         x, y, z, w = self.orientation
         matrix = np.eye(4)
         matrix[:3, :3] = quat2mat((w, x, y, z))
@@ -101,7 +101,7 @@ class Scene:
 
     @property
     def things(self) -> tuple[Thing, ...]:
-        """Give the things."""
+        """Return the things."""
         return tuple(self._things.values())
 
     def replace(self, things: Iterable[Any], table_height: float | None = None) -> None:

@@ -42,7 +42,7 @@ class Sensor:
         self._coin = rng.random(shape, np.float32) < 0.5 * min(noise, 1.0)
 
     def color(self, view: View, variant: int, exposure: float, covered: bool) -> Bytes:
-        """Give the colour picture, B, G, R."""
+        """Return the colour picture, B, G, R."""
         if covered:
             base: npt.NDArray[np.int16] = np.full(view.color.shape, 4, np.int16)
         elif exposure == NORMAL_EXPOSURE:
@@ -54,7 +54,7 @@ class Sensor:
         return np.asarray(np.clip(base, 0, 255), dtype=np.uint8)
 
     def depth(self, view: View, variant: int, covered: bool) -> npt.NDArray[np.uint16]:
-        """Give the depth picture, mm, 0 where there is none."""
+        """Return the depth picture, mm, 0 where there is none."""
         z = view.depth
         if covered:
             return np.zeros(z.shape, np.uint16)

@@ -62,7 +62,7 @@ class BadMessage(Exception):
 
 
 def encode(kind: Kind, header: dict[str, Any], payload: bytes = b"", *, wrong_checksum: bool = False) -> bytes:
-    """Give a message."""
+    """Return a message."""
     text = msgspec.json.encode(header)
     front = struct.pack(">4sBBHI", MAGIC, VERSION, kind, len(text), len(payload))
     check = zlib.crc32(text, zlib.crc32(front)) ^ (0xDEADBEEF if wrong_checksum else 0)

@@ -24,7 +24,7 @@ from arcor2_fakes.wire import register_faults
 
 app = App(name="arcor2_fakes.opcua_plc", help="Fake PLC with an OPC UA server.", version_flags=[])
 SCAN = 0.01
-"""s between scans."""
+"""Time between scans, s."""
 JOBS = {1: 1.0, 2: 3.0, 3: 20.0}
 """Duration of each job, s, before the time scale."""
 
@@ -42,7 +42,7 @@ class OneUser(UserManager):
         password: str | None = None,
         certificate: Any = None,  # noqa: ARG002
     ) -> User | None:
-        """Give the user, None for nobody."""
+        """Return the user, None for nobody."""
         if not self._name or (username, password) == (self._name, self._password):
             return User(role=UserRole.User)
         return None
@@ -80,7 +80,7 @@ class Plc:
         self.cycles += 1
 
     def truth(self) -> dict[str, Any]:
-        """Give what the PLC really does."""
+        """Return what the PLC really does."""
         program, space = self.program, self.space
         return {
             "step": program.step.value,

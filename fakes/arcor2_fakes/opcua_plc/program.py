@@ -10,7 +10,7 @@ ABORTED: Final = 90
 HOST_GONE: Final = 91
 UNKNOWN_JOB: Final = 92
 LIFE_STEP: Final = 0.1
-"""s between two counts of the PLC's own life sign."""
+"""Time between two counts of the PLC's own life sign, s."""
 
 
 class Step(enum.StrEnum):
@@ -61,7 +61,7 @@ class Program:
 
     @property
     def moving(self) -> bool:
-        """Tell whether something moves."""
+        """Return whether something moves."""
         return self.step in (Step.BUSY, Step.STOPPING)
 
     def scan(self, host: Host, time: float) -> bool:

@@ -80,11 +80,11 @@ class Space:
                 self.written.append((name, item.Value.Value.Value))
 
     def value(self, name: str) -> Any:
-        """Give the value of a variable."""
+        """Return the value of a variable."""
         return self._kept[name][1]
 
     async def set(self, name: str, value: Any, status: int | None = None) -> None:
-        """Give a variable a value, with its source time; nothing happens when it has it."""
+        """Return a variable a value, with its source time; nothing happens when it has it."""
         kind, before, code = self._kept[name]
         now = code if status is None else ua.StatusCode(ua.UInt32(status))
         if before != value or now != code:

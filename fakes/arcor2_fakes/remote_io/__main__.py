@@ -7,19 +7,21 @@ from pathlib import Path
 from typing import Any
 
 from cyclopts import App
+from pymodbus import FramerType
+from pymodbus.server import ModbusTcpServer
 
-from arcor2_fakes.control import ControlServer, parse_address
-from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.modbus import serial_line, tcp_wire
 from arcor2_fakes.remote_io.block import ANALOG_IN, DIGITAL, Block
-from arcor2_fakes.remote_io.modbus import SerialPort, TcpPort
-from arcor2_fakes.remote_io.registers import RegisterMap
-from arcor2_fakes.wire import register_faults
+from arcor2_fakes.remote_io.registers import IDENTITY, RegisterMap
+from arcor2_fakes.serial_line import PtyLine
+from arcor2_fakes.serving import Fake, serve
+from arcor2_fakes.wire import TcpWire
 
 app = App(name="arcor2_fakes.remote_io", help="Fake remote I/O block on Modbus TCP or RTU.", version_flags=[])
 
 
 def truth(block: Block) -> dict[str, Any]:
-    """Give what is really so in the block, whatever the wire says."""
+    """Return the real state of the block."""
     block.advance()
     return {
         "inputs": list(block.inputs),
@@ -33,13 +35,13 @@ def truth(block: Block) -> dict[str, Any]:
 
 
 def outputs(block: Block) -> dict[str, Any]:
-    """Give the outputs alone, for a world that asks a hundred times a second."""
+    """Return only the outputs, for the cell, which reads them a hundred times per second."""
     block.advance()
     return {"outputs": list(block.outputs), "analog_outputs": list(block.analog_outputs)}
 
 
-def register_commands(control: ControlServer, block: Block, port: TcpPort | SerialPort) -> None:
-    """Make what the world can do to the block known to the control channel."""
+def register_commands(fake: Fake, block: Block, port: TcpWire | PtyLine) -> None:
+    """Register what tests and the cell can do to the block."""
 
     def set_input(number: int, on: bool) -> None:
         if number not in range(DIGITAL):
@@ -62,22 +64,28 @@ def register_commands(control: ControlServer, block: Block, port: TcpPort | Seri
     def diagnosis(supply_missing: bool = False, overload: bool = False) -> None:
         block.supply_missing, block.overload = bool(supply_missing), bool(overload)
 
+    def reset() -> None:
+        if isinstance(port, TcpWire):  # a serial port stays open when the block restarts
+            port.reset()
+
     def power_cycle() -> None:
         block.power_on()
-        port.reset()
+        reset()
 
     async def renew() -> None:
-        """Be as it is when the process starts: for tests that share one."""
+        """Return to the state after the start, for tests that share a process."""
         block.as_delivered()
         await port.fault("heal")
-        port.reset()
+        reset()
 
-    control.command("renew", renew)
-    control.command("set_input", set_input)
-    control.command("set_inputs", set_inputs)
-    control.command("set_analog", set_analog)
-    control.command("diagnosis", diagnosis)
-    control.command("power_cycle", power_cycle)
+    fake.commands(
+        renew=renew,
+        set_input=set_input,
+        set_inputs=set_inputs,
+        set_analog=set_analog,
+        diagnosis=diagnosis,
+        power_cycle=power_cycle,
+    )
 
 
 @app.default
@@ -98,30 +106,19 @@ def main(
         link: symbolic link to keep on the pty, whose own path changes when it is unplugged and plugged.
         control: HOST:PORT of the control channel; port 0 takes a free one.
     """
-    try:
-        control_host, control_port = parse_address(control)
-    except ValueError as e:
-        sys.stderr.write(f"remote_io: {e}\n")
-        return 2
 
-    async def body() -> None:
+    async def body(fake: Fake) -> None:
         block = Block()
-        registers = RegisterMap(block)
-        modbus = SerialPort(registers, link) if serial else TcpPort(host, port, registers)
-        channel = ControlServer(control_host, control_port)
-        register_commands(channel, block, modbus)
-        register_faults(channel, {"modbus": modbus}, checked=("modbus",) if serial else ())
-        channel.source("truth", lambda: truth(block))
-        channel.source("outputs", lambda: outputs(block))
-        await modbus.open()
-        try:
-            announce(name="remote_io", modbus=modbus.address, control=await channel.start())
-            await until_told_to_end()
-        finally:
-            await modbus.close()
-            await channel.close()
+        framer = FramerType.RTU if serial else FramerType.SOCKET
+        server = ModbusTcpServer(RegisterMap(block).device(), framer=framer, identity=IDENTITY)
+        modbus = serial_line(server, link) if serial else tcp_wire(server, host, port)
+        register_commands(fake, block, modbus)
+        fake.wires(("modbus",) if serial else (), modbus=modbus)
+        fake.truth(lambda: truth(block))
+        fake.channel.source("outputs", lambda: outputs(block))
+        await fake.run(modbus=modbus)
 
-    return run(body, "remote_io")
+    return serve("remote_io", control, body)
 
 
 if __name__ == "__main__":

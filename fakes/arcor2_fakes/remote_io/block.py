@@ -1,4 +1,4 @@
-"""The block itself: inputs, outputs, timed pulses and four watchdogs. Knows nothing of Modbus."""
+"""The block: inputs, outputs, timed pulses and four watchdogs, without Modbus."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _HISTORY = 200
 
 
 class WatchdogState(IntEnum):
-    """What a watchdog is doing."""
+    """State of a watchdog."""
 
     OFF = 0
     RUNNING = 1
@@ -27,7 +27,7 @@ class WatchdogState(IntEnum):
 
 @dataclass
 class Watchdog:
-    """One of the block's watchdogs: the outputs it guards, and what they do when its host is silent."""
+    """A watchdog: the outputs it guards, and their safe states when its host is silent."""
 
     time_ms: int = 0
     number: int = 0
@@ -46,14 +46,14 @@ class Locked(ValueError):
 
 
 class Block:
-    """Time is worked off lazily: `advance` applies what fell due; every other method begins with it."""
+    """Time passes in `advance`, which applies what is due; callers call it before every access."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self.as_delivered()
 
     def as_delivered(self) -> None:
-        """Be without any past: inputs off, nothing written, no fault."""
+        """Reset everything: inputs off, nothing written, no fault."""
         self.inputs = [False] * DIGITAL
         self.analog_inputs = [0] * ANALOG_IN
         self.supply_missing = False
@@ -63,14 +63,14 @@ class Block:
         self.power_on()
 
     def power_on(self) -> None:
-        """Come up: outputs off, watchdogs off."""
+        """Switch on: outputs off, watchdogs off."""
         self.outputs = [False] * DIGITAL
         self.analog_outputs = [0] * ANALOG_OUT
         self.watchdogs = [Watchdog() for _ in range(WATCHDOGS)]
         self._pulses: dict[int, float] = {}
 
     def advance(self) -> None:
-        """Apply in order what fell due: ends of pulses, watchdogs that expire."""
+        """Apply in order what is due: ends of pulses, watchdogs that expire."""
         now = self._clock()
         due: list[tuple[float, int, int]] = [(end, 0, number) for number, end in self._pulses.items() if end <= now]
         due += [
@@ -96,7 +96,7 @@ class Block:
         self.analog_outputs[number] = raw
 
     def pulse(self, number: int, duration_ms: int) -> None:
-        """Switch an output on for so long; 0 ends a pulse at once."""
+        """Switch an output on for a time; 0 ends a pulse at once."""
         if duration_ms:
             self._pulses[number] = self._clock() + duration_ms / 1000.0
             self._switch(number, on=True, at=self._clock())
@@ -116,7 +116,7 @@ class Block:
 
     # -------------------------------------------------------------------------------- watchdogs
     def trigger(self, dog: Watchdog, number: int) -> None:
-        """Start a watchdog, or keep it quiet, in the name of the host with this number."""
+        """Start or trigger a watchdog for the host with this number."""
         dog.number = number
         if dog.state is WatchdogState.EXPIRED:
             return
@@ -124,7 +124,7 @@ class Block:
         dog.expires = self._clock() + dog.time_ms / 1000.0
 
     def command(self, dog: Watchdog, command: int) -> None:
-        """Acknowledge an expired watchdog, or release: safe state at once, then off."""
+        """Acknowledge an expired watchdog, or release one: safe state at once, then off."""
         if command == RELEASE and dog.state is WatchdogState.RUNNING:
             self._to_safe_state(dog, self._clock())
         if command in (ACKNOWLEDGE, RELEASE) and not (
@@ -142,5 +142,5 @@ class Block:
                 self.analog_outputs[number] = dog.ao_safe[number]
 
     def diagnosis(self) -> int:
-        """Give the diagnosis bits."""
+        """Return the diagnosis bits."""
         return int(self.supply_missing) | int(self.overload) << 1

@@ -1,4 +1,4 @@
-"""The register map on Modbus: what a host reads from the block and writes to it."""
+"""The register map of the block on Modbus."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _READ_COILS, _READ_INPUT, _READ_DISCRETE, _WRITE_COIL, _WRITE_COILS = 1, 4, 2, 5
 
 
 class RegisterMap:
-    """Connects the block with the registers of a simulated Modbus device."""
+    """Maps the block to the registers of a simulated Modbus device."""
 
     def __init__(self, block: Block) -> None:
         self._block = block
 
     def device(self) -> SimDevice:
-        """Give the device for the Modbus server."""
+        """Return the device for the Modbus server."""
         return SimDevice(
             UNIT_ID,
             simdata=(
@@ -48,13 +48,13 @@ class RegisterMap:
     async def _access(
         self,
         function_code: int,
-        start_address: int,  # noqa: ARG002 - every table begins at 0
+        start_address: int,  # noqa: ARG002 - every table starts at 0
         address: int,
         count: int,
         registers: list[int],
         set_values: list[int] | list[bool] | None,
     ) -> ExcCodes | None:
-        """Refresh the registers before a read, take what a write commands."""
+        """Update the registers before a read, execute a write."""
         self._block.advance()
         if set_values is not None:
             self._block.writes += 1
@@ -114,7 +114,7 @@ class RegisterMap:
             self._block.write_digital(number, on=on)
 
     def _write_holding(self, address: int, values: list[int]) -> ExcCodes | None:
-        """Take all of a request or nothing."""
+        """Execute all writes of a request, or none."""
         written = dict(enumerate(values, address))
         if not all(_exists(each) for each in written):
             return ExcCodes.ILLEGAL_ADDRESS

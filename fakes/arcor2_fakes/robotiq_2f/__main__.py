@@ -9,24 +9,13 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter, validators
 
-from arcor2_fakes.control import ControlServer, parse_address
-from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.control import parse_address
 from arcor2_fakes.robotiq_2f.ascii_port import AsciiPort
 from arcor2_fakes.robotiq_2f.gripper import Gripper, Mechanics, Pace
 from arcor2_fakes.robotiq_2f.rtu_port import RtuPort
-from arcor2_fakes.wire import register_faults
+from arcor2_fakes.serving import Fake, serve
 
 app = App(name="arcor2_fakes.robotiq_2f", help="Fake Robotiq 2F gripper.", version_flags=[])
-
-
-def register_commands(control: ControlServer, gripper: Gripper) -> None:
-    """Make what the world and a test can do to the gripper known to the control channel."""
-    control.command("put_part", gripper.put_part)
-    control.command("remove_part", gripper.remove_part)
-    control.command("block", gripper.block)
-    control.command("fault", gripper.fault)
-    control.command("stops", lambda: list(gripper.stops))
-    control.command("power_cycle", gripper.power_cycle)
 
 
 @app.default
@@ -49,22 +38,22 @@ def main(
         latency: seconds of the gripper's own between a request and its effect.
         time_scale: how much faster than real the gripper is.
     """
-    try:
-        control_address, ascii_address = parse_address(control), parse_address(ascii_port)
-    except ValueError as e:
-        sys.stderr.write(f"robotiq_2f: {e}\n")
-        return 2
 
-    async def body() -> None:
-        loop = asyncio.get_running_loop()
-        pace = Pace(loop.time, time_scale)
+    async def body(fake: Fake) -> None:
+        pace = Pace(asyncio.get_running_loop().time, time_scale)
         gripper = Gripper(pace, Mechanics(stroke=stroke, latency=latency))
-        port = AsciiPort(*ascii_address, gripper)
+        port = AsciiPort(*parse_address(ascii_port), gripper)
         serial = RtuPort(gripper, link)
-        channel = ControlServer(*control_address)
-        register_commands(channel, gripper)
-        channel.command("pace", pace.set)
-        register_faults(channel, {"ascii": port.wire, "rtu": serial.line}, checked=("rtu",))
+        fake.commands(
+            put_part=gripper.put_part,
+            remove_part=gripper.remove_part,
+            block=gripper.block,
+            fault=gripper.fault,
+            stops=lambda: list(gripper.stops),
+            power_cycle=gripper.power_cycle,
+            pace=pace.set,
+        )
+        fake.wires(("rtu",), ascii=port.wire, rtu=serial.line)
 
         def truth() -> dict[str, Any]:
             return {
@@ -74,18 +63,10 @@ def main(
                 "writes": list(serial.writes),
             }
 
-        channel.source("truth", truth)
-        await serial.line.plug()
-        try:
-            addresses = {"ascii": await port.wire.listen(), "rtu": serial.line.port}
-            announce(name="robotiq_2f", **addresses, control=await channel.start())
-            await until_told_to_end()
-        finally:
-            port.wire.close()
-            await serial.line.unplug()
-            await channel.close()
+        fake.truth(truth)
+        await fake.run(ascii=port.wire, rtu=serial.line)
 
-    return run(body, "robotiq_2f")
+    return serve("robotiq_2f", control, body, ascii_port)
 
 
 if __name__ == "__main__":

@@ -30,15 +30,15 @@ class Mechanics:
     latency: float = 0.015
 
     def count(self, width: float) -> float:
-        """Give the position at a width between the fingers."""
+        """Return the position at a width between the fingers."""
         return self.closed_count - (self.closed_count - self.open_count) * width / self.stroke
 
     def width(self, count: float) -> float:
-        """Give the width between the fingers at a position."""
+        """Return the width between the fingers at a position."""
         return (self.closed_count - count) * self.stroke / (self.closed_count - self.open_count)
 
     def rate(self, speed: float) -> float:
-        """Give counts per second for m/s."""
+        """Return counts per second for m/s."""
         return speed * (self.closed_count - self.open_count) / self.stroke
 
 
@@ -50,7 +50,7 @@ class Pace:
         self._since, self._now = clock(), 0.0
 
     def __call__(self) -> float:
-        """Give the seconds passed at this clock."""
+        """Return the seconds passed at this clock."""
         return self._now + (self._clock() - self._since) * self._factor
 
     def set(self, factor: float) -> None:
@@ -92,7 +92,7 @@ class Gripper:
         self._pending.append((self._clock() + self.mechanics.latency, dict(changes)))
 
     def registers(self) -> dict[str, int]:
-        """Give what the gripper tells now."""
+        """Return what the gripper tells now."""
         self.advance()
         moving = self._object == MOVING and (self._status == ACTIVATING or self.requested["GTO"] == 1)
         return {
@@ -144,7 +144,7 @@ class Gripper:
         self.requested = dict.fromkeys(REQUESTS, 0)
 
     def truth(self) -> dict[str, object]:
-        """Give what is really so."""
+        """Return what is really so."""
         registers = self.registers()
         width = self.mechanics.width(self._position)
         gripped = self._part is not None and abs(width - self._part) < 1e-6

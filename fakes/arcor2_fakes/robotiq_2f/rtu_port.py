@@ -1,8 +1,7 @@
-"""The Modbus RTU side: pymodbus answers the requests, the shared pty carries the bytes and their faults."""
+"""The Modbus RTU port of the gripper."""
 
 from __future__ import annotations
 
-import asyncio
 from collections import deque
 from pathlib import Path
 from typing import Final
@@ -12,8 +11,8 @@ from pymodbus.framer import FramerType
 from pymodbus.server import ModbusSerialServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
+from arcor2_fakes.modbus import serial_line
 from arcor2_fakes.robotiq_2f.gripper import Gripper
-from arcor2_fakes.serial_line import PtyLine
 
 UNIT: Final = 9
 _REQUESTS, _STATUS, _COUNT = 0x03E8, 0x07D0, 3
@@ -31,9 +30,7 @@ class RtuPort:
             action=self._access,
         )
         server = ModbusSerialServer(device, framer=FramerType.RTU, ignore_missing_devices=True)
-        self._protocol = server.handle_new_connection()
-        self.line = PtyLine(self._protocol.data_received, link)
-        self._protocol.connection_made(_OntoLine(self.line))
+        self.line = serial_line(server, link, UNIT)  # the library answers for other units too
 
     async def _access(
         self,
@@ -73,21 +70,3 @@ class RtuPort:
         now = self._gripper.registers()
         status = now["ACT"] | now["GTO"] << 3 | now["STA"] << 4 | now["OBJ"] << 6
         return [status << 8, now["FLT"] << 8 | now["PRE"], now["POS"] << 8 | now["COU"]]
-
-
-class _OntoLine(asyncio.Transport):
-    """What pymodbus takes for its transport."""
-
-    def __init__(self, line: PtyLine) -> None:
-        super().__init__()
-        self._line = line
-
-    def write(self, data: bytes | bytearray | memoryview) -> None:
-        if data[0] == UNIT:  # the library answers for other units too, where a line has silence
-            self._line.send(bytes(data))
-
-    def close(self) -> None:
-        pass
-
-    def is_closing(self) -> bool:
-        return False

@@ -8,18 +8,17 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter, validators
 
-from arcor2_fakes.control import ControlServer, parse_address
-from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.control import parse_address
 from arcor2_fakes.scale.balance import UNITS, Balance
 from arcor2_fakes.serial_line import Line, PtyLine, TcpLine
-from arcor2_fakes.wire import register_faults
+from arcor2_fakes.serving import Fake, serve
 
 app = App(name="arcor2_fakes.scale", help="Fake MT-SICS scale on a pty or TCP.", version_flags=[])
 Positive = Annotated[float, Parameter(validator=validators.Number(gt=0))]
 
 
 def truth(balance: Balance, line: Line) -> dict[str, Any]:
-    """Give what is really so, whatever the line says; masses in kg."""
+    """Return the real state; masses in kg."""
     return {
         "load": balance.load,
         "zero": balance.zero,
@@ -31,8 +30,8 @@ def truth(balance: Balance, line: Line) -> dict[str, Any]:
     }
 
 
-def register_commands(control: ControlServer, balance: Balance) -> None:
-    """Make what the world and a test can do to the scale known to the control channel."""
+def register_commands(fake: Fake, balance: Balance) -> None:
+    """Register what tests and the cell can do to the scale."""
 
     def vibrate(on: bool) -> None:
         balance.vibrating = bool(on)
@@ -50,13 +49,15 @@ def register_commands(control: ControlServer, balance: Balance) -> None:
             raise ValueError("code is one of ES, ET, EL")
         balance.next_error = code
 
-    control.command("put", lambda kg: balance.put(float(kg)))
-    control.command("vibrate", vibrate)
-    control.command("busy", busy)
-    control.command("unit", unit)
-    control.command("error", error)
-    control.command("renew", balance.renew)
-    control.command("power_cycle", balance.power_cycle)
+    fake.commands(
+        put=lambda kg: balance.put(float(kg)),
+        vibrate=vibrate,
+        busy=busy,
+        unit=unit,
+        error=error,
+        renew=balance.renew,
+        power_cycle=balance.power_cycle,
+    )
 
 
 @app.default
@@ -79,46 +80,19 @@ def main(
         settling: how long the value moves after the load has changed, s.
         stability_timeout: how long S, T and Z wait for a stable value, s.
     """
-    try:
-        control_address = parse_address(control)
-        tcp_address = None if tcp is None else parse_address(tcp)
-    except ValueError as e:
-        sys.stderr.write(f"scale: {e}\n")
-        return 2
 
-    async def body() -> None:
+    async def body(fake: Fake) -> None:
         balance = Balance(
-            lambda frame: line.send(frame),
-            capacity=capacity,
-            settling=settling,
-            stability_timeout=stability_timeout,
+            lambda frame: line.send(frame), capacity=capacity, settling=settling, stability_timeout=stability_timeout
         )
-        line: Line = PtyLine(balance.feed, link) if tcp_address is None else TcpLine(balance.feed, *tcp_address)
+        line: Line = PtyLine(balance.feed, link) if tcp is None else TcpLine(balance.feed, *parse_address(tcp))
+        register_commands(fake, balance)
+        fake.line(line, balance.drop_input)
+        fake.truth(lambda: truth(balance, line))
+        fake.at_end(balance.cancel)
+        await fake.run(port=line)
 
-        async def plug() -> str:
-            await line.plug()
-            return line.port
-
-        async def unplug() -> None:
-            await line.unplug()
-            balance.drop_input()
-
-        channel = ControlServer(*control_address)
-        register_commands(channel, balance)
-        register_faults(channel, {"serial": line})
-        channel.command("plug", plug)
-        channel.command("unplug", unplug)
-        channel.source("truth", lambda: truth(balance, line))
-        await line.plug()
-        try:
-            announce(name="scale", port=line.port, control=await channel.start())
-            await until_told_to_end()
-        finally:
-            balance.cancel()
-            await line.unplug()
-            await channel.close()
-
-    return run(body, "scale")
+    return serve("scale", control, body, tcp)
 
 
 if __name__ == "__main__":

@@ -114,7 +114,7 @@ class Balance:
         self._send(text.encode("ascii") + b"\r\n")
 
     def _excuse(self, command: str) -> str:
-        """Give the answer of a command that cannot be done whatever is waited for; empty when it can."""
+        """Return the answer of a command that cannot be done whatever is waited for; empty when it can."""
         if self.next_error:
             return self.next_error
         if self.busy:
@@ -160,18 +160,18 @@ class Balance:
         return f"{word} {mark} {self._field(self.tare)}"
 
     def _field(self, kilograms: float) -> str:
-        """Give the value, right-aligned in ten places, and the unit."""
+        """Return the value, right-aligned in ten places, and the unit."""
         text = f"{kilograms * UNITS[self.unit]:.{DECIMALS[self.unit]}f}"
         return f"{text.removeprefix('-') if float(text) == 0.0 else text:>10} {self.unit}"
 
     # ------------------------------------------------------------------------------------------------ the world's side
     @property
     def stable(self) -> bool:
-        """Tell whether the shown value stands."""
+        """Return whether the shown value stands."""
         return not self.vibrating and self._loop.time() - self._changed >= self._settling
 
     def shown(self) -> float:
-        """Give the gross weight as the sensor shows it now, kg."""
+        """Return the gross weight as the sensor shows it now, kg."""
         since = self._loop.time() - self._changed
         ripple = 0.003 * math.sin(60.0 * self._loop.time()) if self.vibrating else 0.0
         if since >= self._settling:

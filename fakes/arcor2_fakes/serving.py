@@ -1,0 +1,103 @@
+"""The process of a fake: its wires, its control channel, its ready line and its end."""
+
+import contextlib
+import sys
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from arcor2_fakes.control import ControlServer, Handler, parse_address
+from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.serial_line import Line
+from arcor2_fakes.wire import TcpWire, register_faults
+
+Wire = TcpWire | Line
+
+
+class Fake:
+    """A fake while it runs: `serve` makes one and passes it to the function that builds the device."""
+
+    def __init__(self, name: str, channel: ControlServer) -> None:
+        self.name, self.channel = name, channel
+        self._wires: dict[str, Wire] = {}
+        self._ends: list[Callable[[], object]] = []
+
+    def commands(self, **handlers: Handler) -> None:
+        """Make functions known to the control channel by name."""
+        for name, handler in handlers.items():
+            self.channel.command(name, handler)
+
+    def truth(self, read: Callable[[], Any]) -> None:
+        """Make the real state known to the control channel as `truth`."""
+        self.channel.source("truth", read)
+
+    def at_end(self, call: Callable[[], object]) -> None:
+        """Call a function when the fake ends."""
+        self._ends.append(call)
+
+    def wires(self, checked: tuple[str, ...] = (), **wires: Wire) -> None:
+        """Serve on wires, and register their faults; `checked` names those whose frames end in a checksum."""
+        self._wires |= wires
+        register_faults(self.channel, dict(wires), checked)
+
+    def line(self, line: Line, unplugged: Callable[[], object] = lambda: None, name: str = "serial") -> None:
+        """Serve on a serial line that the control channel can plug and unplug."""
+
+        async def plug() -> str:
+            await line.plug()
+            return line.port
+
+        async def unplug() -> None:
+            await line.unplug()
+            unplugged()
+
+        self._wires[name] = line
+        register_faults(self.channel, {name: line})
+        self.commands(plug=plug, unplug=unplug)
+
+    async def run(self, **addresses: Wire) -> None:
+        """Open the wires, print the ready line with the addresses, and return when the fake is told to end."""
+        for wire in self._wires.values():
+            await (wire.listen() if isinstance(wire, TcpWire) else wire.plug())
+        shown = {name: each.address if isinstance(each, TcpWire) else each.port for name, each in addresses.items()}
+        announce(name=self.name, **shown, control=await self.channel.start())
+        await until_told_to_end()
+
+    async def close(self) -> None:
+        """Close the wires and the control channel."""
+        for call in self._ends:
+            call()
+        for wire in self._wires.values():
+            if isinstance(wire, TcpWire):
+                wire.close()
+            else:
+                with contextlib.suppress(OSError):
+                    await wire.unplug()
+        await self.channel.close()
+
+
+def serve(name: str, control: str, body: Callable[[Fake], Awaitable[None]], *addresses: str | None) -> int:
+    """Run a fake to its end and return the exit status: 2 for an address that is not HOST:PORT.
+
+    Args:
+        name: Name of the fake, for messages.
+        control: HOST:PORT of the control channel.
+        body: Builds the device and awaits `Fake.run`.
+        addresses: Further addresses to check before anything starts; None for one that was not given.
+    """
+    try:
+        host, port = parse_address(control)
+        for address in addresses:
+            if address is not None:
+                parse_address(address)
+    except ValueError as e:
+        sys.stderr.write(f"{name}: {e}\n")
+        return 2
+
+    async def main() -> None:
+        fake = Fake(name, ControlServer(host, port))
+        try:
+            await body(fake)
+        finally:
+            await fake.close()
+
+    return run(main, name)
