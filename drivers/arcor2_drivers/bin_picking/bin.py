@@ -67,7 +67,7 @@ class Bin(GenericWithPose):
 
     @property
     def connection(self) -> Connection:
-        """Tell whether the model is loaded."""
+        """Return whether the model is loaded."""
         return self._connected
 
     def _loaded(self) -> "Model":
@@ -92,7 +92,7 @@ class Bin(GenericWithPose):
     # -------------------------------------------------------------------------------- actions
     @action
     def next_part(self, depth: "Image.Image", *, an: str | None = None) -> tuple[Pose, float]:
-        """Give the pose of the part to be taken next, and its quality, 0 to 1.
+        """Return the pose of the part to be taken next, and its quality, 0 to 1.
 
         :param depth: depth picture of the crate, as a camera's depth_image gives
         """
@@ -108,7 +108,7 @@ class Bin(GenericWithPose):
 
     @action
     def is_empty(self, depth: "Image.Image", *, an: str | None = None) -> bool:
-        """Tell whether nothing lies in the crate.
+        """Return whether nothing lies in the crate.
 
         :param depth: depth picture of the crate, as a camera's depth_image gives
         """
@@ -122,7 +122,7 @@ class Bin(GenericWithPose):
 
     @action
     def grip_pose(self, part: Pose, above: float = 0.0, *, an: str | None = None) -> Pose:
-        """Give the pose for the tool at a part: z down into its top, x along its length.
+        """Return the pose for the tool at a part: z down into its top, x along its length.
 
         :param part: what next_part gave
         :param above: metres by which the tool is higher, for coming near and going away

@@ -58,7 +58,7 @@ class Blister(GenericWithPose):
 
     @property
     def connection(self) -> Connection:
-        """Tell whether the state is known."""
+        """Return whether the state is known."""
         return self._connected
 
     def _check(self) -> None:
@@ -68,7 +68,7 @@ class Blister(GenericWithPose):
     # -------------------------------------------------------------------------------- actions
     @action(quick=True)
     def next_part(self, *, an: str | None = None) -> Pose:
-        """Give the pose of the next part; it stays there until part_taken."""
+        """Return the pose of the next part; it stays there until part_taken."""
         self._check()
         found = self._places.next(full=True)
         if found is None:
@@ -87,7 +87,7 @@ class Blister(GenericWithPose):
 
     @action(quick=True)
     def next_free(self, *, an: str | None = None) -> Pose:
-        """Give the pose of the next free place; it stays free until part_put."""
+        """Return the pose of the next free place; it stays free until part_put."""
         self._check()
         found = self._places.next(full=False)
         if found is None:
@@ -106,7 +106,7 @@ class Blister(GenericWithPose):
 
     @action(quick=True)
     def grip_pose(self, part: Pose, above: float = 0.0, *, an: str | None = None) -> Pose:
-        """Give the pose for the tool at a part or place: z down into it.
+        """Return the pose for the tool at a part or place: z down into it.
 
         :param part: what next_part or next_free gave
         :param above: metres by which the tool is higher, for coming near and going away
@@ -117,7 +117,7 @@ class Blister(GenericWithPose):
 
     @action(quick=True)
     def place(self, row: int, column: int, *, an: str | None = None) -> Pose:
-        """Give the pose of a place, whether there is a part or not.
+        """Return the pose of a place, whether there is a part or not.
 
         :param row: counted from 0, along y
         :param column: counted from 0, along x
@@ -127,7 +127,7 @@ class Blister(GenericWithPose):
 
     @action(quick=True)
     def set_place(self, row: int, column: int, full: bool, *, an: str | None = None) -> None:
-        """Say that a place has a part, or has none.
+        """Note that a place has a part, or has none.
 
         :param row: counted from 0, along y
         :param column: counted from 0, along x
@@ -139,30 +139,30 @@ class Blister(GenericWithPose):
 
     @action(quick=True)
     def refill(self, *, an: str | None = None) -> None:
-        """Say that all places have a part: a full one was put there."""
+        """Note that all places have a part: a full one was put there."""
         self._check()
         self._all(True)
 
     @action(quick=True)
     def clear(self, *, an: str | None = None) -> None:
-        """Say that all places are free: an empty one was put there."""
+        """Note that all places are free: an empty one was put there."""
         self._check()
         self._all(False)
 
     @action(quick=True)
     def parts(self, *, an: str | None = None) -> int:
-        """Give how many places have a part."""
+        """Return how many places have a part."""
         self._check()
         return self._places.count
 
     @action(quick=True)
     def is_empty(self, *, an: str | None = None) -> bool:
-        """Tell whether no place has a part."""
+        """Return whether no place has a part."""
         return self.parts() == 0
 
     @action(quick=True)
     def is_full(self, *, an: str | None = None) -> bool:
-        """Tell whether every place has a part."""
+        """Return whether every place has a part."""
         return self.parts() == self._given.rows * self._given.columns
 
     # -------------------------------------------------------------------------------- places

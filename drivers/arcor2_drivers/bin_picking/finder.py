@@ -67,7 +67,7 @@ def see(view: View, crate: Crated, tolerance: float) -> Crate:
 
 
 def _pixels_of(view: View, crate: Crated) -> float:
-    """Give how many pixels the floor of the crate would fill."""
+    """Return how many pixels the floor of the crate would fill."""
     distance = float(view.camera[2, 3])
     across = abs(float(view.camera[2, 2]))
     if distance <= 0.0:
@@ -80,7 +80,7 @@ def _things(seen: Crate, view: View, model: Model, tolerance: float) -> list[Pix
 
 
 def lies_there(view: View, crate: Crated, model: Model, tolerance: float) -> bool:
-    """Tell whether something as large as a part lies in the crate. Raises NoDepth when the crate is not seen."""
+    """Return whether something as large as a part lies in the crate. Raises NoDepth when the crate is not seen."""
     return bool(_things(see(view, crate, tolerance), view, model, tolerance))
 
 
@@ -139,6 +139,6 @@ def _top(crate: Crate, pixels: Pixels) -> float:
 
 
 def _area(pixels: Pixels, view: View) -> float:
-    """Give the area that is seen, m², as if it stood across the line of sight."""
+    """Return the area that is seen, m², as if it stood across the line of sight."""
     z = view.depth[pixels].astype(np.float64) * 0.001
     return float((z * z).sum() / (view.parameters.fx * view.parameters.fy))

@@ -36,12 +36,12 @@ class Model(NamedTuple):
 
     @property
     def size(self) -> Floats:
-        """Give the sides of the bounding box, m."""
+        """Return the sides of the bounding box, m."""
         return self.high - self.low
 
     @property
     def faces(self) -> tuple[float, float]:
-        """Give the areas of the smallest and the largest side of the bounding box, m²."""
+        """Return the areas of the smallest and the largest side of the bounding box, m²."""
         x, y, z = self.size
         areas = sorted((x * y, y * z, x * z))
         return float(areas[0]), float(areas[2])

@@ -53,11 +53,11 @@ class Places:
 
     @property
     def count(self) -> int:
-        """Give how many places have a part."""
+        """Return how many places have a part."""
         return sum(self._full)
 
     def next(self, full: bool) -> tuple[int, int] | None:
-        """Give row and column of the next place with a part, or without; None when there is none."""
+        """Return row and column of the next place with a part, or without; None when there is none."""
         for number in range(self.rows * self.columns):
             row, column = divmod(number, self.columns)
             if self._snake and row % 2:
@@ -67,7 +67,7 @@ class Places:
         return None
 
     def full(self, row: int, column: int) -> bool:
-        """Tell whether a place has a part. Raises IndexError."""
+        """Return whether a place has a part. Raises IndexError."""
         return self._full[self._index(row, column)]
 
     def set(self, row: int, column: int, full: bool) -> None:

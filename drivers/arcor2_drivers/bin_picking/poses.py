@@ -13,7 +13,7 @@ UPRIGHT: Final = 0.3
 
 
 def gripping(part: Pose, base: Pose, top: float, above: float) -> Pose:
-    """Give the tool's pose over a part: z against the base's z, x along the part's x, or y where x stands upright.
+    """Return the tool's pose over a part: z against the base's z, x along the part's x, or y where x stands upright.
 
     part, base: in the world. top: m by which the point to grip is higher than the part's origin. above: m above that.
     """

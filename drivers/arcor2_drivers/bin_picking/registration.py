@@ -98,7 +98,7 @@ def _polished(fit: Fit, judge: Callable[[Floats], Fit], points: Floats) -> Fit:
 
 
 def _moves(step: float) -> list[tuple[float, float, float]]:
-    """Give x, y in m and the turn in rad of each move of one step; a turn moves a part's ends about as far."""
+    """Return x, y in m and the turn in rad of each move of one step; a turn moves a part's ends about as far."""
     turn = step * TURN_PER_STEP
     return [(step, 0, 0), (-step, 0, 0), (0, step, 0), (0, -step, 0), (0, 0, turn), (0, 0, -turn)]
 
@@ -111,7 +111,7 @@ def _shifted(pose: Floats, middle: Floats, move: tuple[float, float, float]) -> 
 
 
 def _starts(points: Floats, model: Model, lowest: float) -> list[Floats]:
-    """Give poses to begin with: each side of the bounding box upwards, turned as the rectangle about the points is.
+    """Return poses to begin with: each side of the bounding box upwards, turned as the rectangle about the points is.
 
     lowest: m, the height below which nothing can be: there is the floor.
     """
@@ -133,7 +133,7 @@ def _starts(points: Floats, model: Model, lowest: float) -> list[Floats]:
 
 
 def _sides(box: bool) -> list[Floats]:
-    """Give the rotations that bring each axis of the model upwards; of a box, one of the two opposite sides."""
+    """Return the rotations that bring each axis of the model upwards; of a box, one of the two opposite sides."""
     up = np.eye(3)
     y_up = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     x_up = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
@@ -147,14 +147,14 @@ def _about_z(angle: float) -> Floats:
 
 
 def _distance(tree: Any, points: Floats, pose: Floats, tolerance: float) -> float:
-    """Give how far the points are from the model on the whole; what is further than 3 tolerances counts as that."""
+    """Return how far the points are from the model on the whole; what is further than 3 tolerances counts as that."""
     local = (points - pose[:3, 3]) @ pose[:3, :3]
     _, squares = tree.knn_search(o3d.core.Tensor.from_numpy(local.astype(np.float32)), 1)
     return float(np.minimum(np.sqrt(squares.numpy()), 3.0 * tolerance).mean())
 
 
 def _refined(points: Floats, model: Model, start: Floats, tolerance: float) -> Floats:
-    """Give the pose after ICP, points onto model, point to plane with Tukey's weights."""
+    """Return the pose after ICP, points onto model, point to plane with Tukey's weights."""
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     model_from_crate = np.linalg.inv(start)
     registration = o3d.pipelines.registration
@@ -186,7 +186,7 @@ class _Judge:
         self._across, self._down = rays[rays.shape[0] // 2, :, 0], rays[:, rays.shape[1] // 2, 1]
 
     def __call__(self, pose: Floats) -> Fit:
-        """Give the model at a pose with its quality."""
+        """Return the model at a pose with its quality."""
         where = self._about(pose)
         reach = self._rendered(pose, where)
         towards = self._camera_from_crate[2]
@@ -203,7 +203,7 @@ class _Judge:
         return Fit(pose, explained * covered, explained, covered, self._count / max(seen, 1), error)
 
     def _rendered(self, pose: Floats, where: tuple[slice, slice]) -> Any:
-        """Give the depth at which each pixel of a rectangle should see the model, m; infinite where it should not."""
+        """Return the depth at which each pixel of a rectangle should see the model, m; infinite where it should not."""
         part_from_camera = (np.linalg.inv(pose) @ self._camera).astype(np.float32)
         beams = self._rays[where]
         both = np.empty((*beams.shape[:2], 6), np.float32)
@@ -212,7 +212,7 @@ class _Judge:
         return self._model.scene.cast_rays(o3d.core.Tensor.from_numpy(both))["t_hit"].numpy()
 
     def _about(self, pose: Floats) -> tuple[slice, slice]:
-        """Give the rectangle about the cluster and about where the model should be seen."""
+        """Return the rectangle about the cluster and about where the model should be seen."""
         top, bottom, left, right = self._bounds
         in_crate = self._model.vertices @ pose[:3, :3].T + pose[:3, 3]
         seen = (in_crate - self._camera[:3, 3]) @ self._camera[:3, :3]

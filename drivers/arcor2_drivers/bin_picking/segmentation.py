@@ -51,7 +51,7 @@ def look_into(points: Floats, length: float, width: float, height: float, tolera
 
 
 def _floor(low: Floats, seen: int, tolerance: float) -> Floats | None:
-    """Give the plane of the floor, normal upwards; None when too little of it is seen."""
+    """Return the plane of the floor, normal upwards; None when too little of it is seen."""
     if len(low) < 50:
         return None
     step = max(1, len(low) // FLOOR_SAMPLES)
@@ -66,7 +66,7 @@ def _floor(low: Floats, seen: int, tolerance: float) -> Floats | None:
 
 
 def clusters(crate: Crate, tolerance: float) -> list[Pixels]:
-    """Give the pixels of each thing above the floor; things that touch in space are one."""
+    """Return the pixels of each thing above the floor; things that touch in space are one."""
     with np.errstate(invalid="ignore"):
         above = crate.inside & (crate.height > tolerance)
     rows, columns = np.nonzero(above)

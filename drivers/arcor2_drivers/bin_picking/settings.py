@@ -1,26 +1,20 @@
-"""Settings of bin and blister, checked when they are given."""
+"""Settings of bin and blister."""
 
 import dataclasses
-import math
+from typing import Annotated
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
-from arcor2_hw.objects.settings import device_file
+from arcor2_hw.objects.settings import Range, device_file, within
 
 LARGEST_PART = 1.0
-"""m"""
+"""Largest edge of a part, m."""
 MOST_PLACES = 10_000
-
-
-def within(name: str, value: float, low: float, high: float) -> None:
-    """Raise OutOfRange, naming the parameter, unless the value lies in the range."""
-    if not (math.isfinite(value) and low <= value <= high):
-        raise OutOfRange(f"{name} must be {low:g} to {high:g}, not {value!r}")
 
 
 @dataclasses.dataclass
 class BinSettings(Settings):
-    """The crate, and the part that lies in it: a box, or a mesh.
+    """The crate, and the part in it: a box, or a mesh.
 
     :param length: inside of the crate along x, m
     :param width: inside of the crate along y, m
@@ -29,28 +23,27 @@ class BinSettings(Settings):
     :param part_width: along its y, m
     :param part_height: along its z, m
     :param part_mesh: path of the part's mesh (STL, OBJ, PLY) in metres, instead of the sizes
-    :param min_quality: 0 to 1, below which a part is not given
-    :param tolerance: m by which a point may miss the part's surface: three times the camera's noise
+    :param min_quality: 0 to 1; parts of lower quality are not returned
+    :param tolerance: m that a point may be away from the surface of its part: three times the noise of the camera
     :param grip_depth: m below a part's top where it is gripped
-    :param max_age: seconds after which a picture is too old
+    :param max_age: seconds after which an image is too old
     """
 
-    length: float
-    width: float
-    height: float
+    length: Annotated[float, Range(0.02, 3.0, "m")]
+    width: Annotated[float, Range(0.02, 3.0, "m")]
+    height: Annotated[float, Range(0.02, 3.0, "m")]
     part_length: float = 0.0
     part_width: float = 0.0
     part_height: float = 0.0
     part_mesh: str = ""
-    min_quality: float = 0.9
-    tolerance: float = 0.004
-    grip_depth: float = 0.0
-    max_age: float = 10.0
+    min_quality: Annotated[float, Range(0.3, 1.0)] = 0.9
+    tolerance: Annotated[float, Range(0.0005, 0.02, "m")] = 0.004
+    grip_depth: Annotated[float, Range(0.0, LARGEST_PART, "m")] = 0.0
+    max_age: Annotated[float, Range(0.1, 3600.0, "s")] = 10.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.part_mesh = device_file("part_mesh", self.part_mesh)
-        for name in ("length", "width", "height"):
-            within(name, getattr(self, name), 0.02, 3.0)
         sizes = {name: getattr(self, name) for name in ("part_length", "part_width", "part_height")}
         if self.part_mesh:
             if any(sizes.values()):
@@ -58,10 +51,6 @@ class BinSettings(Settings):
         else:
             for name, size in sizes.items():
                 within(name, size, 0.003, LARGEST_PART)
-        within("min_quality", self.min_quality, 0.3, 1.0)
-        within("tolerance", self.tolerance, 0.0005, 0.02)
-        within("grip_depth", self.grip_depth, 0.0, LARGEST_PART)
-        within("max_age", self.max_age, 0.1, 3600.0)
 
 
 @dataclasses.dataclass
@@ -75,32 +64,28 @@ class BlisterSettings(Settings):
     :param origin_x: where the first place is, relative to the blister's own pose, m
     :param origin_y: m
     :param origin_z: m
-    :param turn: how parts are turned about z against the blister, degrees
+    :param turn: rotation of the parts about z relative to the blister, degrees
     :param snake: whether every second row is counted backwards
-    :param starts_full: whether all places have a part in the beginning
-    :param state_file: path of a file in which the state is kept, so that it survives a restart; empty: it does not
+    :param starts_full: whether all places have a part at the start
+    :param state_file: path of a file that stores the state over a restart; empty: the state is not stored
     """
 
-    rows: int
-    columns: int
+    rows: Annotated[int, Range(1, MOST_PLACES)]
+    columns: Annotated[int, Range(1, MOST_PLACES)]
     row_pitch: float
     column_pitch: float
-    origin_x: float = 0.0
-    origin_y: float = 0.0
-    origin_z: float = 0.0
-    turn: float = 0.0
+    origin_x: Annotated[float, Range(-5.0, 5.0, "m")] = 0.0
+    origin_y: Annotated[float, Range(-5.0, 5.0, "m")] = 0.0
+    origin_z: Annotated[float, Range(-5.0, 5.0, "m")] = 0.0
+    turn: Annotated[float, Range(-360.0, 360.0, "degrees")] = 0.0
     snake: bool = False
     starts_full: bool = True
     state_file: str = ""
 
     def __post_init__(self) -> None:
-        within("rows", self.rows, 1, MOST_PLACES)
-        within("columns", self.columns, 1, MOST_PLACES)
+        super().__post_init__()
         if self.rows * self.columns > MOST_PLACES:
             raise OutOfRange(f"rows times columns must be at most {MOST_PLACES}")
         for name, count in (("row_pitch", self.rows), ("column_pitch", self.columns)):
             within(name, getattr(self, name), 0.0 if count == 1 else 0.0005, 2.0)
-        for name in ("origin_x", "origin_y", "origin_z"):
-            within(name, getattr(self, name), -5.0, 5.0)
-        within("turn", self.turn, -360.0, 360.0)
         self.state_file = device_file("state_file", self.state_file)

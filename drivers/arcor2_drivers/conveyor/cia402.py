@@ -97,7 +97,7 @@ CW_HALT: Final = 0x0100
 
 
 def power(statusword: int) -> Power:
-    """Give the state a status word tells. Raises ValueError for a pattern that CiA 402 does not know."""
+    """Return the state a status word tells. Raises ValueError for a pattern that CiA 402 does not know."""
     for mask, value, state in _STATES:
         if statusword & mask == value:
             return state

@@ -1,14 +1,13 @@
-"""The conveyor as an object type: an Axis and a Machine on a CiA 402 drive; positions and speeds in m and m/s."""
+"""A conveyor: an Axis and a Machine on a CiA 402 drive; positions and speeds in m and m/s."""
 
-import contextlib
 from typing import ClassVar, Final
 
 from arcor2_hw.actions import action
-from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Reading
-from arcor2_hw.exceptions import ConnectionLost, DeviceError, NotFound, NotInControl, OutOfRange, Refused
+from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction, Reading
+from arcor2_hw.exceptions import ConnectionLost, NotFound, NotInControl, OutOfRange, Refused
 from arcor2_hw.objects import Axis, Machine, MachineCommand, MachineState
-from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
-from arcor2_hw.objects.polled import GoOn
+from arcor2_hw.objects.observing import GoOn
+from arcor2_hw.objects.polled_control import NOBODY, US, PolledControl
 
 from . import cia402
 from .cia402 import FAULTY, Power, State
@@ -19,12 +18,12 @@ from .packml import STATES, Unit
 from .settings import LONGEST_HEARTBEAT, LONGEST_MOVE, LONGEST_RAMP, ConveyorSettings
 
 MARGIN: Final = 30.0
-"""s a move may take beyond LONGEST_MOVE: enabling, the handshake and the stop, each with its longest time-out."""
+"""Time a move may take beyond LONGEST_MOVE, s: enabling, the handshake and the stop, with their time-outs."""
 NOTICES: Final = 0.1
-"""s from the heartbeat's time-out until the drive slows down."""
+"""Time from the heartbeat's time-out until the drive slows down, s."""
 
 
-class Conveyor(Machine, Axis):
+class Conveyor(PolledControl[State], Machine, Axis):
     """A belt conveyor with a servo drive (CANopen, CiA 402)."""
 
     _ABSTRACT = False
@@ -43,53 +42,41 @@ class Conveyor(Machine, Axis):
     def __init__(self, obj_id: str, name: str, settings: ConveyorSettings) -> None:
         super().__init__(obj_id, name, settings)
         self._units = settings
-        self._observer = Observer(name, settings, self._drop_control)
+        self._observer = Observer(name, settings, self.drop_control)
         self._motion = Motion(self._observer, settings)
-        self._who = self._observer.who
-        self._unit = Unit(self._who, self._motion, settings.counts(settings.belt_speed))
-        self._in_control = self._homed = False
+        self._unit = Unit(self._observer.who, self._motion, settings.counts(settings.belt_speed))
+        self._homed = False
+        self.use_link(self._observer.link, self._observer)
 
     # -------------------------------------------------------------------------------- connection
-    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
-        """Begin to observe within `timeout` s; nothing is written. Raises NotConnected, DeviceTimeout, DeviceFault."""
-        self._observer.connect(timeout)
-
     def disconnect(self) -> None:
-        """Give control back and stop observing. A belt that moves is stopped; failing that, the drive does it."""
-        self._observer.stop_waiting()
-        if self._in_control and self._observer.observing.online:
-            newest = self._observer.newest()
-            with contextlib.suppress(DeviceError):  # it is gone; the drive listens for our heartbeat
-                if newest is not None and self._motion.stands(newest):
-                    self._disarm()
-                else:
-                    self._observer.link.write(cia402.CONTROLWORD, cia402.CW_QUICK_STOP)
-        self._drop_control()
-        self._observer.disconnect()
+        """Release control and stop observing. A belt that moves is stopped, by us or by the drive."""
+        self.stop_waiting()
+        super().disconnect()
 
-    @property
-    def connection(self) -> Connection:
-        """Tell how the connection is."""
-        return self._observer.observing.state
+    def leave(self) -> None:
+        """Release control because we disconnect."""
+        newest = self.newest()
+        if newest is not None and self._motion.stands(newest):
+            self.disarm()
+        else:
+            self._observer.link.write(cia402.CONTROLWORD, cia402.CW_QUICK_STOP)
 
-    @property
-    def health(self) -> Health:
-        """Give the condition as the drive last told it; failure when it does not tell any more."""
-        if self.connection in (Connection.LOST, Connection.FAILED):
-            return Health.FAILURE
-        newest = self._observer.newest()
+    def condition(self) -> Health:
+        """Return the condition that the drive last reported."""
+        newest = self.newest()
         return Health.FAILURE if newest is not None and newest.power in FAULTY else Health.NORMAL
 
     def identify(self) -> Identity:
-        """Ask the drive who it is (1018h); its numbers as they stand there."""
-        self._observer.observing.check()
+        """Read the identity object of the drive (1018h)."""
+        self.observing.check()
         entries = (cia402.VENDOR, cia402.PRODUCT, cia402.SERIAL, cia402.REVISION)
         vendor, product, serial, revision = (self._observer.link.read(entry) for entry in entries)
         return Identity(f"CANopen vendor {vendor:X}h", f"product {product:X}h", str(serial), f"{revision:X}h")
 
     def alarms(self) -> list[Alarm]:
-        """Give the fault that stands, or the emergency that was not taken back."""
-        now = self._observer.current().value
+        """Return the present fault, or the emergency that was not cancelled."""
+        now = self.current()
         code = now.error_code if now.power in FAULTY else self._observer.emergency
         if not code:
             return []
@@ -97,27 +84,21 @@ class Conveyor(Machine, Axis):
         return [Alarm(f"{code:04X}h", fault.severity, fault.text, fault.remedy, self._observer.emergency_since)]
 
     def acknowledge(self, code: str) -> None:
-        """Reset the fault `code`. Raises NotFound when it does not stand, Refused while its cause stands."""
-        now = self._observer.fresh().value
+        """Reset the fault `code`. Raises NotFound when there is no such fault, Refused while its cause is present."""
+        now = self.fresh()
         if now.power not in FAULTY or f"{now.error_code:04X}h" != code:
-            raise NotFound(f"{self._who} has no alarm {code} to acknowledge")
+            raise NotFound(f"{self.who} has no alarm {code} to acknowledge")
         self.fault_reset()
 
     # -------------------------------------------------------------------------------- control
-    def take_control(self) -> None:
-        """Arm what the drive does when it loses us; from then on it is commanded. Raises NotInControl, Refused."""
-        now = self._observer.fresh().value
-        if self._in_control:
-            return
-        losses, link = self._observer.losses, self._observer.link
-        if (owner := self._other_owner(now, link.read(cia402.CONSUMER_HEARTBEAT))) is not None:
-            raise NotInControl(f"{self._who}: control is refused in state {now.power}: {owner} has it")
-        s = self._units
+    def arm(self) -> None:
+        """Set what the drive does when it loses us, and start the node."""
+        link, s = self._observer.link, self._units
         armed = (
             (cia402.CONSUMER_HEARTBEAT, s.master_id << 16 | s.heartbeat_ms),
             (cia402.ABORT_OPTION, cia402.QUICK_STOP_ON_LOSS),
         )
-        link.write(cia402.CONSUMER_HEARTBEAT, 0)  # no heartbeat of before counts
+        link.write(cia402.CONSUMER_HEARTBEAT, 0)  # heartbeats from before do not count
         for entry, value in armed:
             link.write(entry, value)
         link.write(cia402.QUICK_STOP_OPTION, cia402.SLOW_DOWN_AND_DISABLE)
@@ -125,95 +106,83 @@ class Conveyor(Machine, Axis):
         link.write(cia402.ACCELERATION, s.rate(s.acceleration))
         link.write(cia402.DECELERATION, s.rate(s.acceleration))
         for entry, value in armed:
-            if (kept := link.read(entry)) != value:
-                raise Refused(f"{self._who}: {entry.title} is {kept} after {value} was written")
+            if (stored := link.read(entry)) != value:
+                raise Refused(f"{self.who}: {entry.title} is {stored} after {value} was written")
         self._observer.listen()
         link.start_node()
         link.heartbeat()
         self._unit.forget()
-        self._in_control = self._observer.guarded = True
-        try:
-            self._observer.check_unbroken(losses)
-        except DeviceError:
-            self._drop_control()
-            raise
-        self._observer.observing.settled()
+        self._observer.guarded = True
+
+    def disarm(self) -> None:
+        """Switch the torque off, and the monitoring of our heartbeat."""
+        self._observer.link.write(cia402.CONTROLWORD, cia402.CW_DISABLE_VOLTAGE)
+        self._observer.link.write(cia402.CONSUMER_HEARTBEAT, 0)
 
     def release_control(self) -> None:
-        """Switch the torque off and the drive's guard over us. Raises Refused while the belt moves."""
-        if not self._in_control:
-            return
-        if not self._motion.stands(self._observer.fresh().value):
-            raise Refused(f"{self._who}: release_control is refused while the belt moves: halt it")
-        self._disarm()
-        self._drop_control()
+        """Switch the torque off, and the monitoring of our heartbeat. Raises Refused while the belt moves."""
+        if self.in_control and not self._motion.stands(self.fresh()):
+            raise Refused(f"{self.who}: release_control is refused while the belt moves: halt it")
+        super().release_control()
 
-    def control_owner(self) -> str | None:
-        """Tell who has control."""
-        if self._in_control:
-            return "us"
-        newest = self._observer.newest()
-        return None if newest is None else self._other_owner(newest, self._observer.consumer)
-
-    def _other_owner(self, now: State, consumer: int) -> str | None:
-        master, limit = consumer >> 16 & 0x7F, consumer & 0xFFFF
+    def owner_of(self, state: State) -> str | None:
+        """Return who has control: us, the node whose heartbeat the drive monitors, or whoever enabled the drive."""
+        if self.in_control:
+            return US
+        master, limit = self._observer.consumer >> 16 & 0x7F, self._observer.consumer & 0xFFFF
         if limit and self._observer.heard(master, limit / 1000.0):
-            return f"node {master}, whose heartbeat the drive listens for,"
+            return f"node {master}, whose heartbeat the drive monitors,"
         if self._observer.heard(self._units.master_id, LONGEST_HEARTBEAT / 1000.0):
             return f"another host, which sends heartbeats as node {self._units.master_id} too,"
-        return "somebody who enabled the drive" if now.power is Power.ENABLED else None
+        return "another client, which enabled the drive," if state.power is Power.ENABLED else None
 
-    def _disarm(self) -> None:
-        link = self._observer.link
-        link.write(cia402.CONTROLWORD, cia402.CW_DISABLE_VOLTAGE)
-        link.write(cia402.CONSUMER_HEARTBEAT, 0)
-
-    def _drop_control(self) -> None:
-        """Forget control; after a loss the drive may have been off, so that its zero is unknown too."""
-        self._observer.guarded = self._in_control = False
+    def drop_control(self, why: str = NOBODY) -> None:
+        """Note that we have no control; after a loss the drive may have been off, so that its zero is unknown too."""
+        super().drop_control(why)
+        self._observer.guarded = False
         self._unit.forget()
-        self._homed = self._homed and self._observer.observing.online
+        self._homed = self._homed and self.observing.online
 
     def _begin(self, what: str, resting: bool = True) -> tuple[State, GoOn]:
-        go_on = self._observer.begin(what)
-        now = self._observer.fresh().value
-        if not self._in_control:
-            refused = f"{self._who}: {what} is refused in state {now.power}"
+        go_on = self.begin(what)
+        now = self.fresh()
+        if not self.in_control:
+            refused = f"{self.who}: {what} is refused in state {now.power}"
             raise NotInControl(f"{refused}: {self.control_owner() or 'nobody'} has control")
         if resting and not self._motion.stands(now):
-            raise Refused(f"{self._who}: {what} is refused while the belt moves: halt it first")
+            raise Refused(f"{self.who}: {what} is refused while the belt moves: halt it first")
         return now, go_on
 
     # -------------------------------------------------------------------------------- values
     def position(self) -> Reading[float]:
-        """Give the belt's position, m. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
+        """Return the position of the belt, m. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
         now, asked, stamp = self._observer.current()
         return Reading(self._units.metres(now.position), stamp, asked)
 
     def velocity(self) -> Reading[float]:
-        """Give the belt's velocity, m/s. Raises like `position`."""
+        """Return the velocity of the belt, m/s. Raises like `position`."""
         now, asked, stamp = self._observer.current()
         return Reading(self._units.metres(now.velocity), stamp, asked)
 
     @property
     def homed(self) -> bool:
-        """Tell whether the drive was homed since we have been observing it without a break."""
+        """Return whether the drive was homed since the last loss of the connection."""
         return self._homed
 
     # -------------------------------------------------------------------------------- the base's methods
     def move_absolute(self, position: float, velocity: float) -> None:
-        """Move to `position`, m, with `velocity`, m/s; return when it is there. Refused before homing."""
+        """Move to `position`, m, with `velocity`, m/s; return at the position. Refused before homing."""
         what = f"move_to {position:g} m"
         self._check(position, velocity, what)
         now, go_on = self._begin(what)
         if not self._homed:
-            raise Refused(f"{self._who}: {what} is refused in state {now.power}: it is not homed")
+            raise Refused(f"{self.who}: {what} is refused in state {now.power}: it is not homed")
         target = self._units.counts(position)
         with self._unit.act(what):
             self._motion.move(target, False, self._units.rate(velocity), target, what, go_on)
 
     def move_relative(self, distance: float, velocity: float) -> None:
-        """Move by `distance`, m, with `velocity`, m/s; return when it is there."""
+        """Move by `distance`, m, with `velocity`, m/s; return at the position."""
         what = f"move_by {distance:g} m"
         now, go_on = self._begin(what)
         end = self._units.metres(now.position) + distance
@@ -226,7 +195,7 @@ class Conveyor(Machine, Axis):
         """Run with `velocity`, m/s, until halted; return when it is reached."""
         what = f"run with {velocity:g} m/s"
         if not abs(velocity) <= self._units.max_speed:
-            raise OutOfRange(f"{self._who}: {what}: velocity must be at most {self._units.max_speed:g} m/s")
+            raise OutOfRange(f"{self.who}: {what}: velocity must be at most {self._units.max_speed:g} m/s")
         _, go_on = self._begin(what, resting=False)
         with self._unit.act(what):
             self._motion.run(self._units.counts(velocity), what, go_on)
@@ -235,23 +204,23 @@ class Conveyor(Machine, Axis):
         s = self._units
         if not s.min_position <= position <= s.max_position:
             limits = f"{s.min_position:g} to {s.max_position:g} m"
-            raise OutOfRange(f"{self._who}: {what}: position must be {limits}, not {position:g} m")
+            raise OutOfRange(f"{self.who}: {what}: position must be {limits}, not {position:g} m")
         if not 0.0 < speed <= s.max_speed:
-            raise OutOfRange(f"{self._who}: {what}: speed must be above 0 and at most {s.max_speed:g} m/s")
+            raise OutOfRange(f"{self.who}: {what}: speed must be above 0 and at most {s.max_speed:g} m/s")
         longest = LONGEST_MOVE * speed
-        if abs(position - s.metres(self._observer.current().value.position)) > longest:
-            raise OutOfRange(f"{self._who}: {what} would take longer than {LONGEST_MOVE:g} s at {speed:g} m/s")
+        if abs(position - s.metres(self.current().position)) > longest:
+            raise OutOfRange(f"{self.who}: {what} would take longer than {LONGEST_MOVE:g} s at {speed:g} m/s")
 
     # -------------------------------------------------------------------------------- machine
     def machine_state(self) -> MachineState:
-        """Give the present state. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
-        return self._unit.state(self._observer.current().value)
+        """Return the present state. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
+        return self._unit.state(self.current())
 
     def command(self, command: MachineCommand) -> None:
-        """Give a command; return when the belt is in the state it leads to. Raises Refused, NotInControl."""
+        """Send a command; return when the belt is in the state it leads to. Raises Refused, NotInControl."""
         now, go_on = self._begin(command.name.lower(), resting=False)
         if command in (MachineCommand.STOP, MachineCommand.ABORT):
-            self._observer.stop_waiting()
+            self.stop_waiting()
         self._unit.command(command, now, go_on)
 
     def wait_for(self, state: MachineState, timeout: float) -> None:
@@ -263,17 +232,17 @@ class Conveyor(Machine, Axis):
                 raise self._motion.fault(now, f"{what} ended")
             return self._unit.state(now) is state
 
-        self._observer.wait(arrived, timeout, what, self._observer.begin(what))
+        self.wait(arrived, timeout, what, self.begin(what))
 
     def stop_reason(self) -> str:
-        """Tell why the belt is aborted, empty when it is not."""
-        return self._unit.reason(self._observer.current().value)
+        """Return why the belt is aborted; empty when it is not."""
+        return self._unit.reason(self.current())
 
     def permissives(self) -> list[tuple[str, bool]]:
-        """Give what a start needs, each with whether it is met."""
-        now = self._observer.current().value
+        """Return the conditions of a start, each with whether it is met."""
+        now = self.current()
         return [
-            ("control is taken", self._in_control),
+            ("control is taken", self.in_control),
             ("no fault stands", now.power not in FAULTY and not self._unit.aborted),
             ("the drive is enabled", now.power is Power.ENABLED),
             ("the belt stands", self._motion.stands(now)),
@@ -287,17 +256,17 @@ class Conveyor(Machine, Axis):
 
     @action
     def start(self, *, an: str | None = None) -> None:
-        """Let the belt run with its speed of the settings; it has to be idle. Return when it has its speed."""
+        """Run the idle belt with the speed of its settings; return when it is reached."""
         self.command(MachineCommand.START)
 
     @action
     def hold(self, *, an: str | None = None) -> None:
-        """Stop the running belt for a while, the torque stays on; return when it stands."""
+        """Stop the running belt, with the torque on; return at standstill."""
         self.command(MachineCommand.HOLD)
 
     @action
     def unhold(self, *, an: str | None = None) -> None:
-        """Let the belt run again as it did before the hold."""
+        """Run the belt again as before the hold."""
         self.command(MachineCommand.UNHOLD)
 
     @action
@@ -307,12 +276,12 @@ class Conveyor(Machine, Axis):
 
     @action
     def clear(self, *, an: str | None = None) -> None:
-        """Clear a fault or an abort after its cause was dealt with; the belt is stopped then."""
+        """Clear a fault or an abort after its cause was removed; the belt is stopped then."""
         self.command(MachineCommand.CLEAR)
 
     @action(deadline=LONGEST_MOVE + MARGIN)
     def home(self, *, an: str | None = None) -> None:
-        """Find the zero of the belt; return when it is found."""
+        """Find the zero of the belt."""
         _, go_on = self._begin("home")
         losses = self._observer.losses
         with self._unit.act("home"):
@@ -321,7 +290,7 @@ class Conveyor(Machine, Axis):
         self._homed = True
         if self._observer.losses != losses:
             self._homed = False
-            raise ConnectionLost(f"{self._who}: the connection was lost while homing ended")
+            raise ConnectionLost(f"{self.who}: the connection was lost while homing ended")
 
     @action(deadline=LONGEST_MOVE + MARGIN)
     def move_to(self, position: float, speed: float = 0.1, *, an: str | None = None) -> None:
@@ -347,7 +316,7 @@ class Conveyor(Machine, Axis):
 
     @action
     def run(self, velocity: float = 0.1, *, an: str | None = None) -> None:
-        """Let the belt run until it is halted; return when it has its velocity.
+        """Run the belt until it is halted; return when it has its velocity.
 
         :param velocity: m/s, negative for backwards
         """
@@ -357,30 +326,30 @@ class Conveyor(Machine, Axis):
 
     @action
     def halt(self, *, an: str | None = None) -> None:
-        """Slow the belt down; return when it stands. A move under way ends with Cancelled."""
-        self._observer.stop_waiting()
-        if self._in_control:
+        """Slow the belt down; return at standstill. A move that runs ends with Cancelled."""
+        self.stop_waiting()
+        if self.in_control:
             self._motion.halt()
 
     def stop(self) -> None:
-        """Halt; called past everything else."""
+        """Halt the belt."""
         self.halt()
 
     @action
     def quick_stop(self, *, an: str | None = None) -> None:
-        """Stop the belt as quickly as its settings allow; return when it stands, without torque."""
-        self._observer.stop_waiting()
-        if self._in_control:
+        """Stop the belt as quickly as its settings allow; return at standstill, without torque."""
+        self.stop_waiting()
+        if self.in_control:
             self._motion.quick_stop()
 
     @action
     def fault_reset(self, *, an: str | None = None) -> None:
-        """Reset a fault after its cause was dealt with; the belt does not move by that."""
+        """Reset a fault after its cause was removed; the belt does not move."""
         _, go_on = self._begin("fault_reset", resting=False)
         self._motion.fault_reset(go_on)
         self._unit.forget()
 
     @action
     def belt_position(self, *, an: str | None = None) -> float:
-        """Give the belt's position, m."""
-        return self._units.metres(self._observer.fresh().value.position)
+        """Return the position of the belt, m."""
+        return self._units.metres(self.fresh().position)

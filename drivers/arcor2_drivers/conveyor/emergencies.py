@@ -86,7 +86,7 @@ _CLASSES: Final = {
 
 
 def fault_of(code: int) -> Fault:
-    """Give what an error code means; by its class when it is not known itself."""
+    """Return what an error code means; by its class when it is not known itself."""
     return _FAULTS.get(code) or Fault(
         _CLASSES.get(code >> 12, "unknown error"), f"look the code up in the drive's manual, {_RESET}"
     )

@@ -138,7 +138,7 @@ class CanLink:
         return can.Bus(channel=settings.channel, interface=settings.interface.value)
 
     def close(self) -> None:
-        """Close; harmless when closed."""
+        """Close; does nothing when closed."""
         self._closing.set()
         self.loss = self.loss or NotConnected(f"{self.who} is not connected")
         receiver, self._receiver = self._receiver, None
@@ -192,7 +192,7 @@ class CanLink:
         return self.loss
 
     def lose(self, error: DeviceError) -> None:
-        """Give the link up for `error` until it is opened again."""
+        """Return the link up for `error` until it is opened again."""
         self._lose(error)
 
     def check(self) -> None:
@@ -274,5 +274,5 @@ class CanLink:
 
 
 def _again(error: DeviceError) -> DeviceError:
-    """Give a new error of the same kind: one object raised in several threads mixes their tracebacks."""
+    """Return a new error of the same kind: one object raised in several threads mixes their tracebacks."""
     return type(error)(str(error), error.detail)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, Refused
-from arcor2_hw.objects.polled import GoOn
+from arcor2_hw.objects.observing import GoOn
 
 from . import cia402
 from .cia402 import FAULTY, Mode, Power, State
@@ -17,7 +17,7 @@ from .settings import ConveyorSettings
 STEP: Final = 1.0
 """s the drive has for one step of its state machine."""
 MARGIN: Final = 2.0
-"""s a motion may take beyond what its speed and ramps say."""
+"""Time a motion may take beyond what its speed and ramps say, s."""
 STANDS: Final = 0.001
 """m/s: slower than that it stands; a velocity that is measured never is quite zero."""
 
@@ -38,11 +38,11 @@ class Motion:
             self._link.write(cia402.CONTROLWORD, word)
 
     def stands(self, now: State) -> bool:
-        """Tell whether the belt stands."""
+        """Return whether the belt stands."""
         return abs(now.velocity) <= self._stands
 
     def fault(self, now: State, what: str) -> DeviceFault:
-        """Give the error for a drive in fault."""
+        """Return the error for a drive in fault."""
         code = now.error_code or self._observer.emergency
         fault = fault_of(code)
         return DeviceFault(

@@ -1,4 +1,4 @@
-"""The observed drive: its state by PDO while it sends that, else by SDO; and our heartbeat while it is heard."""
+"""The observer of the drive: reads its state by PDO or SDO, and sends our heartbeat."""
 
 import time
 from collections.abc import Callable
@@ -6,51 +6,40 @@ from typing import Final
 
 from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault
-from arcor2_hw.objects.polled import Polled, Snapshot
+from arcor2_hw.objects.state_observer import Snapshot, StateObserver
 
 from . import cia402, pdo
 from .cia402 import State
 from .link import EMCY, HEARTBEAT, OPERATIONAL, CanLink
 from .settings import ConveyorSettings
 
-QUIET_PERIOD: Final = 0.05
-"""s between readings while nobody waits."""
-BUSY_PERIOD: Final = 0.01
-"""s between readings while somebody waits for a change."""
-FRESH: Final = 0.5
-"""s: how old a state may be that is told."""
 PDO_MISSED: Final = 0.1
-"""s, beyond its period, after which a PDO that does not come is asked after by SDO."""
+"""Time beyond its period after which a missing PDO is replaced by reading by SDO, s."""
 
 
-class Observer(Polled[State]):
-    """Keeps the newest state. It writes nothing but our heartbeat, while `guarded`."""
+class Observer(StateObserver[State]):
+    """Keeps the newest state. It writes nothing but our heartbeat, while `guarded`.
 
-    def __init__(self, name: str, settings: ConveyorSettings, lost: Callable[[], None]) -> None:
+    lost: called with the reason when control ends.
+    """
+
+    period = 0.05
+    busy_period = 0.01
+
+    def __init__(self, name: str, settings: ConveyorSettings, lost: Callable[[str], None]) -> None:
         self._settings = settings
         self.link = CanLink(name, settings, self._hear)
-        super().__init__(
-            self.link.who,
-            self._open_drive,
-            self._read_state,
-            self.link.close,
-            quiet=QUIET_PERIOD,
-            busy=BUSY_PERIOD,
-            fresh=FRESH,
-            answers_within=6.0 * settings.sdo_timeout,
-            taken=self._note,
-            after=self.keep_alive,
-            lost=self._end_control,
-        )
+        self.answers_within = 6.0 * settings.sdo_timeout
+        super().__init__(self.link.who)
         self.guarded = False
-        """Whether the drive listens for our heartbeat."""
+        """Whether the drive monitors our heartbeat."""
         self.emergency = 0
-        """Code of the newest EMCY that was not taken back."""
+        """Code of the newest EMCY that was not cancelled."""
         self.emergency_since: Timestamp = now()
         self.consumer = 0
-        """1016h:01 as last read: node and ms of the heartbeat that the drive listens for."""
+        """Object 1016h:01 as last read: node and ms of the heartbeat that the drive monitors."""
         self.nmt: int | None = None
-        """NMT state of the drive by its heartbeat: 5 Operational, 127 Pre-operational, 4 Stopped; None: never heard."""
+        """NMT state of the drive by its heartbeat: 5 Operational, 127 Pre-operational, 4 Stopped; None: none came."""
         self.pdos = pdo.PdoState(settings.node_id)
         self._by_pdo = False
         self._drop_control = lost
@@ -59,16 +48,16 @@ class Observer(Polled[State]):
         self._opened = False
 
     def disconnect(self) -> None:
-        """Stop observing; harmless when it was not."""
+        """Stop observing; does nothing when stopped."""
         self.guarded = False
         super().disconnect()
 
     def heard(self, master: int, within: float) -> bool:
-        """Tell whether a heartbeat of node `master` came in the last `within` s; ours does not come back to us."""
+        """Return whether a heartbeat of node `master` came in the last `within` s; we do not receive our own."""
         return time.monotonic() - self._masters.get(master, -1e9) <= within
 
     def listen(self) -> None:
-        """Have the drive send its state by PDO, when the settings say so. Raises Refused when it cannot."""
+        """Make the drive send its state by PDO, when the settings say so. Raises Refused when it cannot."""
         if self._settings.pdo_period_ms:
             pdo.set_up(self.link, self._settings.node_id, self._settings.pdo_period_ms)
             self._by_pdo = True
@@ -94,19 +83,19 @@ class Observer(Polled[State]):
         try:
             return self.pdos.take(identifier, data)
         except ValueError as error:
-            self.link.lose(DeviceFault(f"{self.who} tells what no drive tells: {error}"))
+            self.link.lose(DeviceFault(f"{self.who} sent what no drive sends: {error}"))
             return None
 
     def _hear_nmt(self, state: int) -> None:
         before, self.nmt = self.nmt, state
         if self.guarded and before == OPERATIONAL[0] != state:
-            # Somebody else commands the node; what 6007h says has happened in the drive.
-            self.guarded = False
-            self._drop_control()
+            # Another host commands the node; the drive has reacted as 6007h says.
+            self._drop_control("another host has changed the NMT state of the drive")
             self.wake()
 
     # -------------------------------------------------------------------------------- on the observing thread
-    def _open_drive(self, timeout: float) -> Snapshot[State]:
+    def open(self, timeout: float) -> Snapshot[State]:
+        """Open the bus and see that a drive answers."""
         deadline = time.monotonic() + timeout
         self._opened = self._by_pdo = False
         self.nmt = None
@@ -114,13 +103,14 @@ class Observer(Polled[State]):
         left = deadline - time.monotonic()
         profile = self.link.read_first(cia402.DEVICE_TYPE, left, lambda: self.ending) & 0xFFFF
         if profile != cia402.PROFILE:
-            raise DeviceFault(f"{self.who} is no drive: it has the device profile {profile}, not {cia402.PROFILE}")
+            raise DeviceFault(f"{self.who} is not a drive: its device profile is {profile}, not {cia402.PROFILE}")
         self.link.read(cia402.VENDOR)  # drains what is late, see CanLink
         self.emergency = 0
         self._opened = True  # from now on a boot is a loss
         return Snapshot.by(self._ask)
 
-    def _read_state(self) -> State | None:
+    def read(self) -> State | None:
+        """Read the state by SDO; None while it comes by PDO."""
         if self.link.loss is not None:
             self.link.check()
         missed = PDO_MISSED + self._settings.pdo_period_ms / 1000.0
@@ -128,8 +118,12 @@ class Observer(Polled[State]):
             return None
         return self._ask()
 
-    def keep_alive(self) -> None:
-        """Send our heartbeat when it is due. Called only when the drive was just heard."""
+    def close(self) -> None:
+        """Close the bus."""
+        self.link.close()
+
+    def after_reading(self) -> None:
+        """Send our heartbeat when it is due: the drive has just answered."""
         clock = time.monotonic()
         if self.guarded and clock - self._beat >= self._settings.heartbeat_ms / 6000.0:
             self.link.heartbeat()
@@ -151,13 +145,14 @@ class Observer(Polled[State]):
         try:
             return State.of(*values)
         except ValueError as error:
-            raise DeviceFault(f"{self.who} tells what no drive tells: {error}") from error
+            raise DeviceFault(f"{self.who} sent what no drive sends: {error}") from error
 
-    def _note(self, snapshot: Snapshot[State]) -> None:
+    def on_state(self, snapshot: Snapshot[State]) -> None:
+        """Note when a fault appears."""
         code, before = snapshot.value.error_code, self.newest()
         if code and (before is None or before.error_code != code):
             self.emergency_since = now()
 
-    def _end_control(self, _: DeviceError) -> None:
-        self.guarded = False  # no heartbeat: the drive stops by itself
-        self._drop_control()
+    def on_lost(self, error: DeviceError) -> None:
+        """End control: without our heartbeat the drive stops by itself."""
+        self._drop_control("control ended when the connection was lost")

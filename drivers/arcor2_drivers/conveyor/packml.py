@@ -12,7 +12,7 @@ from typing import Final
 from arcor2_hw.exceptions import Refused
 from arcor2_hw.objects import MachineCommand, MachineState
 from arcor2_hw.objects.machine import ALLOWED
-from arcor2_hw.objects.polled import GoOn
+from arcor2_hw.objects.observing import GoOn
 
 from .cia402 import FAULTY, Mode, Power, State
 from .motion import Motion
@@ -51,7 +51,7 @@ class Unit:
         self.held = self.aborted = False
 
     def state(self, now: State) -> MachineState:
-        """Give the state that the drive is in."""
+        """Return the state that the drive is in."""
         if now.power in FAULTY:
             return S.ABORTED if now.power is Power.FAULT else S.ABORTING
         standing = self._motion.stands(now)
@@ -127,7 +127,7 @@ class Unit:
         self.forget()
 
     def reason(self, now: State) -> str:
-        """Tell why the belt is aborted, empty when it is not."""
+        """Return why the belt is aborted, empty when it is not."""
         if now.power in FAULTY:
             return str(self._motion.fault(now, "aborted"))
         return f"{self._who}: aborted by command" if self.aborted else ""

@@ -24,7 +24,7 @@ class Tpdo(NamedTuple):
     entries: tuple[Entry, ...]
 
     def unpack(self, data: bytes) -> tuple[int, ...] | None:
-        """Give the values, None for a frame of another length."""
+        """Return the values, None for a frame of another length."""
         form = "<" + "".join(entry.form[1:] for entry in self.entries)
         return struct.unpack(form, data) if len(data) == struct.calcsize(form) else None
 

@@ -64,7 +64,7 @@ class SocketcandBus(can.BusABC):
         return True
 
     def _next(self) -> str | None:
-        """Give the next whole message, from < to >. Raises ValueError for what is none."""
+        """Return the next whole message, from < to >. Raises ValueError for what is none."""
         end = self._came.find(b">")
         if end < 0:
             if len(self._came) > LONGEST:
@@ -104,12 +104,12 @@ class SocketcandBus(can.BusABC):
         self._socket.shutdown(socket.SHUT_RDWR)
 
     def shutdown(self) -> None:
-        """Close; harmless when closed."""
+        """Close; does nothing when closed."""
         super().shutdown()
         self._socket.close()
 
     def fileno(self) -> int:
-        """Give the socket's descriptor."""
+        """Return the socket's descriptor."""
         return self._socket.fileno()
 
     def _apply_filters(self, filters: Any) -> None:

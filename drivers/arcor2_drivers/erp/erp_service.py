@@ -31,12 +31,12 @@ from .service import Access, Service, ToldNext
 from .settings import ErpSettings
 
 STATUS_PERIOD: Final = 1.0
-"""s between looks at the service."""
+"""Time between looks at the service, s."""
 ENDS_WITHIN: Final = 0.05
 """s disconnect waits for the sender; a request under way may take longer, and ends by itself."""
 LONGEST_WAIT: Final = 3600.0
 MARGIN: Final = 65.0
-"""s beyond it: two requests."""
+"""Time beyond it, s: two requests."""
 LONGEST_TEXT: Final = 200
 LARGEST_QUANTITY: Final = 1_000_000
 WAITING, REFUSED, LOCKED_OUT = "results_wait", "results_refused", "not_let_in"
@@ -99,7 +99,7 @@ class ErpService(Generic):
         self._sender.start()
 
     def disconnect(self) -> None:
-        """Stop delivering and close; harmless when closed. What waits is kept on disk for the next time."""
+        """Stop delivering and close; does nothing when closed. What waits is kept on disk for the next time."""
         with self._life:
             self.stop()
             sender, self._sender = self._sender, None
@@ -114,12 +114,12 @@ class ErpService(Generic):
 
     @property
     def connection(self) -> Connection:
-        """Tell how the connection is."""
+        """Return the state of the connection."""
         return self.observing.state
 
     @property
     def health(self) -> Health:
-        """Give failure while the service does not answer, check_function while an alarm stands."""
+        """Return failure while the service does not answer, check_function while an alarm stands."""
         if self.connection in (Connection.LOST, Connection.FAILED):
             return Health.FAILURE
         return Health.CHECK_FUNCTION if self.alarms() else Health.NORMAL
@@ -131,7 +131,7 @@ class ErpService(Generic):
         return Identity("", status.service, "", status.version)
 
     def alarms(self) -> list[Alarm]:
-        """Give what a person should deal with: results that wait too long or were refused, a token not taken."""
+        """Return what a person should deal with: results that wait too long or were refused, a token not taken."""
         sender = self._sender
         if sender is None:
             return []
@@ -163,14 +163,14 @@ class ErpService(Generic):
 
     # -------------------------------------------------------------------------------- the outbox
     def outbox(self) -> Reading[OutboxState]:
-        """Tell how many results wait, since when, what the last failure was, and how many were refused."""
+        """Return how many results wait, since when, what the last failure was, and how many were refused."""
         sender = self._sender
         if sender is None:
             raise NotConnected(f"{self._who} is not connected")
         return Reading.of(self._outbox.state(sender.last_error))
 
     def refused(self) -> list[Aside]:
-        """Give the results that the service refused, with its reasons."""
+        """Return the results that the service refused, with its reasons."""
         return self._outbox.aside()
 
     def stop(self) -> None:
@@ -183,7 +183,7 @@ class ErpService(Generic):
     # -------------------------------------------------------------------------------- actions
     @action(deadline=LONGEST_WAIT + MARGIN)
     def next_order(self, wait: float = 0.0, *, an: str | None = None) -> tuple[bool, str, str, int, int]:
-        """Give the order to work at: whether there is one, its id, product, quantity, and pieces still to be reported.
+        """Return the order to work on: whether there is one, its id, product, quantity, and pieces to be reported.
 
         It stays the same order, with the service down too, until a result was reported for each piece or it was closed.
         Then the next one is asked for. An order is never taken twice, nor lost when its answer was.
@@ -250,7 +250,7 @@ class ErpService(Generic):
 
     @action
     def results_waiting(self, *, an: str | None = None) -> int:
-        """Tell how many results the service does not have yet."""
+        """Return how many results the service does not have yet."""
         return self.outbox().value.waiting
 
     @action(deadline=LONGEST_WAIT + MARGIN)
@@ -305,7 +305,7 @@ class ErpService(Generic):
             sender.wake()
 
     def _connected(self) -> Service:
-        """Give the callers' connection; the service itself may be down. Raises NotConnected."""
+        """Return the callers' connection; the service itself may be down. Raises NotConnected."""
         service = self._caller
         if service is None:
             raise NotConnected(f"{self._who} is not connected")

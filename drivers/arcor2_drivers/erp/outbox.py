@@ -29,7 +29,7 @@ PRAGMA user_version = 1;
 """
 _VERSION: Final = 1
 LOOK_AGAIN: Final = 0.02
-"""s between looks whether the file is free."""
+"""Time between looks whether the file is free, s."""
 
 
 class Message(NamedTuple):
@@ -71,7 +71,7 @@ class Aside(NamedTuple):
 
 
 def file_of(directory: str, station: str, url: str) -> Path:
-    """Give the outbox's file: one per station and service, so that no result goes to another service."""
+    """Return the outbox's file: one per station and service, so that no result goes to another service."""
     if directory:
         folder = Path(directory).expanduser()
     else:
@@ -134,7 +134,7 @@ class Outbox:
                 return
 
     def close(self) -> None:
-        """Close; harmless when closed. What waits stays on disk."""
+        """Close; does nothing when closed. What waits stays on disk."""
         with self._one:
             self._close()
 
@@ -197,7 +197,7 @@ class Outbox:
         return key
 
     def heads(self) -> list[Message]:
-        """Give the first waiting message of each order, the oldest first."""
+        """Return the first waiting message of each order, the oldest first."""
         with self._reading() as database:
             rows = database.execute(
                 "SELECT number, key, order_id, path, body FROM message WHERE number IN "
@@ -229,7 +229,7 @@ class Outbox:
             return database.execute("UPDATE message SET state = 'noted' WHERE state = 'refused'").rowcount
 
     def aside(self) -> list[Aside]:
-        """Give what was refused."""
+        """Return what was refused."""
         with self._reading() as database:
             rows = database.execute(
                 "SELECT key, order_id, body, since, why FROM message WHERE state = 'refused' ORDER BY number"
@@ -237,7 +237,7 @@ class Outbox:
         return [Aside(key, order, body.decode(), since, why) for key, order, body, since, why in rows]
 
     def state(self, last_error: str) -> OutboxState:
-        """Give how many wait, and since when."""
+        """Return how many wait, and since when."""
         with self._reading() as database:
             waiting, since = database.execute(
                 "SELECT count(*), min(stored) FROM message WHERE state = 'waiting'"
@@ -247,7 +247,7 @@ class Outbox:
 
     # -------------------------------------------------------------------------------- orders
     def order(self) -> Order | None:
-        """Give the oldest order that is not all reported."""
+        """Return the oldest order that is not all reported."""
         with self._reading() as database:
             row = database.execute(
                 "SELECT id, product, quantity, reported FROM open_order ORDER BY taken, rowid LIMIT 1"
@@ -255,7 +255,7 @@ class Outbox:
         return None if row is None else Order(*row)
 
     def asking(self) -> str:
-        """Give the key to ask for an order with: the same until it was answered."""
+        """Return the key to ask for an order with: the same until it was answered."""
         with self._writing() as database:
             row = database.execute("SELECT key FROM asking").fetchone()
             key: str = uuid.uuid4().hex if row is None else row[0]

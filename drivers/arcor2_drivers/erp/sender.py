@@ -11,7 +11,7 @@ from .outbox import Message, Outbox
 from .service import RETRIED, Answer, Receipt, Service
 
 FIRST_PAUSE: Final = 0.2
-"""s after the first failure; doubled after each further one."""
+"""Time after the first failure, s; doubled after each further one."""
 BUSY: Final = (*RETRIED, 502, 503, 504)
 """Statuses that speak of the service as a whole, not of one message."""
 DOORS: Final = (401, 403, 407)

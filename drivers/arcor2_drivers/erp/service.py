@@ -19,7 +19,7 @@ from .settings import ErpSettings
 LONGEST_ANSWER: Final = 1 << 20
 LONGEST_TOKEN: Final = 8192
 IDLE: Final = 4.0
-"""s an idle connection is used again: many services close one after five."""
+"""Time an idle connection is used again, s: many services close one after five."""
 
 
 class Answer(NamedTuple):
@@ -31,12 +31,12 @@ class Answer(NamedTuple):
 
     @property
     def done(self) -> bool:
-        """Tell whether the service did what was asked."""
+        """Return whether the service did what was asked."""
         return self.status in (200, 201)
 
     @property
     def told(self) -> str:
-        """Give what a service says beside its status."""
+        """Return what a service says beside its status."""
         try:
             return f"{self.status}: {msgspec.json.decode(self.body, type=_Error).error[:200]}"
         except (msgspec.MsgspecError, UnicodeDecodeError):

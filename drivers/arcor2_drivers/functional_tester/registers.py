@@ -1,4 +1,4 @@
-"""The register map (docs/devices/functional-tester.md) as data: what words and bits mean. Pure functions."""
+"""The register map (docs/devices/functional-tester.md) as data. Pure functions."""
 
 import enum
 import struct
@@ -33,7 +33,7 @@ STATES: Final = frozenset(S) - {S.SUSPENDED, S.SUSPENDING, S.UNSUSPENDING}
 RUNNING: Final = frozenset({S.STARTING, S.EXECUTE, S.COMPLETING, S.HOLDING, S.HELD, S.UNHOLDING})
 DOOR_MAY_MOVE: Final = frozenset({S.STOPPED, S.IDLE, S.COMPLETE, S.ABORTED})
 PASSING: Final = frozenset({S.RESETTING, S.CLEARING, S.STOPPING, S.ABORTING})
-"""Short states in which no test runs, and which end by themselves."""
+"""Short states without a test that end by themselves."""
 FALLEN: Final = frozenset({S.ABORTING, S.ABORTED})
 COMMANDS: Final = frozenset(
     {
@@ -54,11 +54,11 @@ REFUSALS: Final = {
     4: "there is no board in the fixture",
     5: "the tester does not know this test program",
 }
-"""command_result, but 0: accepted."""
+"""Values of command_result other than 0 (accepted)."""
 
 
 class Fault(NamedTuple):
-    """What a fault code means, what a person does about it, and how the tester is meanwhile."""
+    """The meaning of a fault code, its remedy, and the condition of the tester meanwhile."""
 
     text: str
     remedy: str
@@ -82,13 +82,13 @@ EMERGENCY_STOP: Final = 106
 
 
 def fault_of(code: int) -> Fault:
-    """Give what a fault code means; one that the map does not have is a failure."""
-    unknown = Fault(f"fault {code}, which is not described", "read the tester's manual, clear", health=Health.FAILURE)
+    """Return the meaning of a fault code; an unknown one counts as a failure."""
+    unknown = Fault(f"unknown fault {code}", "read the tester's manual, clear", health=Health.FAILURE)
     return FAULTS.get(code, unknown)
 
 
 class Inputs(NamedTuple):
-    """All that can be read, at one instant; V, A, Ω."""
+    """All values that can be read, of one instant; V, A, Ω."""
 
     state: MachineState
     command_acknowledged: int
@@ -112,7 +112,7 @@ class Inputs(NamedTuple):
 
 
 def decode(words: Sequence[int], bits: Sequence[bool]) -> Inputs:
-    """Read the input registers and the discrete inputs. Raises ValueError for what the map does not have."""
+    """Decode the input registers and the discrete inputs. Raises ValueError for values outside the map."""
     if len(words) != INPUT_COUNT or len(bits) < DISCRETE_COUNT:
         raise ValueError(f"{len(words)} registers and {len(bits)} inputs instead of {INPUT_COUNT} and {DISCRETE_COUNT}")
     if words[0] not in STATES:
@@ -146,5 +146,5 @@ def decode(words: Sequence[int], bits: Sequence[bool]) -> Inputs:
 
 
 def title(state: MachineState) -> str:
-    """Give a state's name as PackML writes it."""
+    """Return the name of a state as PackML writes it."""
     return state.name.capitalize()

@@ -16,7 +16,7 @@ class BadCalibration(Exception):
 
 
 def parameters(handler: "dai.CalibrationHandler", width: int, height: int, undistorted: bool) -> CameraParameters:
-    """Give the colour camera's parameters for pictures of a size. Raises BadCalibration.
+    """Return the colour camera's parameters for pictures of a size. Raises BadCalibration.
 
     undistorted: the pictures have been freed from distortion, by the device.
     """

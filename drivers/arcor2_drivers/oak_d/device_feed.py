@@ -131,7 +131,7 @@ class DeviceFeed:
         return shot
 
     def temperature(self) -> float | None:
-        """Give the mean temperature of the chip, deg C. Raises ConnectionLost."""
+        """Return the mean temperature of the chip, deg C. Raises ConnectionLost."""
         try:
             return float(self._device.getChipTemperature().average)
         except RuntimeError as e:
@@ -150,7 +150,7 @@ class DeviceFeed:
             raise Refused(f"{self.who} does not take the exposure", str(e)) from e
 
     def close(self) -> None:
-        """Close; harmless when closed."""
+        """Close; does nothing when closed."""
         pipeline, self._pipeline = self._pipeline, None
         if pipeline is not None:
             pipeline.close()

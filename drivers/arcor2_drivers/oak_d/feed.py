@@ -30,22 +30,22 @@ class Shot(NamedTuple):
 
     @property
     def number(self) -> int:
-        """Give the number that the source gave it."""
+        """Return the number that the source gave it."""
         return int(self.color.getSequenceNum())
 
     @property
     def exposure(self) -> float | None:
-        """Give the exposure, s; None when the source does not tell."""
+        """Return the exposure, s; None when the source does not tell."""
         seconds = self.color.getExposureTime().total_seconds()
         return seconds if seconds > 0.0 else None
 
     def depth_mm(self) -> npt.NDArray[np.uint16]:
-        """Give the depth: height × width, mm; of the message's own memory."""
+        """Return the depth: height × width, mm; of the message's own memory."""
         data = np.asarray(self.depth.getData())
         return data.view("<u2").reshape(self.depth.getHeight(), self.depth.getWidth())
 
     def color_rgb(self) -> npt.NDArray[np.uint8]:
-        """Give the colour as a copy: height × width × 3, R, G, B."""
+        """Return the colour as a copy: height × width × 3, R, G, B."""
         data = np.asarray(self.color.getData())
         if self.color.getType() == JPEG:
             import io
@@ -70,13 +70,13 @@ class Feed(Protocol):
         """Wait for the next picture; None when none came. Raises what the source was lost by."""
 
     def temperature(self) -> float | None:
-        """Give the temperature of the chip, deg C; None when it is not told."""
+        """Return the temperature of the chip, deg C; None when it is not told."""
 
     def set_exposure(self, exposure: float | None, timeout: float) -> None:
         """Set the exposure, s, None for automatic. Raises Refused, DeviceTimeout, ConnectionLost."""
 
     def close(self) -> None:
-        """Close; harmless when closed."""
+        """Close; does nothing when closed."""
 
 
 class Pipeline:

@@ -31,7 +31,7 @@ from .stream import (
 
 SEND_TIMEOUT: Final = 0.5
 CLOCK_PERIOD: Final = 0.5
-"""s between questions for the source's clock."""
+"""Time between questions for the source's clock, s."""
 CLOCKS: Final = 20
 """Answers of which the promptest counts: 10 s, in which two quartz clocks drift apart by a millisecond at most."""
 
@@ -90,7 +90,7 @@ class NetworkSource:
         self._ask_clock()
 
     def close(self) -> None:
-        """Close; harmless when closed. Whoever waits in it wakes."""
+        """Close; does nothing when closed. Whoever waits in it wakes."""
         link, self._socket = self._socket, None
         if link is not None:
             with contextlib.suppress(OSError):

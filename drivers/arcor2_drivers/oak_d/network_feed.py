@@ -17,7 +17,7 @@ from .settings import OakDSettings
 from .stream import Status
 
 LOOK: Final = 0.1
-"""s after which somebody who waits for a picture looks whether the source has failed."""
+"""Time after which somebody who waits for a picture looks whether the source has failed, s."""
 
 
 class _Network(dai.node.ThreadedHostNode):
@@ -116,7 +116,7 @@ class NetworkFeed:
         return None
 
     def temperature(self) -> float | None:
-        """Give the temperature that the source told last, deg C."""
+        """Return the temperature that the source told last, deg C."""
         return None if self._told is None else self._told.temperature
 
     def set_exposure(self, exposure: float | None, timeout: float) -> None:
@@ -124,7 +124,7 @@ class NetworkFeed:
         self._source.set_exposure(exposure, timeout)
 
     def close(self) -> None:
-        """Close; harmless when closed."""
+        """Close; does nothing when closed."""
         self._source.close()
         pipeline, self._pipeline = self._pipeline, None
         if pipeline is not None:

@@ -67,58 +67,58 @@ class OakD(Camera):
         self.color_camera_params = self._observed.feed.parameters
 
     def disconnect(self) -> None:
-        """Stop taking pictures; harmless when it was not."""
+        """Stop taking pictures; does nothing when stopped."""
         self._observed.disconnect()
         self.color_camera_params = None
 
     @property
     def connection(self) -> Connection:
-        """Tell how the connection is."""
+        """Return the state of the connection."""
         return self._observed.observing.state
 
     @property
     def health(self) -> Health:
-        """Give failure when it is lost or repeats an old picture, off_spec when it is too hot."""
+        """Return failure when it is lost or repeats an old picture, off_spec when it is too hot."""
         return self._observed.health()
 
     def alarms(self) -> list[Alarm]:
-        """Give what a person should deal with: hot, frozen; each ends with its cause."""
+        """Return what a person should deal with: hot, frozen; each ends with its cause."""
         return self._observed.alarms()
 
     def identify(self) -> Identity:
-        """Give who the camera said it is."""
+        """Return who the camera said it is."""
         return self._observed.feed.identity
 
     @property
     def pictures_taken(self) -> int:
-        """Give how many pictures have come since the object was made."""
+        """Return how many pictures have come since the object was made."""
         return self._observed.taken
 
     @property
     def latency(self) -> float:
-        """Give how old the newest picture was when it came, s. Raises NotConnected, ConnectionLost."""
+        """Return how old the newest picture was when it came, s. Raises NotConnected, ConnectionLost."""
         return self._observed.latency
 
     # -------------------------------------------------------------------------------- camera
     def capture(self) -> Frame:
-        """Give the newest colour and depth. Raises Stale when they are older than `max_age` of the settings."""
+        """Return the newest colour and depth. Raises Stale when they are older than `max_age` of the settings."""
         return self._frame(self._observed.newest(self._given.max_age))
 
     def trigger(self) -> Frame:
-        """Give colour and depth whose exposure began after this call. Raises Stale when none come in time."""
+        """Return colour and depth whose exposure began after this call. Raises Stale when none come in time."""
         return self._frame(self._after_now())
 
     def distortion_model(self) -> str:
-        """Give the model of the lens that the parameters are of: none, or OpenCV's by its number of coefficients."""
+        """Return the model of the lens that the parameters are of: none, or OpenCV's by its number of coefficients."""
         coefficients = self._parameters().dist_coefs
         return f"opencv {len(coefficients)}" if any(coefficients) else "none"
 
     def depth_range(self) -> tuple[float, float]:
-        """Give the nearest and the farthest depth that is measured, m."""
+        """Return the nearest and the farthest depth that is measured, m."""
         return self._observed.feed.depth_range
 
     def modes(self) -> list[Mode]:
-        """Give the sizes that the settings can ask for; for a network source what it sends."""
+        """Return the sizes that the settings can ask for; for a network source what it sends."""
         if self._given.network is not None:
             return [Mode(*self._observed.feed.size, self._given.fps)]
         sizes = [size_of(each) for each in Resolution]
@@ -200,7 +200,7 @@ class OakD(Camera):
         return Frame(shot.color_rgb(), depth if depth.any() else None, self._note(shot), shot.monotonic, shot.exposure)
 
     def _averaged(self, shot: "Shot", count: int) -> "tuple[npt.NDArray[np.uint16], Shot]":
-        """Give the mean of `count` frames, of each pixel where it was valid, and the last of them."""
+        """Return the mean of `count` frames, of each pixel where it was valid, and the last of them."""
         import numpy as np
 
         first = shot.depth_mm()

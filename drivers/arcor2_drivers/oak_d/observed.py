@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 WAIT: Final = 0.1
 LOOK_PERIOD: Final = 0.5
-"""s between looks at the temperature and at what a picture shows."""
+"""Time between looks at the temperature and at what a picture shows, s."""
 HOT: Final = 90.0
 """deg C; the chip switches itself off at 105 (from general knowledge of the Myriad X)."""
 EXPOSURE_TIMEOUT: Final = 1.0
@@ -41,7 +41,7 @@ class Observed:
         self._came = 0.0
         self._stops = 0
         self.taken = 0
-        """Pictures that have come since the object was made."""
+        """Number of images received since the object was made."""
         self._news = threading.Condition()
         self._alarms: dict[str, Alarm] = {}
         self._exposure: float | None = None
@@ -49,7 +49,7 @@ class Observed:
     # -------------------------------------------------------------------------------- asked by everybody
     @property
     def feed(self) -> "Feed":
-        """Give the feed. Raises NotConnected, ConnectionLost."""
+        """Return the feed. Raises NotConnected, ConnectionLost."""
         self.observing.check()
         feed = self._feed
         if feed is None:
@@ -57,7 +57,7 @@ class Observed:
         return feed
 
     def newest(self, max_age: float) -> "Shot":
-        """Give the newest picture. Raises Stale when it is older than `max_age` s, NotConnected, ConnectionLost."""
+        """Return the newest picture. Raises Stale when it is older than `max_age` s, NotConnected, ConnectionLost."""
         self.observing.check()
         return self._fresh(self._newest, max_age)
 
@@ -90,7 +90,7 @@ class Observed:
 
     @property
     def latency(self) -> float:
-        """Give how old the newest picture was when it came, s. Raises NotConnected, ConnectionLost."""
+        """Return how old the newest picture was when it came, s. Raises NotConnected, ConnectionLost."""
         self.observing.check()
         newest = self._newest
         return float("inf") if newest is None else self._came - newest.monotonic
@@ -107,11 +107,11 @@ class Observed:
         self._exposure = exposure
 
     def alarms(self) -> list[Alarm]:
-        """Give what a person should deal with; it ends with its cause."""
+        """Return what a person should deal with; it ends with its cause."""
         return list(self._alarms.values())
 
     def health(self) -> Health:
-        """Give the camera's condition."""
+        """Return the camera's condition."""
         if self.observing.state in (Connection.LOST, Connection.FAILED) or "frozen" in self._alarms:
             return Health.FAILURE
         return Health.OFF_SPEC if self._alarms else Health.NORMAL
@@ -124,7 +124,7 @@ class Observed:
         atexit.register(self.disconnect)
 
     def disconnect(self) -> None:
-        """Stop observing; harmless when it was not."""
+        """Stop observing; does nothing when stopped."""
         atexit.unregister(self.disconnect)
         self.observing.stop()
         self._newest = None

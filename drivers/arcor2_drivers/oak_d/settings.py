@@ -1,19 +1,20 @@
-"""Settings of an OAK-D, checked when they are given."""
+"""Settings of an OAK-D."""
 
 import dataclasses
 import math
 import re
-from typing import Final
+from typing import Annotated, Final
 
 from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
+from arcor2_hw.objects.settings import Range
 
 _NETWORK: Final = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:\[\]\s]+):(\d{1,5})")
 
 
 class Resolution(StrEnum):
-    """Size of the pictures, pixels; depth has that of the colour."""
+    """Size of colour and depth images, pixels."""
 
     HD = "1280x720"
     VGA = "640x480"
@@ -21,7 +22,7 @@ class Resolution(StrEnum):
 
 
 def size_of(resolution: Resolution) -> tuple[int, int]:
-    """Give width and height, pixels."""
+    """Return width and height, pixels."""
     width, height = resolution.value.split("x")
     return int(width), int(height)
 
@@ -35,41 +36,44 @@ class ColorCoding(StrEnum):
 
 @dataclasses.dataclass
 class OakDSettings(Settings):
-    """Which camera it is, and how it is used.
+    """Which camera to use, and how.
 
     :param address: device id (MXID) or IP of the camera, host:port of a network source, or empty for the only camera
-    :param resolution: size of the pictures; a network source sends what it has
-    :param fps: pictures a second, 1 to 60
-    :param max_age: seconds after which a picture is too old to be given
-    :param frame_timeout: seconds without a picture after which the camera counts as lost
+    :param resolution: size of the images; a network source determines its own
+    :param fps: images per second, 1 to 60
+    :param max_age: age from which on an image is too old, s
+    :param frame_timeout: seconds without an image after which the camera counts as lost
     :param color_coding: how a network source sends colour: bgr, or jpeg over a slow network
-    :param white_limit: part of the picture (0 to 1) that may be white before it counts as overexposed
+    :param white_limit: part of the image (0 to 1) that may be white before it counts as overexposed
     """
 
     address: str = ""
     resolution: Resolution = Resolution.HD
-    fps: float = 30.0
+    fps: Annotated[float, Range(1.0, 60.0)] = 30.0
     max_age: float = 0.5
     frame_timeout: float = 1.0
     color_coding: ColorCoding = ColorCoding.RAW
     white_limit: float = 0.5
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.address = self.address.strip()
         if ":" in self.address and self.network is None:
             raise OutOfRange(f"address must be a device id, an IP address or host:port, not {self.address!r}")
-        if not 1.0 <= self.fps <= 60.0:
-            raise OutOfRange(f"fps must be 1 to 60, not {self.fps!r}")
         if not (math.isfinite(self.max_age) and 1.0 / self.fps < self.max_age <= 10.0):
-            raise OutOfRange(f"max_age must be more than one picture ({1.0 / self.fps:.3f} s) and at most 10 s")
+            raise OutOfRange(
+                f"max_age must be more than one image ({1.0 / self.fps:.3f} s) and at most 10 s"
+            )
         if not (math.isfinite(self.frame_timeout) and 2.0 / self.fps < self.frame_timeout <= 10.0):
-            raise OutOfRange(f"frame_timeout must be more than two pictures ({2.0 / self.fps:.3f} s) and at most 10 s")
+            raise OutOfRange(
+                f"frame_timeout must be more than two images ({2.0 / self.fps:.3f} s) and at most 10 s"
+            )
         if not 0.0 < self.white_limit <= 1.0:
             raise OutOfRange(f"white_limit must be within 0 and 1, not {self.white_limit!r}")
 
     @property
     def network(self) -> tuple[str, int] | None:
-        """Give host and port of a network source, None for a camera."""
+        """Return host and port of a network source, None for a camera."""
         found = _NETWORK.fullmatch(self.address)
         if found is None or not 0 < int(found[2]) < 65536:
             return None
@@ -77,5 +81,5 @@ class OakDSettings(Settings):
 
     @property
     def size(self) -> tuple[int, int]:
-        """Give width and height, pixels."""
+        """Return width and height, pixels."""
         return size_of(self.resolution)

@@ -127,7 +127,7 @@ def read(header: bytes | bytearray, kind: type[H]) -> H:
 
 
 def message(kind: Kind, header: dict[str, object]) -> bytes:
-    """Give a message to the source; none has a payload."""
+    """Return a message to the source; none has a payload."""
     text = msgspec.json.encode(header)
     start = _CHECKED.pack(MAGIC, VERSION, kind, len(text), 0)
     return b"".join((start, struct.pack(">I", zlib.crc32(text, zlib.crc32(start))), text))

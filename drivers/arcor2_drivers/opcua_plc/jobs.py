@@ -21,11 +21,11 @@ from .plc import Hand, Plc
 from .values import INTEGERS
 
 LOOK: Final = 0.02
-"""s between looks at the handshake."""
+"""Time between looks at the handshake, s."""
 BEGINS_WITHIN: Final = 2.0
 """s the PLC has to answer a request by busy, done or error, and to be idle again when the request is taken back."""
 STOPS_WITHIN: Final = 5.0
-"""s a job may take to stop."""
+"""Time a job may take to stop, s."""
 
 
 class Jobs:

@@ -21,16 +21,16 @@ from .settings import OpcUaPlcSettings, Security
 T = TypeVar("T")
 
 PUBLISHING: Final = 50.0
-"""ms between two messages of the subscription."""
+"""Time between two messages of the subscription, ms."""
 SAMPLING: Final = 20.0
-"""ms between two looks of the server at a value."""
+"""Time between two looks of the server at a value, ms."""
 KEEP_ALIVE: Final = 10
 """Publishing intervals after which a subscription without news says so."""
 LIFETIME: Final = 200
 QUEUE: Final = 32
 """Changes of one value that the server keeps between two messages."""
 SESSION: Final = 30_000
-"""ms a server keeps a session of which it hears nothing."""
+"""Time a server keeps a session of which it hears nothing, ms."""
 LAST_WORD: Final = 0.3
 """s the server has to take note that we leave."""
 JOIN: Final = 1.0
@@ -48,7 +48,7 @@ Changed = Callable[[str, ua.DataValue], None]
 
 
 def status_name(value: ua.DataValue) -> str:
-    """Give the name of a value's status."""
+    """Return the name of a value's status."""
     return "Good" if value.StatusCode is None else str(value.StatusCode.name)
 
 
@@ -201,7 +201,7 @@ class Link:
 
     @property
     def broken(self) -> str | None:
-        """Tell why the subscription brings nothing any more; None when it does."""
+        """Return why the subscription brings nothing any more; None when it does."""
         subscription = self._subscription
         if subscription is not None and subscription.is_stale(3.0):
             return "the subscription has fallen silent"
@@ -285,7 +285,7 @@ class Link:
 
 
 def _properties(file: str) -> uacrypto.CertProperties:
-    """Give a file to asyncua, which else takes it for PEM by its name alone."""
+    """Return a file to asyncua, which else takes it for PEM by its name alone."""
     content = Path(file).read_bytes()
     return uacrypto.CertProperties(content, extension="pem" if b"-----BEGIN" in content else "der")
 

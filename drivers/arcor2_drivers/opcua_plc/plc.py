@@ -35,7 +35,7 @@ LONGEST_MEMORY: Final = 1000
 """News of the subscription that are kept for those who wait."""
 IDLE_WITHIN: Final = 1.0
 LEAVING: Final = 0.3
-"""s for giving control back when the connection is closed."""
+"""Time for giving control back when the connection is closed, s."""
 
 
 class Hand(NamedTuple):
@@ -77,7 +77,7 @@ class Plc:
 
     # -------------------------------------------------------------------------------- life
     def disconnect(self) -> None:
-        """Give control back, so that a job stops, and close; harmless when closed."""
+        """Give control back, so that a job stops, and close; does nothing when closed."""
         link = self._link
         if self.in_control and link is not None and self.observing.online:
             self._drop("nobody has control")
@@ -95,7 +95,7 @@ class Plc:
 
     @property
     def link(self) -> Link:
-        """Give the connection. Raises NotConnected, or ConnectionLost with what it was lost by."""
+        """Return the connection. Raises NotConnected, or ConnectionLost with what it was lost by."""
         self.observing.check()
         link = self._link
         if link is None:
@@ -109,7 +109,7 @@ class Plc:
 
     @property
     def losses(self) -> int:
-        """Give how often the connection was lost."""
+        """Return how often the connection was lost."""
         return self._losses
 
     # -------------------------------------------------------------------------------- control
@@ -149,7 +149,7 @@ class Plc:
             self.observing.settled()
 
     def _await_idle(self) -> None:
-        """Give the PLC the time to see that the request of a former host has fallen."""
+        """Return the PLC the time to see that the request of a former host has fallen."""
         deadline = time.monotonic() + IDLE_WITHIN
         while time.monotonic() < deadline:
             hand = self.hand()
@@ -165,7 +165,7 @@ class Plc:
                 self.link.write(self._leaving())
 
     def control_owner(self) -> str | None:
-        """Tell who has control as it was last seen: us, another by its number, or nobody."""
+        """Return who has control as it was last seen: us, another by its number, or nobody."""
         if self.in_control:
             return "us"
         return self._named(self._owner) if self._owner and self.observing.online else None
@@ -208,7 +208,7 @@ class Plc:
 
     # -------------------------------------------------------------------------------- points
     def point(self, name: str) -> Point:
-        """Give the point of this name. Raises OutOfRange."""
+        """Return the point of this name. Raises OutOfRange."""
         point = self.points.get(name)
         if point is None:
             raise OutOfRange(f"{self.who} has no point {name!r}; there are {', '.join(self.points)}")
@@ -240,7 +240,7 @@ class Plc:
         self.link.write({name: self.variant(name, given)})
 
     def variant(self, name: str, value: bool | float) -> ua.Variant:
-        """Give a value in the type of a node."""
+        """Return a value in the type of a node."""
         kind = self._types[name]
         if kind is ua.VariantType.Boolean:
             return ua.Variant(bool(value), kind)
@@ -351,7 +351,7 @@ class Plc:
             self.edges.take(name, bool(value.Value.Value), stamp(value), time.monotonic())
 
     def told(self) -> dict[str, Any]:
-        """Give the statuses the subscription told last, by name."""
+        """Return the statuses the subscription told last, by name."""
         with self._news:
             return dict(self._newest)
 

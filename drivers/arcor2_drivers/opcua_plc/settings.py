@@ -1,18 +1,17 @@
-"""Settings of a PLC over OPC UA, checked when they are given."""
+"""Settings of a PLC over OPC UA."""
 
 import dataclasses
-import math
-from typing import Final
+from typing import Annotated, Final
 
 from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
-from arcor2_hw.objects.settings import check_url, device_file, secret_file
+from arcor2_hw.objects.settings import Range, check_url, device_file, secret_file, within
 
 from .points import parse_handshake, parse_points
 
 LONGEST_PATIENCE: Final = 2.0
-"""s: what the type declares as its reaction to a loss holds up to here."""
+"""Longest plc_patience, s; the type declares it as its reaction to a loss."""
 
 
 class Security(StrEnum):
@@ -27,24 +26,18 @@ class Security(StrEnum):
     AES256_SHA256_ENCRYPT = "aes256_sha256_encrypt"
 
 
-def within(name: str, value: float, low: float, high: float) -> None:
-    """Raise OutOfRange, naming the parameter, unless the value lies in the range."""
-    if not (math.isfinite(value) and low <= value <= high):
-        raise OutOfRange(f"{name} must be {low:g} to {high:g}, not {value!r}")
-
-
 @dataclasses.dataclass
 class OpcUaPlcSettings(Settings):
     """Where the PLC is, and what its nodes mean.
 
     :param url: address of the OPC UA server, as opc.tcp://host:4840
-    :param points: name=kind node and options, parted by |: "part=DI ns=2;s=Cell.Part | lamp=DO ns=2;s=Cell.Lamp
+    :param points: name=kind node and options, separated by |: "part=DI ns=2;s=Cell.Part | lamp=DO ns=2;s=Cell.Lamp
         on_loss=off | level=AI ns=2;i=7 scale=0.001 unit=m"; on_loss says what the PLC's program does with it
     :param handshake: nodes of the handshake: "owner=ns=2;s=H.Owner | host_life=... | plc_life=... | number=... |
         request=... | busy=... | done=... | error=... | code=..."; empty for a PLC without
-    :param host_number: our number in owner; each program that may have control takes another
-    :param plc_patience: seconds after which the PLC's program takes us for gone when our life sign stands still
-    :param life_timeout: seconds after which we take the PLC's program for stopped when its life sign stands still
+    :param host_number: our number in owner; each program that may have control uses another
+    :param plc_patience: seconds without a change of our life sign after which the PLC's program considers us gone
+    :param life_timeout: seconds without a change of its life sign after which the PLC's program counts as stopped
     :param request_timeout: seconds the server has to answer one request
     :param user: name of the user; empty for anonymous
     :param password_file: file with the user's password
@@ -57,9 +50,9 @@ class OpcUaPlcSettings(Settings):
     url: str
     points: str
     handshake: str = ""
-    host_number: int = 1
-    plc_patience: float = 1.0
-    life_timeout: float = 1.0
+    host_number: Annotated[int, Range(1, 65535)] = 1
+    plc_patience: Annotated[float, Range(0.3, LONGEST_PATIENCE, "s")] = 1.0
+    life_timeout: Annotated[float, Range(0.3, 10.0, "s")] = 1.0
     request_timeout: float = 0.5
     user: str = ""
     password_file: str = ""
@@ -69,13 +62,11 @@ class OpcUaPlcSettings(Settings):
     server_certificate: str = ""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         host = check_url("url", self.url, "opc.tcp").hostname
         parse_points(self.points)
         parse_handshake(self.handshake)
-        within("host_number", self.host_number, 1, 65535)
-        within("plc_patience", self.plc_patience, 0.3, LONGEST_PATIENCE)
-        within("life_timeout", self.life_timeout, 0.3, 10.0)
-        # A request that is late by all its time must not let our own life sign stand still.
+        # A request that takes its whole time must not stop our own life sign.
         within("request_timeout", self.request_timeout, 0.1, min(2.0, self.plc_patience))
         if bool(self.user) != bool(self.password_file):
             raise OutOfRange("password_file must be given with user, and only with it")

@@ -24,7 +24,7 @@ FLOATS: Final = {_T.Float: 3.4028234663852886e38, _T.Double: math.inf}
 
 
 def type_of(value: ua.DataValue, data_type: ua.DataValue) -> ua.VariantType | None:
-    """Give a variable's type from its value or, when that has none, from its DataType attribute; None when unknown."""
+    """Return the type of a variable from its value, else from its DataType attribute; None when unknown."""
     if value.Value is not None and value.Value.VariantType is not _T.Null:
         return None if value.Value.is_array else value.Value.VariantType
     node = None if data_type.Value is None else data_type.Value.Value
@@ -37,18 +37,18 @@ def type_of(value: ua.DataValue, data_type: ua.DataValue) -> ua.VariantType | No
 
 
 def fits(kind: ua.VariantType | None, digital: bool) -> bool:
-    """Tell whether a variable of this type may be a point."""
+    """Return whether a variable of this type may be a point."""
     return kind is _T.Boolean if digital else kind in INTEGERS or kind in FLOATS
 
 
 def quality(value: ua.DataValue) -> Quality:
-    """Give the quality of a value: the two upper bits of its status (OPC 10000-4, 7.39)."""
+    """Return the quality of a value: the two upper bits of its status (OPC 10000-4, 7.39)."""
     severity = 0 if value.StatusCode is None else int(value.StatusCode.value) >> 30
     return (Quality.GOOD, Quality.UNCERTAIN, Quality.BAD, Quality.BAD)[severity]
 
 
 def stamp(value: ua.DataValue) -> Timestamp:
-    """Give when the source had the value; the server's time, or ours, where the source's is missing."""
+    """Return when the source had the value; the server's time, or ours, where the source's is missing."""
     time: Any = value.SourceTimestamp or value.ServerTimestamp
     if time is None:
         return now()
@@ -56,7 +56,7 @@ def stamp(value: ua.DataValue) -> Timestamp:
 
 
 def raw(value: float, scale: float, kind: ua.VariantType) -> int | float:
-    """Give what is written for a physical value. Raises ValueError with the range."""
+    """Return what is written for a physical value. Raises ValueError with the range."""
     if kind in INTEGERS:
         low, high = INTEGERS[kind]
         number = value / scale

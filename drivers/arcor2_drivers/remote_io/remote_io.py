@@ -29,7 +29,7 @@ class RemoteIO(PointActions, Block, IOBlock):
         self.use_block(settings, parse_points(settings.points))
         self.io_points = {name: point.io for name, point in self.block_points.items()}
 
-    def address_of(self, name: str) -> str:
+    def point_label(self, name: str) -> str:
         """Return the terminal of a point."""
         return self.block_points[name].address
 
@@ -53,7 +53,7 @@ class RemoteIO(PointActions, Block, IOBlock):
 
     def bad_reading(self, name: str) -> DeviceFault:
         """Return the error for an input with a broken wire."""
-        text = f"{self.who}: {name} ({self.address_of(name)}) has a broken wire"
+        text = f"{self.who}: {name} ({self.point_label(name)}) has a broken wire"
         return DeviceFault(text, fault_code="broken_wire")
 
     def write(self, name: str, value: bool | float) -> None:
@@ -72,7 +72,7 @@ class RemoteIO(PointActions, Block, IOBlock):
     def require_output(self, name: str) -> None:
         """Raise Refused for an input."""
         if self.require_point(name).direction is not PointDirection.OUTPUT:
-            raise Refused(f"{self.who}: {name} is {self.address_of(name)}, an input")
+            raise Refused(f"{self.who}: {name} is {self.point_label(name)}, an input")
 
     def await_point(self, name: str, value: bool, timeout: float) -> None:
         """Return when a digital point has the value."""

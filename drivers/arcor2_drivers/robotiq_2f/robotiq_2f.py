@@ -1,176 +1,79 @@
-"""The Robotiq 2F as an object type: activates on command, grips with force and speed, notices a part that is lost."""
+"""A Robotiq 2F gripper: activates on command, grips with force and speed, notices a lost part."""
 
 import contextlib
-import threading
-from collections.abc import Callable
 from typing import ClassVar, Final
 
 from arcor2_hw.actions import action
-from arcor2_hw.data.device import Alarm, Connection, Health, LossReaction
+from arcor2_hw.data.base import Timestamp, now
+from arcor2_hw.data.device import Alarm, Health, LossReaction
 from arcor2_hw.data.geometry import Pose, Position
-from arcor2_hw.exceptions import (
-    Cancelled,
-    DeviceError,
-    DeviceFault,
-    DeviceTimeout,
-    NotFound,
-    NotInControl,
-    OutOfRange,
-    Refused,
-)
+from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
 from arcor2_hw.objects import Gripper, GripResult, PartSize
-from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.objects.observing import GoOn
+from arcor2_hw.objects.polled_control import NOBODY, US, PolledControl
 from arcor2_hw.objects.small import GripperState
+from arcor2_hw.objects.state_observer import Snapshot
 
 from . import scaling
 from .ascii_link import AsciiLink
-from .observer import Observer
 from .rtu_link import RtuLink
 from .settings import Robotiq2FSettings, Wire
 from .status import FIRST_MAJOR, HELD, Activation, Command, Link, Object, Status, fault_of
 
 MARGIN: Final = 2.0
-"""s a motion may take beyond stroke / speed: acceleration, closing the last of the force, a slow wire."""
+"""Time a motion may take beyond stroke / speed, s: acceleration, building up the force, a slow wire."""
 TAKEN_WITHIN: Final = 1.0
-"""s from a command to its echo in the status."""
+"""Time from a command to its echo in the status, s."""
 STANDS_WITHIN: Final = 2.0
-"""s from a stop to fingers at rest."""
+"""Time from a stop to standstill, s."""
 LONGEST_ACTION: Final = 300.0
 PAD_HEIGHT: Final = 0.022
-"""Height of the fingers' pads, m: a part of unknown size is at least between them, above the tool centre point."""
+"""Height of the pads of the fingers, m: the assumed height of a part of unknown size."""
 
 
 def link_of(name: str, settings: Robotiq2FSettings) -> Link:
-    """Give the wire that the settings choose, closed."""
+    """Return the closed connection that the settings choose."""
     if settings.wire is Wire.MODBUS_RTU:
         return RtuLink(name, settings.serial_port, settings.baud_rate, settings.unit_id, settings.request_timeout)
     return AsciiLink(name, settings.host, settings.port, settings.request_timeout)
 
 
-class Robotiq2F(Gripper):
+class Robotiq2F(PolledControl[Status], Gripper):
     """A Robotiq 2F-85 or 2F-140 adaptive gripper, on a robot's URCap or on Modbus RTU."""
 
     _ABSTRACT = False
-    # A closing under way is finished, then it holds; spindle and spring are self-locking.
+    # It finishes a motion, then holds: spindle and spring are self-locking.
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"activate": "stop", "grip": "stop", "release": "stop"}
+    busy_period = 0.01
+    fresh_for = 1.0
 
     def __init__(self, obj_id: str, name: str, settings: Robotiq2FSettings) -> None:
         super().__init__(obj_id, name, settings)
         self._s = settings
         self.tcp = Pose(Position(0.0, 0.0, settings.tcp_z))
         self.mass = settings.mass
-        self._observer = Observer(link_of(name, settings), self._seen, self._drop_control)
-        self._who = self._observer.who
-        self._one_motion = threading.Lock()
-        self._one_command = threading.Lock()
-        self._stops = 0
+        self._gripper = link_of(name, settings)
+        self.answers_within = 16.0 * settings.request_timeout
+        self.use_link(self._gripper)
         self._activating = False
-        self._in_control = False
-        self._foreign = ""
+        self._other_client = ""
         self._commanded: int | None = None
-        """The position we asked for last; None when the gripper need not have it."""
+        """The position we commanded last; None when the gripper need not have it."""
         self._echoed = False
         self._held = self._lost = False
+        self._fault_since: Timestamp = now()
 
-    # -------------------------------------------------------------------------------- connection
-    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
-        """Begin to observe within `timeout` s; nothing is written. Raises NotConnected, DeviceTimeout, DeviceFault."""
-        self._observer.connect(timeout)
+    # -------------------------------------------------------------------------------- state
+    def read_state(self) -> Status:
+        """Read the status."""
+        return self._gripper.read()
 
-    def disconnect(self) -> None:
-        """Stop observing; harmless when not connected. The gripper keeps what it holds."""
-        self._drop_control()
-        self._observer.disconnect()
-        self._held = self._lost = False
-
-    @property
-    def connection(self) -> Connection:
-        """Tell how the connection is."""
-        return self._observer.observing.state
-
-    @property
-    def health(self) -> Health:
-        """Give the condition the gripper told last; failure when it does not tell any more."""
-        if self.connection in (Connection.LOST, Connection.FAILED):
-            return Health.FAILURE
-        status = self._observer.newest()
-        return Health.NORMAL if status is None or not status.fault else fault_of(status.fault).health
-
-    def alarms(self) -> list[Alarm]:
-        """Give the fault that stands."""
-        code = self._observer.current().fault
-        if not code:
-            return []
-        fault = fault_of(code)
-        return [Alarm(str(code), fault.severity, fault.text, fault.remedy, self._observer.fault_since)]
-
-    def acknowledge(self, code: str) -> None:
-        """Reset the gripper after a fault from 10 on; it is not activated then, and nothing moves.
-
-        Raises NotFound when the fault does not stand, Refused for one that ends with its cause.
-        """
-        status = self._fresh()
-        if not status.fault or str(status.fault) != code:
-            raise NotFound(f"{self._who} has no alarm {code}")
-        if status.fault < FIRST_MAJOR:
-            fault = fault_of(status.fault)
-            raise Refused(f"{self._who}: fault {code} ends with its cause: {fault.text}; {fault.remedy}")
-        self._require_control("acknowledge")
-        with self._one_motion:
-            self._reset(lambda: None)
-
-    # -------------------------------------------------------------------------------- control
-    def take_control(self) -> None:
-        """Take control; nothing is written, and the gripper is not activated. Raises NotInControl while it moves."""
-        if self._in_control:
-            return
-        status = self._fresh()
-        if status.moving:
-            raise NotInControl(f"{self._who}: control is refused: somebody else moves the gripper")
-        self._foreign, self._commanded = "", None
-        self._in_control = True
-        self._observer.observing.settled()
-
-    def release_control(self) -> None:
-        """Give control back. Raises Refused while the gripper moves."""
-        if self._in_control and self._fresh().moving:
-            raise Refused(f"{self._who}: release_control is refused in state {self.state()}: stop it first")
-        self._drop_control()
-
-    def control_owner(self) -> str | None:
-        """Tell who has control; another client of the gripper is known when it moves it."""
-        if self._in_control:
-            return "us"
-        return self._foreign or None
-
-    def _drop_control(self) -> None:
-        self._in_control, self._commanded = False, None
-
-    def _require_control(self, what: str) -> None:
-        if not self._in_control:
-            raise NotInControl(f"{self._who}: {what} is refused: {self._foreign or 'nobody'} has control")
-
-    def _require_ready(self, what: str) -> Status:
-        self._require_control(what)
-        status = self._fresh()
-        if status.fault >= FIRST_MAJOR:
-            raise self._fault(status, what)
-        if not status.active:
-            raise Refused(f"{self._who}: {what} is refused in state {GripperState.INACTIVE}: activate it first")
-        return status
-
-    def _fresh(self) -> Status:
-        return self._observer.wait(lambda _: True, 16.0 * self._s.request_timeout, "telling its status")
-
-    def _fault(self, status: Status, what: str) -> DeviceFault:
-        fault = fault_of(status.fault)
-        text = f"{self._who}: {what} ended by fault {status.fault}: {fault.text}"
-        return DeviceFault(text, fault.remedy, fault_code=status.fault)
-
-    # -------------------------------------------------------------------------------- each reading
-    def _seen(self, status: Status) -> None:
-        """Notice a part that is lost, and commands that are not ours. On the observing thread."""
+    def on_state(self, snapshot: Snapshot[Status]) -> None:
+        """Notice faults, a lost part, and commands of other clients."""
+        status, before = snapshot.value, self.newest()
+        if status.fault and (before is None or before.fault != status.fault):
+            self._fault_since = now()
         if not status.active:
             self._held = self._lost = False
             self._commanded = None
@@ -184,12 +87,92 @@ class Robotiq2F(Gripper):
         if status.echo == commanded:
             self._echoed = True
         elif self._echoed:
-            self._foreign = f"another client of the gripper, which asks for position {status.echo},"
-            self._drop_control()
+            self._other_client = f"another client of the gripper, which asks for position {status.echo},"
+            self.drop_control(f"{self._other_client} has control")
 
+    def condition(self) -> Health:
+        """Return the condition that the gripper last reported."""
+        status = self.newest()
+        return Health.NORMAL if status is None or not status.fault else fault_of(status.fault).health
+
+    def alarms(self) -> list[Alarm]:
+        """Return the present fault."""
+        code = self.current().fault
+        if not code:
+            return []
+        fault = fault_of(code)
+        return [Alarm(str(code), fault.severity, fault.text, fault.remedy, self._fault_since)]
+
+    def acknowledge(self, code: str) -> None:
+        """Reset the gripper after a fault with a code of 10 or more; it is not activated then, and nothing moves.
+
+        Raises NotFound when there is no such fault, Refused for one that ends with its cause.
+        """
+        status = self.fresh()
+        if not status.fault or str(status.fault) != code:
+            raise NotFound(f"{self.who} has no alarm {code}")
+        if status.fault < FIRST_MAJOR:
+            fault = fault_of(status.fault)
+            raise Refused(f"{self.who}: fault {code} ends with its cause: {fault.text}; {fault.remedy}")
+        with self.act("acknowledge") as go_on:
+            self._reset(go_on)
+
+    # -------------------------------------------------------------------------------- control
+    def disconnect(self) -> None:
+        """Stop observing; does nothing when not connected. The gripper keeps what it holds."""
+        super().disconnect()
+        self._held = self._lost = False
+
+    def leave(self) -> None:
+        """Leave the gripper alone: it finishes what it does, and holds."""
+
+    def is_busy(self, state: Status) -> bool:
+        """Return whether the fingers move."""
+        return state.moving
+
+    def owner_of(self, state: Status) -> str | None:
+        """Return who moves the gripper; another client is noticed only by that."""
+        if self.in_control:
+            return US
+        return "another client, which moves the gripper," if state.moving else None
+
+    def arm(self) -> None:
+        """Take control; nothing is written, and the gripper is not activated."""
+        self._other_client, self._commanded = "", None
+
+    def release_control(self) -> None:
+        """Release control. Raises Refused while the gripper moves."""
+        if self.in_control and self.fresh().moving:
+            raise Refused(f"{self.who}: release_control is refused in state {self.state()}: stop it first")
+        super().release_control()
+
+    def control_owner(self) -> str | None:
+        """Return who has control."""
+        return super().control_owner() or self._other_client or None
+
+    def drop_control(self, why: str = NOBODY) -> None:
+        """Note that we have no control any more."""
+        super().drop_control(why)
+        self._commanded = None
+
+    def _require_ready(self, what: str) -> Status:
+        self.require_control(what)
+        status = self.fresh()
+        if status.fault >= FIRST_MAJOR:
+            raise self._fault(status, what)
+        if not status.active:
+            raise Refused(f"{self.who}: {what} is refused in state {GripperState.INACTIVE}: activate it first")
+        return status
+
+    def _fault(self, status: Status, what: str) -> DeviceFault:
+        fault = fault_of(status.fault)
+        text = f"{self.who}: {what} ended by fault {status.fault}: {fault.text}"
+        return DeviceFault(text, fault.remedy, fault_code=status.fault)
+
+    # -------------------------------------------------------------------------------- observing
     def state(self) -> GripperState:
-        """Tell what it is doing. Raises Stale, NotConnected, ConnectionLost."""
-        status = self._observer.current()
+        """Return what it is doing. Raises Stale, NotConnected, ConnectionLost."""
+        status = self.current()
         if status.moving and not self._lost:
             return GripperState.MOVING
         if not status.active:
@@ -199,63 +182,50 @@ class Robotiq2F(Gripper):
         return GripperState.HOLDING if status.object in HELD else GripperState.AT_POSITION
 
     def width(self) -> float:
-        """Give the width between the fingers, m. Raises Stale, NotConnected, ConnectionLost."""
-        return scaling.width(self._s, self._observer.current().position)
+        """Return the width between the fingers, m. Raises Stale, NotConnected, ConnectionLost."""
+        return scaling.width(self._s, self.current().position)
 
     # -------------------------------------------------------------------------------- motion
     def stop(self) -> None:
-        """Stop the fingers and return when they stand. What is held stays held; a standing gripper is left alone."""
-        self._stops += 1
-        if not self._in_control:
-            self._observer.wake()
+        """Stop the fingers and return at standstill. The gripper keeps what it holds; at standstill nothing is sent."""
+        self.stop_waiting()
+        if not self.in_control:
             return
-        with self._one_command:
-            moving = self._one_motion.locked() or self._fresh().moving
+        with self._sending:
+            moving = self._acting.locked() or self.fresh().moving
             if moving:
-                self._observer.link.write(Command(act=not self._activating, go_to=False))  # only a reset ends that
-        self._observer.wake()
+                self._gripper.write(Command(act=not self._activating, go_to=False))  # only a reset ends an activation
         if moving:
-            self._await_rest()
+            self._await_standstill()
 
-    def _await_rest(self) -> None:
+    def _await_standstill(self) -> None:
         before: list[int] = []
 
         def stands(status: Status) -> bool:
             before.append(status.position)
             return not status.go_to and len(before) > 1 and before[-2] == status.position
 
-        self._observer.wait(stands, STANDS_WITHIN, "coming to rest")
+        self.wait(stands, STANDS_WITHIN, "coming to a standstill")
 
-    def _begin(self, what: str) -> Callable[[], None]:
-        """Give what raises as soon as `what` was stopped, or control was lost, since now."""
-        stops = self._stops
-
-        def go_on() -> None:
-            if self._stops != stops:
-                raise Cancelled(f"{self._who}: {what} was stopped")
-            self._require_control(what)
-
-        return go_on
-
-    def _write(self, command: Command, go_on: Callable[[], None]) -> None:
-        with self._one_command:  # a stop comes before, and this is not sent, or after it
-            go_on()
+    def _write(self, command: Command, what: str, go_on: GoOn) -> None:
+        def write() -> None:
             self._commanded, self._echoed = None, False
             self._held = self._lost = False
-            self._observer.link.write(command)
+            self._gripper.write(command)
             self._commanded = command.position
 
-    def _reset(self, go_on: Callable[[], None]) -> None:
-        self._write(Command(act=False, go_to=False), go_on)
+        self.send(what, write, go_on)  # a stop comes before, and this is not sent, or after it
+
+    def _reset(self, go_on: GoOn) -> None:
+        self._write(Command(act=False, go_to=False), "the reset", go_on)
 
         def done(status: Status) -> bool:
             return not status.act and status.activation is Activation.RESET and not status.fault
 
-        self._observer.wait(done, TAKEN_WITHIN + self._s.request_timeout, "the reset")
+        self.wait(done, TAKEN_WITHIN + self._s.request_timeout, "the reset")
 
     def _move(self, width: float, force: float, speed: float, what: str) -> Status:
-        """Send the fingers to a width; give the status when they stand."""
-        go_on = self._begin(what)
+        """Move the fingers to a width; return the status at standstill."""
         try:
             command = Command(
                 position=scaling.position(self._s, width),
@@ -263,68 +233,61 @@ class Robotiq2F(Gripper):
                 speed=scaling.speed(self._s, speed),
             )
         except OutOfRange as e:
-            raise OutOfRange(f"{self._who}: {e}") from e
-        if not self._one_motion.acquire(blocking=False):
-            raise Refused(f"{self._who}: {what} is refused in state {GripperState.MOVING}")
-        try:
+            raise OutOfRange(f"{self.who}: {e}") from e
+        with self.act(what) as go_on:
             self._require_ready(what)
-            self._write(command, go_on)
+            self._write(command, what, go_on)
 
             def stands(status: Status) -> bool:
-                go_on()
+                self.require_control(what)
                 if status.fault >= FIRST_MAJOR:
                     raise self._fault(status, what)
                 if not status.active:
-                    raise DeviceFault(f"{self._who}: {what} was ended: the gripper was reset or switched off")
+                    raise DeviceFault(f"{self.who}: {what} was ended: the gripper was reset or switched off")
                 taken = status.go_to and status.echo == command.position
                 return taken and status.object is not Object.MOVING
 
             try:
-                return self._observer.wait(stands, self._s.stroke / speed + TAKEN_WITHIN + MARGIN, what)
+                return self.wait(stands, self._s.stroke / speed + TAKEN_WITHIN + MARGIN, what, go_on)
             except DeviceTimeout:
-                with contextlib.suppress(DeviceError):  # it finishes then, and holds
-                    self._write(Command(go_to=False), go_on)  # nothing may go on that nobody waits for any more
+                with contextlib.suppress(DeviceError):  # then it finishes the motion, and holds
+                    self._write(Command(go_to=False), what, go_on)  # no motion that nobody waits for
                 raise
-        finally:
-            self._one_motion.release()
 
     # -------------------------------------------------------------------------------- actions
     @action(deadline=LONGEST_ACTION)
     def activate(self, *, an: str | None = None) -> None:
-        """Make the gripper ready; it opens and closes once, unless it is ready. A part it holds may be dropped."""
+        """Activate the gripper: it opens and closes once unless it is active. It may drop a part that it holds."""
         what = "activate"
-        go_on = self._begin(what)
-        if not self._one_motion.acquire(blocking=False):
-            raise Refused(f"{self._who}: {what} is refused in state {GripperState.MOVING}")
-        try:
-            self._require_control(what)
-            status = self._fresh()
+        with self.act(what) as go_on:
+            self.require_control(what)
+            status = self.fresh()
             if status.fault >= FIRST_MAJOR:
                 raise self._fault(status, what)
             if status.active:
                 return
             self._reset(go_on)
             self._activating = True
-            self._write(Command(act=True, go_to=False), go_on)
+            try:
+                self._write(Command(act=True, go_to=False), what, go_on)
 
-            def ready(status: Status) -> bool:
-                go_on()
-                if status.fault >= FIRST_MAJOR:
-                    raise self._fault(status, what)
-                return status.active
+                def ready(status: Status) -> bool:
+                    self.require_control(what)
+                    if status.fault >= FIRST_MAJOR:
+                        raise self._fault(status, what)
+                    return status.active
 
-            self._observer.wait(ready, self._s.activation_timeout, what)
-        finally:
-            self._activating = False
-            self._one_motion.release()
+                self.wait(ready, self._s.activation_timeout, what, go_on)
+            finally:
+                self._activating = False
 
     @action(deadline=LONGEST_ACTION)
     def grip(
         self, width: float = 0.0, force: float = 40.0, speed: float = 0.1, *, an: str | None = None
     ) -> tuple[bool, float]:
-        """Move the fingers to a width; true when something is held, and the width between the fingers, m.
+        """Move the fingers to a width; return whether a part is held, and the width between the fingers, m.
 
-        :param width: width to go to when nothing is in between, m
+        :param width: width to move to when nothing is in between, m
         :param force: force to hold with, N
         :param speed: speed of the fingers, m/s
         """
@@ -344,14 +307,14 @@ class Robotiq2F(Gripper):
         try:
             status = self._move(self._s.stroke, self._s.min_force, self._s.max_speed, "release")
         finally:
-            if not self._held:  # it was told to open
+            if not self._held:
                 self.detach_part()
         if status.object is not Object.ARRIVED:
             opened = scaling.width(self._s, status.position)
-            raise DeviceFault(f"{self._who}: release ended at {opened:.4f} m: the fingers are blocked")
+            raise DeviceFault(f"{self.who}: release ended at {opened:.4f} m: the fingers are blocked")
 
     @action
     def part_held(self, *, an: str | None = None) -> bool:
-        """Tell whether a part is held; false when it was lost since it was gripped."""
-        self._fresh()
+        """Return whether a part is held; false when it was lost after it was gripped."""
+        self.fresh()
         return self.state() is GripperState.HOLDING

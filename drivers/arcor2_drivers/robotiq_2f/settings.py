@@ -1,14 +1,13 @@
-"""Settings of a Robotiq 2F gripper, checked when they are given."""
+"""Settings of a Robotiq 2F gripper."""
 
 import dataclasses
-import math
-from typing import Final
+from typing import Annotated, Final
 
 from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
 from arcor2_hw.objects.gripping import check_part_size
-from arcor2_hw.objects.settings import check_host, check_serial_port
+from arcor2_hw.objects.settings import Range, check_host, check_serial_port, within
 
 
 class Wire(StrEnum):
@@ -27,7 +26,7 @@ class Model(StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class ModelData:
-    """What the vendor's data sheet says of a model; m, kg, N, m/s. A tcp_z of 0 is one that we do not know for sure."""
+    """The vendor's data sheet of a model; m, kg, N, m/s. A tcp_z of 0 is unknown."""
 
     tcp_z: float
     mass: float
@@ -44,15 +43,9 @@ MODELS: Final = {
 }
 
 
-def within(name: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """Raise OutOfRange, naming the parameter, unless the value lies in the range."""
-    if not (math.isfinite(value) and low <= value <= high):
-        raise OutOfRange(f"{name} must be {low:g} to {high:g}{unit and ' ' + unit}, not {value!r}")
-
-
 @dataclasses.dataclass
 class Robotiq2FSettings(Settings):
-    """Where the gripper is, and the limits of its model. Where a number is 0, it is that of the model.
+    """Where the gripper is, and the limits of its model. A number that is 0 means that of the model.
 
     :param model: which gripper it is
     :param wire: urcap for the ASCII port of the URCap on a robot, modbus_rtu for a serial port
@@ -84,14 +77,14 @@ class Robotiq2FSettings(Settings):
     host: str = ""
     port: int = 63352
     serial_port: str = ""
-    baud_rate: int = 115200
-    unit_id: int = 9
-    request_timeout: float = 0.5
-    activation_timeout: float = 10.0
+    baud_rate: Annotated[int, Range(9600, 115200)] = 115200
+    unit_id: Annotated[int, Range(1, 247)] = 9
+    request_timeout: Annotated[float, Range(0.05, 5.0, "s")] = 0.5
+    activation_timeout: Annotated[float, Range(1.0, 60.0, "s")] = 10.0
     tcp_z: float = 0.0
     mass: float = 0.0
     stroke: float = 0.0
-    open_position: int = 3
+    open_position: Annotated[int, Range(0, 254)] = 3
     closed_position: int = 230
     min_force: float = 0.0
     max_force: float = 0.0
@@ -104,22 +97,20 @@ class Robotiq2FSettings(Settings):
     part_offset_z: float = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         data = MODELS[self.model]
         for field in dataclasses.fields(data):
             if getattr(self, field.name) == 0.0:
                 setattr(self, field.name, getattr(data, field.name))
-        within("tcp_z", self.tcp_z, 0.05, 0.5, f"m; that of a {self.model} is not known here and has to be given")
+        if self.tcp_z == 0.0:
+            raise OutOfRange(f"tcp_z must be set to 0.05 to 0.5 m: that of a {self.model} is unknown")
+        within("tcp_z", self.tcp_z, 0.05, 0.5, "m")
         within("mass", self.mass, 0.1, 5.0, "kg")
         if self.wire is Wire.URCAP:
             check_host(self.host, self.port)
         else:
             check_serial_port("serial_port", self.serial_port)
-        within("baud_rate", self.baud_rate, 9600, 115200)
-        within("unit_id", self.unit_id, 1, 247)
-        within("request_timeout", self.request_timeout, 0.05, 5.0, "s")
-        within("activation_timeout", self.activation_timeout, 1.0, 60.0, "s")
         within("stroke", self.stroke, 0.01, 0.2, "m")
-        within("open_position", self.open_position, 0, 254)
         within("closed_position", self.closed_position, self.open_position + 1, 255)
         within("min_force", self.min_force, 0.0, 500.0, "N")
         within("max_force", self.max_force, self.min_force + 1.0, 500.0, "N")

@@ -1,4 +1,4 @@
-"""What the gripper tells and is told, whatever the wire; its faults with text and remedy."""
+"""Status and commands of the gripper on either wire; its faults with text and remedy."""
 
 import dataclasses
 import enum
@@ -8,7 +8,7 @@ from arcor2_hw.data.device import Health, Severity
 
 
 class Object(enum.IntEnum):
-    """gOBJ: object detection."""
+    """Object detection (gOBJ)."""
 
     MOVING = 0
     CONTACT_OPENING = 1
@@ -17,7 +17,7 @@ class Object(enum.IntEnum):
 
 
 class Activation(enum.IntEnum):
-    """gSTA."""
+    """Activation status (gSTA)."""
 
     RESET = 0
     ACTIVATING = 1
@@ -29,7 +29,7 @@ HELD: Final = (Object.CONTACT_OPENING, Object.CONTACT_CLOSING)
 
 @dataclasses.dataclass(frozen=True)
 class Status:
-    """One reading. `echo` is the position request as the gripper has it."""
+    """One reading. `echo` is the position request that the gripper has received."""
 
     act: bool
     go_to: bool
@@ -41,12 +41,12 @@ class Status:
 
     @property
     def active(self) -> bool:
-        """Tell whether it is activated and obeys."""
+        """Return whether it is activated."""
         return self.act and self.activation is Activation.ACTIVE
 
     @property
     def moving(self) -> bool:
-        """Tell whether the fingers move."""
+        """Return whether the fingers move."""
         return self.activation is Activation.ACTIVATING or (
             self.active and self.go_to and self.object is Object.MOVING and self.fault < FIRST_MAJOR
         )
@@ -54,7 +54,7 @@ class Status:
 
 @dataclasses.dataclass(frozen=True)
 class Command:
-    """What is asked for: only what differs from None is sent on a wire that can."""
+    """A command; values that are None stay as they are."""
 
     act: bool = True
     go_to: bool = True
@@ -64,25 +64,25 @@ class Command:
 
 
 class Link(Protocol):
-    """A wire. Every error names the device and its address."""
+    """A connection to the gripper. Every error names the device and its address."""
 
     who: str
 
     def open(self, timeout: float) -> None:
-        """Open within `timeout` s; nothing is asked."""
+        """Open within `timeout` s; nothing is sent."""
 
     def close(self) -> None:
-        """Close; harmless when closed. A request that waits for its answer fails at once."""
+        """Close; does nothing when closed. A request that waits for its answer fails at once."""
 
     def read(self) -> Status:
-        """Read; where one after the other, the object status after the requests it belongs to, and then the width."""
+        """Read the status. Values that are read one by one: the object status after its requests, then the width."""
 
     def write(self, command: Command) -> None:
-        """Command; never sent a second time."""
+        """Send a command; never sent a second time."""
 
 
 class Fault(NamedTuple):
-    """What a fault means, and what to do about it."""
+    """The meaning of a fault, and what to do about it."""
 
     text: str
     remedy: str
@@ -91,7 +91,7 @@ class Fault(NamedTuple):
 
 
 FIRST_MAJOR: Final = 0x0A
-"""From here on only a reset ends a fault."""
+"""Lowest code of the faults that only a reset ends."""
 _REACTIVATE: Final = "; acknowledge the fault, then activate the gripper"
 
 FAULTS: Final = {
@@ -124,13 +124,13 @@ FAULTS: Final = {
         Severity.ERROR,
         Health.FAILURE,
     ),
-    0x0E: Fault("overcurrent", "look for what jams the fingers" + _REACTIVATE, Severity.ERROR, Health.FAILURE),
-    0x0F: Fault("automatic release completed", "take the part away" + _REACTIVATE, Severity.ERROR, Health.FAILURE),
+    0x0E: Fault("overcurrent", "find what jams the fingers" + _REACTIVATE, Severity.ERROR, Health.FAILURE),
+    0x0F: Fault("automatic release completed", "remove the part" + _REACTIVATE, Severity.ERROR, Health.FAILURE),
 }
 """gFLT, 2F-85 & 2F-140 instruction manual, section 4 (fault status)."""
 
 
 def fault_of(code: int) -> Fault:
-    """Give what a fault means; one the manual does not know is severe."""
+    """Return the meaning of a fault; an unknown code counts as a failure."""
     unknown = Fault(f"fault {code}", "see the manual" + _REACTIVATE, Severity.ERROR, Health.FAILURE)
     return FAULTS.get(code, unknown)

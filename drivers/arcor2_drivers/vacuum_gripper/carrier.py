@@ -77,14 +77,14 @@ class Carrier:
 
     @property
     def object(self) -> Generic:
-        """Give the carrier; NotConnected before `connect`."""
+        """Return the carrier; NotConnected before `connect`."""
         if self._found is None:
             raise NotConnected(f"{self.name} is not connected to {self.carrier}")
         return self._found
 
     @property
     def connection(self) -> Connection:
-        """Tell how the carrier's connection is."""
+        """Return the state of the carrier's connection."""
         return Connection.OFFLINE if self._found is None else self._found.connection
 
     def require_up(self) -> None:
@@ -98,7 +98,7 @@ class Carrier:
 
     # -------------------------------------------------------------------------------- points
     def require(self, name: str, direction: PointDirection, kind: PointKind) -> IOPoint:
-        """Give a point of the carrier; InvalidData when there is none of that name and kind."""
+        """Return a point of the carrier; InvalidData when there is none of that name and kind."""
         for point in self._points.points():
             if point.name == name and point.direction is direction and point.kind is kind:
                 return point
@@ -127,7 +127,7 @@ class Carrier:
 
     # -------------------------------------------------------------------------------- control
     def control_owner(self) -> str | None:
-        """Tell who has control of the carrier."""
+        """Return who has control of the carrier."""
         with self._naming():
             return self.object.control_owner()
 
@@ -137,7 +137,7 @@ class Carrier:
             self.object.take_control()
 
     def reason(self) -> str:
-        """Tell why the carrier's connection is lost."""
+        """Return why the carrier's connection is lost."""
         with contextlib.suppress(DeviceError):
             return self.object.connection_reason
         return ""

@@ -1,22 +1,17 @@
-"""Settings of a vacuum gripper, checked when they are given."""
+"""Settings of a vacuum gripper."""
 
 import dataclasses
-import math
+from typing import Annotated
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
 from arcor2_hw.objects.gripping import check_part_size
-
-
-def within(name: str, value: float, low: float, high: float) -> None:
-    """Raise OutOfRange, naming the parameter, unless the value lies in the range."""
-    if not (math.isfinite(value) and low <= value <= high):
-        raise OutOfRange(f"{name} must be {low:g} to {high:g}, not {value!r}")
+from arcor2_hw.objects.settings import Range, within
 
 
 @dataclasses.dataclass
 class VacuumGripperSettings(Settings):
-    """The points are named as the carrier names them.
+    """The points of the carrier that the gripper uses, by their names on the carrier.
 
     :param carrier: name of the robot or I/O block in the scene whose outputs are used
     :param vacuum_output: digital output that makes the vacuum
@@ -39,26 +34,22 @@ class VacuumGripperSettings(Settings):
     blow_output: str = ""
     part_input: str = ""
     vacuum_input: str = ""
-    part_vacuum: float = 30_000.0
-    grip_time: float = 1.0
-    release_time: float = 1.0
-    blow_time: float = 0.2
-    lost_after: float = 0.1
+    part_vacuum: Annotated[float, Range(1.0, 101_325.0, "Pa")] = 30_000.0
+    grip_time: Annotated[float, Range(0.0, 60.0, "s")] = 1.0
+    release_time: Annotated[float, Range(0.0, 60.0, "s")] = 1.0
+    blow_time: Annotated[float, Range(0.01, 10.0, "s")] = 0.2
+    lost_after: Annotated[float, Range(0.0, 10.0, "s")] = 0.1
     robot: str = ""
     part_size_x: float = 0.0
     part_size_y: float = 0.0
     part_size_z: float = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("carrier", "vacuum_output"):
             if not getattr(self, name).strip():
                 raise OutOfRange(f"{name} must not be empty")
         points = [p for p in (self.vacuum_output, self.blow_output, self.part_input, self.vacuum_input) if p]
         if len(set(points)) != len(points):
-            raise OutOfRange(f"each point serves once: {', '.join(points)}")
-        within("part_vacuum", self.part_vacuum, 1.0, 101_325.0)
-        within("grip_time", self.grip_time, 0.0, 60.0)
-        within("release_time", self.release_time, 0.0, 60.0)
-        within("blow_time", self.blow_time, 0.01, 10.0)
-        within("lost_after", self.lost_after, 0.0, 10.0)
+            raise OutOfRange(f"each point may be used once: {', '.join(points)}")
         check_part_size(self, within)

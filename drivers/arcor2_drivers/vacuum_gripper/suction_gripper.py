@@ -87,7 +87,7 @@ class SuctionGripper(Suction):
 
     @property
     def connection(self) -> Connection:
-        """Tell how the carrier's connection is."""
+        """Return the state of the carrier's connection."""
         state = self._carrier.connection
         if state is Connection.OFFLINE and self._failed:
             return Connection.FAILED
@@ -98,7 +98,7 @@ class SuctionGripper(Suction):
 
     @property
     def connection_reason(self) -> str:
-        """Tell why the carrier's connection is lost."""
+        """Return why the carrier's connection is lost."""
         return self._carrier.reason()
 
     @property
@@ -113,12 +113,12 @@ class SuctionGripper(Suction):
         self._carrier.take_control()
 
     def control_owner(self) -> str | None:
-        """Tell who has control of the carrier."""
+        """Return who has control of the carrier."""
         return self._carrier.control_owner()
 
     # -------------------------------------------------------------------------------- alarms
     def alarms(self) -> list[Alarm]:
-        """Give the alarm of a part that was lost while it was held; it stands until it is acknowledged."""
+        """Return the alarm of a part that was lost while it was held; it stands until it is acknowledged."""
         since = self._lost_since
         if since is None:
             return []
@@ -145,11 +145,11 @@ class SuctionGripper(Suction):
     # -------------------------------------------------------------------------------- the part
     @property
     def senses(self) -> bool:
-        """Tell whether something tells of a held part."""
+        """Return whether something tells of a held part."""
         return bool(self._set.part_input or self._set.vacuum_input)
 
     def part_held(self) -> bool:
-        """Tell whether a part is held: by the sensor, by the vacuum, or, without either, by whether the vacuum is on.
+        """Return whether a part is held: by the sensor, by the vacuum, or, without either, by whether the vacuum is on.
 
         Raises NotConnected, ConnectionLost, DeviceTimeout, Stale.
         """
@@ -160,7 +160,7 @@ class SuctionGripper(Suction):
         return bool(self._carrier.read(self._set.vacuum_output).value)
 
     def vacuum(self) -> Reading[float]:
-        """Give the vacuum below the surrounding pressure, Pa. Refused without vacuum_input."""
+        """Return the vacuum below the surrounding pressure, Pa. Refused without vacuum_input."""
         if not self._set.vacuum_input:
             raise Refused(f"{self.name} has no vacuum_input")
         found = self._carrier.read(self._set.vacuum_input)
@@ -223,7 +223,7 @@ class SuctionGripper(Suction):
 
     @action
     def is_part_held(self, *, an: str | None = None) -> bool:
-        """Tell whether a part is held now."""
+        """Return whether a part is held now."""
         return self.part_held()
 
     @action

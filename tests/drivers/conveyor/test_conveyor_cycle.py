@@ -181,7 +181,7 @@ def test_control_is_refused_while_another_master_has_it(
     other = make(fake.ready["can"], master_id=126)
     other.connect()
     wait_for(lambda: other._observer.heard(127, 0.9))
-    with pytest.raises(NotInControl, match="node 127, whose heartbeat the drive listens for, has it"):
+    with pytest.raises(NotInControl, match="node 127, whose heartbeat the drive monitors, has it"):
         other.take_control()
     belt.run(0.05)
     belt.halt()

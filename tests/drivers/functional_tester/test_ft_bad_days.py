@@ -218,7 +218,7 @@ def test_a_life_counter_that_stands_is_stale(relay: Relay, make: Callable[..., F
     time.sleep(0.7)
     assert tester.machine_state() is MachineState.STOPPED  # it counts ten times a second: not yet out of the ordinary
     time.sleep(0.7)
-    with pytest.raises(Stale, match=r"answers, but its life counter has stood at \d+ for 1\.\d s"):
+    with pytest.raises(Stale, match=r"answers, but its life counter has been \d+ for 1\.\d s"):
         tester.machine_state()
     assert tester.connection is Connection.ONLINE
 

@@ -166,7 +166,7 @@ def test_control_is_refused_while_somebody_elses_test_runs(
     fake.control.do("command", name="start")
     tester = make(fake.ready["modbus"])
     tester.connect()
-    with pytest.raises(NotInControl, match="somebody who started a test"):
+    with pytest.raises(NotInControl, match="another client, which started a test"):
         tester.take_control()
     tester.stop()
     wait_for(lambda: fake.truth()["state"], lambda state: state == "Complete")

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from arcor2_drivers.opcua_plc.edges import Edge
 from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import (
@@ -20,6 +19,7 @@ from arcor2_hw.exceptions import (
     NotInControl,
     Stale,
 )
+from arcor2_hw.objects.edges import Edge
 from tests.drivers.benches.opcua_plc_bench import ORPHAN
 from tests.drivers.opcua_plc.conftest import HANDSHAKE, POINTS, Beside
 from tests.fakes.conftest import FakeProcess

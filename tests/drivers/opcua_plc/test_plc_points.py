@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from arcor2_drivers.opcua_plc.edges import Edge
 from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
 from arcor2_drivers.opcua_plc.points import parse_handshake, parse_points
 from arcor2_drivers.opcua_plc.settings import OpcUaPlcSettings
 from arcor2_hw.data.device import Connection, Health, Quality
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, OutOfRange, Refused
+from arcor2_hw.objects.edges import Edge
 from tests.drivers.opcua_plc.conftest import HANDSHAKE, Beside
 from tests.fakes.conftest import FakeProcess
 

@@ -21,7 +21,7 @@ def test_nobody_there(make: Callable[..., Robotiq2F]) -> None:
         taken.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{taken.getsockname()[1]}"
         gripper = make(address)
-        with pytest.raises(NotConnected, match=f"gripper at {address} cannot be reached"):
+        with pytest.raises(NotConnected, match=f"gripper at {address}: the port cannot be opened"):
             gripper.connect(1.0)
         assert gripper.connection is Connection.FAILED
         with pytest.raises(NotConnected):

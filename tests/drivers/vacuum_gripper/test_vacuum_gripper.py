@@ -322,5 +322,5 @@ def test_a_lost_carrier_tells_nothing_old(holding: SuctionGripper, fake: FakePro
 )
 def test_a_senseless_setting_is_named(name: str, value: object) -> None:
     chosen: dict[str, Any] = {"carrier": "block", "vacuum_output": "vacuum", name: value}
-    with pytest.raises(OutOfRange, match=name if name != "blow_output" else "serves once"):
+    with pytest.raises(OutOfRange, match=name if name != "blow_output" else "may be used once"):
         VacuumGripperSettings(**chosen)

@@ -1,0 +1,225 @@
+"""Tester: state, control and commands of a functional tester on Modbus TCP. A mixin of the object type."""
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Final
+
+from arcor2_hw.data.base import Timestamp, now
+from arcor2_hw.exceptions import (
+    DeviceError,
+    DeviceFault,
+    DeviceTimeout,
+    NotConnected,
+    NotInControl,
+    Refused,
+    SafetyStop,
+    Stale,
+)
+from arcor2_hw.objects import MachineCommand, MachineState, UnitMode
+from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.objects.modbus_device import ModbusDevice
+from arcor2_hw.objects.modbus_link import ModbusLink
+from arcor2_hw.objects.observing import GoOn
+from arcor2_hw.objects.polled_control import US
+from arcor2_hw.objects.state_observer import Snapshot
+
+from . import registers
+from .registers import FALLEN, RUNNING, Holding, Inputs, fault_of, title
+from .settings import FunctionalTesterSettings
+
+TRANSITION: Final = 3.0
+"""Time for a short state, s: Resetting, Clearing, Stopping, Aborting take about 0.2 s."""
+LIFE_STANDS: Final = 1.0
+"""Time without a change of the life counter after which something else than the tester answers, s."""
+NOTICED: Final = 0.2
+"""Time beyond the watchdog after which the tester has certainly noticed that we are gone, s."""
+
+
+class Tester(ModbusDevice[Inputs]):
+    """A tester whose state is read each 0.1 s, which also keeps its host watchdog quiet."""
+
+    def use_tester(self, settings: FunctionalTesterSettings) -> None:
+        """Prepare the connection; called in `__init__`."""
+        self._s = settings
+        self.link = ModbusLink(self.name, settings.host, settings.port, settings.unit_id, settings.request_timeout)
+        # Two readings, each repeated once, and a connection that is opened again in between.
+        self.answers_within = 6.0 * settings.request_timeout
+        self.use_link(self.link)
+        self.fault_since: Timestamp = now()
+        self._one_command = threading.Lock()
+        self._leave_alone_until = 0.0
+        self._life = (-1, 0.0)
+
+    # -------------------------------------------------------------------------------- state
+    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
+        """Start to observe within `timeout` s; nothing is written. Raises NotConnected, DeviceTimeout, DeviceFault."""
+        self._leave_alone_until = 0.0
+        super().connect(timeout)
+
+    def open_link(self, timeout: float) -> Snapshot[Inputs]:
+        """Open the connection, unless the tester has to notice first that we were gone."""
+        left = self._leave_alone_until - time.monotonic()
+        if left > 0.0:
+            raise NotConnected(f"{self.who} is left alone for {left:.1f} s, so that it notices that we were gone")
+        self._life = (-1, 0.0)
+        return super().open_link(timeout)
+
+    def read_state(self) -> Inputs:
+        """Read the input registers and the discrete inputs."""
+        words = self.link.read_input_registers(0, registers.INPUT_COUNT)
+        bits = self.link.read_discrete_inputs(0, registers.DISCRETE_COUNT)
+        try:
+            return registers.decode(words, bits)
+        except ValueError as error:
+            raise DeviceFault(f"{self.who} sent what no tester of this kind sends: {error}") from error
+
+    def on_state(self, snapshot: Snapshot[Inputs]) -> None:
+        """Note changes of the life counter and of the fault."""
+        inputs, before = snapshot.value, self.newest()
+        if inputs.life != self._life[0]:
+            self._life = (inputs.life, time.monotonic())
+        if inputs.fault_code and (before is None or before.fault_code != inputs.fault_code):
+            self.fault_since = now()
+
+    def on_lost(self, error: DeviceError) -> None:
+        """End control. Requests would keep a test alive that nobody waits for: leave the tester alone for a while."""
+        newest = self.newest()
+        if self.in_control and newest is not None and newest.state in RUNNING:
+            self._leave_alone_until = self.link.sent + self._s.watchdog_ms / 1000.0 + NOTICED
+        super().on_lost(error)
+
+    def current(self) -> Inputs:
+        """Return the newest state. Raises NotConnected, ConnectionLost, or Stale when it is too old."""
+        newest = super().current()
+        value, since = self._life
+        if (stands := time.monotonic() - since) > LIFE_STANDS:
+            raise Stale(f"{self.who} answers, but its life counter has been {value} for {stands:.1f} s")
+        return newest
+
+    # -------------------------------------------------------------------------------- control
+    def arm(self) -> None:
+        """Set the host watchdog."""
+        self.link.write_registers(Holding.HOST_WATCHDOG, self._s.watchdog_ms)
+        if (stored := self._read_holding()[Holding.HOST_WATCHDOG]) != self._s.watchdog_ms:
+            raise Refused(f"{self.who}: host_watchdog is {stored} ms after {self._s.watchdog_ms} was written")
+
+    def disarm(self) -> None:
+        """Switch the host watchdog off."""
+        self.link.write_registers(Holding.HOST_WATCHDOG, 0)
+
+    def leave(self) -> None:
+        """Release control because we disconnect; a test that runs is left to the watchdog, which ends it."""
+        newest = self.newest()
+        if newest is not None and newest.state not in RUNNING:
+            super().leave()
+
+    def release_control(self) -> None:
+        """Switch the host watchdog off. Raises Refused while a test runs."""
+        if self.in_control and (state := self.fresh().state) in RUNNING:
+            raise Refused(f"{self.who}: release_control is refused in state {title(state)}: stop the test")
+        super().release_control()
+
+    def owner_of(self, state: Inputs) -> str | None:
+        """Return who has control: us, the person with the key, or the client whose test runs."""
+        if state.mode is not UnitMode.PRODUCE:
+            return f"the key switch at the station ({state.mode.name.lower()})"
+        if self.in_control:
+            return US
+        return f"another client, which started a test (state {title(state.state)})," if state.state in RUNNING else None
+
+    def why_control_ended(self, state: Inputs) -> str:
+        """Return nothing: the key switch only interrupts our control."""
+        return ""
+
+    def control_owner(self) -> str | None:
+        """Return who has control."""
+        newest = self.newest()
+        return None if newest is None else self.owner_of(newest)
+
+    def require_command(self, what: str) -> Inputs:
+        """Return a fresh state when commands are obeyed. Raises NotInControl naming who has control."""
+        inputs = self.fresh()
+        owner = self.owner_of(inputs)
+        if owner != US:
+            refused = f"{self.who}: {what} is refused in state {title(inputs.state)}"
+            raise NotInControl(f"{refused}: {owner or 'nobody'} has control")
+        return inputs
+
+    # -------------------------------------------------------------------------------- commands
+    def give(self, command: MachineCommand, go_on: GoOn) -> None:
+        """Send a command: it is taken when command_acknowledged shows its number. Raises Refused with the reason."""
+        name = command.name.lower()
+        if command not in registers.COMMANDS:
+            state = title(self.fresh().state)
+            raise Refused(f"{self.who}: {name} is refused in state {state}: it has no such command")
+        with self._one_command:
+            before = self.fresh()
+            # Read, not counted here: the tester may have restarted, or another host may have sent commands.
+            sequence = (self._read_holding()[Holding.COMMAND_SEQUENCE] + 1) & 0xFFFF
+            go_on()
+            self.link.write_registers(Holding.COMMAND, command, sequence)
+            after = self.wait(
+                lambda inputs: inputs.command_acknowledged == sequence,
+                4.0 * self._s.request_timeout,
+                f"taking the command {name}",
+            )
+        if after.command_result != registers.ACCEPTED:
+            why = registers.REFUSALS.get(after.command_result, f"result {after.command_result}")
+            if before.emergency_stop:
+                why = "the emergency stop is pressed"
+            raise Refused(f"{self.who}: {name} is refused in state {title(before.state)}: {why}")
+
+    def reach(self, wanted: set[MachineState], timeout: float, what: str, go_on: GoOn) -> Inputs:
+        """Wait for one of the states. Raises DeviceTimeout, and DeviceFault or SafetyStop when it aborts instead."""
+
+        def arrived(inputs: Inputs) -> bool:
+            if inputs.state in wanted:
+                return True
+            if inputs.state in FALLEN and not wanted & FALLEN:
+                raise self.fault(inputs, what)
+            return False
+
+        return self.wait(arrived, timeout, what, go_on)
+
+    def fault(self, inputs: Inputs, what: str) -> DeviceError:
+        """Return the error for a tester that has aborted."""
+        code = inputs.fault_code
+        if not code:
+            return DeviceFault(f"{self.who}: {what} ended: aborted by command; clear it", fault_code=0)
+        fault = fault_of(code)
+        text = f"{self.who}: {what} ended: fault {code}, {fault.text}; {fault.remedy}"
+        if code == registers.EMERGENCY_STOP:
+            return SafetyStop(text, kind="emergency_stop")
+        return DeviceFault(text, fault_code=code)
+
+    def move_door(self, command: int, what: str, arrived: Callable[[Inputs], bool]) -> None:
+        """Move the door and wait for its end position. The tester reports no refusal, so the state is checked."""
+        go_on = self.begin(what)
+        began = time.monotonic()
+
+        def done(inputs: Inputs) -> bool:
+            where = f"{self.who}: {what} is refused in state {title(inputs.state)}"
+            if inputs.emergency_stop:
+                raise SafetyStop(f"{where}: the emergency stop is pressed", kind="emergency_stop")
+            if inputs.state not in registers.DOOR_MAY_MOVE | registers.PASSING:
+                raise Refused(f"{where}: the door moves only when no test runs")
+            return arrived(inputs)
+
+        def movable(inputs: Inputs) -> bool:
+            done(inputs)
+            return inputs.state in registers.DOOR_MAY_MOVE
+
+        self.wait(movable, TRANSITION, f"{what}: reaching a state that lets the door move", go_on)
+        with self._one_command:
+            sequence = (self._read_holding()[Holding.DOOR_SEQUENCE] + 1) & 0xFFFF
+            go_on()
+            self.link.write_registers(Holding.DOOR_COMMAND, command, sequence)
+        left = max(0.1, began + self._s.door_timeout - time.monotonic())
+        try:
+            self.wait(done, left, what, go_on)
+        except DeviceTimeout as error:
+            raise DeviceTimeout(f"{error}: the door does not reach its end position") from error
+
+    def _read_holding(self) -> list[int]:
+        return self.link.read_holding_registers(0, registers.HOLDING_COUNT)
