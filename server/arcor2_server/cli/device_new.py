@@ -73,9 +73,7 @@ WIRES: Final = {
         (("port", "str", "", "path of the serial port"), ("baud_rate", "int", "9600", "bits per second")),
         "address",
         "/dev/does-not-exist",
-        """        check_serial_port("port", self.port)
-        if not 300 <= self.baud_rate <= 921600:
-            raise OutOfRange(f"baud_rate must be 300 to 921600, not {self.baud_rate!r}")""",
+        '        check_serial_port("port", self.port)',
     ),
     Bus.HTTP: Wire(
         "HTTP",
@@ -88,7 +86,8 @@ WIRES: Final = {
     ),
 }
 
-
+RANGES: Final = {"baud_rate": "Annotated[int, Range(300, 921600)]"}
+"""Types of settings that have a range."""
 NO_SENSE: Final = {
     Base.ROBOT: "a robot needs its model: see docs/how-to/add-a-robot.md, and start from the one most like yours "
     "(drivers/arcor2_drivers/dobot_magician, universal_robots)",
@@ -149,7 +148,6 @@ def texts(name: str, base: Base, bus: Bus) -> dict[str, str]:
     module = name.replace("-", "_")
     words = _words(name, module, base, bus)
     words["control"] = _fill("control.txt", words)
-    words["done"] = _fill("done.txt", words)
     words["long"] = _fill("long.txt", words) if KINDS[base].run_long else ""
     found = {
         f"{module}/__init__.py": f'"""{words["A_title"]}."""\n',
@@ -162,7 +160,7 @@ def texts(name: str, base: Base, bus: Bus) -> dict[str, str]:
         "cell.yaml": _fill("cell.yaml", words),
     }
     if bus is not Bus.MODBUS:
-        found[f"{module}/link.py"] = _fill(f"link_{bus}.py", words)
+        found[f"{module}/link.py"] = _fill("link_http.py" if bus is Bus.HTTP else "link_text.py", words)
     return found
 
 
@@ -179,9 +177,12 @@ def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
     modbus = bus is Bus.MODBUS
     names = [field[0] for field in wire.fields]
     imported = sorted(set(re.findall(r"check_\w+", wire.check)))
-    out_of_range = "OutOfRange, " if "OutOfRange" in wire.check else ""
+    serial = bus is Bus.SERIAL
+    stdlib = (["sys"] if kind.run_long else []) + (["threading"] if base is Base.READER else [])
+    if serial:
+        imported.insert(0, "Range")
     made = ", ".join(f"settings.{field}" for field in names)
-    lines = [f"    {n}: {t}" + (f" = {d}" if d else "") for n, t, d, _ in wire.fields]
+    lines = [f"    {n}: {RANGES.get(n, t)}" + (f" = {d}" if d else "") for n, t, d, _ in wire.fields]
     settings = "\n".join(
         [
             "@dataclasses.dataclass",
@@ -194,6 +195,7 @@ def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
             *lines,
             "",
             "    def __post_init__(self) -> None:",
+            "        super().__post_init__()",
             wire.check,
             "",
         ]
@@ -228,7 +230,6 @@ def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
         "build": made_in_test,
         "orphan": orphan,
         "absent": wire.absent,
-        "reset": '        self.do("rest")\n',
         "rest_value": str(kind.rest_value),
         "observe": kind.observe,
         "ask": kind.ask,
@@ -236,11 +237,12 @@ def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
         "run_long": kind.run_long,
         "own_test": kind.own_test,
         "imports": _imports(base),
-        "threading": "import threading\n" if base is Base.READER else "",
+        "stdlib": "".join(f"import {each}\n" for each in stdlib) + ("\n" if stdlib else ""),
+        "link_arguments": ", ".join(f"{field}: {kind_of}" for field, kind_of, _, _ in wire.fields),
+        "link_address": "{host}:{port}" if bus is Bus.TCP else "{port}",
+        "link_port": 'f"socket://{host}:{port}"' if bus is Bus.TCP else "port, baud_rate",
         "settings_import": f"from arcor2_hw.objects.settings import {', '.join(imported)}\n",
-        "exceptions": "from arcor2_hw.exceptions import OutOfRange\n" if out_of_range else "",
-        "point_exceptions": f"from arcor2_hw.exceptions import NotFound, {out_of_range}Refused\n",
-        "fault_exceptions": f"from arcor2_hw.exceptions import DeviceFault{', OutOfRange' if out_of_range else ''}\n",
+        "typing_import": "from typing import Annotated\n" if serial else "",
         "actions": kind.actions,
         "on_loss": kind.on_loss,
         "loss_case": "test_loss_reaction" if kind.run_long else "test_control_does_not_come_back",
@@ -259,9 +261,8 @@ def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
 def _imports(base: Base) -> str:
     lines = [
         "import pytest",
-        "from arcor2_fakes.control import BlockingControlClient",
-        "from arcor2_hw.testing.bench import Bench",
         "from arcor2_hw.testing.conformance import Conformance",
+        "from arcor2_hw.testing.fake_bench import FakeBench",
     ]
     if base is Base.MACHINE:
         lines += [

@@ -1,7 +1,6 @@
 """One cell host as the server sees it: a process, a socket, what it says, and when it falls silent or ends."""
 
 import asyncio
-import contextlib
 import itertools
 import os
 import signal
@@ -25,8 +24,6 @@ LONGEST_LINE: Final = 64 * 1024
 """Bytes of one line of a program's or driver's output that are kept."""
 GOES_WITHIN: Final = 3.0
 """Seconds a host has to end by itself once it should; then it is killed."""
-DEVICES_END_WITHIN: Final = 2.0
-"""Seconds that processes of devices have to stop, disconnect and end after the host has ended; then they are killed."""
 LAST_WORDS: Final = 0.2
 """Seconds that the second sign of the end (socket or process) may come after the first."""
 HELD_WITHIN: Final = 15.0
@@ -290,12 +287,6 @@ class CellHost:
             if self._wire.transport is not None:
                 self._wire.transport.abort()
             self.ended.set_result(None)
-            asyncio.get_running_loop().call_later(DEVICES_END_WITHIN, self._kill_rest)
-
-    def _kill_rest(self) -> None:
-        """Kill processes of devices that a C call keeps from ending, which hold the output of the host open."""
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(self.pid, signal.SIGKILL)  # the host was the leader of its process group
 
     def _tell_end(self, reason: str) -> None:
         if self.reason:
