@@ -61,13 +61,9 @@ class OakDSettings(Settings):
         if ":" in self.address and self.network is None:
             raise OutOfRange(f"address must be a device id, an IP address or host:port, not {self.address!r}")
         if not (math.isfinite(self.max_age) and 1.0 / self.fps < self.max_age <= 10.0):
-            raise OutOfRange(
-                f"max_age must be more than one image ({1.0 / self.fps:.3f} s) and at most 10 s"
-            )
+            raise OutOfRange(f"max_age must be more than one image ({1.0 / self.fps:.3f} s) and at most 10 s")
         if not (math.isfinite(self.frame_timeout) and 2.0 / self.fps < self.frame_timeout <= 10.0):
-            raise OutOfRange(
-                f"frame_timeout must be more than two images ({2.0 / self.fps:.3f} s) and at most 10 s"
-            )
+            raise OutOfRange(f"frame_timeout must be more than two images ({2.0 / self.fps:.3f} s) and at most 10 s")
         if not 0.0 < self.white_limit <= 1.0:
             raise OutOfRange(f"white_limit must be within 0 and 1, not {self.white_limit!r}")
 
