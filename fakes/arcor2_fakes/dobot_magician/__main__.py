@@ -24,7 +24,7 @@ app = App(name="arcor2_fakes.dobot_magician", help="Fake Dobot Magician on a pty
 
 
 def register_commands(control: ControlServer, arm: Arm, commands: Commands) -> None:
-    """Make what a test can do to the arm known to the control channel."""
+    """Register the commands of the control channel."""
 
     def alarm(code: int) -> None:
         if not 0 <= code < 128:
@@ -44,7 +44,7 @@ def register_commands(control: ControlServer, arm: Arm, commands: Commands) -> N
         commands.renew()
 
     def drive(turn: float, percent: float = 5.0) -> None:
-        """Turn the base, as a program on another host would."""
+        """Turn the base, like a program on another host."""
         arm.set.speed_ratio = float(percent)
         first, second, third, fourth = arm.joints
         target = (first + float(turn), second, third, fourth)
@@ -68,7 +68,7 @@ def register_commands(control: ControlServer, arm: Arm, commands: Commands) -> N
 
 
 async def live(arm: Arm) -> None:
-    """Let the arm move in time."""
+    """Advance the simulation."""
     loop = asyncio.get_running_loop()
     last = loop.time()
     while True:
@@ -87,12 +87,12 @@ def main(
         float, Parameter(name=("--time-scale", "--pace"), validator=validators.Number(gt=0, lte=100))
     ] = 1.0,
 ) -> int:
-    """Start the fake; it prints one line `ready {json}` with its port and ends on SIGTERM.
+    """Start the fake; it prints one line `ready {json}` with its port and exits on SIGTERM.
 
     Args:
-        link: symbolic link to keep on the pty, whose own path changes when it is unplugged and plugged.
+        link: Symbolic link to the pty, whose path changes when it is unplugged and plugged.
         control: HOST:PORT of the control channel; port 0 takes a free one.
-        pace: how much faster than in reality it moves.
+        pace: Speed of the simulation; 1 is real time.
     """
     try:
         control_address = parse_address(control)

@@ -1,4 +1,4 @@
-"""The arm itself: queue, motion in time, alarms, end effector, stepper. Knows no frame."""
+"""The simulated arm: queue, motion, alarms, end effector, stepper; independent of frames."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from arcor2_fakes.dobot_magician.geometry import Four, beyond, joints_for, tool_
 from arcor2_fakes.dobot_magician.motion import Motion, Part, Trapezoid, between
 
 QUEUE = 32
-HOMING = 5.0  # s for each of its two halves at speed 1: to the switches and back
+HOMING = 5.0  # s: duration of each half at speed 1, to the switches and back
 SWITCHES: Four = (-85.0, 5.0, -5.0, 0.0)
 FOLDED: Four = (0.0, 45.0, 45.0, 0.0)
 RESET, PLANNING_SINGULAR, PLANNING_LIMIT, MOVING_LIMIT = 0x00, 0x10, 0x11, 0x21
@@ -20,7 +20,7 @@ RESET, PLANNING_SINGULAR, PLANNING_LIMIT, MOVING_LIMIT = 0x00, 0x10, 0x11, 0x21
 
 @dataclasses.dataclass
 class Parameters:
-    """What a host may set; mm, degrees and seconds, ratios in percent."""
+    """Parameters; mm, degrees and seconds, ratios in percent."""
 
     home: Four = (259.1, 0.0, -8.5, 0.0)
     bias: tuple[float, float, float] = (59.7, 0.0, 0.0)
@@ -44,7 +44,7 @@ class Arm:
         self.as_delivered()
 
     def as_delivered(self) -> None:
-        """Be as new: folded, not homed, nothing set."""
+        """Reset to the state as delivered: folded, not homed, default parameters."""
         self.homed = False
         self.joints: Four = FOLDED
         self.alarms: set[int] = set()
@@ -65,7 +65,7 @@ class Arm:
         self._homing = False
 
     def power_cycle(self) -> None:
-        """Lose everything that is not mechanical; the reset is told as an alarm."""
+        """Reset everything that is not mechanical; this raises the reset alarm."""
         self._boot()
         self.homed = False
         self.alarms = {RESET}
@@ -74,18 +74,18 @@ class Arm:
 
     @property
     def tool(self) -> Four:
-        """x, y, z in mm and r in degrees."""
+        """Return x, y, z in mm and r in degrees."""
         return tool_at(self.joints, self.set.bias)
 
     @property
     def moving(self) -> bool:
-        """Whether a motion runs."""
+        """Return whether a motion runs."""
         return self._motion is not None
 
     # ---------------------------------------------------------------------------------------------------- the queue
 
     def enqueue(self, begin: Callable[[], Motion | None]) -> int:
-        """Take a command into the queue; give its index. Raises `BufferError` when it is full."""
+        """Append a command to the queue and return its index. Raise `BufferError` if the queue is full."""
         if len(self.queue) >= QUEUE:
             raise BufferError
         self._last_index += 1
@@ -95,11 +95,11 @@ class Arm:
 
     @property
     def space(self) -> int:
-        """How many commands the queue still takes."""
+        """Return the free space of the queue, commands."""
         return QUEUE - len(self.queue)
 
     def force_stop(self) -> None:
-        """Stand at once. What is queued behind stays queued."""
+        """Stop at once. The rest of the queue stays."""
         self.running = False
         if self._motion is not None:
             self._motion = None
@@ -107,12 +107,12 @@ class Arm:
             self.queue.popleft()
 
     def clear(self) -> None:
-        """Forget what waits; what runs goes on."""
+        """Clear the queue; a running command continues."""
         while len(self.queue) > (1 if self._motion is not None else 0):
             self.queue.pop()
 
     def advance(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance the simulation."""
         if self._motion is None:
             if not self.running or not self.queue or self.alarms - {RESET}:
                 return
@@ -136,14 +136,14 @@ class Arm:
             self.done_index = self.queue.popleft()[0]
 
     def raise_alarm(self, code: int) -> None:
-        """An alarm stops what runs; its index is never reached."""
+        """Raise an alarm, which stops the running command; its index is never reached."""
         self.alarms.add(code)
         self.force_stop()
 
     # ---------------------------------------------------------------------------------------------------- motions
 
     def home(self) -> Motion:
-        """Run to the switches and back to the home position."""
+        """Move to the switches and back to the home position."""
         self._homing = True
         start, end = self.joints, joints_for(self.set.home, self.set.bias) or FOLDED
         whole = Trapezoid(1.0, 1.0 / (HOMING - 1.0), 1.0 / (HOMING - 1.0))
@@ -155,7 +155,7 @@ class Arm:
         )
 
     def point_to_point(self, mode: int, target: Four) -> Motion | None:
-        """Run to a point; None, and an alarm, when it cannot be planned."""
+        """Plan a motion to a point; return None and raise an alarm if it cannot be planned."""
         if mode in (6,):  # steps of the joints
             target = _sum(self.joints, target)
         elif mode in (7, 8):  # steps of the tool
@@ -193,7 +193,7 @@ class Arm:
         return Motion([self._straight_part(here, over), across, self._straight_part(above, goal)])
 
     def _joint_part(self, start: Four, end: Four) -> Part:
-        """All joints arrive together: the slowest decides."""
+        """Return the part in which all joints arrive together; the slowest determines the time."""
         fast, quick = self.set.speed_ratio / 100.0, self.set.acceleration_ratio / 100.0
         shares = [
             Trapezoid(abs(b - a), speed * fast, acceleration * quick)
@@ -213,7 +213,7 @@ class Arm:
         )
 
     def truth(self) -> dict[str, Any]:
-        """Return what is really so."""
+        """Return the true state."""
         return {
             "joints": self.joints,
             "tool": self.tool,

@@ -1,4 +1,4 @@
-"""What each id of the protocol does to the arm, and what it is answered."""
+"""Effects and answers of the ids of the protocol."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ ALARM_BYTES = 16
 
 
 class Commands:
-    """Reads frames, obeys, answers. A frame that makes no sense gets no answer."""
+    """Executes and answers frames. An invalid frame is not answered."""
 
     def __init__(self, arm: Arm, send: Callable[[bytes], None]) -> None:
         self._arm, self._send = arm, send
         self._cutter = Cutter()
         self.received: deque[tuple[int, int]] = deque(maxlen=2000)
         self.stops: deque[float] = deque(maxlen=200)
-        """When forced stops came, by the machine's monotonic clock, s."""
+        """Times of forced stops, on the monotonic clock, s."""
         self.spoiled = 0
         self.mute: set[int] = set()
 
     def drop_input(self) -> None:
-        """Forget the part of a frame that has come."""
+        """Drop an incomplete frame."""
         self._cutter.drop()
 
     def renew(self) -> None:
-        """Forget all that has come, and every fault."""
+        """Drop received bytes, and reset all faults."""
         self.drop_input()
         self.received.clear()
         self.stops.clear()
@@ -41,7 +41,7 @@ class Commands:
         self.spoiled = 0
 
     def feed(self, data: bytes) -> None:
-        """Take bytes from the line."""
+        """Process received bytes."""
         for command, control, parameters in self._cutter.cut(data):
             self.received.append((command, control))
             try:

@@ -1,4 +1,4 @@
-"""The wire of the Dobot protocol: AA AA, length, id, control, parameters, checksum."""
+"""Frames of the Dobot protocol: AA AA, length, id, control, parameters, checksum."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ _SHORTEST = 2  # id and control
 
 
 def build(command: int, control: int, parameters: bytes = b"") -> bytes:
-    """Return a whole frame."""
+    """Return a frame."""
     payload = bytes((command, control)) + parameters
     return bytes((_HEAD, _HEAD, len(payload))) + payload + bytes(((0x100 - sum(payload) % 0x100) % 0x100,))
 
 
 class Cutter:
-    """Finds the frames in what comes; a frame with a wrong checksum is passed over, as the arm does."""
+    """Finds frames in received bytes; a frame with a wrong checksum is skipped, as by the arm."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
 
     def drop(self) -> None:
-        """Forget a frame that has begun."""
+        """Drop an incomplete frame."""
         self._bytes.clear()
 
     def cut(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:

@@ -1,7 +1,7 @@
-"""Where the arm's tool is for its joint angles, and back. Millimetres and degrees, as on the wire.
+"""Forward and inverse kinematics, in millimetres and degrees, as on the wire.
 
 Links as published: rear arm 135 mm, forearm 147 mm. Angle 2 is from the vertical, angle 3 from the horizontal and
-positive downwards; the wrist stays level, so that angle 4 only turns the tool.
+positive downwards; the wrist stays level, so that angle 4 only rotates the tool.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def tool_at(joints: Four, bias: tuple[float, float, float]) -> Four:
 
 
 def joints_for(tool: Four, bias: tuple[float, float, float]) -> Four | None:
-    """Return the joint angles for x, y, z, r; None when the links do not reach."""
+    """Return the joint angles for x, y, z, r; None if it is out of reach."""
     x, y, z, r = tool
     square = x * x + y * y - bias[1] * bias[1]
     if square <= 0.0:
@@ -50,7 +50,7 @@ def joints_for(tool: Four, bias: tuple[float, float, float]) -> Four | None:
 
 
 def beyond(joints: Four) -> int | None:
-    """Return the alarm of the first joint that is beyond a limit: 40h and on, positive and negative by turns."""
+    """Return the alarm of the first joint beyond a limit: from 40h on, positive and negative limits alternate."""
     for number, (angle, low, high) in enumerate(zip(joints, LOWEST, HIGHEST, strict=True)):
         if angle > high + 1e-3:
             return 0x40 + 2 * number

@@ -1,4 +1,4 @@
-"""A motion in time: a path of parts, each run with a trapezoid of speed."""
+"""A motion: a path of parts, each with a trapezoidal speed profile."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from arcor2_fakes.dobot_magician.geometry import Four
 
 
 def between(a: Four, b: Four, share: float) -> Four:
-    """Return the point at a share of the way from `a` to `b`."""
+    """Return the point at a fraction of the way from `a` to `b`."""
     return (
         a[0] + (b[0] - a[0]) * share,
         a[1] + (b[1] - a[1]) * share,
@@ -21,7 +21,7 @@ def between(a: Four, b: Four, share: float) -> Four:
 
 @dataclasses.dataclass(frozen=True)
 class Trapezoid:
-    """A distance run with a highest speed and an acceleration."""
+    """A trapezoidal speed profile."""
 
     distance: float
     speed: float
@@ -29,19 +29,19 @@ class Trapezoid:
 
     @property
     def _ramp(self) -> float:
-        """Return the time of one ramp, s; without a plateau when the distance is short."""
+        """Return the time of one ramp, s; shorter if the maximum speed is not reached."""
         return min(self.speed / self.acceleration, math.sqrt(self.distance / self.acceleration))
 
     @property
     def duration(self) -> float:
-        """Return the time it takes, s."""
+        """Return the duration, s."""
         ramp = self._ramp
         if ramp <= 0.0:
             return 0.0
         return ramp + self.distance / (self.acceleration * ramp)
 
     def share(self, time: float) -> float:
-        """Return how much of the distance is done after `time` s, 0 to 1."""
+        """Return the fraction of the distance covered after `time` s."""
         whole, ramp = self.duration, self._ramp
         if time >= whole:
             return 1.0
@@ -56,21 +56,21 @@ class Trapezoid:
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """A stretch of a motion: its timing, and the joints at a share of it (None: the links do not reach)."""
+    """A part of a motion: speed profile, and joints at a fraction of it (None: out of reach)."""
 
     timing: Trapezoid
     joints_at: Callable[[float], Four | None]
 
 
 class Motion:
-    """Parts run one after the other."""
+    """Parts executed one after the other."""
 
     def __init__(self, parts: list[Part]) -> None:
         self._parts = parts
         self._time = 0.0
 
     def advance(self, seconds: float) -> tuple[Four | None, bool]:
-        """Go on; give the joints now (None: not reached) and whether it is at its end."""
+        """Advance; return the joints (None: out of reach) and whether the motion has ended."""
         self._time += seconds
         while len(self._parts) > 1 and self._time >= self._parts[0].timing.duration:
             self._time -= self._parts.pop(0).timing.duration

@@ -20,7 +20,7 @@ app = App(name="arcor2_fakes.two_axis_robot", help="Fake servos on a pty, Dynami
 
 
 def truth(bus: Bus, line: PtyLine) -> dict[str, Any]:
-    """Return what is really so, whatever the line says; angles in rad from the middle."""
+    """Return the true state, whatever the faults of the line; angles in rad from the middle."""
     found = {}
     for number, servo in bus.servos.items():
         servo.advance()
@@ -38,14 +38,14 @@ def truth(bus: Bus, line: PtyLine) -> dict[str, Any]:
 
 
 def motion(bus: Bus) -> dict[str, Any]:
-    """Return the angles alone, rad from the middle: the world asks for them a hundred times a second."""
+    """Return the angles, rad from the middle, for a simulated world that polls them a hundred times per second."""
     for servo in bus.servos.values():
         servo.advance()
     return {"angles": {str(n): (s.position - TICKS / 2) * math.tau / TICKS for n, s in bus.servos.items()}}
 
 
 def register_commands(control: ControlServer, bus: Bus) -> None:
-    """Make what the world and a test can do to the servos known to the control channel."""
+    """Register the commands of the control channel."""
 
     def at(number: int) -> Servo:
         if number not in bus.servos:
@@ -85,13 +85,13 @@ def main(
     ids: tuple[int, ...] = (1, 2),
     time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=20))] = 1.0,
 ) -> int:
-    """Start the fake; it prints one line `ready {json}` with its port and ends on SIGTERM.
+    """Start the fake; it prints one line `ready {json}` with its port and exits on SIGTERM.
 
     Args:
-        link: symbolic link to keep on the pty, whose own path changes when it is unplugged and plugged.
+        link: Symbolic link to the pty, whose path changes when it is unplugged and plugged.
         control: HOST:PORT of the control channel; port 0 takes a free one.
-        ids: ids of the servos on the bus.
-        time_scale: how many times faster than real the servos move; their watchdogs stay in real time.
+        ids: Ids of the servos on the bus.
+        time_scale: Speed of the servos; 1 is real time. Their watchdogs always run in real time.
     """
     try:
         control_address = parse_address(control)

@@ -1,4 +1,4 @@
-"""The bus: takes instruction packets to the servos and puts their status packets on the line."""
+"""The bus: passes instruction packets to the servos and sends their status packets."""
 
 import time
 from collections import deque
@@ -17,7 +17,7 @@ SYNC_WRITE: Final = 0x83
 
 
 class Bus:
-    """Servos side by side; `send` puts one status packet on the line."""
+    """Servos on one bus; `send` sends a status packet."""
 
     def __init__(self, servos: list[Servo], send: Callable[[bytes], None]) -> None:
         self.servos = {servo.number: servo for servo in servos}
@@ -25,20 +25,20 @@ class Bus:
         self._receiver = Receiver()
         self.packets = 0
         self.sync_writes: deque[float] = deque(maxlen=200)
-        """When sync writes of goals came, by the machine's monotonic clock, s."""
+        """Times of sync writes of goals, on the monotonic clock, s."""
         self.wrong_crcs = 0
         self._refusals: dict[int, int] = {}
 
     def refuse_next(self, servo: int, error: int) -> None:
-        """Have the next instruction to that servo alone answered by an error and not done."""
+        """Answer the next instruction to a servo with an error, without executing it."""
         self._refusals[servo] = error
 
     def clear(self) -> None:
-        """Forget half a packet."""
+        """Drop an incomplete packet."""
         self._receiver.clear()
 
     def feed(self, data: bytes) -> None:
-        """Take bytes from the line."""
+        """Process received bytes."""
         for found in self._receiver.feed(data):
             if isinstance(found, BadCrc):
                 if (servo := self._awake(found.servo)) is not None:
@@ -116,7 +116,7 @@ class Bus:
         if address <= goal.address < address + size:
             self.sync_writes.append(time.monotonic())
         if len(rest) % (size + 1):
-            return  # nobody answers a broadcast, not even to refuse it
+            return  # a broadcast is never answered, not even with an error
         for start in range(0, len(rest), size + 1):
             for servo in self._named(rest[start : start + 1]):
                 servo.write(address, rest[start + 1 : start + 1 + size])

@@ -1,4 +1,4 @@
-"""Packets of Dynamixel protocol 2.0: header, stuffing, CRC; bytes in, instructions out."""
+"""Packets of Dynamixel protocol 2.0: header, stuffing, CRC."""
 
 from collections.abc import Iterator
 from typing import Final, NamedTuple
@@ -33,7 +33,7 @@ def crc16(data: bytes) -> int:
 
 
 class Instruction(NamedTuple):
-    """An instruction packet, taken apart."""
+    """A decoded instruction packet."""
 
     servo: int
     code: int
@@ -41,13 +41,13 @@ class Instruction(NamedTuple):
 
 
 class BadCrc(NamedTuple):
-    """A packet whose checksum is wrong, as far as it names a servo."""
+    """A packet with a wrong checksum, addressed to a servo."""
 
     servo: int
 
 
 def packet(servo: int, code: int, parameters: bytes) -> bytes:
-    """Return a whole packet, stuffed and with its checksum."""
+    """Return a packet with stuffing and checksum."""
     body = (bytes([code]) + parameters).replace(STUFFED, STUFFED + b"\xfd")
     head = HEADER + bytes([servo]) + (len(body) + 2).to_bytes(2, "little")
     return head + body + crc16(head + body).to_bytes(2, "little")
@@ -59,17 +59,17 @@ def status(servo: int, error: int, parameters: bytes = b"") -> bytes:
 
 
 class Receiver:
-    """Finds packets in a stream of bytes; what is none is dropped."""
+    """Finds packets in a stream of bytes, and drops garbage."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
 
     def clear(self) -> None:
-        """Forget what has come so far."""
+        """Drop the bytes received so far."""
         self._buffer.clear()
 
     def feed(self, data: bytes) -> Iterator[Instruction | BadCrc]:
-        """Return the packets that `data` completes."""
+        """Return the packets completed by `data`."""
         self._buffer += data
         while True:
             start = self._buffer.find(HEADER)

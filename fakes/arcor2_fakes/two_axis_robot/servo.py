@@ -1,4 +1,4 @@
-"""One servo: its control table and its motion in time. Knows nothing of packets."""
+"""One servo: control table and motion, independent of packets."""
 
 import math
 from collections.abc import Callable
@@ -8,7 +8,7 @@ TICKS: Final = 4096  # per turn
 VELOCITY_UNIT: Final = 0.229 * TICKS / 60.0  # ticks/s
 ACCELERATION_UNIT: Final = 214.577 * TICKS / 3600.0  # ticks/s²
 WATCHDOG_UNIT: Final = 0.02  # s
-HARDEST: Final = 80_000.0  # ticks/s²: what the motor can do when no profile limits it
+HARDEST: Final = 80_000.0  # ticks/s²: acceleration of the motor without a profile
 STEP: Final = 0.001  # s
 REBOOTS: Final = 0.3  # s without an answer
 EEPROM_END: Final = 64
@@ -20,7 +20,7 @@ ALERT: Final = 0x80
 
 
 class Field(NamedTuple):
-    """A register: where, how long, what it is after a reset, and what may be written (nothing: read only)."""
+    """A register: address, size, value after a reset, and range that may be written (none: read only)."""
 
     address: int
     size: int
@@ -61,9 +61,9 @@ GOALS: Final = ("goal",)
 
 
 class Servo:
-    """A servo with id `number`; `clock` gives s and never goes back, `position` is the shaft's, in ticks.
+    """A servo with id `number`; `clock` returns monotonic seconds, `position` is that of the shaft, in ticks.
 
-    The clock may run `time_scale` times faster than real; the bus watchdog, which concerns the host, does not.
+    The clock runs `time_scale` times faster than real time; the bus watchdog, which concerns the host, does not.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Servo:
 
     # ------------------------------------------------------------------------------------------------ the world's side
     def advance(self) -> None:
-        """Let time pass up to now."""
+        """Advance the simulation to the present."""
         now = self._clock()
         limit = self._values["watchdog"]
         if self._values["torque"] and 0 < limit < TRIPPED:
@@ -104,7 +104,7 @@ class Servo:
 
     @property
     def position(self) -> float:
-        """Return where the horn stands as the servo counts it, ticks."""
+        """Return the position of the horn as the servo counts it, ticks."""
         return self._shaft + self._values["homing_offset"]
 
     @property
@@ -120,18 +120,18 @@ class Servo:
         self._shaft = self._target = position - self._values["homing_offset"]
 
     def fail(self, bits: int) -> None:
-        """Have a hardware error: it shuts down."""
+        """Raise a hardware error, which shuts the servo down."""
         self.advance()
         self._values["hardware_error"] = bits
         self._values["torque"] = 0
         self._speed = 0.0
 
     def warm(self, temperature: int) -> None:
-        """Be that warm, °C."""
+        """Set the temperature, °C."""
         self._values["temperature"] = temperature
 
     def reboot(self) -> None:
-        """Start anew: the RAM half of the table is as after power-on."""
+        """Reboot: reset the RAM half of the table."""
         self.advance()
         for name, field in FIELDS.items():
             if field.address >= EEPROM_END:
@@ -142,7 +142,7 @@ class Servo:
 
     @property
     def answers(self) -> bool:
-        """Return whether it is there and awake."""
+        """Return whether the servo is connected and has booted."""
         return not self.absent and self._clock() >= self._away_until
 
     def _move_until(self, until: float) -> None:
@@ -161,7 +161,7 @@ class Servo:
     def _step(self, step: float, acceleration: float, fastest: float) -> None:
         left = self._target - self._shaft
         change = acceleration * step
-        # The fastest from which it can still stop there, seen from the middle of this step.
+        # Highest speed from which it can still stop there, at the middle of this step.
         allowed = math.sqrt(2.0 * acceleration * abs(left) + change * change / 4.0) - change / 2.0
         wanted = math.copysign(min(fastest, max(allowed, 0.0)), left)
         self._speed += max(-change, min(change, wanted - self._speed))
@@ -177,7 +177,7 @@ class Servo:
         return ALERT if self._values["hardware_error"] else 0
 
     def hear(self) -> None:
-        """Note that an instruction for it came: the bus watchdog starts anew."""
+        """Restart the bus watchdog: an instruction was received."""
         self.advance()
         self._heard = self._now
 
@@ -197,7 +197,7 @@ class Servo:
         return bytes(table[address : address + size])
 
     def write(self, address: int, data: bytes) -> int:
-        """Write whole registers from `address` on; gives an error, OK when all was taken."""
+        """Write whole registers from `address` on; return an error, or OK."""
         end = address + len(data)
         found = [(n, f) for n, f in FIELDS.items() if address <= f.address and f.address + f.size <= end]
         if not data or end > TABLE_END:

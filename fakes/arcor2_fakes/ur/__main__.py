@@ -23,8 +23,8 @@ from arcor2_fakes.wire import TcpWire, register_faults
 log = logging.getLogger("main")
 
 _POLYSCOPE_X = 10  # has no dashboard server
-_MOST_AT_ONCE = 100  # control cycles made up for after the process was held up: kicks that waited count as one
-_CHUNK = 10  # of them without reading what has come in
+_MOST_AT_ONCE = 100  # control cycles to catch up after a delay; watchdog signals that waited count as one
+_CHUNK = 10  # cycles to catch up before the sockets are read again
 
 
 def _version(text: str) -> tuple[int, ...]:
@@ -83,7 +83,7 @@ async def _serve(options: argparse.Namespace) -> None:
     register(control, controller, rtde, script, dashboard)
 
     def power_cycle() -> None:
-        """The main switch off and on: every connection breaks, the arm is without power until somebody powers it."""
+        """Switch the controller off and on: every connection breaks, and the arm has no power."""
         for wire in wires.values():
             wire.reset()
         controller.boot()
@@ -91,7 +91,7 @@ async def _serve(options: argparse.Namespace) -> None:
     control.command("power_cycle", power_cycle)
 
     def calibration(deltas: list[list[float]], told: bool = True) -> None:
-        """What a calibration adds to theta, a, d and alpha of the joints; `told`: the primary port tells of it."""
+        """Set what a calibration adds to theta, a, d and alpha; `told`: whether the primary port reports it."""
         if [len(row) for row in deltas] != [6] * 4:
             raise ValueError("four rows of six numbers")
         primary.deltas, primary.told = deltas, told
@@ -110,7 +110,7 @@ async def _serve(options: argparse.Namespace) -> None:
             catch_up()
 
     def catch_up() -> None:
-        """A few cycles; what has come in meanwhile, such as a kick of the watchdog, is read before the next few."""
+        """Run some cycles; data received meanwhile, such as a watchdog signal, is read before the next ones."""
         nonlocal owed
         cycles = min(owed, _CHUNK)
         for _ in range(cycles):
@@ -136,7 +136,7 @@ async def _serve(options: argparse.Namespace) -> None:
 
 
 def main() -> int:
-    """Runs until told to end; the exit status."""
+    """Run until told to end; the exit status."""
     options = _arguments()
     return run(lambda: _serve(options), "ur")
 

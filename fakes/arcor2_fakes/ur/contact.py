@@ -1,17 +1,17 @@
-"""What the tool can run into: a plane of some stiffness, as a bench or a part held in a vice."""
+"""An obstacle for the tool: a plane with a stiffness, such as a bench or a part in a vice."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-STIFFNESS = 20_000.0  # N/m, a part on a bench with the arm's own give
-COLLISION = 150.0  # N at the TCP at which the controller's own supervision stops the arm; UR's default limit
-TOUCH = 5.0  # N that the controller takes for a contact (tool_contact)
+STIFFNESS = 20_000.0  # N/m: a part on a bench, with the compliance of the arm
+COLLISION = 150.0  # N: force at the TCP at which the controller stops the arm; UR's default limit
+TOUCH = 5.0  # N: force that counts as a contact (tool_contact)
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A plane through a point in the base; the normal leads out of it, into the free."""
+    """A plane through a point in the base; the normal points away from the obstacle."""
 
     point: tuple[float, float, float]
     normal: tuple[float, float, float]
@@ -19,7 +19,7 @@ class Obstacle:
 
     @classmethod
     def of(cls, point: Sequence[float], normal: Sequence[float], stiffness: float = STIFFNESS) -> "Obstacle":
-        """Check what a test gives. Raises `ValueError`."""
+        """Check the values. Raise `ValueError`."""
         length = math.hypot(*normal)
         if len(point) != 3 or len(normal) != 3 or not 0.0 < length < math.inf or not 0.0 < stiffness < math.inf:
             raise ValueError("an obstacle has a point and a normal of three numbers and a stiffness above zero")
@@ -27,7 +27,7 @@ class Obstacle:
         return cls((point[0], point[1], point[2]), (x, y, z), stiffness)
 
     def force(self, tip: Sequence[float]) -> tuple[float, float, float]:
-        """Return the force on the tool, N in base axes: that of a spring, once the tip is behind the plane."""
+        """Return the force on the tool, N in base axes: that of a spring, when the tip is behind the plane."""
         depth = sum(n * (p - t) for n, p, t in zip(self.normal, self.point, tip, strict=False))
         if depth <= 0.0:
             return (0.0, 0.0, 0.0)

@@ -1,7 +1,7 @@
-"""What ur_rtde's uploaded program does on the controller: a command loop over registers, with its threads.
+"""Model of the program that ur_rtde uploads: a command loop over registers, with threads.
 
-The program text itself says what each command code does; this is a model of that text, including the stop it really
-runs: a stopL or stopJ is run as stopj until the first asynchronous stop, and as stopl from then on.
+The command codes are those of the program's text. So are its stops: a stopL or stopJ is run as stopj until the first
+asynchronous stop, and as stopl from then on.
 """
 
 import math
@@ -23,14 +23,14 @@ _MARK = "def rtde_control()"
 
 
 class ControlScript(Program):
-    """The control script of a client, told by its text."""
+    """The control script of a client, identified by its text."""
 
     name = "rtde_control"
     register_offset: int
 
     @staticmethod
     def is_one(text: str) -> bool:
-        """Whether a program text is the control script."""
+        """Return whether a program text is the control script."""
         return text.startswith(_MARK)
 
     def __init__(self, controller: Controller, text: str) -> None:
@@ -69,7 +69,7 @@ class ControlScript(Program):
         self._c.output_doubles[start : start + len(values)] = values
 
     def progress(self, value: int) -> None:
-        """The asynchronous status: 0 starts an operation, a negative value ends it, the others are its progress."""
+        """Write the asynchronous status: 0 starts an operation, a negative value ends it, others are its progress."""
         self._async_writes = (self._async_writes + 1) % 128
         if value == 0:
             self._async_operation = (self._async_operation + 1) % 128
@@ -78,7 +78,7 @@ class ControlScript(Program):
 
     # ----------------------------------------------------------------------------------------------------- main loop
     def run(self) -> Steps:
-        """Main thread and the others, one control cycle at a time."""
+        """Run the main thread and the other threads, one control cycle at a time."""
         main = self._main()
         while True:
             try:
@@ -190,7 +190,7 @@ class ControlScript(Program):
         }
 
     def _move(self, motion: Callable[[], Steps]) -> Steps | None:
-        """A motion command: in a thread of its own if the client asked for that, else in the command loop."""
+        """Run a motion command, in a separate thread if requested, else in the command loop."""
         self._stop_async_move()
         if self._ints(1) != 1:
             return motion()
@@ -329,7 +329,7 @@ class _WithProgress(Interpreter):
         self._script = script
 
     def at_once(self, call: Call) -> None:
-        """As the others, and progress."""
+        """Run the calls, and report progress."""
         if call.name == "signal_async_progress":
             self._script.progress(int(call.get("value", 0, 0)))
         else:

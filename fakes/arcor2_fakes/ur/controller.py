@@ -1,4 +1,4 @@
-"""The controller: power, safety, the program that runs, registers and I/O, advanced one control cycle at a time."""
+"""The controller: power, safety, running program, registers and I/O, advanced one control cycle at a time."""
 
 import abc
 import logging
@@ -22,17 +22,17 @@ REDUCED_JOINT_SPEED = 1.0  # rad/s
 _EMERGENCY_DECELERATION = 24.0  # rad/s^2
 _POWER_ON_TIME = 4.0  # s
 _BRAKE_RELEASE_TIME = 3.0  # s
-_KEPT = 200  # commands and stops remembered for the truth
+_KEPT = 200  # number of commands and stops recorded for the truth
 Steps = Generator[None, None, None]
-"""A running piece of program: each step ends where the real one waits for the next control cycle."""
+"""A running part of a program; each step ends where the real program waits for the next control cycle."""
 
 
 class Refused(ValueError):
-    """The controller does not do that in its present state; the text is the dashboard's answer."""
+    """The controller refuses a command in its state; the text is the dashboard's answer."""
 
 
 class Program(abc.ABC):
-    """Something that plays on the controller."""
+    """A program that plays on the controller."""
 
     name = "program"
     register_offset: int | None = None
@@ -40,14 +40,14 @@ class Program(abc.ABC):
 
     @abc.abstractmethod
     def run(self) -> Steps:
-        """The program's main thread; it ends when this does."""
+        """Return the program's main thread; it ends when this does."""
 
     def ended(self) -> None:  # noqa: B027
-        """Called once when the program is over, whatever ended it."""
+        """Handle the end of the program, whatever ended it."""
 
 
 class Controller:
-    """State shared by the ports. Everything runs in the event loop's thread; `tick` is one control cycle."""
+    """State shared by the ports. For the event loop's thread; `tick` is one control cycle."""
 
     def __init__(self, model: str, version: tuple[int, ...], frequency: float, time_scale: float = 1.0) -> None:
         self.model, self.version, self.frequency = model, version, frequency
@@ -84,15 +84,15 @@ class Controller:
         self._steps: Steps | None = None
         self._conditions: dict[SafetyMode, bool] = dict.fromkeys(SafetyMode, False)
         self._unlockable = 0  # cycle from which a protective stop may be unlocked
-        self._goes_on = False  # a safeguard stop holds the program: it goes on by itself
-        self._suspended = False  # held without saying so
-        self._watchdog: tuple[int, float] | None = None  # input register and the longest silence
+        self._goes_on = False  # a safeguard stop holds the program, which continues by itself
+        self._suspended = False  # held without reporting it
+        self._watchdog: tuple[int, float] | None = None  # input register and timeout, s
         self._written = [0] * 48  # cycle of the last write of each integer register
         self._due: list[tuple[int, Callable[[], None]]] = []  # (cycle, what)
 
     # ------------------------------------------------------------------------------------------------ control cycle
     def tick(self) -> None:
-        """One control cycle."""
+        """Run one control cycle."""
         self.cycles += 1
         if self._due:
             self._run_due()
@@ -106,7 +106,7 @@ class Controller:
                 self.stop_program("ended")
             except MotionRefused as e:
                 self.protective_stop(str(e))
-            except (ValueError, TypeError, LookupError, ArithmeticError) as e:  # what the program says makes no sense
+            except (ValueError, TypeError, LookupError, ArithmeticError) as e:  # the program is invalid
                 self.stop_program(f"runtime error: {e}")
         elif runtime is Runtime.STOPPING and not self.arm.busy:
             self.runtime = Runtime.STOPPED
@@ -134,15 +134,15 @@ class Controller:
 
     @property
     def touching(self) -> bool:
-        """Whether the controller takes the tool for in contact."""
+        """Return whether the tool counts as in contact."""
         return self.contact or math.hypot(*self.tcp_force[:3]) > TOUCH
 
     def place_obstacle(self, obstacle: Obstacle | None) -> None:
-        """Puts something in the tool's way, or takes it away."""
+        """Set or remove the obstacle."""
         self.obstacle, self.tcp_force = obstacle, (0.0,) * 6
 
     def after(self, seconds: float, do: Callable[[], None]) -> None:
-        """Does something so much later, in the controller's time and by `time_scale`."""
+        """Call a function later, by the controller's time and `time_scale`."""
         self._due.append((self.cycles + max(1, round(seconds * self.time_scale * self.frequency)), do))
 
     def _run_due(self) -> None:
@@ -178,7 +178,7 @@ class Controller:
 
     def _condition(self, mode: SafetyMode, on: bool) -> None:
         self._conditions[mode] = on
-        # The worst prevails; the numbers rise with it, but for recovery, which hides no protective stop.
+        # The worst state prevails, that is the highest number, but recovery does not hide a protective stop.
         rank = [m for m in SafetyMode if self._conditions[m]]
         if self._conditions[SafetyMode.PROTECTIVE_STOP] and SafetyMode.RECOVERY in rank:
             rank.remove(SafetyMode.RECOVERY)
@@ -189,7 +189,7 @@ class Controller:
         self.changed()
 
     def protective_stop(self, why: str) -> None:
-        """Stops on the path and pauses the program until a person unlocks it."""
+        """Stop on the path, and pause the program until a person unlocks it."""
         log.info("protective stop: %s", why)
         self._unlockable = self.cycles + round(UNLOCK_WAIT * self.time_scale * self.frequency)
         self._pause(protective=True)
@@ -197,7 +197,7 @@ class Controller:
         self._condition(SafetyMode.PROTECTIVE_STOP, True)
 
     def unlock_protective_stop(self) -> None:
-        """Raises `Refused` in the first seconds, with the controller's text. The program stays paused."""
+        """Unlock the protective stop. Raise `Refused` in the first seconds; the program stays paused."""
         if not self._conditions[SafetyMode.PROTECTIVE_STOP]:
             return
         if self.cycles < self._unlockable:
@@ -208,10 +208,10 @@ class Controller:
         self._condition(SafetyMode.PROTECTIVE_STOP, False)
 
     def safeguard_stop(self, on: bool, reports_paused: bool = False) -> None:
-        """The door. Holds a playing program, which goes on by itself when the door closes: there is no reset input.
+        """Open or close the door. It holds a playing program, which continues when it closes: there is no reset input.
 
-        RTDE goes on saying "playing" by default, for ur_rtde keeps waiting through a safeguard stop and would give up
-        at once if told "paused"; `reports_paused` gives the other reading of the manual.
+        RTDE reports "playing" by default, because ur_rtde waits through a safeguard stop, but fails at once when
+        "paused" is reported; `reports_paused` selects the other interpretation of the manual.
         """
         if on and not self._conditions[SafetyMode.SAFEGUARD_STOP]:
             self._goes_on = self.runtime in (Runtime.PLAYING, Runtime.RESUMING)
@@ -227,7 +227,7 @@ class Controller:
             self.arm.go_on()
 
     def emergency_stop(self, on: bool, system: bool = False) -> None:
-        """The mushroom button. Ends the program; the arm loses power when it stands."""
+        """Press or release the emergency stop. It ends the program; the arm loses power at standstill."""
         mode = SafetyMode.SYSTEM_EMERGENCY_STOP if system else SafetyMode.ROBOT_EMERGENCY_STOP
         if on:
             self._cut(mode)
@@ -236,20 +236,20 @@ class Controller:
             self._condition(SafetyMode.ROBOT_EMERGENCY_STOP, False)
 
     def fault(self, violation: bool) -> None:
-        """A violation of a safety limit, or a fault; only `restart_safety` leads out of it."""
+        """Enter a violation of a safety limit, or a fault, until `restart_safety`."""
         self._cut(SafetyMode.VIOLATION if violation else SafetyMode.FAULT)
 
     def reduced(self, on: bool) -> None:
-        """Lower limits from the next motion on."""
+        """Reduce the limits from the next motion on."""
         self._condition(SafetyMode.REDUCED, on)
 
     def recovery(self, on: bool) -> None:
-        """The arm is outside its safety limits: no program runs, a person moves it back by hand."""
+        """Enter recovery mode: no program runs, and a person moves the arm back within its limits."""
         self.stop_program("recovery")
         self._condition(SafetyMode.RECOVERY, on)
 
     def restart_safety(self) -> None:
-        """Clears violation and fault; the arm is left without power."""
+        """Clear violation and fault; the arm has no power afterwards."""
         for mode in (SafetyMode.VIOLATION, SafetyMode.FAULT, SafetyMode.PROTECTIVE_STOP):
             self._condition(mode, False)
         self.power_off()
@@ -269,7 +269,7 @@ class Controller:
 
     # --------------------------------------------------------------------------------------------------------- power
     def power_on(self) -> None:
-        """From off to idle with brakes on. Raises `Refused` in an emergency stop or fault."""
+        """Switch from off to idle, brakes closed. Raise `Refused` in an emergency stop or fault."""
         if self.safety >= SafetyMode.SYSTEM_EMERGENCY_STOP:
             raise Refused(f"Command is not allowed in safety mode {self.safety.name}")
         if self.robot_mode is RobotMode.POWER_OFF:
@@ -277,14 +277,14 @@ class Controller:
             self.after(_POWER_ON_TIME, lambda: self._mode_from(RobotMode.POWER_ON, RobotMode.IDLE))
 
     def power_off(self) -> None:
-        """Ends the program, brakes on, arm without power."""
+        """End the program, close the brakes and switch power off."""
         self.stop_program("power off")
         self.arm.teleport(self.arm.q)
         self.freedrive = False
         self._mode(RobotMode.POWER_OFF)
 
     def brake_release(self) -> None:
-        """To running, from idle or, with the time it takes, from off. Raises `Refused`."""
+        """Release the brakes; from off, switch power on first. Raise `Refused`."""
         self.power_on()
         if self.robot_mode is RobotMode.POWER_ON:
             self.after(_POWER_ON_TIME + _BRAKE_RELEASE_TIME, lambda: self._mode_from(RobotMode.IDLE, RobotMode.RUNNING))
@@ -292,7 +292,7 @@ class Controller:
             self.after(_BRAKE_RELEASE_TIME, lambda: self._mode_from(RobotMode.IDLE, RobotMode.RUNNING))
 
     def boot(self) -> None:
-        """The controller has just been switched on: booting, then off."""
+        """Return the controller has just been switched on: booting, then off."""
         self.power_off()
         self._mode(RobotMode.BOOTING)
         self.after(_POWER_ON_TIME, lambda: self._mode_from(RobotMode.BOOTING, RobotMode.POWER_OFF))
@@ -302,12 +302,12 @@ class Controller:
         self.changed()
 
     def _mode_from(self, expected: RobotMode, mode: RobotMode) -> None:
-        if self.robot_mode is expected:  # else something else came between
+        if self.robot_mode is expected:  # else the state has changed meanwhile
             self._mode(mode)
 
     # ------------------------------------------------------------------------------------------------------- program
     def start_program(self, program: Program) -> None:
-        """Replaces what runs. Raises `Refused` when the arm can't move now."""
+        """Replace the running program. Raise `Refused` if the arm cannot move."""
         if self.robot_mode is not RobotMode.RUNNING or self.safety not in MAY_MOVE:
             raise Refused(f"Command is not allowed: {self.robot_mode.name}, {self.safety.name}")
         self.stop_program("replaced")
@@ -318,7 +318,7 @@ class Controller:
         self.changed()
 
     def stop_program(self, why: str) -> None:
-        """Ends the program for good; the arm decelerates. Does nothing without a program."""
+        """End the program, if there is one; the arm decelerates."""
         if self.program is None:
             return
         log.info("program %s: %s", self.program.name, why)
@@ -338,14 +338,14 @@ class Controller:
         self.changed()
 
     def pause_program(self) -> None:
-        """Pauses on the path. Raises `Refused` when nothing plays."""
+        """Pause on the path. Raise `Refused` if no program plays."""
         if self.runtime is not Runtime.PLAYING:
             raise Refused("Failed to execute: pause")
         self._goes_on = False
         self._pause()
 
     def play_program(self) -> None:
-        """Continues a paused program, or starts the loaded one. Raises `Refused`."""
+        """Continue a paused program, or starts the loaded one. Raise `Refused`."""
         if self.robot_mode is not RobotMode.RUNNING or self.safety not in MAY_MOVE:
             raise Refused("Failed to execute: play")
         if self.runtime in (Runtime.PAUSED, Runtime.PAUSING):
@@ -370,17 +370,17 @@ class Controller:
 
     # ---------------------------------------------------------------------------------------------------- watchdog
     def integer_written(self, index: int) -> None:
-        """An RTDE client has just written an integer input register."""
+        """Handle a write of an integer input register by an RTDE client."""
         self._written[index] = self.cycles
 
     def set_watchdog(self, register: int, minimum_frequency: float) -> None:
-        """Stops the program when the register is written less often than that; 0 Hz disarms."""
+        """Set the watchdog: stop the program when the register is written less often, Hz; 0 disarms it."""
         self._watchdog = (register, 1.0 / minimum_frequency) if minimum_frequency > 0.0 else None
         self._written[register] = self.cycles
 
     @property
     def watchdog(self) -> float | None:
-        """The longest silence it tolerates in s, or None when it is not armed."""
+        """Return the timeout of the watchdog, s; None when it is not armed."""
         return None if self._watchdog is None else self._watchdog[1]
 
     def _check_watchdog(self) -> None:
@@ -392,10 +392,10 @@ class Controller:
 
     # --------------------------------------------------------------------------------------------------- what happened
     def note_command(self, kind: str, **details: Any) -> None:
-        """Remembers a motion command for the truth."""
+        """Record a motion command for the truth."""
         self.commands.append({"t": time.monotonic(), "kind": kind, **details})
 
     def note_stop(self, via: str, code: int | str) -> None:
-        """Remembers a frame that asks for a stop, at its arrival."""
+        """Record a frame that requests a stop, at its arrival."""
         self.stops_seen += 1
         self.stops.append({"t": time.monotonic(), "via": via, "code": code})

@@ -1,4 +1,7 @@
-"""The dashboard server: one line of text in, one line out. Source: Universal Robots, "Dashboard Server, e-Series"."""
+"""The dashboard server: one line of text per command and answer.
+
+Source: Universal Robots, "Dashboard Server, e-Series".
+"""
 
 import logging
 import re
@@ -84,7 +87,7 @@ class Dashboard:
         self._names = sorted(self._commands, key=len, reverse=True)
 
     def opened(self, connection: Connection) -> None:
-        """A client has connected."""
+        """Serve a client."""
         buffer = bytearray()
 
         def received(data: bytes) -> None:
@@ -106,7 +109,7 @@ class Dashboard:
         connection.send(f"{GREETING}\n".encode())
 
     def answer(self, line: str) -> str:
-        """The answer to one command."""
+        """Return the answer to one command."""
         for name in self._names:
             if line == name or line.startswith(f"{name} "):
                 if name in _REMOTE_ONLY and not self.controller.remote:

@@ -1,7 +1,7 @@
-"""Forward and inverse kinematics of the UR e-series from nominal DH parameters, in plain floats for the 500 Hz tick.
+"""Forward and inverse kinematics of the UR e-series from nominal DH parameters, in plain floats for the 500 Hz cycle.
 
-Poses are in the controller's base: rigid transforms here, x, y, z and rotation vector on the wire. A real arm has a
-calibration of its own and differs from this by millimetres. Source of the parameters: Universal Robots, "DH Parameters
+Poses are in the controller's base: rigid transforms here, x, y, z and rotation vector on the wire. A real arm has its
+own calibration and differs by millimetres. Source of the parameters: Universal Robots, "DH Parameters
 for calculations of kinematics and dynamics", e-Series table. The inverse follows from the geometry: the wrist center
 gives joint 1, the offset along the normal of joint 1's plane gives joint 5, and two links are left for joints 2 to 4.
 """
@@ -17,8 +17,8 @@ Transform = tuple[Vector, Vector, Vector, Vector]
 """The axes x, y, z and the origin of a frame, each in base coordinates."""
 
 IDENTITY: Transform = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-_SINGULAR = 1e-6  # sine of joint 5; acos has no more to give near 1
-_MARGIN = 1e-7  # of a cosine beyond 1, at the edge of reach
+_SINGULAR = 1e-6  # sine of joint 5: the precision of acos near 1
+_MARGIN = 1e-7  # tolerance of a cosine above 1, at the limit of the reach
 _DAMPING = 1e-10 * np.eye(6)
 _SMALL_STEP = 1e-4  # rad
 
@@ -44,16 +44,16 @@ MODELS = {
 
 
 class NoSolution(ValueError):
-    """The pose is out of reach."""
+    """The pose cannot be reached."""
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product."""
+    """Return vector product."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def dot(a: Vector, b: Vector) -> float:
-    """Scalar product."""
+    """Return scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -62,7 +62,7 @@ def _combine(f: float, a: Vector, g: float, b: Vector) -> Vector:
 
 
 def compose(a: Transform, b: Transform) -> Transform:
-    """The frame `b`, given in `a`, in the base of `a`."""
+    """Return the frame `b`, given in `a`, in the base of `a`."""
     x, y, z, o = a
 
     def turn(v: Vector) -> Vector:
@@ -77,7 +77,7 @@ def compose(a: Transform, b: Transform) -> Transform:
 
 
 def invert(a: Transform) -> Transform:
-    """The base in the frame `a`."""
+    """Return the base in the frame `a`."""
     x, y, z, o = a
     return (
         (x[0], y[0], z[0]),
@@ -88,7 +88,7 @@ def invert(a: Transform) -> Transform:
 
 
 def from_pose(pose: Sequence[float]) -> Transform:
-    """x, y, z [m] and rotation vector [rad] as a transform (Rodrigues' formula)."""
+    """Return x, y, z [m] and rotation vector [rad] as a transform (Rodrigues' formula)."""
     px, py, pz, rx, ry, rz = pose
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
     if angle < 1e-12:
@@ -105,7 +105,7 @@ def from_pose(pose: Sequence[float]) -> Transform:
 
 
 def rotation_vector(a: Transform) -> Vector:
-    """Axis times angle in [0, pi], stable at both ends."""
+    """Return axis times angle in [0, pi], stable at both ends."""
     x, y, z, _ = a
     vx, vy, vz = y[2] - z[1], z[0] - x[2], x[1] - y[0]
     sine2 = math.sqrt(vx * vx + vy * vy + vz * vz)  # 2 sin
@@ -148,20 +148,20 @@ class Chain:
         self._flange_from_tcp = IDENTITY
 
     def set_tcp(self, offset: Sequence[float]) -> None:
-        """The TCP in the flange, as on the wire."""
+        """Return the TCP in the flange, as on the wire."""
         self.tcp = from_pose(offset)
         self._flange_from_tcp = invert(self.tcp)
 
     def forward(self, q: Sequence[float]) -> Transform:
-        """The TCP in the base."""
+        """Return the TCP in the base."""
         return compose(self._frames(q)[0], self.tcp)
 
     def flange(self, q: Sequence[float]) -> Transform:
-        """The tool flange in the base."""
+        """Return the tool flange in the base."""
         return self._frames(q)[0]
 
     def jacobian(self, q: Sequence[float]) -> np.ndarray:
-        """6 x 6, TCP velocity (m/s, rad/s, base axes) per joint velocity."""
+        """Return 6 x 6, TCP velocity (m/s, rad/s, base axes) per joint velocity."""
         return self._tip_and_jacobian(q)[1]
 
     def _tip_and_jacobian(self, q: Sequence[float]) -> tuple[Transform, np.ndarray]:
@@ -175,7 +175,7 @@ class Chain:
         return tip, np.array(columns).T
 
     def _frames(self, q: Sequence[float]) -> tuple[Transform, tuple[Vector, ...], tuple[Vector, ...]]:
-        """Flange, the joints' axes and a point on each. Each line is one row of the DH table."""
+        """Return the flange, and axis and point of each joint. Each line is one row of the DH table."""
         g = self.geometry
         c1, s1 = math.cos(q[0]), math.sin(q[0])
         x1: Vector = (c1, s1, 0.0)
@@ -200,7 +200,7 @@ class Chain:
         return flange, ((0.0, 0.0, 1.0), n, n, n, z4, z5), ((0.0, 0.0, 0.0), p1, p2, p3, p4, p5)
 
     def solutions(self, target: Transform, q6_if_free: float = 0.0) -> list[tuple[float, ...]]:
-        """Up to eight joint configurations that bring the TCP to `target`, angles in (-pi, pi]."""
+        """Return up to eight joint configurations that bring the TCP to `target`, angles in (-pi, pi]."""
         g = self.geometry
         x6, y6, z6, p = compose(target, self._flange_from_tcp)
         wx, wy = p[0] - g.d6 * z6[0], p[1] - g.d6 * z6[1]
@@ -238,7 +238,7 @@ class Chain:
         return found
 
     def inverse(self, target: Transform, near: Sequence[float]) -> tuple[float, ...]:
-        """The configuration closest to `near` within +-2 pi. Raises `NoSolution` when the pose is out of reach."""
+        """Return the configuration closest to `near` within +-2 pi. Raise `NoSolution` if there is none."""
         best, least = None, math.inf
         for solution in self.solutions(target, near[5]):
             q = tuple(_unwind(angle, n) for angle, n in zip(solution, near, strict=True))
@@ -250,20 +250,20 @@ class Chain:
         return self.follow(target, best) or best  # singular ones are exact only after a step of Newton's
 
     def follow(self, target: Transform, q: Sequence[float], steps: int = 5) -> tuple[float, ...] | None:
-        """A configuration right beside `q` (Newton, damped near singularities); None when it does not get there."""
+        """Return a configuration next to `q` (Newton, damped near singularities); None if it does not converge."""
         for _ in range(steps):
             tip, jacobian = self._tip_and_jacobian(q)
             shift, turn = difference(tip, target)
             error = np.array((*shift, *turn))
             step = (jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + _DAMPING, error)).tolist()
             q = [a + b for a, b in zip(q, step, strict=True)]
-            # Newton converges quadratically: what a small step leaves is its square.
+            # Newton converges quadratically: the error after a small step is its square.
             if max(map(abs, step)) < _SMALL_STEP:
                 return tuple(q)
         return None
 
     def joint_rates(self, q: Sequence[float], twist: Sequence[float]) -> list[float]:
-        """Joint velocities that give the TCP the velocity `twist`."""
+        """Return joint velocities that give the TCP the velocity `twist`."""
         jacobian = self.jacobian(q)
         damped = jacobian @ jacobian.T + 1e-8 * np.eye(6)
         rates: list[float] = (jacobian.T @ np.linalg.solve(damped, np.array(twist))).tolist()

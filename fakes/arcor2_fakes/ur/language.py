@@ -1,9 +1,9 @@
-"""URScript as a language: blocks, variables, conditions, loops and threads, so that a client's program runs as it says.
+"""URScript as a language: blocks, variables, conditions, loops and threads, to run the programs of clients.
 
-Read line by line into statements, whose expressions are Python's but for ``p[...]``. One scope for all variables. A
-statement that waits (a motion, ``sync``, ``sleep``) has to be a statement of its own. What is not known is an error, as
-on the controller: a program that cannot be read does not start, an unknown name or function ends it.
-Source of the words: Universal Robots, "The URScript Programming Language".
+A program is parsed line by line into statements, with Python expressions except for ``p[...]``. All variables are in
+one scope. A call that waits (a motion, ``sync``, ``sleep``) must be a separate statement. As on the controller, a
+program that cannot be parsed does not start, and an unknown name or function ends it. Source: Universal Robots, "The
+URScript Programming Language".
 """
 
 import ast
@@ -36,12 +36,12 @@ _BLOCK = re.compile(r"(def|thread)\s+(\w+)\s*\(\s*\)\s*:|(while|if|elif)\b(.+):|
 _ASSIGNMENT = re.compile(r"(?:(?:global|local)\s+)?(\w+)\s*=(?!=)\s*(.+)")
 _RUN = re.compile(r"run\s+(\w+)\s*\(\s*\)")
 _HANDLING = re.compile(r"(kill|join)\s+(\w+)")
-_MOST_AT_ONCE = 10_000  # statements in one control cycle: then the controller sees an infinite loop
+_MOST_AT_ONCE = 10_000  # statements in one control cycle; more are an infinite loop
 
 
 @dataclass
 class Statement:
-    """One line with what belongs to it: `kind`, a name, an expression, and the lines below it."""
+    """One statement: `kind`, a name, an expression, and the statements of its block."""
 
     kind: str
     name: str = ""
@@ -51,7 +51,7 @@ class Statement:
 
 
 def parse(text: str) -> list[Statement]:
-    """Return the statements of a program. Raises `ValueError` naming the line that cannot be read."""
+    """Return the statements of a program. Raise `ValueError` naming a line that cannot be parsed."""
     lines = iter([line.split("#", 1)[0].strip() for line in text.splitlines()])
     body, end = _block(lines)
     if end:
@@ -119,11 +119,11 @@ def _expression(text: str) -> ast.expr:
 
 
 class _Leave(Exception):
-    """`break`, `return` or `halt` on its way out."""
+    """Unwinding by `break`, `return` or `halt`."""
 
 
 class WrittenProgram(Program):
-    """A program that a client has sent, run as its text says."""
+    """A program of a client."""
 
     def __init__(self, controller: Controller, name: str, text: str) -> None:
         self.name = name
@@ -137,7 +137,7 @@ class WrittenProgram(Program):
         self._functions: dict[str, Callable[..., Any]] = self._table()
 
     def run(self) -> Steps:
-        """Main thread and the others, one control cycle at a time; it ends with the main thread."""
+        """Run all threads, one control cycle at a time, until the main thread ends."""
         main = self._main()
         while True:
             self._done = 0
@@ -221,7 +221,7 @@ class WrittenProgram(Program):
 
     # ------------------------------------------------------------------------------------------------ expressions
     def value(self, node: ast.expr | None) -> Any:
-        """Return what an expression is worth now. Raises `ValueError`, `LookupError`, `TypeError`."""
+        """Return the value of an expression. Raise `ValueError`, `LookupError`, `TypeError`."""
         match node:
             case ast.Constant():
                 return node.value

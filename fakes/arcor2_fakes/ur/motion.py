@@ -1,8 +1,8 @@
-"""How the arm moves in time: trapezoidal motions in joint and Cartesian space, velocity control, servoing, stopping.
+"""Motions of the arm: trapezoidal in joint and Cartesian space, velocity control, servoing, stopping.
 
-One `Arm.step` per control cycle. Motions along a path (movej, movel) are functions of a path time that runs at
-`Arm.rate`: the speed slider, a pause and a protective stop only slow that time down, so that the arm stays on its path
-and can go on.
+`Arm.step` is one control cycle. Motions along a path (movej, movel) are functions of a path time that runs at
+`Arm.rate`: the speed slider, a pause and a protective stop only slow this time down, so that the arm stays on its path
+and can continue.
 """
 
 import math
@@ -13,28 +13,28 @@ from arcor2_fakes.ur.kinematics import Chain, Transform, to_pose
 from arcor2_fakes.ur.paths import JointBlend, JointMove, Joints, LinearBlend, LinearMove, MotionRefused
 
 MAX_JOINT_SPEED = math.pi  # rad/s, UR5e data sheet: 180 degrees per second on every joint
-MAX_JOINT_ACCELERATION = 40.0  # rad/s^2, beyond what any program may ask for
+MAX_JOINT_ACCELERATION = 40.0  # rad/s^2, more than any program may request
 MAX_TCP_SPEED = 3.0  # m/s
 JOINT_RANGE = math.tau  # rad either way
-PROGRAM_STOP_DECELERATION = 14.0  # rad/s^2, when a program ends or a thread is killed in mid-move
-_PAUSE_TIME = 0.2  # s from full speed to rest on the path
+PROGRAM_STOP_DECELERATION = 14.0  # rad/s^2, when a program ends or a thread is killed during a move
+_PAUSE_TIME = 0.2  # s from full speed to standstill on the path
 _PROTECTIVE_TIME = 0.08  # s, the same for a protective stop
 
 
 class Motion(Protocol):
-    """What the arm is doing; `step` gives the next joint positions."""
+    """A motion; `step` returns the next joint positions."""
 
     done: bool
     along_path: bool
     """Whether a pause may slow it down on its path; if not, it ends by itself or by a halt."""
 
     def step(self, arm: "Arm", dt: float, /) -> Joints:
-        """Positions after `dt` seconds of this motion's own time."""
+        """Return positions after `dt` seconds of the motion's own time."""
         ...
 
 
 class JointSpeed:
-    """speedj: a joint velocity reached under an acceleration and kept until something else comes."""
+    """speedj: a joint velocity reached under an acceleration and kept until the next command."""
 
     along_path = False
     done = False
@@ -43,12 +43,12 @@ class JointSpeed:
         self.target, self.acceleration = tuple(target), acceleration
 
     def step(self, arm: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds."""
+        """Return positions after `dt` seconds."""
         return _toward(arm.qd, [v * arm.rate for v in self.target], self.acceleration, arm.q, dt)
 
 
 class LinearSpeed:
-    """speedl: a TCP velocity reached under an acceleration and kept until something else comes."""
+    """speedl: a TCP velocity reached under an acceleration and kept until the next command."""
 
     along_path = False
     done = False
@@ -58,7 +58,7 @@ class LinearSpeed:
         self._twist = arm.twist()
 
     def step(self, arm: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds."""
+        """Return positions after `dt` seconds."""
         gap = [t * arm.rate - v for t, v in zip(self.target, self._twist, strict=True)]
         most = max(math.dist((0.0, 0.0, 0.0), gap[:3]), math.dist((0.0, 0.0, 0.0), gap[3:]))
         f = min(1.0, self.acceleration * dt / most) if most > 0.0 else 0.0
@@ -68,20 +68,20 @@ class LinearSpeed:
 
 
 class LinearHalt(LinearSpeed):
-    """stopl: the TCP's velocity goes to zero in its direction."""
+    """stopl: the TCP decelerates along its direction."""
 
     def __init__(self, arm: "Arm", deceleration: float) -> None:
         super().__init__(arm, (0.0,) * 6, deceleration)
 
     def step(self, arm: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds."""
+        """Return positions after `dt` seconds."""
         q = super().step(arm, dt)
         self.done = max(map(abs, self._twist)) < 1e-9
         return arm.q if self.done else q
 
 
 class JointHalt:
-    """stopj: all joint velocities go to zero together."""
+    """stopj: all joint velocities reach zero together."""
 
     along_path = False
 
@@ -90,14 +90,14 @@ class JointHalt:
         self.done = not any(arm.qd)
 
     def step(self, arm: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds."""
+        """Return positions after `dt` seconds."""
         q = _toward(arm.qd, (0.0,) * 6, self._deceleration, arm.q, dt)
         self.done = max(abs(a - b) for a, b in zip(q, arm.q, strict=True)) < 1e-12
         return q
 
 
 class Servo:
-    """servoj: follows a target that is renewed all the time, with the lag of the look-ahead time."""
+    """servoj: follows a target that is renewed continuously, with the delay of the look-ahead time."""
 
     along_path = False
     done = False
@@ -106,7 +106,7 @@ class Servo:
         self.target, self.lookahead = tuple(target), min(0.2, max(0.03, lookahead))
 
     def step(self, arm: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds: a critically damped follower within the joints' limits."""
+        """Return positions after `dt` seconds: a critically damped follower within the joints' limits."""
         omega = 2.0 / self.lookahead
         q = []
         for a, v, target in zip(arm.q, arm.qd, self.target, strict=True):
@@ -117,7 +117,7 @@ class Servo:
 
 
 class Guided:
-    """A person moves the arm by hand in freedrive: straight to a configuration, slowly."""
+    """Freedrive: a person moves the arm by hand, slowly and straight to a configuration."""
 
     along_path = False
 
@@ -126,14 +126,14 @@ class Guided:
         self.done = self._move.done
 
     def step(self, arm: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds."""
+        """Return positions after `dt` seconds."""
         q = self._move.step(arm, dt)
         self.done = self._move.done
         return q
 
 
 def _toward(qd: Joints, target: Joints, acceleration: float, q: Joints, dt: float) -> Joints:
-    """Joint positions one step on, the velocity vector drawn straight towards `target`."""
+    """Return joint positions after one step, the velocity vector drawn straight towards `target`."""
     gap = [t - v for t, v in zip(target, qd, strict=True)]
     most = max(map(abs, gap))
     f = min(1.0, acceleration * dt / most) if most > 0.0 else 0.0
@@ -141,57 +141,57 @@ def _toward(qd: Joints, target: Joints, acceleration: float, q: Joints, dt: floa
 
 
 class Arm:
-    """Position and velocity of the six joints, and the one motion going on."""
+    """Position and velocity of the six joints, and the current motion."""
 
     def __init__(self, chain: Chain, q: Joints) -> None:
         self.chain = chain
         self.q: tuple[float, ...] = tuple(q)
         self.qd: tuple[float, ...] = (0.0,) * 6
         self.period = 0.0
-        """The length of the cycle in progress."""
+        """The length of the current cycle."""
         self.motion: Motion | None = None
         self.rate = 1.0
         """How fast path time runs now: the speed slider, or on its way to or from zero in a pause."""
         self.slider = 1.0
         self.held = False
-        """Path time is brought to a stand: paused, or stopped by the safety system."""
+        """Return whether path time is stopped, by a pause or by the safety system."""
         self.speed_limit = MAX_JOINT_SPEED
         self._ramp = _PAUSE_TIME
         self._pose: tuple[float, ...] | None = None
 
     @property
     def pose(self) -> tuple[float, ...]:
-        """The TCP as x, y, z and rotation vector."""
+        """Return the TCP as x, y, z and rotation vector."""
         if self._pose is None:
             self._pose = to_pose(self.chain.forward(self.q))
         return self._pose
 
     @property
     def moving(self) -> bool:
-        """Whether a joint has a velocity."""
+        """Return whether a joint has a velocity."""
         return any(self.qd)
 
     @property
     def busy(self) -> bool:
-        """Whether there is a motion that has not come to its end."""
+        """Return whether a motion has not ended yet."""
         return self.motion is not None
 
     def twist(self) -> list[float]:
-        """TCP velocity in base axes."""
+        """Return TCP velocity in base axes."""
         if not self.moving:
             return [0.0] * 6
         twist: list[float] = (self.chain.jacobian(self.q) @ self.qd).tolist()
         return twist
 
     def set_tcp(self, offset: Sequence[float]) -> None:
-        """Mounts another TCP."""
+        """Set the TCP."""
         self.chain.set_tcp(offset)
         self._pose = None
 
     def move_joints(self, goal: Joints, velocity: float, acceleration: float, blend: bool = False) -> None:
-        """Starts a movej. Velocity and acceleration beyond the arm's own are cut, as the controller does.
+        """Start a movej. Velocity and acceleration are limited to those of the arm, as by the controller.
 
-        With `blend` it begins while the movej before comes to its end.
+        With `blend`, it starts while the previous movej ends.
         """
         if max(map(abs, goal)) > JOINT_RANGE:
             raise MotionRefused("the goal is beyond the joint limits")
@@ -203,7 +203,7 @@ class Arm:
             self.motion = JointMove(self.q, goal, velocity, acceleration)
 
     def move_linear(self, goal: Transform, velocity: float, acceleration: float, blend: bool = False) -> None:
-        """Starts a movel; with `blend` while the movel before comes to its end."""
+        """Start a movel; with `blend`, while the previous movel ends."""
         velocity, leaving = min(velocity, MAX_TCP_SPEED), self.motion if blend else None
         if isinstance(leaving, LinearMove | LinearBlend):
             self.motion = LinearBlend(leaving, LinearMove(leaving.goal, goal, velocity, acceleration))
@@ -211,29 +211,29 @@ class Arm:
             self.motion = LinearMove(self.chain.forward(self.q), goal, velocity, acceleration)
 
     def halt(self, deceleration: float = PROGRAM_STOP_DECELERATION, linear: bool = False) -> None:
-        """Ends the present motion and brings the arm to rest; it will not go on afterwards."""
+        """End the motion and decelerate; it does not continue."""
         if not self.moving:
             self.motion = None
         else:
             self.motion = LinearHalt(self, deceleration) if linear else JointHalt(self, deceleration)
 
     def hold(self, protective: bool = False) -> None:
-        """Brings the arm to rest on its path; `go_on` continues. What has no path is ended."""
+        """Decelerate on the path; `go_on` continues. A motion without a path ends."""
         self.held = True
         self._ramp = _PROTECTIVE_TIME if protective else _PAUSE_TIME
         if self.motion is not None and not self.motion.along_path:
             self.halt()
 
     def go_on(self) -> None:
-        """Lets path time run again."""
+        """Let path time run again."""
         self.held, self._ramp = False, _PAUSE_TIME
 
     def teleport(self, q: Joints) -> None:
-        """Puts the arm elsewhere at rest; for a test's set-up."""
+        """Place the arm at joint positions, at standstill."""
         self.motion, self.qd, self.q, self._pose = None, (0.0,) * 6, tuple(q), None
 
     def step(self, dt: float) -> None:
-        """One control cycle. Raises `MotionRefused` when a limit would be passed; the arm is then as before."""
+        """One control cycle. Raise `MotionRefused` if a limit would be exceeded; the arm is then unchanged."""
         wanted = 0.0 if self.held else self.slider
         if self.rate != wanted:
             change = dt / self._ramp

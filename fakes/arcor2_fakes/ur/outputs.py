@@ -1,4 +1,4 @@
-"""What the RTDE output variables are read from, and how the RTDE inputs act on the controller."""
+"""Sources of the RTDE output variables, and effects of the RTDE input variables."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -14,7 +14,7 @@ _LINK_LOAD = (0.0, 30.0, 14.0, 1.5, 1.0, 0.0)  # N m at full reach, roughly thos
 
 
 def readers(c: Controller) -> dict[str, Reader]:
-    """One function per RTDE output variable; each gives the values to pack."""
+    """One function per RTDE output variable; each returns the values to pack."""
     arm = c.arm
     six = (0.0,) * 6
 
@@ -22,7 +22,7 @@ def readers(c: Controller) -> dict[str, Reader]:
         return lambda: values
 
     def torques() -> tuple[float, ...]:
-        """Gravity of links and payload on joints 2 and 3, by reach: plausible, not a dynamic model."""
+        """Return the gravity torques of links and payload on joints 2 and 3, by reach; not a dynamic model."""
         if c.robot_mode is not RobotMode.RUNNING:
             return six
         x, y = arm.pose[0], arm.pose[1]
@@ -92,12 +92,12 @@ def readers(c: Controller) -> dict[str, Reader]:
 
 
 def flange_pose(c: Controller) -> tuple[float, ...]:
-    """The flange as x, y, z and rotation vector."""
+    """Return the flange as x, y, z and rotation vector."""
     return to_pose(c.chain.flange(c.arm.q))
 
 
 def apply_inputs(c: Controller, values: dict[str, Any]) -> None:
-    """Acts on the I/O variables of one RTDE package; a mask says which of the bits count."""
+    """Apply the I/O variables of one RTDE package; a mask selects the bits."""
     for group, shift in (("standard", 0), ("configurable", 8), ("tool", 16)):
         mask = values.get(f"{group}_digital_output_mask", 0)
         if mask:

@@ -13,11 +13,11 @@ Joints = Sequence[float]
 
 
 class MotionRefused(Exception):
-    """The controller's own supervision refuses to go on; it ends in a protective stop."""
+    """The controller refuses to continue, with a protective stop."""
 
 
 class Profile:
-    """A trapezoidal (or triangular) velocity profile over `length`, at rest at both ends."""
+    """A trapezoidal (or triangular) velocity profile over `length`, with standstill at both ends."""
 
     def __init__(self, length: float, velocity: float, acceleration: float) -> None:
         self.length = length
@@ -28,7 +28,7 @@ class Profile:
         self.duration = 2.0 * self.ramp + cruise
 
     def position(self, t: float) -> float:
-        """Distance covered after `t` seconds."""
+        """Return distance covered after `t` seconds."""
         if t >= self.duration:
             return self.length
         if t < self.ramp:
@@ -40,7 +40,7 @@ class Profile:
 
 
 class JointMove:
-    """movej: all joints start and end together, the one with the longest way keeps the limits."""
+    """movej: all joints start and end together; the one with the longest distance keeps the limits."""
 
     along_path = True
 
@@ -52,7 +52,7 @@ class JointMove:
         self.done = self.profile.length == 0.0
 
     def step(self, _: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds."""
+        """Return positions after `dt` seconds."""
         self.done = self.done or self._t >= self.profile.duration  # one cycle at the goal: the velocity is then zero
         self._t += dt
         if self._t >= self.profile.duration:
@@ -62,12 +62,12 @@ class JointMove:
 
     @property
     def braking(self) -> bool:
-        """Whether it slows down towards its end."""
+        """Return whether the motion decelerates towards its end."""
         return self._t >= self.profile.duration - self.profile.ramp
 
 
 class JointBlend:
-    """The end of one movej and the begin of the next laid over each other, so that the arm rounds the corner."""
+    """The end of one movej overlaid with the start of the next, so that the arm rounds the corner."""
 
     along_path = True
 
@@ -78,7 +78,7 @@ class JointBlend:
         self.done = False
 
     def step(self, arm: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds."""
+        """Return positions after `dt` seconds."""
         parts = zip(self._leaving.step(arm, dt), self._entering.step(arm, dt), self._corner, strict=True)
         q = [a + b - corner for a, b, corner in parts]
         self.done = self._leaving.done and self._entering.done
@@ -86,12 +86,12 @@ class JointBlend:
 
     @property
     def braking(self) -> bool:
-        """Whether it slows down towards its end."""
+        """Return whether the motion decelerates towards its end."""
         return self._leaving.done and self._entering.braking
 
 
 class LinearMove:
-    """movel: the TCP on a straight line at the given speed, turning at an even rate."""
+    """movel: the TCP moves in a straight line at the given speed, rotating evenly."""
 
     along_path = True
 
@@ -99,14 +99,14 @@ class LinearMove:
         self._start, self.goal = start, goal
         self._shift, self._turn = difference(self._start, goal)
         length = math.dist((0.0, 0.0, 0.0), self._shift)
-        if length < 1e-6:  # turning only: the limits then count in rad
+        if length < 1e-6:  # rotation only: the limits are in rad
             length = math.dist((0.0, 0.0, 0.0), self._turn)
         self.profile = Profile(length, velocity, acceleration)
         self._t = 0.0
         self.done = length < 1e-9
 
     def pose(self, dt: float) -> Transform:
-        """Where the TCP is to be after `dt` seconds."""
+        """Return set point of the TCP after `dt` seconds."""
         if self.done:
             return self.goal
         self.done = self._t >= self.profile.duration  # one cycle at the goal: the velocity is then zero
@@ -118,19 +118,19 @@ class LinearMove:
         return (turned[0], turned[1], turned[2], there)
 
     def step(self, arm: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds. Raises `MotionRefused` in a singularity or out of reach."""
+        """Return positions after `dt` seconds. Raise `MotionRefused` in a singularity or out of reach."""
         if self.done or dt == 0.0:
             return arm.q
         return _follow(arm, self.pose(dt))
 
     @property
     def braking(self) -> bool:
-        """Whether it slows down towards its end."""
+        """Return whether the motion decelerates towards its end."""
         return self._t >= self.profile.duration - self.profile.ramp
 
 
 class LinearBlend:
-    """The end of one movel and the begin of the next laid over each other, in place and in orientation."""
+    """The end of one movel overlaid with the start of the next, in position and orientation."""
 
     along_path = True
 
@@ -141,7 +141,7 @@ class LinearBlend:
         self.done = False
 
     def pose(self, dt: float) -> Transform:
-        """Where the TCP is to be after `dt` seconds."""
+        """Return set point of the TCP after `dt` seconds."""
         a, b, corner = self._leaving.pose(dt), self._entering.pose(dt), self._corner
         back = invert((corner[0], corner[1], corner[2], (0.0, 0.0, 0.0)))
         x, y, z, _ = compose(compose((b[0], b[1], b[2], (0.0, 0.0, 0.0)), back), (a[0], a[1], a[2], (0.0, 0.0, 0.0)))
@@ -150,12 +150,12 @@ class LinearBlend:
         return (x, y, z, (ax + bx - cx, ay + by - cy, az + bz - cz))
 
     def step(self, arm: "Arm", dt: float) -> Joints:
-        """Positions after `dt` seconds. Raises `MotionRefused` in a singularity or out of reach."""
+        """Return positions after `dt` seconds. Raise `MotionRefused` in a singularity or out of reach."""
         return arm.q if self.done or dt == 0.0 else _follow(arm, self.pose(dt))
 
     @property
     def braking(self) -> bool:
-        """Whether it slows down towards its end."""
+        """Return whether the motion decelerates towards its end."""
         return self._leaving.done and self._entering.braking
 
 

@@ -1,8 +1,8 @@
-"""The primary port: to each client one robot state that carries the kinematics of the arm, as a controller sends first.
+"""The primary port: sends each client one robot state with the kinematics of the arm, as a controller does first.
 
-Layout from general knowledge of the primary interface: a message is its length (u32), its type and what follows; a
-robot state (type 16) holds packages of the same form, of which package 5 has the arm's DH parameters. Big-endian. Not
-modelled: all other packages, and the stream of states that follows.
+A message is its length (u32), its type and its content. A robot state (type 16) consists of packages of the same form;
+package 5 has the DH parameters of the arm. Numbers are big-endian. The layout is from general knowledge of the
+interface. Not modelled: other packages, and the stream of states that follows.
 """
 
 import math
@@ -23,7 +23,7 @@ def _framed(kind: int, content: bytes) -> bytes:
 
 
 class PrimaryPort:
-    """All clients of the primary port. deltas: what a calibration adds to theta, a, d and alpha of the six joints."""
+    """All clients of the primary port. `deltas` are added to theta, a, d and alpha, as by a calibration."""
 
     def __init__(self, geometry: Geometry, version: tuple[int, ...]) -> None:
         self._version = version
@@ -38,7 +38,7 @@ class PrimaryPort:
         self.told = True
 
     def opened(self, connection: Connection) -> None:
-        """A client has connected; nothing that it sends is taken."""
+        """Serve a client; its data is ignored."""
         connection.received = lambda _: None
         project = b"URControl"
         version = struct.pack(">QbBB", 0, -2, _VERSION_MESSAGE, len(project)) + project

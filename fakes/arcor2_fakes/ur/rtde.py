@@ -27,7 +27,7 @@ class Kind(IntEnum):
 
 
 class FramingError(ValueError):
-    """The bytes can't be a frame; the connection is of no use any more."""
+    """The bytes are not a frame; the connection cannot be used any more."""
 
 
 FORMATS = {
@@ -113,7 +113,7 @@ class Deframer:
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> Iterator[tuple[int, bytes]]:
-        """The frames completed by `data`, as (type, payload). Raises `FramingError` on a size that can't be."""
+        """Return the frames completed by `data`, as (type, payload). Raise `FramingError` for an impossible size."""
         self._buffer += data
         start = 0
         try:
@@ -131,7 +131,7 @@ class Deframer:
 
 
 def split_names(payload: bytes) -> list[str]:
-    """The variable names of a set-up request; an empty one after a trailing comma is none. Raises `FramingError`."""
+    """Return the variable names of a set-up request; a trailing comma is ignored. Raise `FramingError`."""
     try:
         names = [name for name in payload.decode("ascii").split(",") if name]
     except UnicodeDecodeError as e:

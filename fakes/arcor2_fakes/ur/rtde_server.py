@@ -22,14 +22,14 @@ def _zeros(count: int) -> Reader:
 
 
 class OutputRecipe:
-    """One data package, packed again each cycle into the same buffer."""
+    """One data package, packed into the same buffer in each cycle."""
 
     def __init__(self, number: int, names: list[str], sources: dict[str, Reader], every: float) -> None:
         offset = HEADER.size + 1
         self._fields: list[tuple[Callable[..., None], int, Reader]] = []
         for name in names:
             field = struct.Struct(">" + FORMATS[OUTPUTS[name]])
-            # A variable that is not modelled is sent as zeros, as the controller sends those without hardware.
+            # A variable that is not modelled is zero, like one without hardware on a controller.
             read = sources.get(name) or _zeros(len(field.unpack(bytes(field.size))))
             self._fields.append((field.pack_into, offset, read))
             offset += field.size
@@ -40,7 +40,7 @@ class OutputRecipe:
         self._left = 1.0
 
     def due(self) -> bool:
-        """Counts one control cycle; true when the client wants this one."""
+        """Count one control cycle; return whether a package is due."""
         self._left -= 1.0
         if self._left > 1e-9:
             return False
@@ -48,7 +48,7 @@ class OutputRecipe:
         return True
 
     def frame(self) -> bytes:
-        """The package of this cycle."""
+        """Return the package of this cycle."""
         buffer = self._buffer
         for pack_into, offset, read in self._fields:
             pack_into(buffer, offset, *read())
@@ -56,7 +56,7 @@ class OutputRecipe:
 
 
 class InputRecipe:
-    """Where the values of one input package go."""
+    """Destination of the values of an input package."""
 
     def __init__(self, names: list[str], controller: Controller) -> None:
         self.names = names
@@ -76,7 +76,7 @@ class InputRecipe:
         self._controller = controller
 
     def apply(self, payload: bytes) -> bool:
-        """Takes one package; a longer one than the recipe is cut. False if it is too short."""
+        """Apply a package; bytes beyond the recipe are ignored. Return False if it is too short."""
         if len(payload) - 1 < self._format.size:
             return False
         values = self._format.unpack_from(payload, 1)
@@ -99,18 +99,18 @@ class RtdeServer:
         self.controller = controller
         self.sources = readers(controller)
         self.claims: dict[str, object] = {}
-        """Input variable -> who writes it; a variable has one writer."""
+        """Writer of each input variable; there is only one."""
         self.not_found: set[str] = set()
         self.sessions: set[Session] = set()
         self.samples_sent = 0
         self.samples_lost = 0
 
     def opened(self, connection: Connection) -> None:
-        """A client has connected."""
+        """Serve a client."""
         self.sessions.add(Session(self, connection))
 
     def tick(self) -> None:
-        """Sends this cycle's packages."""
+        """Send this cycle's packages."""
         for session in self.sessions:
             if session.recipe is not None and session.recipe.due():
                 if session.connection.send(session.recipe.frame()):
@@ -154,7 +154,7 @@ class Session:
             (frequency,) = struct.unpack_from(">d", payload)
             self._answer(kind, self._set_up_outputs(frequency, split_names(payload[8:])))
         elif kind == Kind.START:
-            # The answer goes first: a client takes the next package for it.
+            # The answer must be first: a client takes the next package for it.
             self._answer(kind, bytes((self._outputs is not None,)))
             self.recipe = self._outputs
         elif kind == Kind.PAUSE:

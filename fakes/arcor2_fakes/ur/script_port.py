@@ -1,4 +1,4 @@
-"""The script port: a program comes in as text and replaces the one that plays."""
+"""The script port: receives a program as text, which replaces the playing one."""
 
 import logging
 
@@ -20,7 +20,7 @@ class ScriptPort:
         self.scripts_ignored = 0
 
     def opened(self, connection: Connection) -> None:
-        """A client has connected."""
+        """Serve a client."""
         splitter = Splitter()
 
         def received(data: bytes) -> None:
@@ -34,13 +34,13 @@ class ScriptPort:
         connection.received = received
 
     def take(self, kind: str, name: str, text: str) -> None:
-        """Plays a script; the port has no answer to say why it does not."""
+        """Play a script, if possible; the port sends no answer."""
         if not self.controller.remote:
             self.scripts_ignored += 1
             log.info("not in remote control: script %s ignored", name)
             return
         self.scripts_taken += 1
-        if kind == "sec":  # a secondary program runs beside and takes no time
+        if kind == "sec":  # a secondary program runs concurrently and takes no time
             interpreter = Interpreter(self.controller)
             try:
                 for call in calls(text):

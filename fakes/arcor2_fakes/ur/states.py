@@ -1,4 +1,4 @@
-"""The controller's states as numbers and words on the wire. Source: Universal Robots, RTDE and dashboard manuals."""
+"""States of the controller as numbers and names on the wire. Source: Universal Robots, RTDE and dashboard manuals."""
 
 from enum import IntEnum
 

@@ -1,10 +1,10 @@
-"""The fake's control channel: the truth about the arm, and all that may happen to a controller from outside.
+"""The control channel of the fake: the true state, and events from outside the controller.
 
-To read and subscribe: `truth` (everything), `pose` (the little a world follows at a high rate). To read: `stops`
-(frames that ask for a stop, stamped at arrival), `commands_taken` (motions really run), `popup`. To do, with `on` true
-or false: `safeguard_stop` (`reports_paused`), `emergency_stop` (`system`), `reduced`, `remote_control`,
+To read and subscribe: `truth` (everything), `pose` (what a simulated world follows at a high rate). To read: `stops`
+(frames that request a stop, stamped at arrival), `commands_taken` (executed motions), `popup`. To do, with `on` true or
+false: `safeguard_stop` (`reports_paused`), `emergency_stop` (`system`), `reduced`, `remote_control`,
 `foreign_program`, `power`, `contact`, `fieldbus` (owns registers 0 to 23). To do: `protective_stop`, `violation`,
-`fault`, `boot`, `obstacle` point normal stiffness (a plane in the base, in m and N/m; `no_obstacle` takes it away),
+`fault`, `boot`, `obstacle` point normal stiffness (a plane in the base, in m and N/m; `no_obstacle` removes it),
 `recovery` on, `brake_release`, `operational_mode` mode, `set_input` bit on, `speed_slider` fraction, `place` q (a
 test's set-up), `guide` q speed (by hand, in freedrive only), `in_use` and `not_found` names of RTDE variables. The
 faults of the wires rtde, script and dashboard are those of `arcor2_fakes.wire`.
@@ -26,7 +26,7 @@ from arcor2_fakes.ur.urscript import ForeignProgram
 
 
 def truth(c: Controller, rtde: RtdeServer, script: ScriptPort) -> dict[str, Any]:
-    """What is really so. Stamps are `time.monotonic()` of this machine."""
+    """Return the true state. Time stamps are `time.monotonic()` of this machine."""
     return {
         "timestamp": c.cycles * c.period,
         "q": c.arm.q,
@@ -64,7 +64,7 @@ def truth(c: Controller, rtde: RtdeServer, script: ScriptPort) -> dict[str, Any]
 
 
 def pose_truth(c: Controller) -> dict[str, Any]:
-    """The little that a world around the robot follows at a high rate."""
+    """Return the state that a simulated world follows at a high rate."""
     return {
         "t": c.cycles * c.period,
         "q": c.arm.q,
@@ -85,7 +85,7 @@ def _switch(act: Callable[[bool], None]) -> Callable[..., None]:
 
 
 def register(control: ControlServer, c: Controller, rtde: RtdeServer, script: ScriptPort, dashboard: Dashboard) -> None:
-    """Adds all commands and sources."""
+    """Register all commands and sources."""
 
     def power(on: bool) -> None:
         if on:

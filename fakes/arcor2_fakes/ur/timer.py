@@ -1,4 +1,4 @@
-"""A periodic clock of the kernel for the control cycle: asyncio's own timers have a grain of a millisecond."""
+"""A periodic kernel timer for the control cycle: asyncio timers have a resolution of one millisecond."""
 
 import asyncio
 import contextlib
@@ -21,9 +21,9 @@ class _Itimerspec(ctypes.Structure):
 
 
 class PeriodicTimer:
-    """Calls `tick(n)` in the event loop each period; n > 1 when the process was held up and periods went by.
+    """Calls `tick(n)` in the event loop each period; n > 1 if the process was delayed by several periods.
 
-    Python has timerfd only from 3.13 on, hence ctypes.
+    Uses ctypes, because Python has timerfd only from 3.13 on.
     """
 
     def __init__(self, period: float, tick: Callable[[int], None]) -> None:
@@ -39,11 +39,11 @@ class PeriodicTimer:
         self._count = struct.Struct("@Q")
 
     def start(self) -> None:
-        """Begins to tick in the running event loop."""
+        """Start in the running event loop."""
         asyncio.get_running_loop().add_reader(self._fd, self._expired)
 
     def close(self) -> None:
-        """Ends ticking; does nothing the second time."""
+        """Stop the timer, if it runs."""
         if self._fd >= 0:
             asyncio.get_running_loop().remove_reader(self._fd)
             os.close(self._fd)

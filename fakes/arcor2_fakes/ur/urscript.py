@@ -1,7 +1,7 @@
-"""URScript, as far as clients send it: programs told apart, calls with literal arguments, what each call does.
+"""URScript of clients: splitting programs, calls with literal arguments, and their effects.
 
-Programs with variables, conditions, loops and threads are run by `language`. Motions blend with one of their own kind
-only; the blend begins with the braking of the first, so that a large radius is not made use of as a controller does.
+Programs with variables, conditions, loops and threads are run by `language`. Motions blend with one of the same kind
+only. The blend starts when the first motion brakes, so that a large radius is not used in full.
 """
 
 import ast
@@ -25,7 +25,7 @@ MAX_SCRIPT = 4 << 20
 
 
 class Pose(tuple[float, ...]):
-    """``p[x, y, z, rx, ry, rz]``, told apart from a list of joints."""
+    """A pose ``p[x, y, z, rx, ry, rz]``, as opposed to a list of joints."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Call:
     named: dict[str, Any] = field(default_factory=dict)
 
     def get(self, name: str, position: int, default: Any) -> Any:
-        """An argument by name, else by position."""
+        """Return an argument by name, else by position."""
         if name in self.named:
             return self.named[name]
         return self.arguments[position] if position < len(self.arguments) else default
@@ -52,7 +52,7 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 def _literal(node: ast.expr) -> Any:
-    """The value of a literal, of a pose, or of arithmetic on numbers (clients write offsets as sums)."""
+    """Return the value of a literal, of a pose, or of arithmetic on numbers (clients write offsets as sums)."""
     if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "p":
         return Pose(_literal(node.slice))
     if isinstance(node, ast.List | ast.Tuple):
@@ -63,7 +63,7 @@ def _literal(node: ast.expr) -> Any:
 
 
 def parse_call(line: str) -> Call | None:
-    """The call on a line; None if the line is none or has arguments that are not literal."""
+    """Return the call on a line; None if there is none, or its arguments are not literal."""
     try:
         node = ast.parse(line.strip(), mode="eval").body
         if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
@@ -75,7 +75,7 @@ def parse_call(line: str) -> Call | None:
 
 
 def calls(text: str) -> list[Call]:
-    """The calls of a program's body in order."""
+    """Return the calls of a program's body in order."""
     found = []
     for line in text.splitlines():
         bare = line.split("#", 1)[0].strip()
@@ -90,14 +90,17 @@ def calls(text: str) -> list[Call]:
 
 
 class Splitter:
-    """Cuts what comes in on the script port into programs: from ``def`` or ``sec`` to ``end``, or a line by itself."""
+    """Splits received text into programs: from ``def`` or ``sec`` to ``end``, or a single line."""
 
     def __init__(self) -> None:
         self._rest = b""
         self._lines: list[str] = []
 
     def feed(self, data: bytes) -> Iterator[tuple[str, str, str]]:
-        """The programs completed by `data`, as (kind, name, text); kind is def, sec or line. `ValueError`: too long."""
+        """Return the programs completed by `data`, as (kind, name, text); kind is def, sec or line.
+
+        Raise `ValueError` if one is too long.
+        """
         *lines, self._rest = (self._rest + data).split(b"\n")
         if len(self._rest) + sum(map(len, self._lines)) > MAX_SCRIPT:
             raise ValueError("the script is too long")
@@ -118,20 +121,20 @@ class Splitter:
 
 
 class Interpreter:
-    """Runs calls on the controller. Motions take their time; everything else is done at once."""
+    """Runs calls on the controller. Only motions take time."""
 
     def __init__(self, controller: Controller) -> None:
         self.controller = controller
         self._left: Motion | None = None
-        """The motion that a blend has left before its end."""
+        """The motion that a blend has left early."""
 
     def run(self, statements: Sequence[Call]) -> Steps:
-        """All of them in order. Raises `MotionRefused`, or `ValueError` and the like."""
+        """Run all calls in order. Raise `MotionRefused`, or `ValueError` and the like."""
         for call in statements:
             yield from self.statement(call)
 
     def statement(self, call: Call) -> Steps:
-        """One of them."""
+        """Run one call."""
         match call.name:
             case "movej":
                 goal = call.get("q", 0, None)
@@ -152,7 +155,7 @@ class Interpreter:
                 self.at_once(call)
 
     def at_once(self, call: Call) -> None:
-        """What takes no time: outputs, registers, payload, TCP."""
+        """Run a call that takes no time: outputs, registers, payload, TCP."""
         c = self.controller
         first, second = call.get("n", 0, 0), call.get("b", 1, 0)
         match call.name:
@@ -186,11 +189,11 @@ class Interpreter:
         c.changed()
 
     def joints(self, pose: Sequence[float], near: Sequence[float] | None = None) -> tuple[float, ...]:
-        """get_inverse_kin. Raises `NoSolution`."""
+        """get_inverse_kin. Raise `NoSolution`."""
         return self.controller.chain.inverse(from_pose(pose), near or self.controller.arm.q)
 
     def move_joints(self, q: Sequence[float], velocity: float, acceleration: float, blend: float = 0.0) -> Steps:
-        """movej: to its end, to within the blend of it, or until another motion has taken its place."""
+        """Run a movej to its end, to its blend, or until another motion replaces it."""
         arm = self.controller.arm
         self._check(q, velocity, acceleration)
         self.controller.note_command("movej", q=list(q), v=velocity, a=acceleration, r=blend)
@@ -202,7 +205,7 @@ class Interpreter:
     def move_linear(
         self, goal: Sequence[float], velocity: float, acceleration: float, is_pose: bool, blend: float = 0.0
     ) -> Steps:
-        """movel to a pose, or to where joints have the TCP."""
+        """Run a movel to a pose, or to the pose of joint values."""
         arm = self.controller.arm
         self._check(goal, velocity, acceleration)
         target = from_pose(goal) if is_pose else self.controller.chain.forward(goal)
@@ -213,13 +216,13 @@ class Interpreter:
         yield from self._to_end(blend, target[3])
 
     def _free(self, blends: bool) -> Steps:
-        """Wait until the next motion may begin: at once when it blends with the one that this program left early."""
+        """Wait until the next motion may start: at once if it blends with the previous one."""
         arm = self.controller.arm
         while arm.moving and not (blends and arm.motion is self._left):
             yield
 
     def stop(self, deceleration: float, linear: bool) -> Steps:
-        """stopl or stopj: until the arm stands."""
+        """Run a stopl or stopj until standstill."""
         arm = self.controller.arm
         self.controller.note_command("stopl" if linear else "stopj", a=deceleration)
         arm.halt(max(0.01, deceleration), linear)
@@ -247,7 +250,7 @@ def _rounds(motion: Motion) -> bool:
 
 
 class ForeignProgram(Program):
-    """What the integrator's own program might be: to and fro between two configurations for ever."""
+    """A foreign program: moves between two configurations forever."""
 
     def __init__(self, controller: Controller, name: str = "production.urp") -> None:
         self.name = name
@@ -255,7 +258,7 @@ class ForeignProgram(Program):
         self._interpreter = Interpreter(controller)
 
     def run(self) -> Steps:
-        """Plays until it is stopped."""
+        """Run until the program is stopped."""
         here = self._controller.arm.q
         there = (here[0] + 0.4, *here[1:])
         while True:
