@@ -206,7 +206,7 @@ def test_what_is_computed_and_what_is_searched_agree() -> None:
     assert np.allclose(computing.solve(arm.forward(straight), straight), straight, atol=1e-6)
 
 
-@given(st.tuples(*(st.floats(low, high) for low, high in dobot_kinematics.LIMITS)))
+@given(st.tuples(*(st.floats(low, high) for low, high in dobot_kinematics.LIMITS.values())))
 def test_a_dobot_has_the_joints_that_its_driver_computes(q: tuple[float, float, float, float]) -> None:
     arm = RobotModel.load(DOBOT).arm("tcp")
     target = arm.forward(np.array(q))

@@ -57,11 +57,11 @@ def test_links_and_chains_agree_and_the_jacobian_is_the_derivative(values: tuple
             assert np.allclose(jacobian[3:, number], (turn[2, 1], turn[0, 2], turn[1, 0]), atol=1e-6)
 
 
-@given(st.tuples(*(st.floats(low, high) for low, high in dobot_kinematics.LIMITS)), st.floats(0.0, 0.3))
+@given(st.tuples(*(st.floats(low, high) for low, high in dobot_kinematics.LIMITS.values())), st.floats(0.0, 0.3))
 def test_a_dobot_is_where_its_driver_says_whatever_its_tool(q: tuple[float, float, float, float], tool: float) -> None:
     model = RobotModel.load(DOBOT, {"tool_x": tool, "tool_z": -0.05, "port": "not a number, and none is needed"})
     assert model.joint_names == dobot_kinematics.JOINTS
-    assert np.allclose(np.column_stack((model.lower, model.upper)), dobot_kinematics.LIMITS)
+    assert np.allclose(np.column_stack((model.lower, model.upper)), list(dobot_kinematics.LIMITS.values()))
     expected = dobot_kinematics.forward(q, tool, -0.05).pose
     assert np.allclose(model.arm("tcp").forward(np.array(q)), expected.matrix(), atol=1e-12)
 

@@ -7,10 +7,11 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import InvalidData, NotFound, Refused
 from arcor2_hw.objects import MultiArmRobot
 from arcor2_hw.objects.arm import joint_values
+from arcor2_hw.objects.settings import within
 
 from .nominal import LIMITS
 from .observer import UNITS, Sample
-from .settings import ARMS, YumiSettings, within
+from .settings import ARMS, YumiSettings
 
 JOINTS: Final = {arm: tuple(f"{unit}_{number}" for number in range(1, 8)) for arm, unit in UNITS.items()}
 """Axes 1 to 7 of each mechanical unit; 7 is the one between 2 and 3, eax_a on the wire."""

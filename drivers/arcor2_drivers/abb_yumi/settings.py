@@ -2,11 +2,12 @@
 
 import dataclasses
 import math
+from typing import Annotated
 
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
-from arcor2_hw.objects.settings import check_host
+from arcor2_hw.objects.settings import Range, check_host, within
 
 LEFT = "left"
 RIGHT = "right"
@@ -14,13 +15,7 @@ ARMS = (LEFT, RIGHT)
 MAX_PAYLOAD = 0.5
 """Greatest mass at the flange of an arm, hand included, kg."""
 
-
-def within(name: str, value: float, low: float, high: float) -> None:
-    """Raise OutOfRange, naming the parameter, unless the value is in the range."""
-    if not (math.isfinite(value) and low <= value <= high):
-        raise OutOfRange(f"{name} must be {low:g} to {high:g}, not {value!r}")
-
-
+TURN = 2.0 * math.pi
 LONGEST_WATCHDOG = 0.5
 """Longest watchdog, s, with which an arm stops within the time that the type declares (`loss_reaction`)."""
 
@@ -67,61 +62,51 @@ class YumiSettings(Settings):
     """
 
     host: str
-    rws_port: int = 80
+    rws_port: Annotated[int, Range(1, 65535)] = 80
     user: str = "Default User"
     password: str = dataclasses.field(default="robotics", repr=False, metadata={"secret": True})  # what ABB delivers
-    left_port: int = 6101
-    right_port: int = 6111
+    left_port: Annotated[int, Range(1, 65534)] = 6101
+    right_port: Annotated[int, Range(1, 65534)] = 6111
     left_mass: float = -1.0
-    left_cog_x: float = 0.0
-    left_cog_y: float = 0.0
-    left_cog_z: float = 0.05
-    left_tcp_x: float = 0.0
-    left_tcp_y: float = 0.0
-    left_tcp_z: float = 0.0
-    left_tcp_rx: float = 0.0
-    left_tcp_ry: float = 0.0
-    left_tcp_rz: float = 0.0
+    left_cog_x: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    left_cog_y: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    left_cog_z: Annotated[float, Range(-0.5, 0.5)] = 0.05
+    left_tcp_x: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    left_tcp_y: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    left_tcp_z: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    left_tcp_rx: Annotated[float, Range(-TURN, TURN)] = 0.0
+    left_tcp_ry: Annotated[float, Range(-TURN, TURN)] = 0.0
+    left_tcp_rz: Annotated[float, Range(-TURN, TURN)] = 0.0
     right_mass: float = -1.0
-    right_cog_x: float = 0.0
-    right_cog_y: float = 0.0
-    right_cog_z: float = 0.05
-    right_tcp_x: float = 0.0
-    right_tcp_y: float = 0.0
-    right_tcp_z: float = 0.0
-    right_tcp_rx: float = 0.0
-    right_tcp_ry: float = 0.0
-    right_tcp_rz: float = 0.0
+    right_cog_x: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    right_cog_y: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    right_cog_z: Annotated[float, Range(-0.5, 0.5)] = 0.05
+    right_tcp_x: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    right_tcp_y: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    right_tcp_z: Annotated[float, Range(-0.5, 0.5)] = 0.0
+    right_tcp_rx: Annotated[float, Range(-TURN, TURN)] = 0.0
+    right_tcp_ry: Annotated[float, Range(-TURN, TURN)] = 0.0
+    right_tcp_rz: Annotated[float, Range(-TURN, TURN)] = 0.0
     left_gripper: bool = True
     right_gripper: bool = True
     left_suction: bool = False
     right_suction: bool = False
-    max_tcp_speed: float = 0.5
-    max_joint_speed: float = 1.0
-    clearance: float = 0.02
-    watchdog: float = 0.4
-    poll_period: float = 0.1
+    max_tcp_speed: Annotated[float, Range(0.01, 1.5)] = 0.5
+    max_joint_speed: Annotated[float, Range(0.01, math.pi)] = 1.0
+    clearance: Annotated[float, Range(0.0, 0.08)] = 0.02  # the shoulders are 0.1 m apart
+    watchdog: Annotated[float, Range(0.2, LONGEST_WATCHDOG)] = 0.4
+    poll_period: Annotated[float, Range(0.02, 0.5)] = 0.1
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         check_host(self.host)
         if not self.user.strip():
             raise OutOfRange("user must be a user of the controller, not empty")
-        within("rws_port", self.rws_port, 1, 65535)
-        for arm in ARMS:
-            within(f"{arm}_port", self.port(arm), 1, 65534)
-            if not getattr(self, f"{arm}_mass") < 0.0:
-                within(f"{arm}_mass", getattr(self, f"{arm}_mass"), 0.001, MAX_PAYLOAD)
-            for axis in "xyz":
-                within(f"{arm}_cog_{axis}", getattr(self, f"{arm}_cog_{axis}"), -0.5, 0.5)
-                within(f"{arm}_tcp_{axis}", getattr(self, f"{arm}_tcp_{axis}"), -0.5, 0.5)
-                within(f"{arm}_tcp_r{axis}", getattr(self, f"{arm}_tcp_r{axis}"), -2.0 * math.pi, 2.0 * math.pi)
+        for name in ("left_mass", "right_mass"):
+            if not getattr(self, name) < 0.0:
+                within(name, getattr(self, name), 0.001, MAX_PAYLOAD)
         if abs(self.left_port - self.right_port) < 2:
             raise OutOfRange(f"right_port must differ from left_port {self.left_port} by at least 2: an arm uses two")
-        within("max_tcp_speed", self.max_tcp_speed, 0.01, 1.5)
-        within("max_joint_speed", self.max_joint_speed, 0.01, math.pi)
-        within("clearance", self.clearance, 0.0, 0.08)  # the shoulders themselves are 0.1 m apart
-        within("watchdog", self.watchdog, 0.2, LONGEST_WATCHDOG)
-        within("poll_period", self.poll_period, 0.02, 0.5)
 
     def port(self, arm: str) -> int:
         """Return the port of an arm's motion server."""

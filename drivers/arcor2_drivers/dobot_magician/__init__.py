@@ -1,1 +1,1 @@
-"""The Dobot Magician, a desktop arm on a serial line (docs/devices/dobot-magician.md)."""
+"""Dobot Magician: a desktop arm of four axes on a serial port."""

@@ -1,25 +1,36 @@
-"""The Dobot Magician as an object type: what it offers to programs."""
+"""DobotMagician: the object type of the Dobot Magician, composed of observer, control and motion."""
 
 import time
 from typing import ClassVar, Final
 
 from arcor2_hw.actions import StrEnum, action
+from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ProjectRobotJoints
-from arcor2_hw.exceptions import DeviceFault
-from arcor2_hw.objects import HoldsParts
+from arcor2_hw.data.robot import Control as ControlMode
+from arcor2_hw.data.robot import Joint, Mode, MoveResult, Power, ProgramState, RobotState, RobotType, Safety
+from arcor2_hw.exceptions import DeviceError, DeviceFault, NotFound, OutOfRange, Refused
+from arcor2_hw.objects import HoldsParts, Robot
+from arcor2_hw.objects.arm import TCP, StopGuard, check_end_effector, named_joints
+from arcor2_hw.objects.connected import Connected
+from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.objects.surroundings import Surroundings
 
-from .dobot_arm import JOINT_TO_POSE, JUMP, LINE_TO_POSE, DobotArm
+from . import alarms
+from .control import Control
 from .frames import Command
+from .kinematics import JOINTS, LIMITS, values
+from .motion import JOINT_TO_POSE, JUMP, LINE_TO_POSE, Motion
+from .observer import Observer
 from .settings import DobotMagicianSettings
 
 LONGEST_HOMING: Final = 320.0
-"""s: the longest that home_timeout allows, and the margin for questions and the stop."""
+"""Deadline of homing, s: the longest home_timeout, and time for communication and the stop."""
 POLL: Final = 0.01
 
 
 class DobotMoveType(StrEnum):
-    """How the tool gets to its target."""
+    """Path of the tool to its target."""
 
     LINEAR = "linear"
     JOINT = "joint"
@@ -29,16 +40,14 @@ class DobotMoveType(StrEnum):
 _MODES: Final = {DobotMoveType.LINEAR: LINE_TO_POSE, DobotMoveType.JOINT: JOINT_TO_POSE, DobotMoveType.JUMP: JUMP}
 
 
-def behind(pose: Pose, distance: float) -> Pose:
-    """Give the pose `distance` m behind another along the tool's axis: above it, as the tool points down."""
-    return pose * Pose(Position(0.0, 0.0, -distance))
-
-
-class DobotMagician(HoldsParts, DobotArm):
+class DobotMagician(HoldsParts, Connected, Robot):
     """Dobot Magician: four axes, 0.5 kg, 320 mm, with suction cup or gripper."""
 
     _ABSTRACT = False
+    robot_type: ClassVar[RobotType] = RobotType.ARTICULATED
     urdf_package_name = "dobot_magician.zip"
+    # The arm has no watchdog: it completes a motion that was started. There is never a second one in its queue.
+    loss_reaction: ClassVar[LossReaction] = LossReaction.continues()
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {
         "home": "stop",
         "move": "stop",
@@ -49,11 +58,211 @@ class DobotMagician(HoldsParts, DobotArm):
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: DobotMagicianSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
+        self._dobot = settings
+        self._observer = Observer(name, settings)
+        self._control = Control(self._observer, settings, self._move_lock)
+        self._motion = Motion(self, self._observer, self._control, settings, self._move_lock)
+        self._observer.on_lost = self.on_lost  # type: ignore[method-assign]
+        self.safe_moves = self._motion.safe
+        self.keep_connection(self._observer.who, self._observer.observing)
 
+    # -------------------------------------------------------------------------------- connection and control
+    def surround(self, surroundings: Surroundings) -> None:
+        """Store the access to objects around the arm, and load its model."""
+        super().surround(surroundings)
+        self.safe_moves.prepare()
+
+    def on_lost(self, error: DeviceError) -> None:
+        """End control."""
+        self._control.drop()
+
+    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
+        """Observe the arm; a motion continues. Raise NotConnected, DeviceTimeout, ConnectionLost or DeviceFault."""
+        self._observer.connect(timeout)
+
+    def disconnect(self) -> None:
+        """Stop arm and belt, release control and close the port."""
+        self._control.leave()
+        self._observer.disconnect()
+
+    def condition(self) -> Health:
+        """Return the condition of the arm."""
+        newest = self._observer.newest()
+        active = newest.alarms if newest is not None else frozenset[int]()
+        if not active:
+            return Health.NORMAL
+        return Health.FAILURE if any(0 < code < 0x10 for code in active) else Health.CHECK_FUNCTION
+
+    def identify(self) -> Identity:
+        """Read serial number, name and version."""
+        serial = self._observer.text(Command.SERIAL_NUMBER)
+        name = self._observer.text(Command.NAME)
+        version = ".".join(map(str, self._observer.raw(Command.VERSION)[:3]))
+        return Identity("Dobot", name or "Magician", serial, version)
+
+    def alarms(self) -> list[Alarm]:
+        """Return the active alarms. Raise NotConnected, ConnectionLost or Stale."""
+        found = []
+        for code in sorted(self._observer.sample().alarms):
+            text, remedy, severity = alarms.describe(code)
+            if (since := self._observer.since.get(code)) is not None:
+                found.append(Alarm(alarms.title(code), severity, text, remedy, since))
+        return found
+
+    def acknowledge(self, code: str) -> None:
+        """Clear an alarm. Raise Refused while its cause persists, or if others are active: all are cleared together."""
+        active = {alarm.code for alarm in self.alarms()}
+        if code not in active:
+            raise NotFound(f"{self.who} has no alarm {code}.")
+        if others := active - {code, alarms.title(alarms.RESET)}:
+            raise Refused(
+                f"{self.who}: alarm {code} cannot be acknowledged alone; also active: {', '.join(sorted(others))}.",
+                "acknowledge_all",
+            )
+        self.acknowledge_all()
+
+    def acknowledge_all(self) -> None:
+        """Clear all alarms, after a person has dealt with them. Raise Refused while a cause persists."""
+        self._observer.set(Command.CLEAR_ALARMS)
+        if left := alarms.codes(self._observer.raw(Command.ALARMS)):
+            names = ", ".join(map(alarms.title, sorted(left)))
+            raise Refused(f"{self.who}: alarm {names} is active again. Remove its cause first.")
+
+    def take_control(self) -> None:
+        """Take control of an arm at standstill, unless we have it. Raise NotInControl or Refused."""
+        self._control.take()
+
+    def release_control(self) -> None:
+        """Stop arm and belt, and release control, if we have it."""
+        self._control.release()
+
+    def control_owner(self) -> str | None:
+        """Return "us", "another client" while the arm moves without us, or None."""
+        return self._control.owner()
+
+    # -------------------------------------------------------------------------------- state
+    def state(self) -> RobotState:
+        """Return the state of the robot; the arm has neither modes nor safety functions. Raise NotConnected, Stale."""
+        sample = self._observer.sample()
+        program = ProgramState.STOPPED
+        if sample.moving:
+            program = ProgramState.PLAYING if self.move_in_progress else ProgramState.FOREIGN
+        return RobotState(
+            Mode.OTHER,
+            Power.OPERATIONAL,
+            Safety.NORMAL,
+            program,
+            ControlMode.REMOTE,
+            sample.moving,
+            1.0,
+            self._motion.obstacles(sample),
+        )
+
+    def get_end_effectors_ids(self) -> set[str]:
+        """Return the only end effector."""
+        return {TCP}
+
+    def get_end_effector_pose(self, end_effector: str) -> Pose:
+        """Return the tool in the world, by the arm's own kinematics. Raise NotFound, NotConnected or Stale."""
+        check_end_effector(self.name, end_effector)
+        return self._motion.world(self._observer.sample().tool)
+
+    def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
+        """Return the joint values. Raise NotConnected, ConnectionLost or Stale."""
+        return named_joints(JOINTS, self._observer.sample().q)
+
+    def grippers(self) -> set[str]:
+        """Return the gripper on the arm's pump."""
+        return {"gripper"}
+
+    def suctions(self) -> set[str]:
+        """Return the suction cup on the arm's pump."""
+        return {"suction"}
+
+    def joint_limits(self) -> dict[str, tuple[float, float]]:
+        """Return the published limits, rad; the linkage narrows those of joints 2 and 3."""
+        return dict(LIMITS)
+
+    def max_tcp_speed(self) -> float:
+        """Return the configured maximum of the tool speed, m/s."""
+        return self._dobot.max_tcp_speed
+
+    # -------------------------------------------------------------------------------- motion
+    @property
+    def last_move(self) -> MoveResult | None:
+        """Return the result of the last motion."""
+        return self._motion.last
+
+    def check_if_ready_to_move(self) -> None:
+        """Raise what prevents the arm from moving."""
+        self._motion.check_ready()
+
+    def move_to_pose(
+        self, end_effector_id: str, target_pose: Pose, speed: float, safe: bool = True, linear: bool = True
+    ) -> None:
+        """Move the tool to a pose in the world, in a line or with all joints together.
+
+        With `safe`, a line that collides is refused, and a joint move leads around obstacles. An obstacle that enters
+        the path later stops the arm.
+
+        Raises:
+            KinematicsException: The pose cannot be reached.
+            PathBlocked: An obstacle is in the way.
+            DeviceError: OutOfRange, Refused, NotInControl, DeviceFault, Cancelled or DeviceTimeout.
+        """
+        guard = self._control.stops.guard()
+        check_end_effector(self.name, end_effector_id)
+        if not safe:
+            self._motion.to_pose(target_pose, LINE_TO_POSE if linear else JOINT_TO_POSE, speed, guard)
+        elif linear:
+            self._motion.line_safely(target_pose, speed, guard)
+        else:
+            self._motion.go_around(self._motion.solve(target_pose)[1], speed, guard)
+
+    def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
+        """Move to joint values, with `safe` around obstacles. Raise as `move_to_pose`, and InvalidData."""
+        guard, q = self._control.stops.guard(), values(self.name, target_joints)
+        (self._motion.go_around if safe else self._motion.to_joints)(q, speed, guard)
+
+    def stop(self) -> None:
+        """Stop arm and belt, also what a connection loss left running. This is not a safety function.
+
+        Raise ConnectionLost, NotInControl while another client moves the arm, or DeviceTimeout.
+        """
+        self._control.stop()
+
+    def inverse_kinematics(
+        self,
+        end_effector_id: str,
+        pose: Pose,
+        start_joints: list[Joint] | None = None,
+        avoid_collisions: bool = True,
+    ) -> list[Joint]:
+        """Return the joints for a pose in the world; there is at most one solution.
+
+        Raise KinematicsException if it cannot be reached, or, with `avoid_collisions`, if it collides.
+        """
+        check_end_effector(self.name, end_effector_id)
+        if start_joints:
+            values(self.name, start_joints)
+        found = named_joints(JOINTS, self._motion.solve(pose)[1])
+        if avoid_collisions and (hit := self.safe_moves.contacts(found)):
+            raise self.KinematicsException(f"{self.name} reaches the pose only in collision: {hit[0]}")
+        return found
+
+    def forward_kinematics(self, end_effector_id: str, joints: list[Joint]) -> Pose:
+        """Return the tool in the world for joints. Raise InvalidData, or KinematicsException beyond a limit."""
+        check_end_effector(self.name, end_effector_id)
+        try:
+            return self._motion.forward(values(self.name, joints))
+        except OutOfRange as e:
+            raise self.KinematicsException(str(e)) from None
+
+    # -------------------------------------------------------------------------------- actions
     @action(deadline=LONGEST_HOMING)
     def home(self, *, an: str | None = None) -> None:
-        """Reference the axes: the arm runs to its switches and back. Keep clear of it."""
-        super().home()
+        """Reference the axes: the arm moves to its switches and back. Keep clear of it."""
+        self._motion.home(self._control.stops.guard())
 
     @action
     def move(
@@ -61,112 +270,110 @@ class DobotMagician(HoldsParts, DobotArm):
     ) -> None:
         """Move the tool to a pose.
 
-        :param pose: where to; the tool points down
+        :param pose: target; the tool points down
         :param move_type: in a line, all joints together, or up, across and down
         :param speed: fraction of the configured maximum
         """
         assert 0.01 <= speed <= 1.0
-        self._move_pose(pose, _MODES[move_type], speed, self._stops)
+        self._motion.to_pose(pose, _MODES[move_type], speed, self._control.stops.guard())
 
     @action
     def move_to(self, joints: ProjectRobotJoints, speed: float = 0.25, *, an: str | None = None) -> None:
-        """Move to stored joint values, all joints arriving together.
+        """Move to stored joint values; all joints arrive together.
 
-        :param joints: where to
+        :param joints: target
         :param speed: fraction of the configured maximum
         """
         assert 0.01 <= speed <= 1.0
-        self._move_joints(self._checked_joints(joints.joints), speed, self._stops)
+        self._motion.to_joints(values(self.name, joints.joints), speed, self._control.stops.guard())
 
     @action
     def pick(
         self, pose: Pose, approach: float = 0.05, speed: float = 0.5, slow_speed: float = 0.1, *, an: str | None = None
     ) -> None:
-        """Pick a part with the suction cup: approach from above, suck, retreat. Nothing tells whether it is held.
+        """Pick a part with the suction cup: approach from above, switch suction on, retreat. No sensor checks the part.
 
         :param pose: where the cup touches the part
-        :param approach: height from which it is approached, m
-        :param speed: fraction of the maximum on the way there
+        :param approach: height of the approach, m
+        :param speed: fraction of the maximum before the approach
         :param slow_speed: fraction of the maximum at the part
         """
         assert 0.0 <= approach <= 0.2
         assert 0.01 <= speed <= 1.0
         assert 0.01 <= slow_speed <= 1.0
-        self._at_part("pick", pose, approach, speed, slow_speed, suck=True)
+        self._pick_or_place("pick", pose, approach, speed, slow_speed, suck=True)
 
     @action
     def place(
         self, pose: Pose, approach: float = 0.05, speed: float = 0.5, slow_speed: float = 0.1, *, an: str | None = None
     ) -> None:
-        """Place the part that the suction cup holds: approach from above, let go, retreat.
+        """Place the part on the suction cup: approach from above, switch suction off, retreat.
 
-        :param pose: where the part is let go
-        :param approach: height from which it is approached, m
-        :param speed: fraction of the maximum on the way there
+        :param pose: where the part is released
+        :param approach: height of the approach, m
+        :param speed: fraction of the maximum before the approach
         :param slow_speed: fraction of the maximum at the place
         """
         assert 0.0 <= approach <= 0.2
         assert 0.01 <= speed <= 1.0
         assert 0.01 <= slow_speed <= 1.0
-        self._at_part("place", pose, approach, speed, slow_speed, suck=False)
+        self._pick_or_place("place", pose, approach, speed, slow_speed, suck=False)
 
     @action
     def suck(self, on: bool, *, an: str | None = None) -> None:
-        """Switch the suction on or off, and wait until it holds or lets go; it stays when the hub is lost.
+        """Switch suction on or off, and wait until it has taken effect. It keeps its state on connection loss.
 
-        :param on: whether to suck
+        :param on: on or off
         """
-        self._switch("suck", Command.SUCTION_CUP, on, self._dobot.suction_time, self._stops)
-        self._part_switched(on, hanging=True)
+        self._switch("suck", Command.SUCTION_CUP, on, self._dobot.suction_time, self._control.stops.guard())
 
     @action
     def gripper(self, closed: bool, *, an: str | None = None) -> None:
-        """Close or open the gripper, and wait until it has; it stays when the hub is lost.
+        """Close or open the gripper, and wait until it has moved. It keeps its state on connection loss.
 
-        :param closed: whether to close it
+        :param closed: closed or open
         """
-        self._switch("gripper", Command.GRIPPER, closed, self._dobot.gripper_time, self._stops)
-        self._part_switched(closed, hanging=False)
+        self._switch("gripper", Command.GRIPPER, closed, self._dobot.gripper_time, self._control.stops.guard())
 
     @action
     def conveyor(self, speed: float, *, an: str | None = None) -> None:
-        """Drive the conveyor belt; it runs on when the hub is lost, as the arm has no watchdog.
+        """Drive the conveyor belt. It keeps running on connection loss: the arm has no watchdog.
 
-        :param speed: m/s, negative backwards, 0 stops it
+        :param speed: speed, m/s; negative: backwards; 0: stop
         """
         assert -0.2 <= speed <= 0.2
-        stops = self._stops
-        with self._orders:
-            self._check_not_stopped("conveyor", stops)
-            self._require_control()
-            self._drive_belt(speed)
+        guard = self._control.stops.guard()
+        with self._control.commands:
+            guard.check(f"conveyor of {self.who}")
+            self._control.require()
+            self._control.drive_belt(speed)
 
-    def _at_part(self, what: str, pose: Pose, approach: float, speed: float, slow_speed: float, *, suck: bool) -> None:
-        stops, above = self._stops, behind(pose, approach)
-        self._solve(pose)  # before anything moves
-        self._move_pose(above, JOINT_TO_POSE, speed, stops)
-        self._move_pose(pose, LINE_TO_POSE, slow_speed, stops)
-        self._switch(what, Command.SUCTION_CUP, suck, self._dobot.suction_time, stops)
-        self._part_switched(suck, hanging=True)
-        self._move_pose(above, LINE_TO_POSE, slow_speed, stops)
+    def _pick_or_place(
+        self, what: str, pose: Pose, approach: float, speed: float, slow_speed: float, *, suck: bool
+    ) -> None:
+        # The tool points down, so the approach is from above.
+        guard, above = self._control.stops.guard(), pose * Pose(Position(0.0, 0.0, -approach))
+        self._motion.solve(pose)  # before the arm moves
+        self._motion.to_pose(above, JOINT_TO_POSE, speed, guard)
+        self._motion.to_pose(pose, LINE_TO_POSE, slow_speed, guard)
+        self._switch(what, Command.SUCTION_CUP, suck, self._dobot.suction_time, guard)
+        self._motion.to_pose(above, LINE_TO_POSE, slow_speed, guard)
 
-    def _part_switched(self, held: bool, *, hanging: bool) -> None:
-        if held:
-            self.attach_part(hanging=hanging)
-        else:
-            self.detach_part()
-
-    def _switch(self, what: str, command: Command, on: bool, seconds: float, stops: int) -> None:
-        """Switch the pump's valve, see it switched, and give it its time. Raises DeviceFault when it does not."""
-        wanted = (1, int(on))
-        with self._orders:
-            self._check_not_stopped(what, stops)
-            self._require_control()
+    def _switch(self, what: str, command: Command, on: bool, seconds: float, guard: StopGuard) -> None:
+        """Switch the valve of the pump, read it back, and wait until it has taken effect. Raise DeviceFault."""
+        wanted, what = (1, int(on)), f"{what} of {self.who}"
+        with self._control.commands:
+            guard.check(what)
+            self._control.require()
             self._observer.set(command, "2B", *wanted)
-            kept = self._observer.get(command, "2B")
-        if kept != wanted:
-            raise DeviceFault(f"{what} of {self._who} did not switch", f"told {wanted}, has {kept}")
+            actual = self._observer.get(command, "2B")
+        if actual != wanted:
+            raise DeviceFault(f"{what} did not switch.", f"sent {wanted}, read {actual}")
         until = time.monotonic() + seconds
         while time.monotonic() < until:
-            self._check_not_stopped(what, stops)
+            guard.check(what)
             time.sleep(POLL)
+        if on:
+            self.attach_part(hanging=command is Command.SUCTION_CUP)
+        else:
+            self.detach_part()

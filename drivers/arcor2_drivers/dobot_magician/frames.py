@@ -1,7 +1,8 @@
-"""Frames of the Dobot protocol: bytes in, messages out. Pure; the vendor's communication protocol, "Protocol format".
+"""Frames of the Dobot protocol.
 
-AA AA, length of the payload, then the payload (id, control, parameters), then the checksum: what makes the sum of the
-payload's bytes zero, modulo 256. Numbers are little-endian; millimetres, degrees.
+A frame is AA AA, the length of the payload, the payload (id, control, parameters), and a checksum that makes the sum of
+the payload and itself zero, modulo 256. Numbers are little-endian, in millimetres and degrees. Source: Dobot,
+"Communication Protocol", section "Protocol format".
 """
 
 import enum
@@ -11,11 +12,11 @@ HEADER: Final = b"\xaa\xaa"
 WRITE: Final = 0x01
 QUEUED: Final = 0x02
 LONGEST: Final = 0xFF - 2
-"""Bytes of parameters: the length byte counts id and control too."""
+"""Greatest size of the parameters, bytes: the length byte counts id and control, too."""
 
 
 class Command(enum.IntEnum):
-    """Ids as far as they are used here."""
+    """Ids of the commands in use."""
 
     SERIAL_NUMBER = 0
     NAME = 1
@@ -40,7 +41,7 @@ class Command(enum.IntEnum):
 
 
 class Frame(NamedTuple):
-    """What one frame carries."""
+    """Content of a frame."""
 
     command: int
     control: int
@@ -48,23 +49,23 @@ class Frame(NamedTuple):
 
 
 def encode(command: int, control: int, parameters: bytes = b"") -> bytes:
-    """Give the bytes of a frame. Raises ValueError when the parameters are too long for one."""
+    """Return the bytes of a frame. Raise ValueError if the parameters are too long."""
     if len(parameters) > LONGEST:
-        raise ValueError(f"a frame has at most {LONGEST} bytes of parameters, not {len(parameters)}")
+        raise ValueError(f"A frame has at most {LONGEST} bytes of parameters, not {len(parameters)}.")
     payload = bytes((command, control)) + parameters
     return HEADER + bytes((len(payload),)) + payload + bytes((-sum(payload) & 0xFF,))
 
 
 class FrameBuffer:
-    """Cuts frames out of what comes; after bytes that are none it comes into step at the next whole frame."""
+    """Splits received bytes into frames; after garbage it synchronizes at the next complete frame."""
 
     def __init__(self) -> None:
         self._rest = b""
         self.garbage = 0
-        """Bytes passed over."""
+        """Number of bytes skipped."""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Give the frames completed by `data`."""
+        """Add received bytes and return the frames they complete."""
         frames: list[Frame] = []
         rest = self._rest + data
         while True:
@@ -81,7 +82,7 @@ class FrameBuffer:
                 return frames
             payload = rest[3 : 3 + rest[2]]
             if rest[2] < 2 or (sum(payload) + rest[3 + rest[2]]) & 0xFF:
-                self.garbage += 1  # the next frame may have begun inside of what looked like this one
+                self.garbage += 1  # the next frame may have started inside of this one
                 rest = rest[1:]
                 continue
             frames.append(Frame(payload[0], payload[1], payload[2:]))

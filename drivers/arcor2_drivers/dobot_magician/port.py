@@ -1,4 +1,4 @@
-"""The serial port of the arm: one question, one answer."""
+"""The serial port of the arm: one command, one answer."""
 
 import contextlib
 from typing import Final
@@ -11,35 +11,46 @@ from arcor2_hw.keep_alive import RunningTime
 from .frames import FrameBuffer, encode
 
 BAUD_RATE: Final = 115200
-LOOK: Final = 0.02
-"""Seconds a read waits for the first byte before it is seen whether the time is up."""
+READ_WAIT: Final = 0.02
+"""Time a read waits for the first byte, s."""
 WRITE_TIMEOUT: Final = 1.0
-"""Seconds to write a question. A process that stands still in writing must not take that for a port that is stuck."""
+"""Time to write a command, s: long enough for a process that is not scheduled while it writes."""
 
 
 class Port:
-    """An open port; used by one thread at a time."""
+    """An open port, for one thread at a time."""
 
     def __init__(self, who: str, path: str) -> None:
-        """Open. Raises NotConnected naming the port."""
+        """Open the port. Raise NotConnected."""
         self.who = who
         self._frames = FrameBuffer()
         try:
-            self._serial = serial.Serial(path, BAUD_RATE, timeout=LOOK, write_timeout=WRITE_TIMEOUT, exclusive=True)
+            self._serial = serial.Serial(
+                path, BAUD_RATE, timeout=READ_WAIT, write_timeout=WRITE_TIMEOUT, exclusive=True
+            )
             self._serial.reset_input_buffer()
         except (serial.SerialException, OSError, ValueError) as e:
             why = "is used by another program" if "exclusively" in str(e) else "cannot be opened"
-            raise NotConnected(f"{who}: the port {why}", str(e)) from e
+            raise NotConnected(f"{who}: the port {why}.", str(e)) from e
 
     @property
     def garbage(self) -> int:
-        """Count the bytes that belonged to no frame."""
+        """Return the number of bytes that belonged to no frame."""
         return self._frames.garbage
 
     def ask(self, command: int, control: int, parameters: bytes, timeout: float, *, first: bool = False) -> bytes:
-        """Give the parameters of the answer. Raises DeviceTimeout after `timeout` s, ConnectionLost naming the port.
+        """Send a command and return the parameters of the answer.
 
-        With `first` an answer to another question before it is a DeviceTimeout: the arm lags behind.
+        Args:
+            command: Id of the command.
+            control: Control byte.
+            parameters: Parameters of the command.
+            timeout: Time for the answer, s.
+            first: Fail with DeviceTimeout if another answer comes first: the arm lags behind.
+
+        Raises:
+            DeviceTimeout: No answer came in time.
+            ConnectionLost: The port failed.
         """
         clock = RunningTime()
         try:
@@ -52,20 +63,18 @@ class Port:
                     if (frame.command, frame.control) == (command, control):
                         return frame.parameters
                     if first:
-                        raise DeviceTimeout(f"{self.who} lags behind", f"{frame.command} came before {command}")
+                        raise DeviceTimeout(f"{self.who} lags behind.", f"{frame.command} came before {command}")
                 if clock() >= timeout:
                     raise DeviceTimeout(
-                        f"{self.who} did not answer within {timeout:g} s",
+                        f"{self.who} did not answer within {timeout:g} s.",
                         f"id {command}, {self.garbage} bytes of garbage so far",
                     )
         except serial.SerialTimeoutException as e:
-            raise DeviceTimeout(f"{self.who} takes no bytes", str(e)) from e
-        except (serial.SerialException, OSError, TypeError) as e:  # TypeError: pyserial's own, on a closed port
-            raise ConnectionLost(
-                f"{self.who}: the connection was lost: unplugged, or the port was closed", str(e)
-            ) from e
+            raise DeviceTimeout(f"{self.who} accepts no bytes.", str(e)) from e
+        except (serial.SerialException, OSError, TypeError) as e:  # TypeError: raised by pyserial on a closed port
+            raise ConnectionLost(f"{self.who}: the connection was lost. Check the cable.", str(e)) from e
 
     def close(self) -> None:
-        """Close; harmless when closed."""
+        """Close the port, if it is open."""
         with contextlib.suppress(serial.SerialException, OSError):
             self._serial.close()

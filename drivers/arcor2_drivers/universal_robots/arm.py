@@ -7,10 +7,11 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Robot
 from arcor2_hw.objects.arm import joint_values
+from arcor2_hw.objects.settings import within
 
 from .geometry import JOINT_LIMITS, ArmModel, from_vector, to_vector, world_from_base
 from .observer import Sample
-from .settings import UrSettings, within
+from .settings import UrSettings
 
 
 class Arm:

@@ -2,25 +2,20 @@
 
 import dataclasses
 import math
+from typing import Annotated
 
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
-from arcor2_hw.objects.gripping import check_part_size
-from arcor2_hw.objects.settings import check_host
+from arcor2_hw.objects.gripping import LARGEST
+from arcor2_hw.objects.settings import Range, check_host, within
 
 SLOWEST_WATCHDOG = 2.5
 """Lowest watchdog frequency, Hz, with which the arm stops within the time that the type declares (`loss_reaction`)."""
 MANUAL_TCP_SPEED = 0.25
 """Highest TCP speed in manual mode, m/s (ISO 10218-1, reduced speed)."""
+TURN = 2.0 * math.pi
 OUTPUTS = 18
 """Number of digital inputs, and of digital outputs: 8 standard, 8 configurable, 2 at the tool."""
-
-
-def within(name: str, value: float, low: float, high: float) -> None:
-    """Raise OutOfRange, naming the parameter, unless the value is in the range."""
-    if not (math.isfinite(value) and low <= value <= high):
-        raise OutOfRange(f"{name} must be {low:g} to {high:g}, not {value!r}")
 
 
 @dataclasses.dataclass
@@ -56,48 +51,35 @@ class UrSettings(Settings):
 
     host: str
     payload_mass: float = -1.0
-    payload_cog_x: float = 0.0
-    payload_cog_y: float = 0.0
-    payload_cog_z: float = 0.0
-    tcp_x: float = 0.0
-    tcp_y: float = 0.0
-    tcp_z: float = 0.0
-    tcp_rx: float = 0.0
-    tcp_ry: float = 0.0
-    tcp_rz: float = 0.0
-    max_tcp_speed: float = 1.0
-    max_joint_speed: float = 1.05
-    tcp_acceleration: float = 1.2
-    joint_acceleration: float = 1.4
-    stop_deceleration: float = 5.0
-    watchdog_frequency: float = SLOWEST_WATCHDOG
+    payload_cog_x: Annotated[float, Range(-1.0, 1.0)] = 0.0
+    payload_cog_y: Annotated[float, Range(-1.0, 1.0)] = 0.0
+    payload_cog_z: Annotated[float, Range(-1.0, 1.0)] = 0.0
+    tcp_x: Annotated[float, Range(-1.0, 1.0)] = 0.0
+    tcp_y: Annotated[float, Range(-1.0, 1.0)] = 0.0
+    tcp_z: Annotated[float, Range(-1.0, 1.0)] = 0.0
+    tcp_rx: Annotated[float, Range(-TURN, TURN)] = 0.0
+    tcp_ry: Annotated[float, Range(-TURN, TURN)] = 0.0
+    tcp_rz: Annotated[float, Range(-TURN, TURN)] = 0.0
+    max_tcp_speed: Annotated[float, Range(0.01, 3.0)] = 1.0
+    max_joint_speed: Annotated[float, Range(0.01, math.pi)] = 1.05
+    tcp_acceleration: Annotated[float, Range(0.05, 15.0)] = 1.2
+    joint_acceleration: Annotated[float, Range(0.05, 40.0)] = 1.4
+    stop_deceleration: Annotated[float, Range(0.5, 15.0)] = 5.0
+    watchdog_frequency: Annotated[float, Range(SLOWEST_WATCHDOG, 50.0)] = SLOWEST_WATCHDOG
     use_upper_range_registers: bool = True
-    gripper_output: int = 0
-    part_sensor_input: int = -1
-    gripper_time: float = 0.3
-    part_size_x: float = 0.0
-    part_size_y: float = 0.0
-    part_size_z: float = 0.0
-    part_offset_z: float = 0.0
+    gripper_output: Annotated[int, Range(-1, OUTPUTS - 1)] = 0
+    part_sensor_input: Annotated[int, Range(-1, OUTPUTS - 1)] = -1
+    gripper_time: Annotated[float, Range(0.0, 10.0)] = 0.3
+    part_size_x: Annotated[float, Range(0.0, LARGEST)] = 0.0
+    part_size_y: Annotated[float, Range(0.0, LARGEST)] = 0.0
+    part_size_z: Annotated[float, Range(0.0, LARGEST)] = 0.0
+    part_offset_z: Annotated[float, Range(-1.0, 1.0)] = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         check_host(self.host)
         if not self.payload_mass < 0.0:
             within("payload_mass", self.payload_mass, 0.0, 40.0)
-        for axis in "xyz":
-            within(f"payload_cog_{axis}", getattr(self, f"payload_cog_{axis}"), -1.0, 1.0)
-            within(f"tcp_{axis}", getattr(self, f"tcp_{axis}"), -1.0, 1.0)
-            within(f"tcp_r{axis}", getattr(self, f"tcp_r{axis}"), -2.0 * math.pi, 2.0 * math.pi)
-        within("max_tcp_speed", self.max_tcp_speed, 0.01, 3.0)
-        within("max_joint_speed", self.max_joint_speed, 0.01, math.pi)
-        within("tcp_acceleration", self.tcp_acceleration, 0.05, 15.0)
-        within("joint_acceleration", self.joint_acceleration, 0.05, 40.0)
-        within("stop_deceleration", self.stop_deceleration, 0.5, 15.0)
-        within("watchdog_frequency", self.watchdog_frequency, SLOWEST_WATCHDOG, 50.0)
-        for name in ("gripper_output", "part_sensor_input"):
-            within(name, getattr(self, name), -1, OUTPUTS - 1)
-        within("gripper_time", self.gripper_time, 0.0, 10.0)
-        check_part_size(self, within)
 
     @property
     def tcp(self) -> Pose:

@@ -60,7 +60,7 @@ def test_a_joint_move_goes_around(arm: DobotMagician, around: Around, to_pose: b
         sample = values(arm)
         if not seen or sample != seen[-1]:
             seen.append(sample)
-        arm._observer.after(arm._observer.sample().monotonic)
+        arm._observer.fresh()
     doing.result()
     assert arm.get_end_effector_pose("tcp").position.distance_to(goal.position) < 1e-3
     assert touches(around, *seen) == set()
@@ -100,7 +100,7 @@ def test_a_stop_ends_it_and_nothing_follows(arm: DobotMagician, around: Around, 
         doing.result(2.0)
     at = values(arm)
     assert abs(at[0] - RIGHT[0]) > 0.3
-    arm._observer.after(arm._observer.sample().monotonic)
+    arm._observer.fresh()
     assert values(arm) == pytest.approx(at, abs=1e-6)
 
 
