@@ -1,1 +1,1 @@
-"""The two-axis fine-manipulation robot on Dynamixel protocol 2.0 (docs/devices/two-axis-robot.md)."""
+"""Two-axis robot: a planar arm of two Dynamixel servos on protocol 2.0."""

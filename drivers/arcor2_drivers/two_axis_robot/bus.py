@@ -1,4 +1,4 @@
-"""The bus: the vendor's library with typed errors and time limits. For one thread alone."""
+"""The bus: the vendor's library with typed errors and time limits. For one thread."""
 
 import contextlib
 import termios
@@ -20,36 +20,36 @@ from arcor2_hw.keep_alive import KeepAlive, RunningTime
 from .registers import LED, STATUS_ERRORS, Register
 
 POLL: Final = 0.002
-"""s for which a read waits for bytes: the library alone would spin."""
+"""Time a read waits for bytes, s: the library itself would poll continuously."""
 LONGEST: Final = 0.35
-"""s for one exchange whatever comes; the library's own limit is not looked at while bytes keep coming."""
+"""Longest exchange, s; the library does not check its own limit while bytes keep arriving."""
 WRITE_TIMEOUT: Final = 1.0
-"""s to write a packet. A process that stands still in writing must not take that for a port that is stuck."""
+"""Time to write a packet, s: long enough for a process that is not scheduled while it writes."""
 PATIENCE: Final = 0.25
-"""s that the first byte of an answer is waited for; the library's 0.034 are few on a busy computer."""
+"""Time to wait for the first byte of an answer, s; the library's 0.034 s is too short on a busy computer."""
 QUIET: Final = 0.03
-"""s for which what comes late is thrown away before something is asked anew."""
+"""Time without bytes after which the line is quiet, s."""
 ALERT: Final = 0x80
 PKT_ID, PKT_LENGTH_L, PKT_LENGTH_H, PKT_ERROR, PKT_DATA = 4, 5, 6, 8, 9
 EMPTY: Final = 4
-"""What the length field says of an answer without data: instruction, error, checksum."""
+"""Length field of an answer without data: instruction, error, checksum."""
 SHORTEST: Final = 11
-"""Bytes of an answer without data."""
+"""Size of an answer without data, bytes."""
 
 
 class _Endless(Exception):
-    """Bytes keep coming and none of them is an answer."""
+    """Bytes keep arriving without forming an answer."""
 
 
 class _Port(PortHandler):  # type: ignore[misc]
-    """The library's port, waiting instead of spinning. Times are running time: an answer waits while we do not run."""
+    """The library's port, without continuous polling. Times count only while this process runs."""
 
     def __init__(self, path: str) -> None:
         super().__init__(path)
         self.begin()
 
     def begin(self) -> None:
-        """Begin an exchange."""
+        """Start an exchange."""
         self._clock = RunningTime()
         self._asked = 0.0
         self._heard = False
@@ -71,16 +71,16 @@ class _Port(PortHandler):  # type: ignore[misc]
 
 
 class _Recorder:
-    """In place of a port: takes the bytes of a packet."""
+    """Replaces a port to record the bytes of a packet."""
 
     is_using = False
     packet = b""
 
     def clearPort(self) -> None:  # noqa: N802 - the library's name
-        """Clear nothing."""
+        """Do nothing."""
 
     def writePort(self, packet: list[int]) -> int:  # noqa: N802 - the library's name
-        """Take a packet."""
+        """Record a packet."""
         self.packet = bytes(packet)
         return len(packet)
 
@@ -95,11 +95,11 @@ class Bus:
         self._packets: Any = PacketHandler(2.0)
 
     def servo(self, number: int) -> str:
-        """Name a servo in an error."""
+        """Return the name of a servo for errors."""
         return f"servo {number} of {self.who}"
 
     def open(self) -> None:
-        """Open the port for us alone. Raises NotConnected naming it."""
+        """Open the port exclusively. Raise NotConnected."""
         port = _Port(self._path)
         try:
             port.baudrate = self._baud_rate
@@ -111,12 +111,15 @@ class Bus:
             if port.ser is not None:
                 with contextlib.suppress(OSError, termios.error):
                     port.ser.close()
-            raise NotConnected(f"{self._name}: port {self._path} cannot be opened", str(e)) from e
+            raise NotConnected(
+                f"{self._name}: port {self._path} cannot be opened. Check the cable, and close other programs.",
+                str(e),
+            ) from e
         self._port = port
         self.drain()
 
     def close(self) -> None:
-        """Close; harmless when closed. The next `open` makes a new port: this one may say for ever that it is used."""
+        """Close the port, if it is open. `open` creates a new one: this one may report forever that it is used."""
         port, self._port = self._port, None
         if port is not None:
             with contextlib.suppress(OSError, termios.error):
@@ -131,14 +134,14 @@ class Bus:
         try:
             yield port
         except (OSError, termios.error) as e:
-            raise ConnectionLost(f"the port of {self.who} is gone", str(e)) from e
+            raise ConnectionLost(f"The port of {self.who} has disappeared. Check the cable.", str(e)) from e
         except (_Endless, IndexError) as e:
-            raise DeviceTimeout(f"{self.who}: what comes on the line is no answer", "garbage") from e
+            raise DeviceTimeout(f"{self.who}: the bytes received are not an answer.", "garbage") from e
         finally:
             port.is_using = False
 
     def drain(self) -> None:
-        """Throw away what still comes, until nothing has come for a moment."""
+        """Discard received bytes until the line is quiet."""
         with self._exchange() as port:
             quiet = time.monotonic() + QUIET
             while time.monotonic() < quiet:
@@ -147,9 +150,9 @@ class Bus:
 
     def _check(self, number: int, result: int, error: int, what: str) -> None:
         if result == COMM_RX_TIMEOUT:
-            raise DeviceTimeout(f"{self.servo(number)} did not answer {what}")
+            raise DeviceTimeout(f"{self.servo(number)} did not answer {what}. Check power and cable.")
         if result == COMM_RX_CORRUPT:
-            raise DeviceTimeout(f"the answer of {self.servo(number)} to {what} was damaged")
+            raise DeviceTimeout(f"The answer of {self.servo(number)} to {what} was damaged.")
         if result != COMM_SUCCESS:
             raise ConnectionLost(f"{what} could not be sent to {self.servo(number)}", f"result {result}")
         if error & ~ALERT:
@@ -157,14 +160,14 @@ class Bus:
             raise Refused(f"{self.servo(number)} refuses {what}: {reason}", f"status error {error:#04x}")
 
     def ping(self, number: int) -> int:
-        """Give the model number. Raises DeviceTimeout, Refused, ConnectionLost, each naming the servo."""
+        """Return the model number of a servo. Raise DeviceTimeout, Refused, ConnectionLost."""
         with self._exchange() as port:
             model, result, error = self._packets.ping(port, number)
         self._check(number, result, error, "a ping")
         return int(model)
 
     def _answer(self, port: _Port, number: int, size: int, what: str) -> bytes:
-        """Give the data of a servo's answer. One of another length is a late answer to something else."""
+        """Return the data of a servo's answer. An answer of another length is a late one to another instruction."""
         while True:
             packet, result = self._packets.rxPacket(port, False)
             if result != COMM_SUCCESS or packet[PKT_ID] == number:
@@ -172,11 +175,13 @@ class Bus:
         self._check(number, result, packet[PKT_ERROR] if result == COMM_SUCCESS else 0, what)
         found = (packet[PKT_LENGTH_L] | packet[PKT_LENGTH_H] << 8) - EMPTY
         if found != size:
-            raise DeviceTimeout(f"the answer of {self.servo(number)} to {what} was another one's", f"{found} bytes")
+            raise DeviceTimeout(
+                f"The answer of {self.servo(number)} to {what} belongs to another instruction.", f"{found} bytes"
+            )
         return bytes(packet[PKT_DATA : PKT_DATA + size])
 
     def read(self, number: int, register: Register) -> bytes:
-        """Give the bytes of a register or block. Raises DeviceTimeout, Refused, ConnectionLost, naming the servo."""
+        """Return the bytes of a register or block. Raise DeviceTimeout, Refused, ConnectionLost."""
         what = f"a reading of register {register.address}"
         with self._exchange() as port:
             sent = self._packets.readTx(port, number, register.address, register.size)
@@ -184,7 +189,7 @@ class Bus:
             return self._answer(port, number, register.size, what)
 
     def write(self, number: int, register: Register, value: int) -> None:
-        """Write a register and have it acknowledged. Raises Refused with what the servo says."""
+        """Write a register, with acknowledgement. Raise Refused with the servo's reason."""
         what = f"{value} in register {register.address}"
         data = list((value & ((1 << 8 * register.size) - 1)).to_bytes(register.size, "little"))
         with self._exchange() as port:
@@ -194,13 +199,13 @@ class Bus:
             self._answer(port, number, 0, what)
 
     def reboot(self, number: int) -> None:
-        """Reboot a servo; it answers and is away for some tenths of a second."""
+        """Reboot a servo, which takes some tenths of a second after its answer."""
         with self._exchange() as port:
             result, error = self._packets.reboot(port, number)
         self._check(number, result, error, "a reboot")
 
     def sync_read(self, numbers: tuple[int, ...], register: Register) -> list[bytes]:
-        """Give the same block of each servo, of one instant."""
+        """Return the same block of each servo, read at one instant."""
         what = f"a reading of register {register.address}"
         with self._exchange() as port:
             sent = self._packets.syncReadTx(port, register.address, register.size, list(numbers), len(numbers), False)
@@ -208,7 +213,7 @@ class Bus:
             return [self._answer(port, number, register.size, what) for number in numbers]
 
     def sync_write(self, address: int, blocks: dict[int, bytes]) -> None:
-        """Write a block to each servo in one packet; nobody acknowledges it."""
+        """Write a block to each servo in one packet, without acknowledgement."""
         size = len(next(iter(blocks.values())))
         data = [byte for number, block in blocks.items() for byte in (number, *block)]
         with self._exchange() as port:
@@ -216,9 +221,9 @@ class Bus:
         self._check(next(iter(blocks)), result, 0, f"a block at register {address}")
 
     def keep_alive(self, numbers: tuple[int, ...], period: float, quiet: float) -> KeepAlive:
-        """Keep the servos' bus watchdog quiet from a child process when the line is quiet for `quiet` s.
+        """Keep the bus watchdog from tripping by a child process, whenever the line is quiet for `quiet` s.
 
-        It writes the LEDs, which nothing here uses: nobody answers a sync write, so no answer of ours is disturbed.
+        It writes the unused LEDs: a sync write is not answered, so it disturbs no other answer.
         """
         recorder = _Recorder()
         data = [byte for number in numbers for byte in (number, 0)]
@@ -227,7 +232,7 @@ class Bus:
             return KeepAlive(port.ser.fileno(), recorder.packet, period, quiet)
 
     def again(self, ask: Callable[[], Any]) -> Any:
-        """Give what `ask` gives; ask a second time, on a quiet line, when the answer was missing or damaged."""
+        """Return the result of `ask`; repeat it once, on a quiet line, if the answer was missing or damaged."""
         try:
             return ask()
         except DeviceTimeout:

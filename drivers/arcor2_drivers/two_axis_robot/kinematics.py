@@ -4,14 +4,14 @@ import math
 from typing import Final
 
 OUT_OF_REACH: Final = 1e-9
-"""m by which rounding may put a point beyond the stretched arm."""
+"""Rounding error of the distance of a point, m."""
 
 STRETCHED: Final = 0.05
-"""Sine of the elbow's angle below which a velocity across the arm needs joints of any speed."""
+"""Sine of the elbow angle below which the arm counts as stretched: joint speeds would be unlimited."""
 
 
 def forward(links: tuple[float, float], q: tuple[float, float]) -> tuple[float, float, float]:
-    """Give x, y of the tool centre point and its heading."""
+    """Return x, y of the tool center point and its heading."""
     heading = q[0] + q[1]
     x = links[0] * math.cos(q[0]) + links[1] * math.cos(heading)
     y = links[0] * math.sin(q[0]) + links[1] * math.sin(heading)
@@ -19,7 +19,7 @@ def forward(links: tuple[float, float], q: tuple[float, float]) -> tuple[float, 
 
 
 def rates(links: tuple[float, float], q: tuple[float, float], x: float, y: float) -> tuple[float, float] | None:
-    """Give the joints' rates, rad/s, for a velocity of the tool centre point, m/s; None where it is stretched."""
+    """Return the joints' rates, rad/s, for a velocity of the tool center point, m/s; None for a stretched arm."""
     first, second = links
     if abs(math.sin(q[1])) < STRETCHED:
         return None
@@ -31,12 +31,12 @@ def rates(links: tuple[float, float], q: tuple[float, float], x: float, y: float
 
 
 def _turned(angle: float) -> float:
-    """Give the angle within -pi and pi."""
+    """Return an angle between -pi and pi."""
     return math.remainder(angle, math.tau)
 
 
 def inverse(links: tuple[float, float], x: float, y: float) -> list[tuple[float, float]]:
-    """Give the solutions, elbow on the left and on the right: two, one of the stretched arm, none out of reach."""
+    """Return the solutions, with the elbow left and right: two, one for a stretched arm, none out of reach."""
     first, second = links
     distance = math.hypot(x, y)
     if distance > first + second + OUT_OF_REACH or distance < abs(first - second) - OUT_OF_REACH:
@@ -53,6 +53,6 @@ def inverse(links: tuple[float, float], x: float, y: float) -> list[tuple[float,
 def nearest(
     solutions: list[tuple[float, float]], seed: tuple[float, float], limits: tuple[tuple[float, float], ...]
 ) -> tuple[float, float] | None:
-    """Give the solution within the limits whose farthest joint has the shortest way from the seed; None if none is."""
+    """Return the solution within the limits with the smallest greatest joint motion from the seed, or None."""
     allowed = [q for q in solutions if all(low <= a <= high for a, (low, high) in zip(q, limits, strict=True))]
     return min(allowed, key=lambda q: max(abs(q[0] - seed[0]), abs(q[1] - seed[1])), default=None)

@@ -1,4 +1,4 @@
-"""The control table of X-series servos as far as it is used: addresses, units, what bits mean. Pure functions."""
+"""Control table of X-series servos: addresses, units and bits in use. Pure functions."""
 
 import math
 from typing import Final, NamedTuple
@@ -6,22 +6,22 @@ from typing import Final, NamedTuple
 from .settings import TwoAxisRobotSettings
 
 TICK: Final = math.tau / 4096
-"""rad of one step of the encoder."""
+"""Angle of one step of the encoder, rad."""
 MIDDLE: Final = 2048
 VELOCITY: Final = 0.229 * math.tau / 60.0
-"""rad/s"""
+"""Unit of velocities, rad/s."""
 ACCELERATION: Final = 214.577 * math.tau / 3600.0
-"""rad/s²"""
+"""Unit of accelerations, rad/s²."""
 CURRENT: Final = 2.69e-3
-"""A"""
+"""Unit of currents, A."""
 WATCHDOG: Final = 0.02
-"""s"""
+"""Unit of the bus watchdog, s."""
 TRIPPED: Final = 0xFF
 POSITION_CONTROL: Final = 3
 
 
 class Register(NamedTuple):
-    """Where a register is, and its bytes."""
+    """Address and size of a register, bytes."""
 
     address: int
     size: int
@@ -47,20 +47,20 @@ VOLTAGE: Final = Register(144, 2)
 TEMPERATURE: Final = Register(146, 1)
 
 STATE: Final = Register(64, 83)
-"""All that changes, read at once."""
+"""All registers that change, read at once."""
 EEPROM: Final = Register(0, 56)
-"""All that is set up once."""
+"""All registers of the setup."""
 
 HARDWARE_ERRORS: Final = {
-    0: ("input voltage out of range", "check the supply"),
-    2: ("overheating", "let it cool and find out why it had to work so hard"),
-    3: ("encoder fault", "replace the servo"),
-    4: ("electrical shock, or not enough power", "check the supply and the wiring"),
-    5: ("overload", "take away what blocks the joint"),
+    0: ("input voltage out of range", "Check the supply"),
+    2: ("overheating", "Let it cool down, and reduce the load"),
+    3: ("encoder fault", "Replace the servo"),
+    4: ("electrical shock, or not enough power", "Check supply and wiring"),
+    5: ("overload", "Remove what blocks the joint"),
 }
 STATUS_ERRORS: Final = {
     1: "the instruction failed",
-    2: "it does not know the instruction",
+    2: "the instruction is unknown",
     3: "the packet was damaged",
     4: "the value is out of range, or its bus watchdog has tripped",
     5: "the length of the data is wrong",
@@ -70,18 +70,18 @@ STATUS_ERRORS: Final = {
 
 
 def signed(value: int, size: int) -> int:
-    """Give a register's value with its sign; the library gives all of them without."""
+    """Return a register's value with its sign; the library returns unsigned values."""
     return value - (1 << 8 * size) if value >> (8 * size - 1) else value
 
 
 def pick(block: bytes, start: int, register: Register, with_sign: bool = False) -> int:
-    """Give a register's value out of a block read from address `start` on."""
+    """Return a register's value out of a block read from address `start` on."""
     part = block[register.address - start :][: register.size]
     return int.from_bytes(part, "little", signed=with_sign)
 
 
 class ServoState(NamedTuple):
-    """What changes in a servo, at one instant, in the servo's units."""
+    """State of a servo at one instant, in the servo's units."""
 
     torque: bool
     hardware_error: int
@@ -98,7 +98,7 @@ class ServoState(NamedTuple):
 
 
 def decode(block: bytes) -> ServoState:
-    """Read the block STATE."""
+    """Decode the block STATE."""
 
     def get(register: Register, with_sign: bool = False) -> int:
         return pick(block, STATE.address, register, with_sign)
@@ -120,7 +120,7 @@ def decode(block: bytes) -> ServoState:
 
 
 class ServoSetup(NamedTuple):
-    """What is set up in a servo, in the servo's units."""
+    """Setup of a servo, in the servo's units."""
 
     model: int
     firmware: int
@@ -132,7 +132,7 @@ class ServoSetup(NamedTuple):
 
 
 def decode_setup(block: bytes) -> ServoSetup:
-    """Read the block EEPROM."""
+    """Decode the block EEPROM."""
     return ServoSetup(
         model=pick(block, 0, Register(0, 2)),
         firmware=pick(block, 0, Register(6, 1)),
@@ -145,21 +145,21 @@ def decode_setup(block: bytes) -> ServoSetup:
 
 
 def to_ticks(angle: float, direction: int) -> int:
-    """Give the servo's position for a joint's angle, rad."""
+    """Return the servo's position for a joint's angle, rad."""
     return MIDDLE + direction * round(angle / TICK)
 
 
 def to_angle(ticks: int, direction: int) -> float:
-    """Give the joint's angle, rad, for a servo's position."""
+    """Return the joint's angle, rad, for a servo's position."""
     return direction * (ticks - MIDDLE) * TICK
 
 
 def profile(speed: float, acceleration: float) -> tuple[int, int]:
-    """Give profile acceleration and velocity for rad/s² and rad/s; never 0, which would mean: no limit."""
+    """Return profile acceleration and velocity for rad/s² and rad/s; never 0, which means no limit."""
     return max(1, round(acceleration / ACCELERATION)), max(1, round(speed / VELOCITY))
 
 
 def wanted_setup(settings: TwoAxisRobotSettings, joint: int) -> dict[Register, int]:
-    """Give what the settings ask to be set up in the servo of joint 0 or 1."""
+    """Return the setup that the settings require for the servo of joint 0 or 1."""
     offset = (settings.homing_offset_1, settings.homing_offset_2)[joint]
     return {HOMING_OFFSET: round(offset / TICK), CURRENT_LIMIT: round(settings.current_limit / CURRENT)}

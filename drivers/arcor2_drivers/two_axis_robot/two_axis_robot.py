@@ -1,88 +1,213 @@
-"""The two-axis robot as an object type: its motions."""
+"""TwoAxisRobot: the object type of a planar arm, composed of observer, control and motion."""
 
-import contextlib
-import math
-import time
 from typing import ClassVar, Final, Literal
 
 from arcor2_hw.actions import action
-from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
+from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import ProjectRobotJoints
-from arcor2_hw.data.robot import Joint, MoveEnd, MoveResult
-from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotInControl, OutOfRange, Refused
+from arcor2_hw.data.robot import Control as ControlMode
+from arcor2_hw.data.robot import Joint, Mode, MoveResult, Power, ProgramState, RobotState, RobotType, Safety
+from arcor2_hw.exceptions import DeviceError, Refused
+from arcor2_hw.keep_alive import FROZEN_AFTER
+from arcor2_hw.objects import Robot
+from arcor2_hw.objects.arm import TCP, check_end_effector, named_joints
+from arcor2_hw.objects.connected import Connected
+from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.objects.surroundings import Surroundings
 
-from . import kinematics
-from . import registers as reg
-from .bus import Bus
-from .controlled import GOALS, POLL, REST_WITHIN, TwoAxisControlled
-from .observed import JOINTS
-from .observer import Snapshot
-from .registers import to_ticks
-from .settings import TwoAxisRobotSettings, within
+from .control import Control
+from .motion import JOINTS, Motion
+from .observer import Observer
+from .settings import LONGEST_WATCHDOG, TwoAxisRobotSettings
 
-REACHED: Final = 12
-"""Ticks (1°) from the goal at which a joint that stands has arrived: a loaded servo rests short of its goal."""
-STILL: Final = 1e-6
-"""m/s, rad/s below which a part of a twist counts as none."""
-STANDING: Final = 0.5
-"""s both joints may stand, short of the goal, before the move counts as failed."""
+MODELS: Final = {1020: "XM430-W350", 1030: "XM430-W210", 1120: "XM540-W270", 1130: "XM540-W150"}
 
 
-class TwoAxisRobot(TwoAxisControlled):
+class TwoAxisRobot(Connected, Robot):
     """A planar arm of two Dynamixel servos for fine manipulation."""
 
     _ABSTRACT = False
+    robot_type = RobotType.SCARA
     urdf_package_name = "two_axis_robot.zip"
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(FROZEN_AFTER + LONGEST_WATCHDOG + 0.1)
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"move": "stop", "move_to": "stop"}
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: TwoAxisRobotSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
-        self.last_move: MoveResult | None = None
+        self._axes = settings
+        self._observer = Observer(name, settings)
+        self._control = Control(name, self._observer, settings)
+        self._motion = Motion(self, self._observer, self._control, settings, self._move_lock)
+        self._observer.on_lost = self.on_lost  # type: ignore[method-assign]
+        self.safe_moves = self._motion.safe
+        self.keep_connection(self._observer.who, self._observer.observing)
 
-    # -------------------------------------------------------------------------------- moving
+    # -------------------------------------------------------------------------------- connection and control
+    def surround(self, surroundings: Surroundings) -> None:
+        """Store the access to objects around the arm, and load its model."""
+        super().surround(surroundings)
+        self.safe_moves.prepare()
+
+    def on_lost(self, error: DeviceError) -> None:
+        """End control."""
+        self._control.drop(f"the connection was lost: {error}")
+
+    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
+        """Observe the servos; torque is unchanged. Raise NotConnected, DeviceTimeout or ConnectionLost."""
+        self._observer.connect(timeout)
+
+    def disconnect(self) -> None:
+        """Release control and close the port."""
+        self._control.leave()
+        self._observer.disconnect()
+
+    def condition(self) -> Health:
+        """Return failure while a servo has a hardware error."""
+        newest = self._observer.newest()
+        failed = newest is not None and any(servo.hardware_error for servo in newest.servos)
+        return Health.FAILURE if failed else Health.NORMAL
+
+    def identify(self) -> Identity:
+        """Return models and firmware of the servos; they have no serial number."""
+        self._observer.observing.check()
+        setups = self._observer.setups
+        model = " + ".join(MODELS.get(setup.model, f"model {setup.model}") for setup in setups)
+        return Identity("ROBOTIS", model, "", " + ".join(str(setup.firmware) for setup in setups))
+
+    def alarms(self) -> list[Alarm]:
+        """Return the active hardware errors, by servo and bit."""
+        return self._control.alarms()
+
+    def acknowledge(self, code: str) -> None:
+        """Raise Refused: only a named person can acknowledge a hardware error. Raise NotFound for an inactive alarm."""
+        self._control.acknowledge(code)
+
+    def take_control(self) -> None:
+        """Take control, unless we have it; the arm does not move. Raise DeviceFault, NotInControl or Refused."""
+        if not self._control.ours:
+            self.safe_moves.prepare()  # before the watchdog is armed: meanwhile nothing signals it
+        self._control.take()
+
+    def release_control(self) -> None:
+        """Stop and release control, if we have it. The joints hold, without a watchdog."""
+        self._control.release()
+
+    def control_owner(self) -> str | None:
+        """Return "us" or None: no other client can use the port while we are connected."""
+        return "us" if self._control.ours else None
+
+    # -------------------------------------------------------------------------------- state
+    def state(self) -> RobotState:
+        """Return the state of the robot. Raise NotConnected, ConnectionLost or Stale."""
+        state = self._observer.current().value
+        missing = [alarm.text for alarm in self.alarms()]
+        powered = all(servo.torque for servo in state.servos)
+        if not self._control.ours:
+            missing.append("control is not taken")
+        elif not powered:
+            missing.append("torque is off")
+        return RobotState(
+            mode=Mode.AUTOMATIC,
+            power=Power.OPERATIONAL if powered else Power.OFF,
+            safety=Safety.FAULT if any(servo.hardware_error for servo in state.servos) else Safety.NORMAL,
+            program=ProgramState.STOPPED,
+            control=ControlMode.REMOTE,
+            moving=not state.standing,
+            speed_override=1.0,
+            not_ready_because=missing,
+        )
+
+    def get_end_effectors_ids(self) -> set[str]:
+        """Return the only end effector, the tool center point."""
+        return {TCP}
+
+    def grippers(self) -> set[str]:
+        """Return no gripper."""
+        return set()
+
+    def suctions(self) -> set[str]:
+        """Return no suction cup."""
+        return set()
+
+    def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
+        """Return the angles, rad. Raise Stale."""
+        return named_joints(JOINTS, self._motion.present())
+
+    def get_end_effector_pose(self, end_effector: str) -> Pose:
+        """Return the pose of the tool center point in the world. Raise Stale."""
+        check_end_effector(self.name, end_effector)
+        return self._motion.world(self._motion.present())
+
+    def joint_limits(self) -> dict[str, tuple[float, float]]:
+        """Return the limits of the settings, rad."""
+        return dict(self._motion.limits)
+
+    def max_tcp_speed(self) -> float:
+        """Return the speed of the stretched arm with both joints at their maximum, m/s."""
+        return self._axes.max_joint_speed * (self._axes.link_1 + 2.0 * self._axes.link_2)
+
+    def forward_kinematics(self, end_effector_id: str, joints: list[Joint]) -> Pose:
+        """Return the pose in the world for joints."""
+        check_end_effector(self.name, end_effector_id)
+        return self._motion.world(self._motion.values(joints))
+
+    def inverse_kinematics(
+        self,
+        end_effector_id: str,
+        pose: Pose,
+        start_joints: list[Joint] | None = None,
+        avoid_collisions: bool = True,
+    ) -> list[Joint]:
+        """Return the joints for a position, with the elbow on the side nearest to `start_joints`.
+
+        Two joints cannot set the heading; it results from the position. With `avoid_collisions`, the elbow is on a
+        side that is free of collisions. Raise KinematicsException if there are none.
+        """
+        check_end_effector(self.name, end_effector_id)
+        seed = self._motion.values(start_joints) if start_joints else self._motion.present()
+        return named_joints(JOINTS, (self._motion.solve_free if avoid_collisions else self._motion.solve)(pose, seed))
+
+    # -------------------------------------------------------------------------------- motion
+    @property
+    def last_move(self) -> MoveResult | None:
+        """Return the result of the last motion."""
+        return self._motion.last
+
     def check_if_ready_to_move(self) -> None:
-        """Raise what keeps the arm from moving now; return when nothing does."""
+        """Raise what prevents the arm from moving."""
         super().check_if_ready_to_move()
-        self._check_takes_goals()
+        self._control.require_motion()
 
     def move_to_pose(
         self, end_effector_id: str, target_pose: Pose, speed: float, safe: bool = True, linear: bool = True
     ) -> None:
-        """Move to a position in the world, joint by joint; a straight line is refused.
+        """Move to a position in the world by a joint move; a line is refused.
 
-        With `safe` around what stands in the scene, standing at each waypoint, or not at all; an obstacle that comes
-        into the path meanwhile stops the arm.
-        Raises KinematicsException, PathBlocked, OutOfRange, Refused, NotInControl, DeviceFault, Cancelled,
-        DeviceTimeout.
+        With `safe`, the arm moves around obstacles. An obstacle that enters the path later stops it.
+
+        Raises:
+            KinematicsException: The position cannot be reached.
+            PathBlocked: An obstacle is in the way.
+            DeviceError: OutOfRange, Refused, NotInControl, DeviceFault, Cancelled or DeviceTimeout.
         """
-        stops = self._stops
-        self._check_end_effector(end_effector_id)
+        guard = self._control.stops.guard()
+        check_end_effector(self.name, end_effector_id)
         if linear:
-            raise Refused(f"{self.name} does not move in a straight line; ask for a joint move (linear=false)")
+            raise Refused(f"{self.name} cannot move in a straight line. Use a joint move (linear=false).")
+        present = self._motion.present()
         if safe:
-            self._go_around(self._free(target_pose, self._angles(self._observer.current())), speed, stops)
+            self._motion.go_around(self._motion.solve_free(target_pose, present), speed, guard)
         else:
-            self._move_pose(target_pose, speed, 1.0, stops)
+            self._motion.to_joints(self._motion.solve(target_pose, present), speed, 1.0, guard)
 
     def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
-        """Move to joint values, both joints arriving together; with `safe` around what stands in the way."""
-        stops, q = self._stops, self._checked(target_joints)
+        """Move to joint values, with `safe` around obstacles. Raise as `move_to_pose`."""
+        guard, q = self._control.stops.guard(), self._motion.values(target_joints)
         if safe:
-            self._go_around(q, speed, stops)
+            self._motion.go_around(q, speed, guard)
         else:
-            self._move(q, speed, 1.0, stops)
-
-    def _go_around(self, q: tuple[float, float], speed: float, stops: int) -> None:
-        """Plan a way and drive it, standing at each waypoint: as the checked way is straight in joint space."""
-        within(f"{self.name}: speed", speed, 0.001, 1.0)
-        with self._moving():
-            self._check_takes_goals()
-            now = self.robot_joints()
-            way = self.safe_moves.to_joints(now, self._joints(q), speed, stopped=lambda: self._stops != stops)
-            way.require_begin(self.name, self.robot_joints())
-            with self.safe_moves.monitored(way):
-                for waypoint in way.waypoints[1:]:
-                    self._drive(self._checked(waypoint), speed, 1.0, stops)
+            self._motion.to_joints(q, speed, 1.0, guard)
 
     def jog(
         self,
@@ -92,186 +217,62 @@ class TwoAxisRobot(TwoAxisControlled):
         valid_for: float = 0.2,
         end_effector_id: str | None = None,
     ) -> None:
-        """Move with a velocity that runs out by itself: the goals are where the servos come to rest after that.
+        """Move with a velocity that expires `valid_for` s from now. A twist must be in the plane, without rotation.
 
-        Of a twist, what lies in the plane; two joints cannot choose how the tool turns.
-        Raises OutOfRange, Refused for a turn, a way out of the plane and a stretched arm, NotInControl, DeviceFault.
+        Raise OutOfRange, Refused (also for a stretched arm), NotInControl or DeviceFault.
         """
-        within(f"{self.name}: valid_for", valid_for, 0.01, 1.0)
-        if end_effector_id is not None:
-            self._check_end_effector(end_effector_id)
-        if (twist is None) == (joint_velocities is None):
-            raise OutOfRange(f"{self.name}: jog needs either twist or joint_velocities")
-        stops, until = self._stops, time.monotonic() + valid_for
-        with self._moving():
-            self._check_takes_goals()
-            snapshot = self._observer.current()
-            rates = self._rates(twist, frame, self._angles(snapshot)) if twist is not None else joint_velocities or []
-            if len(rates) != len(JOINTS):
-                raise OutOfRange(f"{self.name}: joint_velocities must have {len(JOINTS)} numbers")
-            top, blocks = self._axes.max_joint_speed, {}
-            for joint, rate in enumerate(rates):
-                within(f"{self.name}: velocity of {JOINTS[joint]}", rate, -top, top)
-                blocks[self._axes.ids[joint]] = self._running_out(joint, rate, valid_for, snapshot)
+        check_end_effector(self.name, end_effector_id or TCP)
+        self._motion.jog(twist, joint_velocities, frame, valid_for)
 
-            def command(bus: Bus) -> None:
-                if self._stops != stops or not self._ours or time.monotonic() >= until:
-                    raise Cancelled(f"a jog of {self.name} was stopped, or came too late")
-                bus.sync_write(GOALS, blocks)
+    def stop(self) -> None:
+        """Stop and wait for standstill. This is not a safety function. Raise ConnectionLost or DeviceTimeout."""
+        self._control.stop()
 
-            self._observer.do(command)
+    def get_hand_teaching_mode(self) -> bool:
+        """Return whether torque is off so that the arm can be moved by hand."""
+        return self._control.teaching
 
-    def _running_out(self, joint: int, rate: float, valid_for: float, snapshot: Snapshot) -> bytes:
-        """Give profile and goal of a joint that goes at a rate (rad/s) for a time and then comes to rest."""
-        servo, setup, ramp = snapshot.servos[joint], self._observer.setups[joint], self._axes.joint_acceleration
-        # A servo that shall stand is still brought to rest.
-        turning = rate * self._directions[joint] or servo.velocity * reg.VELOCITY
-        way = rate * self._directions[joint] * valid_for + math.copysign(turning**2 / (2.0 * ramp), turning)
-        lower, upper = sorted(to_ticks(limit, self._directions[joint]) for limit in self._limits[joint])
-        goal = servo.position + round(way / reg.TICK)
-        goal = max(lower, setup.min_position, min(upper, setup.max_position, goal))
-        return b"".join(value.to_bytes(4, "little", signed=True) for value in (*reg.profile(abs(turning), ramp), goal))
+    def set_hand_teaching_mode(self, enabled: bool) -> None:
+        """Switch torque off, or on again at the present position. Raise Refused while the arm moves."""
+        if enabled != self._control.teaching:
+            with self._motion.exclusive():
+                self._control.set_teaching(enabled)
 
-    def _rates(self, twist: tuple[float, ...], frame: str, q: tuple[float, float]) -> list[float]:
-        """Give the joints' rates for a velocity of the tool centre point."""
-        heading = kinematics.forward(self._links, q)[2]
-        axes = {
-            "world": self._pose.orientation.inverted(),
-            "base": Orientation(),
-            "tool": Orientation.from_rotation_vector(0.0, 0.0, heading),
-        }.get(frame)
-        if axes is None:
-            raise Refused(f"{self.name} has no frame {frame!r} to jog in")
-        x, y, z = Position(*twist[:3]).rotated(axes)
-        if abs(z) > STILL or any(abs(part) > STILL for part in twist[3:]):
-            raise Refused(f"{self.name} moves in a plane, and its tool does not turn by itself")
-        rates = kinematics.rates(self._links, q, x, y)
-        if rates is None:
-            raise Refused(f"{self.name} is stretched or folded: jog its joints")
-        return list(rates)
+    def restart_safety(self, confirmed_by: str) -> None:
+        """Reboot the servos with a hardware error; control ends.
 
-    def _check_takes_goals(self) -> None:
-        self._require_control()
-        if self._teaching:
-            raise Refused(f"{self.name} is in hand teaching mode")
+        Raises:
+            InvalidData: No person is named.
+            Refused: There is no hardware error.
+            DeviceTimeout: A servo does not answer after the reboot.
+            DeviceFault: The error is active again.
+        """
+        self._control.reboot(confirmed_by)
 
     @action
     def move(self, pose: Pose, speed: float = 0.25, acceleration: float = 0.5, *, an: str | None = None) -> None:
-        """Move the tool centre point to a position; the heading is what comes of it.
+        """Move the tool center point to a position. The heading cannot be set.
 
-        :param pose: where to
+        :param pose: target
         :param speed: fraction of the configured maximum
         :param acceleration: fraction of the configured maximum
         """
         assert 0.01 <= speed <= 1.0
         assert 0.01 <= acceleration <= 1.0
-        self._move_pose(pose, speed, acceleration, self._stops)
+        guard = self._control.stops.guard()
+        self._motion.to_joints(self._motion.solve(pose, self._motion.present()), speed, acceleration, guard)
 
     @action
     def move_to(
         self, joints: ProjectRobotJoints, speed: float = 0.25, acceleration: float = 0.5, *, an: str | None = None
     ) -> None:
-        """Move to stored joint values, both joints arriving together.
+        """Move to stored joint values; both joints arrive together.
 
-        :param joints: where to
+        :param joints: target
         :param speed: fraction of the configured maximum
         :param acceleration: fraction of the configured maximum
         """
         assert 0.01 <= speed <= 1.0
         assert 0.01 <= acceleration <= 1.0
-        self._move(self._checked(joints.joints), speed, acceleration, self._stops)
-
-    def _move_pose(self, pose: Pose, speed: float, acceleration: float, stops: int) -> MoveResult:
-        return self._move(self._solve(pose, self._angles(self._observer.current())), speed, acceleration, stops)
-
-    def _move(self, q: tuple[float, float], speed: float, acceleration: float, stops: int) -> MoveResult:
-        """Move; `stops` is the count of stops when the caller was called: one more since then, and nothing starts."""
-        within(f"{self.name}: speed", speed, 0.001, 1.0)
-        within(f"{self.name}: acceleration", acceleration, 0.01, 1.0)
-        with self._moving():
-            return self._drive(q, speed, acceleration, stops)
-
-    def _drive(self, q: tuple[float, float], speed: float, acceleration: float, stops: int) -> MoveResult:
-        self._check_takes_goals()
-        goals = self._ticks(q)
-        self._check_servo_limits(goals)
-        start = self._observer.fresh()
-        began = time.monotonic()
-        top, ramp = speed * self._axes.max_joint_speed, acceleration * self._axes.joint_acceleration
-        distances = [abs(goal - servo.position) * reg.TICK for goal, servo in zip(goals, start.servos, strict=True)]
-        longest = max(distances)
-        blocks, slowest = {}, 0.0
-        for number, goal, distance in zip(self._axes.ids, goals, distances, strict=True):
-            part = distance / longest if longest else 1.0
-            a, v = reg.profile(top * part, ramp * part)  # one shape for both, so that they arrive together
-            slowest = max(slowest, distance / (v * reg.VELOCITY) + v * reg.VELOCITY / (a * reg.ACCELERATION))
-            blocks[number] = b"".join(value.to_bytes(4, "little", signed=True) for value in (a, v, goal))
-
-        def command(bus: Bus) -> None:
-            if self._stops != stops or not self._ours:
-                raise Cancelled(f"a move of {self.name} was stopped")
-            bus.sync_write(GOALS, blocks)
-
-        try:
-            self._observer.do(command)
-            self._check_taken(goals, stops)
-            self._wait_done(goals, 1.5 * slowest + 1.0, stops)
-        except Cancelled:
-            self._wait_rest(REST_WITHIN)
-            self._note(speed, began, MoveEnd.STOPPED)
-            raise
-        except (DeviceFault, NotInControl):
-            with contextlib.suppress(DeviceError):  # the servo that is well must not go on alone
-                self._observer.do(self._brake, urgent=True)
-            self._note(speed, began, MoveEnd.SAFETY)
-            raise
-        return self._note(speed, began, MoveEnd.DONE)
-
-    def _check_servo_limits(self, goals: tuple[int, int]) -> None:
-        for number, goal, setup in zip(self._axes.ids, goals, self._observer.setups, strict=True):
-            if not setup.min_position <= goal <= setup.max_position:
-                raise OutOfRange(
-                    f"{self._observer.bus.servo(number)} allows positions {setup.min_position} to "
-                    f"{setup.max_position}, not {goal}"
-                )
-
-    def _check_taken(self, goals: tuple[int, int], stops: int) -> None:
-        """Look whether both servos have the goal: nobody acknowledges a sync write."""
-        for number, goal, servo in zip(self._axes.ids, goals, self._observer.fresh().servos, strict=True):
-            if servo.goal != goal:
-                self._require_control()
-                if self._stops != stops:
-                    raise Cancelled(f"a move of {self.name} was stopped")
-                self.stop()
-                raise DeviceFault(f"{self._observer.bus.servo(number)} did not take the goal {goal}", fault_code="goal")
-
-    def _wait_done(self, goals: tuple[int, int], budget: float, stops: int) -> None:
-        began = standing = time.monotonic()
-        while True:
-            if self._stops != stops:
-                raise Cancelled(f"a move of {self.name} was stopped")
-            snapshot = self._observer.fresh()
-            self._require_control()
-            now = time.monotonic()
-            if not snapshot.standing:
-                standing = now
-            elif all(abs(s.position - g) <= REACHED for s, g in zip(snapshot.servos, goals, strict=True)):
-                if self._stops == stops:
-                    return
-            elif now - standing > STANDING:
-                short = " and ".join(
-                    name
-                    for name, s, g in zip(JOINTS, snapshot.servos, goals, strict=True)
-                    if abs(s.position - g) > REACHED
-                )
-                raise DeviceFault(f"{short} of {self.name} stands short of its goal", fault_code="short_of_goal")
-            if now - began > budget:
-                self.stop()
-                raise DeviceTimeout(f"a move of {self.name} did not end within {budget:.1f} s; it was stopped")
-            time.sleep(POLL)
-
-    def _note(self, speed: float, began: float, end: MoveEnd) -> MoveResult:
-        newest = self._observer.newest()
-        assert newest is not None
-        self.last_move = MoveResult(self._world(self._angles(newest)), speed, time.monotonic() - began, end)
-        return self.last_move
+        guard = self._control.stops.guard()
+        self._motion.to_joints(self._motion.values(joints.joints), speed, acceleration, guard)
