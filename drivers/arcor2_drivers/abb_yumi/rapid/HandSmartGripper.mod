@@ -1,5 +1,5 @@
 MODULE HandSmartGripper
-    ! The SmartGripper by the instructions of its add-in. Without the add-in take HandNone.mod instead.
+    ! The SmartGripper, by the instructions of its add-in. Without the add-in use HandNone.mod instead.
     ! Widths are in mm, forces in N.
 
     PROC HandCalibrate()

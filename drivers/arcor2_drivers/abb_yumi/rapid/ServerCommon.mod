@@ -1,8 +1,8 @@
 MODULE ServerCommon
     ! Motion server of one arm: lines of numeric codes on a command socket and on a watch socket. See README.md.
     !
-    ! Nothing but the watch socket is read while the arm moves: a timed interrupt looks at it. A stop, or silence for
-    ! longer than the watchdog, stops the arm, clears its path and goes back to main; nothing goes on by itself.
+    ! While the arm moves, only the watch socket is read, by a timed interrupt. A stop, or no keep-alive within the time
+    ! of the watchdog, stops the arm, clears its path and returns to main; nothing continues by itself.
 
     CONST num VERSION_NUMBER:=1;
     CONST num BUFFER:=80;
@@ -36,18 +36,18 @@ MODULE ServerCommon
     VAR num nWatchdog:=0;
     VAR intnum inLook;
     VAR bool bMoving:=FALSE;
-    ! Something is under way in which main does not look at the watch socket.
+    ! A command is executed in which main does not read the watch socket.
     VAR bool bBusy:=FALSE;
     VAR bool bTogether:=FALSE;
     VAR bool bBroken:=FALSE;
-    ! The motion under way, and how it ended when it was cut short.
+    ! The current motion, and how it ended if it was interrupted.
     VAR num nMoveSeq:=0;
     VAR num nMoveCode:=0;
     VAR num nMoveEnd:=0;
-    ! The stop that is to be answered when the arm stands.
+    ! The stop to be answered at standstill.
     VAR num nStopSeq:=0;
 
-    ! The line last read.
+    ! The last line read.
     VAR num nSeq;
     VAR num nCode;
     VAR num nArg{10};
@@ -68,12 +68,12 @@ MODULE ServerCommon
     VAR syncident syTogether;
     VAR syncident syApart;
 
-    !------------------------------------------------------------------------------------------ serving
+    !------------------------------------------------------------------------------------------ connections
     PROC Serve()
         EndLook;
         bMoving:=FALSE;
         bTogether:=FALSE;
-        ! After ExitCycle: the arm stands, and what was under way is told as ended.
+        ! After ExitCycle: the arm is at standstill; report the end of the current command.
         IF nMoveSeq>0 THEN
             EndMotion nMoveEnd;
         ENDIF
@@ -93,7 +93,7 @@ MODULE ServerCommon
         ENDWHILE
     ENDPROC
 
-    ! From here on the interrupt looks at the watch socket, and main does not.
+    ! From here on the interrupt reads the watch socket, and main does not.
     PROC BeginLook()
         bBusy:=TRUE;
         ITimer\Single,LOOK_MOVING,inLook;
@@ -126,7 +126,7 @@ MODULE ServerCommon
         SocketListen sdWatchPort;
         SocketAccept sdCommandPort,sdCommand\Time:=WAIT_MAX;
         SocketAccept sdWatchPort,sdWatch\Time:=2;
-        ! One client at a time: nobody else is let in while it is there.
+        ! One client at a time: others are refused while it is connected.
         SocketClose sdCommandPort;
         SocketClose sdWatchPort;
     ERROR
@@ -150,7 +150,7 @@ MODULE ServerCommon
         RETURN ;
     ENDPROC
 
-    ! Keep-alive and stop. Called from main while the arm stands, and from the interrupt while it moves.
+    ! Keep-alive and stop. Called from main at standstill, and from the interrupt during a motion.
     PROC LookAtWatch()
         VAR string stLine;
         WHILE NextLine(sdWatch,stWatch,stLine) DO
@@ -207,7 +207,7 @@ MODULE ServerCommon
     ENDTRAP
 
     !------------------------------------------------------------------------------------------ lines
-    ! Takes what has come, and gives the next whole line.
+    ! Reads the socket, and returns the next complete line.
     FUNC bool NextLine(VAR socketdev sd,VAR string stBuffer,VAR string stLine)
         VAR num nBytes;
         VAR num nAt;
@@ -247,7 +247,7 @@ MODULE ServerCommon
         RETURN nSum MOD 997;
     ENDFUNC
 
-    ! Takes a line apart; a code below zero is minus the status that the line is answered with.
+    ! Decodes a line; a negative code is minus the status of the answer.
     PROC Parse(string stLine)
         VAR num nStar;
         VAR num nFrom:=1;
@@ -311,12 +311,12 @@ MODULE ServerCommon
         RETURN " 0";
     ENDFUNC
 
-    ! A number so that seven joints fit into a line.
+    ! Formats a number so that seven joints fit into a line.
     FUNC string Number(num nValue)
         RETURN " "+NumToStr(nValue,3);
     ENDFUNC
 
-    ! A part of a quaternion.
+    ! Formats a component of a quaternion.
     FUNC string Part(num nValue)
         RETURN " "+NumToStr(nValue,6);
     ENDFUNC
@@ -333,7 +333,7 @@ MODULE ServerCommon
         RETURN Part(p.rot.q1)+Part(p.rot.q2)+Part(p.rot.q3)+Part(p.rot.q4)+" "+NumToStr(p.robconf.cf1,0)+" "+NumToStr(p.robconf.cf4,0)+" "+NumToStr(p.robconf.cf6,0)+" "+NumToStr(p.robconf.cfx,0);
     ENDFUNC
 
-    !------------------------------------------------------------------------------------------ obeying
+    !------------------------------------------------------------------------------------------ commands
     FUNC num Arguments(num nOfCode)
         TEST nOfCode
         CASE 1,3,10,11,12,23,24,31,33,40,41,42,50,53:
@@ -494,7 +494,7 @@ MODULE ServerCommon
         Tell ST_DONE;
     ENDPROC
 
-    !------------------------------------------------------------------------------------------ moving
+    !------------------------------------------------------------------------------------------ motion
     PROC Move()
         IF ((nCode=30 OR nCode=34) AND NOT bJoints) OR ((nCode=31 OR nCode=32) AND NOT (bPosition AND bOrientation)) OR (nCode=33 AND nPath=0) THEN
             Tell ST_BAD_VALUE;
@@ -542,7 +542,7 @@ MODULE ServerCommon
         bMoving:=FALSE;
         EndLook;
         EndMotion ST_DONE;
-        ! A stop that came too late to change anything.
+        ! A stop that came too late to have an effect.
         IF nStopSeq>0 THEN
             Answer sdWatch,nStopSeq,91,ST_DONE,"";
             nStopSeq:=0;

@@ -1,9 +1,9 @@
 MODULE ServerLeft
     ! Motion server of the left arm, for task T_ROB_L. With ServerCommon.mod and one of the Hand modules.
 
-    ! Address of the controller on the network that the hub is in.
+    ! Address of the controller on the network of the hub.
     CONST string SERVER_ADDRESS:="192.168.125.1";
-    ! Port of the commands; the watch line has the next.
+    ! Port of the commands; the watch line has the next one.
     CONST num SERVER_PORT:=6101;
     ! 1: left, 2: right
     CONST num SERVER_ARM:=1;
