@@ -1,4 +1,4 @@
-"""Every installed driver: described as it has to be, and through the whole suite."""
+"""The conformance suite on every installed driver, and the declarations of its source."""
 
 import importlib
 import pkgutil
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from arcor2_hw.analysis import InstalledType
-from arcor2_hw.testing import described, quality
+from arcor2_hw.testing import declarations, quality
 from arcor2_hw.testing.bench import Bench
 from arcor2_hw.testing.conformance import Conformance
 from tests.drivers import benches
@@ -29,11 +29,11 @@ class TestConformance(Conformance):
     benches = found_benches()
 
 
-@pytest.mark.parametrize("driver", described.drivers(), ids=lambda driver: driver.name)
+@pytest.mark.parametrize("driver", declarations.drivers(), ids=lambda driver: driver.name)
 def test_every_installed_driver_is_covered(driver: InstalledType) -> None:
     assert driver.file is not None, driver.problem and driver.problem.text
     file = Path(driver.folder) / quality.FILE
-    wrong = described.faults(driver.file)
+    wrong = declarations.faults(driver.file)
     assert not wrong, "; ".join(wrong)
     assert quality.is_bench(file), "quality.yaml does not say `conformance: bench`: none of our drivers is exempt"
     claims = quality.read(file)
