@@ -33,8 +33,7 @@ _TEXTS: Final[dict[int, tuple[str, str]]] = {
     0x48: ("the parallelogram is at its positive limit", _LIMIT),
     0x49: ("the parallelogram is at its negative limit", _LIMIT),
     **{
-        0x50 + i: (f"joint {i + 1} has lost steps", "Remove the obstacle, acknowledge, then home it.")
-        for i in range(4)
+        0x50 + i: (f"joint {i + 1} has lost steps", "Remove the obstacle, acknowledge, then home it.") for i in range(4)
     },
 }
 
