@@ -5,8 +5,6 @@ import functools
 from collections.abc import Mapping
 from typing import Any, Final
 
-from docstring_parser import DocstringStyle, ParseError
-from docstring_parser import parse as parse_docstring
 from msgspec.structs import replace
 
 from arcor2_hw.actions.json_values import encode
@@ -324,6 +322,10 @@ def _ranges(node: FunctionNode) -> dict[str, _Limits]:
 @functools.lru_cache(maxsize=1024)
 def described_parameters(docstring: str | None) -> Mapping[str, str]:
     """Return the description of each parameter in a docstring, in any of the usual styles."""
+    # Imported here: a start of the server that restores its stored analysis does without.
+    from docstring_parser import DocstringStyle, ParseError
+    from docstring_parser import parse as parse_docstring
+
     if not docstring:
         return {}
     if ":param" in docstring:

@@ -1,8 +1,8 @@
-"""Files that only their owner may read: databases, tokens, secrets."""
+"""Atomic replacement of files, and files that only their owner may read."""
 
 import os
+import secrets
 import stat
-import tempfile
 from pathlib import Path
 from typing import Final
 
@@ -15,7 +15,7 @@ DIRECTORY_MODE: Final = 0o700
 
 
 def ensure_private(path: Path) -> None:
-    """Create a file if it is missing, and take the rights of group and others away. Raises OSError."""
+    """Create a file if it is missing, and remove the permissions of group and others. Raise OSError if that fails."""
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, FILE_MODE)
     try:
         if os.fstat(descriptor).st_mode & 0o077:
@@ -25,7 +25,7 @@ def ensure_private(path: Path) -> None:
 
 
 def tighten(directory: Path) -> None:
-    """Take the rights of group and others away from a directory and what is directly in it, where we own it."""
+    """Remove the permissions of group and others from a directory and its entries, as far as the process may."""
     for path in (directory, *directory.iterdir()):
         try:
             status = path.lstat()
@@ -36,17 +36,52 @@ def tighten(directory: Path) -> None:
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Replace a file in one step: after a crash it is the old one or the new one. Raises OSError."""
-    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")  # mode 0600
+    """Replace a file that only its owner may read, as `replace_file` does. Raise OSError if that fails."""
+    replace_file(path, content)
+
+
+def replace_file(
+    path: Path,
+    content: bytes,
+    *,
+    mode: int = FILE_MODE,
+    durable: bool = True,
+    temporary: Path | None = None,
+) -> None:
+    """Write a file in one step: after a crash it has either the old or the new content.
+
+    Args:
+        path: the file.
+        content: its new content.
+        mode: permissions of a new file before the umask.
+        durable: flush the content to the disk before the file is replaced.
+        temporary: beginning of the path of the temporary file, on the same file system; None: hidden, next to `path`.
+
+    Raises:
+        OSError: the file cannot be written. The old one is unchanged.
+    """
+    start = path.with_name(f".{path.name}") if temporary is None else temporary
+    fresh = start.with_name(f"{start.name}.{secrets.token_hex(6)}")
+    descriptor = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
     try:
         with os.fdopen(descriptor, "wb") as file:
             file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).replace(path)
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
+        fresh.replace(path)
     except BaseException:
-        Path(name).unlink(missing_ok=True)
+        fresh.unlink(missing_ok=True)
         raise
+
+
+def sync_directory(directory: Path) -> None:
+    """Flush the entries of a directory to the disk, so that renamed and deleted files stay so. Raise OSError."""
+    descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def aside(path: Path, stamp: str) -> Path:

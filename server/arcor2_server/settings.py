@@ -1,4 +1,4 @@
-"""Settings of the server: where it listens, where it keeps data, its limits; from the command line and environment."""
+"""Settings of the server, from the command line and the environment."""
 
 import ipaddress
 import os
@@ -14,6 +14,10 @@ from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 
+VERSION: Final = "1.4.0"
+"""Version of the ARServer that this server is compatible with; its own version: `arcor2-hw --version`."""
+API_VERSION: Final = "1.1.0"
+"""Version of the protocol. Existing clients refuse another major version."""
 MIB: Final = 1024 * 1024
 DEVICE_FILES_NAME: Final = "device-files"
 """Directory, in the data directory, of the files that the settings of devices may name."""
@@ -92,12 +96,12 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def documents_database(self) -> Path:
-        """Give the file of the documents when they are in SQLite."""
+        """Return the file of the documents when they are in SQLite."""
         return self.data_dir / "documents.sqlite"
 
     @property
     def journal_database(self) -> Path:
-        """Give the file of the journal of the open document."""
+        """Return the file of the journal of the open document."""
         return self.data_dir / "journal.sqlite"
 
     @property
@@ -117,17 +121,17 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def markers_file(self) -> Path:
-        """Give the file in which markers are kept that were set over REST."""
+        """Return the file in which markers are kept that were set over REST."""
         return self.data_dir / "markers.json"
 
     @property
     def secrets_file(self) -> Path:
-        """Give the file of the secrets of devices."""
+        """Return the file of the secrets of devices."""
         return self.data_dir / "secrets.json"
 
     @property
     def assets_dir(self) -> Path:
-        """Give the directory of assets."""
+        """Return the directory of assets."""
         return self.data_dir / "assets"
 
     @property
@@ -137,18 +141,18 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def device_files_dirs(self) -> tuple[Path, ...]:
-        """Give the directories in which the settings of devices may name files; the outbox is where results wait."""
+        """Return the directories in which the settings of devices may name files; the outbox is where results wait."""
         data = self.data_dir.absolute()
         return (data / DEVICE_FILES_NAME, data / "outbox", *map(Path, self.device_files))
 
     @property
     def prepared_dir(self) -> Path:
-        """Give the directory of meshes as clients show them; it may be emptied at any time."""
+        """Return the directory of meshes as clients show them; it may be emptied at any time."""
         return self.data_dir / "prepared"
 
     @property
     def packages_dir(self) -> Path:
-        """Give the directory of execution packages."""
+        """Return the directory of execution packages."""
         return self.data_dir / "packages"
 
     @classmethod
@@ -208,7 +212,7 @@ _LISTS: Final = {"allowed_hosts": ",", "trusted_proxies": ",", "device_files": o
 
 
 def default_data_dir(environment: Mapping[str, str] = os.environ) -> Path:
-    """Give the user's data directory (XDG base directory specification) with our own folder in it."""
+    """Return the user's data directory (XDG base directory specification) with our own folder in it."""
     base = environment.get("XDG_DATA_HOME") or ""
     root = Path(base) if base.startswith("/") else Path.home() / ".local" / "share"
     return root / "arcor2-hw"

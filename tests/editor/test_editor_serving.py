@@ -8,7 +8,7 @@ import httpx
 import pytest
 from litestar import Litestar
 
-from arcor2_server.app import create_app, running_services
+from arcor2_server.app import create_app, running_server
 from arcor2_server.settings import ServerSettings
 from arcor2_server.web.editor import NONCE, editor_routes
 
@@ -89,7 +89,7 @@ async def test_missing_build_explains_how_to_build(tmp_path: Path) -> None:
 
 async def test_page_needs_no_token_but_foreign_origins_are_refused(tmp_path: Path) -> None:
     settings = ServerSettings(data_dir=tmp_path, host="192.0.2.1")  # on a network every client needs a token
-    async with running_services(settings) as services:
+    async with running_server(settings) as services:
         transport = httpx.ASGITransport(create_app(services))
         async with httpx.AsyncClient(transport=transport, base_url="http://192.0.2.1:6789") as client:
             assert (await client.get("/")).status_code == 200

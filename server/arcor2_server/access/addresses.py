@@ -1,4 +1,4 @@
-"""At which addresses others reach this server, for who wants to invite them."""
+"""The addresses at which other machines reach this server, for inviting users."""
 
 import ipaddress
 import socket
@@ -22,7 +22,7 @@ class Joining(Data, frozen=True):
 
 
 def joining(settings: ServerSettings, port: int) -> Joining:
-    """Give how others join; `port` is the one at which it was asked, for a server that took any free one."""
+    """Return how others join; `port` is the one at which it was asked, for a server that took any free one."""
     from arcor2_server.access.admission import is_loopback  # which needs the routes, of which this is one
 
     scheme = "https" if settings.fingerprint else "http"
@@ -33,7 +33,7 @@ def joining(settings: ServerSettings, port: int) -> Joining:
 
 
 def _hosts(host: str) -> list[str]:
-    """Give the addresses of this machine that stand for one on which it listens."""
+    """Return the addresses of this machine that stand for one on which it listens."""
     try:
         address = ipaddress.ip_address(host.strip("[]"))
     except ValueError:

@@ -1,4 +1,4 @@
-"""Who gets in, and in which role: by a token, by the listener, or because the server is for this machine alone."""
+"""Admission of clients: the role that a token, the listener or a local-only server gives them."""
 
 import ipaddress
 import time
@@ -13,11 +13,11 @@ from litestar.handlers import BaseRouteHandler, WebsocketRouteHandler
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.access.connection_limits import CONNECTION
+from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE
 from arcor2_server.access.tokens import FILE, Token, TokenFile
 from arcor2_server.log import audit
-from arcor2_server.rest.responses import AS_ROLE, OPEN, PERSON, ROLE
 from arcor2_server.settings import ServerSettings
-from arcor2_server.web.connection_limits import CONNECTION
 
 log = structlog.get_logger(__name__)
 
@@ -51,7 +51,7 @@ class Admission(Data, frozen=True):
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether only this machine can reach an address."""
+    """Return whether only this machine can reach an address."""
     if host == "localhost":
         return True
     try:
@@ -98,7 +98,7 @@ class Access:
         return Admission(token.role, token)
 
     def admit(self, connection: ASGIConnection[Any, Any, Any, Any]) -> Admission:
-        """Decide by the listener and by the token in header or query. AccessRefused."""
+        """Decide by the listener and by the token in header or query. Raise AccessRefused if that is impossible."""
         secret = _secret(connection)
         if secret is not None:
             return self.by_token(secret, address_of(connection))
@@ -116,7 +116,7 @@ class Access:
         return self._tokens.repair()
 
     def valid(self, token: Token) -> bool:
-        """Tell whether a token that let somebody in still would."""
+        """Return whether a token that let somebody in still would."""
         return self._tokens.valid(token)
 
     def _by_legacy_listener(self, connection: ASGIConnection[Any, Any, Any, Any]) -> bool:
@@ -133,7 +133,7 @@ class Access:
 
 
 def address_of(connection: ASGIConnection[Any, Any, Any, Any]) -> str:
-    """Give the other side's address."""
+    """Return the other side's address."""
     return connection.client.host if connection.client else ""
 
 

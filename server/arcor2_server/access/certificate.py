@@ -1,8 +1,7 @@
-"""The certificate with which the server speaks TLS: one that was given, or one made here and kept."""
+"""The TLS certificate of the server: a configured one, or a self-signed one created here."""
 
 import contextlib
 import ipaddress
-import os
 import socket
 import ssl
 from datetime import UTC, datetime, timedelta
@@ -15,6 +14,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.files import replace_file
 
 VALID_DAYS: Final = 825
 """Longer ones are refused by some browsers."""
@@ -44,7 +44,7 @@ def fingerprint(files: tuple[Path, Path]) -> str:
 
 
 def self_signed(data_dir: Path, host: str) -> tuple[Path, Path]:
-    """Give certificate and key of our own, made when there are none, they end soon, or the host is another."""
+    """Return certificate and key of our own, made when there are none, they end soon, or the host is another."""
     files = (data_dir / CERTIFICATE, data_dir / KEY)
     if not _serves(files[0], host):
         try:
@@ -65,7 +65,7 @@ def _serves(certificate: Path, host: str) -> bool:
 
 
 def _names(host: str) -> list[x509.GeneralName]:
-    """Give the names and addresses under which this machine may be asked."""
+    """Return the names and addresses under which this machine may be asked."""
     texts = dict.fromkeys((host, socket.gethostname(), "localhost", "127.0.0.1", "::1"))
     names: list[x509.GeneralName] = []
     for text in texts:
@@ -98,13 +98,5 @@ def _make(files: tuple[Path, Path], host: str) -> None:
     )
     pem = serialization.Encoding.PEM
     secret = key.private_bytes(pem, serialization.PrivateFormat.PKCS8, serialization.NoEncryption())
-    _write(files[1], secret, 0o600)
-    _write(files[0], certificate.public_bytes(pem), 0o644)
-
-
-def _write(path: Path, content: bytes, mode: int) -> None:
-    fresh = path.with_suffix(".new")
-    fresh.unlink(missing_ok=True)
-    with open(os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:  # noqa: PTH123
-        file.write(content)
-    fresh.replace(path)
+    replace_file(files[1], secret)
+    replace_file(files[0], certificate.public_bytes(pem), mode=0o644)

@@ -1,4 +1,4 @@
-"""Keep foreign web pages out: a page that is open in somebody's browser must neither command nor read this server."""
+"""Origin checks: web pages from elsewhere can neither command nor read this server."""
 
 import ipaddress
 import socket

@@ -1,4 +1,4 @@
-"""Tokens: who may connect, and in which role; kept in a file of which nobody can read a token again."""
+"""Tokens for clients, each with a role. The token file stores only hashes."""
 
 import contextlib
 import fcntl
@@ -36,7 +36,7 @@ class Token(Data, frozen=True):
 
     @property
     def expired(self) -> bool:
-        """Tell whether its time is over."""
+        """Return whether its time is over."""
         return self.expires is not None and datetime.fromisoformat(self.expires) <= datetime.now(UTC)
 
 
@@ -103,7 +103,7 @@ class TokenFile:
         return damage
 
     def find(self, secret: str) -> Token | None:
-        """Give the token with this secret, None when there is none or its time is over."""
+        """Return the token with this secret, None if there is none or its time is over."""
         digest = hashlib.sha256(secret.encode(errors="replace")).hexdigest()
         found = None
         for token in self.all():  # all of them, so that the time taken tells nothing
@@ -112,11 +112,14 @@ class TokenFile:
         return None if found is None or found.expired else found
 
     def valid(self, token: Token) -> bool:
-        """Tell whether a token is still there and its time is not over."""
+        """Return whether a token is still there and its time is not over."""
         return not token.expired and any(each.id == token.id for each in self.all())
 
     def add(self, name: str, role: Role, days: int | None = None) -> tuple[Token, str]:
-        """Make a token; gives it with its secret, which is nowhere kept. InvalidData, Conflict."""
+        """Create a token; return it with its secret, which is nowhere kept.
+
+        Raise InvalidData or Conflict if that is impossible.
+        """
         if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
             raise InvalidData(f"A token needs the name of a person or a device, of {LONGEST_NAME} characters at most.")
         secret = secrets.token_urlsafe(32)
@@ -132,7 +135,7 @@ class TokenFile:
         return token, secret
 
     def revoke(self, which: str) -> list[Token]:
-        """Take out the tokens of this id or name, and give them. NotFound."""
+        """Take out the tokens of this id or name, and give them. Raise NotFound if there is none."""
         with self._changing() as tokens:
             gone = [token for token in tokens if which in (token.id, token.name)]
             if not gone:

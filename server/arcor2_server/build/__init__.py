@@ -1,1 +1,1 @@
-"""Build service: a project becomes a Python program, and a program with all it needs becomes a package."""
+"""The Build service: turns a project into a Python program, and the program into a package."""

@@ -1,4 +1,4 @@
-"""Object types as they would be with those of a package: what an import is checked against before it is made."""
+"""The object types of the server combined with those of a package, for checking an import before it is written."""
 
 from collections.abc import Iterable, Mapping
 
@@ -30,13 +30,13 @@ class Candidates:
                 raise InvalidPackage(f"object type {name}: {error}") from error
 
     def analysis(self, name: str) -> TypeAnalysis:
-        """Give what the source of a type, or of a helper or mixin, says."""
+        """Return what the source of a type, or of a helper or mixin, says."""
         if name not in self._library:
             raise NotFound(f"The object type {name} is neither in the package nor here.")
         return self._library.analyse(name)
 
     def meta(self, name: str) -> ObjectTypeMeta:
-        """Give one type."""
+        """Return one type."""
         found = self.analysis(name)
         if not found.is_object_type:
             raise NotFound(f"{name} is no object type.")
@@ -50,17 +50,17 @@ class Candidates:
         raise NotFound(f"The object type {type_name} has no action {name!r}.")
 
     def robot_meta(self, name: str) -> RobotMeta:
-        """Give the features of a robot type; NotFound when it is none."""
+        """Return the features of a robot type; raise NotFound when it is none."""
         if (robot := self.analysis(name).robot) is None:
             raise NotFound(f"The object type {name} is no robot.")
         return robot
 
     def enumerations(self, name: str) -> dict[tuple[str, str], Enumeration]:
-        """Give the enumerations that the actions of a type take."""
+        """Return the enumerations that the actions of a type take."""
         return self.analysis(name).enumerations
 
     def facts(self, scene: Scene) -> dict[str, TypeFacts]:
-        """Give what a script needs of the types in a scene: all of their actions."""
+        """Return what a script needs of the types in a scene: all of their actions."""
         facts: dict[str, TypeFacts] = {}
         for name in {obj.type for obj in scene.objects}:
             found = self.analysis(name)

@@ -1,4 +1,4 @@
-"""The logic of a project as the statements of a script's loop."""
+"""The logic of a project as statements of a script's loop."""
 
 import ast
 
@@ -43,7 +43,7 @@ class Cycle:
 
     # ------------------------------------------------------------------------------------------------ blocks
     def statements(self) -> Block:
-        """Give the body of the loop."""
+        """Return the body of the loop."""
         body: Block = []
         stack: Stack = [(0, body)]
         while stack:
@@ -115,7 +115,7 @@ class Cycle:
 
     # ------------------------------------------------------------------------------------------------ expressions
     def _result(self, node: int, source: int, output: int, kind: str) -> str:
-        """Give the variable that holds a result of action number `source` where number `node` uses it."""
+        """Return the variable that holds a result of action number `source` where number `node` uses it."""
         user, giver = self.flow.actions[node], self.flow.actions[source]
         names, returns = self.results[source], self.declared[source][3].returns
         if output >= len(names):

@@ -1,4 +1,4 @@
-"""The few kinds of expression that a generated script is made of; they are shared, so none is ever changed."""
+"""The kinds of expression that a generated script consists of. They are shared and never modified."""
 
 import ast
 from functools import lru_cache
@@ -10,33 +10,33 @@ _STORE: Final = ast.Store()
 
 @lru_cache(maxsize=1024)
 def name(name: str) -> ast.Name:
-    """Give a variable."""
+    """Return a variable."""
     return ast.Name(name, _LOAD)
 
 
 def target(name: str) -> ast.Name:
-    """Give a variable that is assigned to."""
+    """Return a variable that is assigned to."""
     return ast.Name(name, _STORE)
 
 
 def assign(name: str, value: ast.expr) -> ast.Assign:
-    """Give `name = value`."""
+    """Return `name = value`."""
     return ast.Assign([target(name)], value, lineno=0)
 
 
 @lru_cache(maxsize=4096)
 def dotted(first: str, parts: tuple[str, ...]) -> ast.expr:
-    """Give `first.part.part`."""
+    """Return `first.part.part`."""
     if not parts:
         return name(first)
     return ast.Attribute(dotted(first, parts[:-1]), parts[-1], _LOAD)
 
 
 def equals(variable: str, value: bool | int | str) -> ast.expr:
-    """Give `variable == value`."""
+    """Return `variable == value`."""
     return ast.Compare(name(variable), [ast.Eq()], [ast.Constant(value)])
 
 
 def differs(variable: str, value: bool | int | str) -> ast.expr:
-    """Give `variable != value`."""
+    """Return `variable != value`."""
     return ast.Compare(name(variable), [ast.NotEq()], [ast.Constant(value)])

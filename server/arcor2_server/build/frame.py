@@ -1,4 +1,4 @@
-"""What stands around the logic in a script: imports, objects, project parameters, entry; and all names in it."""
+"""The frame of a generated script around the logic: imports, objects, project parameters, entry point and names."""
 
 import ast
 import builtins
@@ -62,7 +62,7 @@ class Frame:
             raise NotFound(f"object type {type_name} is not known") from None
 
     def imported(self, module: str, name: str) -> str:
-        """Give the name under which the script knows a class, imported where it is used first."""
+        """Return the name under which the script knows a class, imported where it is used first."""
         key = (module, name)
         if key not in self.imports:
             self.imports[key] = self.names.claim(name, f"{name}Type")
@@ -70,7 +70,7 @@ class Frame:
 
     # ------------------------------------------------------------------------------------------------ module
     def module(self, loop: list[ast.stmt]) -> str:
-        """Give the text of the script with `loop` as its cycle; without one there is just the place for it."""
+        """Return the text of the script with `loop` as its cycle; without one there is just the place for it."""
         body: list[ast.stmt] = [
             expressions.assign("aps", ast.Call(expressions.name("ActionPoints"), [expressions.name("res")], []))
         ]
@@ -139,7 +139,10 @@ class Frame:
 
     # ------------------------------------------------------------------------------------------------ actions
     def declared(self, action: Action) -> tuple[str, str, str, ObjectAction]:
-        """Give object id, type and method of an action, and what the type says of it; InvalidProject, NotFound."""
+        """Return object id, type and method of an action, and what the type says of it.
+
+        Raise InvalidProject or NotFound if that is impossible.
+        """
         try:
             object_id, method = action.parse_type()
             obj = self.index.scene_object(object_id)
@@ -172,22 +175,22 @@ class References:
         return expressions.dotted("aps", known[wanted])
 
     def pose(self, orientation_id: str) -> ast.expr:
-        """Give the expression for the pose of an action point with this orientation."""
+        """Return the expression for the pose of an action point with this orientation."""
         return self._below("orientation", self._frame.points.poses, orientation_id)
 
     def position(self, action_point_id: str) -> ast.expr:
-        """Give the expression for the position of an action point."""
+        """Return the expression for the position of an action point."""
         return self._below("action point", self._frame.points.positions, action_point_id)
 
     def joints(self, joints_id: str) -> ast.expr:
-        """Give the expression for joints of an action point."""
+        """Return the expression for joints of an action point."""
         _, joints = self._frame.index.joints(joints_id)
         if joints.robot_id != self._object_id:
             raise InvalidData(f"joints {joints.name} belong to another robot")
         return self._below("joints", self._frame.points.joints, joints_id)
 
     def enum_member(self, parameter: Parameter, value: str | int) -> ast.expr:
-        """Give the expression for the member with `value` of the enumeration that `parameter` takes."""
+        """Return the expression for the member with `value` of the enumeration that `parameter` takes."""
         kind = self._enumerations.get((self._method, parameter.name))
         if kind is None or value not in kind.members:
             raise InvalidData(f"parameter {parameter.name}: {value!r} is no member of its enumeration")

@@ -47,7 +47,7 @@ class Tree:
         return node
 
     def common(self, a: int, b: int) -> int:
-        """Give the deepest node that is both, or an ancestor of both."""
+        """Return the deepest node that is both, or an ancestor of both."""
         depths, jumps, parents = self.depths, self._jumps, self.parents
         if depths[a] < depths[b]:
             a, b = b, a
@@ -88,11 +88,11 @@ class Layout:
     _end: list[int]
 
     def always_before(self, earlier: int, later: int) -> bool:
-        """Tell whether every way to `later` passes `earlier`. Holds for a layout without actions moved out."""
+        """Return whether every way to `later` passes `earlier`. Holds for a layout without actions moved out."""
         return self._begin[earlier] <= self._begin[later] < self._end[earlier]
 
     def needs_note(self, source: int, target: int) -> bool:
-        """Tell whether the way from `source` to the join `target` has to be noted."""
+        """Return whether the way from `source` to the join `target` has to be noted."""
         return target != self.placed[source].follow or self.placed[target].guarded
 
 
@@ -229,7 +229,7 @@ def _too_deep(layout: Layout, edges: Sequence[tuple[Edge, ...]], parents: Sequen
 
 
 def arrange(edges: Sequence[tuple[Edge, ...]]) -> tuple[Layout, Layout]:
-    """Give the layout of a graph, and for `always_before` the one before too deep blocks were moved out."""
+    """Return the layout of a graph, and for `always_before` the one before too deep blocks were moved out."""
     placing = _Placing(edges, ())
     natural = layout = placing.layout()
     moved: set[int] = set()

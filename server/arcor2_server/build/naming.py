@@ -1,4 +1,4 @@
-"""Names in generated code: valid, no keyword, each used once; the same project always gets the same names."""
+"""Names in generated code: valid, unique identifiers that are the same for the same project."""
 
 import keyword
 import re
@@ -11,7 +11,7 @@ _NO_PART_OF_A_NAME: Final = re.compile(r"\W", re.ASCII)
 
 
 def identifier(text: str) -> str:
-    """Give text as a Python identifier: what may stand in one stays as it is.
+    """Return text as a Python identifier: what may stand in one stays as it is.
 
     No two leading underscores: inside a class Python would change such a name.
     """
@@ -24,7 +24,7 @@ def identifier(text: str) -> str:
 
 
 def class_name(text: str) -> str:
-    """Give text as the name of a class: `pick_up2` becomes `PickUp2`."""
+    """Return text as the name of a class: `pick_up2` becomes `PickUp2`."""
     name = str(humps.pascalize(identifier(text).strip("_"))).replace("_", "")
     return identifier(name[:1].upper() + name[1:]) if name else "Nameless"
 

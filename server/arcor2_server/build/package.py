@@ -1,4 +1,4 @@
-"""A package as files, in a directory or a zip: the same files give the same bytes."""
+"""A package as files, in a directory or a zip. The same files give the same bytes."""
 
 import io
 import os
@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import Final
 
 from arcor2_hw.exceptions import InvalidPackage, StorageError
+from arcor2_server.files import sync_directory
 from arcor2_server.storage.packages import MAX_FILES, inside
 
 Files = Mapping[str, bytes]
@@ -33,7 +34,7 @@ def _checked(path: str) -> str:
 
 
 def to_zip(files: Files) -> bytes:
-    """Give the files as a zip, in order of their paths."""
+    """Return the files as a zip, in order of their paths."""
     with io.BytesIO() as buffer:
         with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
             for path in sorted(files):
@@ -99,7 +100,7 @@ def write(files: Files, directory: Path) -> None:
             _write(file, content)
         temporary.chmod(0o755)
         temporary.rename(directory)
-        _sync(directory.parent)
+        sync_directory(directory.parent)
     except OSError as error:
         raise StorageError(f"package {directory.name} cannot be written: {error.strerror}", str(directory)) from error
     finally:
@@ -111,11 +112,3 @@ def _write(file: Path, content: bytes) -> None:
         stream.write(content)
         stream.flush()
         os.fsync(stream.fileno())
-
-
-def _sync(directory: Path) -> None:
-    descriptor = os.open(directory, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

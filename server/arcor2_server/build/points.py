@@ -27,7 +27,7 @@ class PointNames:
 
 
 def names_of(project: Project) -> PointNames:
-    """Give the names below `aps` of all positions, poses and joints."""
+    """Return the names below `aps` of all positions, poses and joints."""
     result = PointNames()
     points = Names([_OWN_FIELD])
     for point in project.action_points:
@@ -61,7 +61,7 @@ def _class(name: str, title: str, fields: Sequence[str], properties: Sequence[tu
 
 
 def _point(point: ActionPoint, names: PointNames, classes: Names) -> tuple[str, list[str]]:
-    """Give the name of an action point's class, and the classes it needs, itself last."""
+    """Return the name of an action point's class, and the classes it needs, itself last."""
     own = classes.claim(class_name(point.name))
     attribute = names.positions[point.id][0]
     parts: list[str] = []
@@ -82,7 +82,7 @@ def _point(point: ActionPoint, names: PointNames, classes: Names) -> tuple[str, 
 
 
 def source(project: Project) -> str:
-    """Give the text of action_points.py."""
+    """Return the text of action_points.py."""
     names = names_of(project)
     classes = Names(_IMPORTED)
     parts: list[str] = []

@@ -12,7 +12,7 @@ from arcor2_server.documents import logic_graph
 
 
 def from_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> str:
-    """Give the script of a project's logic, which runs in a loop until it is stopped or an action finishes it.
+    """Return the script of a project's logic, which runs in a loop until it is stopped or an action finishes it.
 
     Raises InvalidProject naming the action that is wrong, NotFound for an object type that `types` does not have.
     """
@@ -22,7 +22,7 @@ def from_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -
 
 
 def without_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> str:
-    """Give a script that makes objects, action points and parameters known and does nothing yet."""
+    """Return a script that makes objects, action points and parameters known and does nothing yet."""
     return Frame(scene, project, types).module([])
 
 

@@ -1,10 +1,9 @@
-"""The Build service: gathers what a project needs, makes its program, and writes the package."""
+"""The Build service: collects what a project needs, generates its program, and writes the package."""
 
 import asyncio
 import contextlib
 import gc
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 import msgspec
 from msgspec import field
@@ -19,11 +18,10 @@ from arcor2_hw.exceptions import InvalidProject, NotFound
 from arcor2_server.build import package, points, script, snapshot
 from arcor2_server.build.frame import TypeFacts
 from arcor2_server.documents.renamed_actions import with_present_names
-from arcor2_server.object_types.registry import ObjectTypes, PackageType
-from arcor2_server.storage import package_versions
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
+from arcor2_server.object_types.catalog import PackageType
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage import Storage, package_versions
 
 
 class Ingredients(Data, frozen=True):
@@ -43,7 +41,7 @@ class Ingredients(Data, frozen=True):
 
 
 def _facts(types: ObjectTypes, scene: Scene, project: Project, code: Iterable[PackageType]) -> dict[str, TypeFacts]:
-    """Give what the script needs of the types in the scene: their modules, and the actions that the project uses."""
+    """Return what the script needs of the types in the scene: their modules, and the actions that the project uses."""
     carried = {one.name: one for one in code}
     type_of = {obj.id: obj.type for obj in scene.objects}
     actions: dict[str, dict[str, ObjectAction]] = {name: {} for name in type_of.values()}
@@ -70,7 +68,7 @@ def _facts(types: ObjectTypes, scene: Scene, project: Project, code: Iterable[Pa
 
 
 def files_of(made_of: Ingredients) -> dict[str, bytes]:
-    """Give the files of a package (protocol, section 11). Raises InvalidProject, NotFound."""
+    """Return the files of a package (protocol, section 11). Raise InvalidProject or NotFound if that is impossible."""
     project, scene = made_of.project, made_of.scene
     if project.has_logic:
         source = script.from_logic(scene, project, made_of.facts)
@@ -122,14 +120,14 @@ def _made(made_of: Ingredients) -> dict[str, bytes]:
 class BuildService:
     """Builds packages. Errors: NotFound (project, scene, object type), InvalidProject, StorageError."""
 
-    def __init__(self, services: "Services") -> None:
-        self.importing = asyncio.Lock()
-        """Held by the one import that is being checked and written."""
-        self._services = services
+    def __init__(self, settings: ServerSettings, storage: Storage, types: ObjectTypes) -> None:
+        self._settings = settings
+        self._storage = storage
+        self._types = types
 
     async def gather(self, project_id: str, package_name: str = "") -> Ingredients:
-        """Give what a package of a saved project is made of; without a name it gets the project's."""
-        storage, types = self._services.storage, self._services.types
+        """Return what a package of a saved project is made of; without a name it gets the project's."""
+        storage, types = self._storage, self._types
         project = await storage.project(project_id)
         scene = await storage.scene(project.scene_id)
         project = with_present_names(scene, project, types)
@@ -169,11 +167,11 @@ class BuildService:
         """Write the package of a saved project among the packages, under a new id unless one is given; gives the id."""
         made_of = await self.gather(project_id, package_name)
         package_id = package_id or new_id("pkg")
-        directory = self._services.settings.packages_dir / package_id
+        directory = self._settings.packages_dir / package_id
         await asyncio.to_thread(lambda: package.write(_made(made_of), directory))
         return package_id
 
     async def publish(self, project_id: str, package_name: str = "") -> bytes:
-        """Give the package of a saved project as a zip."""
+        """Return the package of a saved project as a zip."""
         made_of = await self.gather(project_id, package_name)
         return await asyncio.to_thread(lambda: package.to_zip(_made(made_of)))

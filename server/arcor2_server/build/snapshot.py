@@ -1,21 +1,17 @@
-"""The code of object types as a package carries it: uploaded modules, and for a driver a copy of its own folder."""
+"""The code of object types in a package: uploaded modules, and copies of the folders of drivers."""
 
 import ast
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from arcor2_hw.analysis import Enumeration
 from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build.naming import Names
 from arcor2_server.build.style import docstring
-
-if TYPE_CHECKING:
-    from arcor2_server.object_types.registry import (
-        PackageType,  # with it comes the database, which the command line has no use for
-    )
+from arcor2_server.object_types.catalog import PackageType
 
 FOLDER: Final = "object_types"
 _LEFT_OUT: Final = frozenset({"__pycache__", ".mypy_cache", ".ruff_cache", ".pytest_cache"})
@@ -31,7 +27,7 @@ class _Imports(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def _imports(source: bytes) -> _Imports:
-    """Give what a source imports."""
+    """Return what a source imports."""
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
@@ -50,7 +46,7 @@ def _imports(source: bytes) -> _Imports:
 
 
 def imported_packages(files: Mapping[str, bytes]) -> set[str]:
-    """Give the names of the packages that the Python files among `files` import."""
+    """Return the names of the packages that the Python files among `files` import."""
     return {
         name.partition(".")[0]
         for path, content in files.items()
@@ -67,8 +63,8 @@ def _files_below(folder: Path) -> Iterator[Path]:
             yield path
 
 
-def _inside(one: "PackageType", folder: Path) -> tuple[str, str]:
-    """Give the dotted name of a driver's folder, and of the type's module within it ("" for the folder itself)."""
+def _inside(one: PackageType, folder: Path) -> tuple[str, str]:
+    """Return the dotted name of a driver's folder, and of the type's module within it ("" for the folder itself)."""
     module = one.entry_point.partition(":")[0].split(".")
     for end in range(1, len(module) + 1):
         *between, last = module[end:] or [""]
@@ -81,7 +77,7 @@ def _inside(one: "PackageType", folder: Path) -> tuple[str, str]:
     )
 
 
-def _check_own(one: "PackageType", path: Path, content: bytes, own: str) -> None:
+def _check_own(one: PackageType, path: Path, content: bytes, own: str) -> None:
     """Refuse a driver that imports itself by its full name: the package would run the hub's code, not its own.
 
     Likewise one that imports, with more dots than its file lies deep, from outside of its folder.
@@ -101,8 +97,8 @@ def _check_own(one: "PackageType", path: Path, content: bytes, own: str) -> None
             )
 
 
-def _given(one: "PackageType", own: str, copied: str, inner: str, kinds: Iterable[Enumeration]) -> bytes:
-    """Give the module that stands for an installed type: its class, and the enumerations that its actions take."""
+def _given(one: PackageType, own: str, copied: str, inner: str, kinds: Iterable[Enumeration]) -> bytes:
+    """Return the module that stands for an installed type: its class, and the enumerations that its actions take."""
     place = f".{copied}{'.' if inner else ''}{inner}"
     given = {one.entry_point.partition(":")[2] or one.name: place}
     for kind in kinds:

@@ -1,4 +1,4 @@
-"""From a syntax tree to text that a person likes to read: blank lines, comments, quotes, lines of bearable length."""
+"""Formats a syntax tree as readable source: blank lines, comments, quotes and line lengths."""
 
 import ast
 import re
@@ -12,7 +12,7 @@ _BLOCKS: Final = (ast.If, ast.While, ast.With, ast.Try, ast.FunctionDef)
 
 
 def quoted(value: str) -> str:
-    """Give a string as Python, in double quotes unless it has some inside."""
+    """Return a string as Python, in double quotes unless it has some inside."""
     shown = repr(value)
     return f'"{shown[1:-1]}"' if shown[0] == "'" and '"' not in shown else shown
 
@@ -77,7 +77,7 @@ def _in_quotes(match: re.Match[str]) -> str:
 
 
 def docstring(text: str) -> str:
-    """Give text as a docstring on one line."""
+    """Return text as a docstring on one line."""
     plain = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     return '"""' + plain.replace("\\", "\\\\").replace('"', '\\"') + '"""'
 
@@ -100,7 +100,7 @@ def _simple(node: ast.stmt, indent: str) -> list[str]:
 
 
 def _reads(test: ast.expr, before: ast.stmt) -> bool:
-    """Tell whether a condition asks for what the statement before it has just found out."""
+    """Return whether a condition asks for what the statement before it has just found out."""
     if not isinstance(before, ast.Assign):
         return False
     given = {name.id for target in before.targets for name in ast.walk(target) if isinstance(name, ast.Name)}
@@ -115,7 +115,7 @@ class Writer:
         self._lines: list[str] = []
 
     def module(self, module: ast.Module) -> str:
-        """Give the text of the module."""
+        """Return the text of the module."""
         self._block(module.body, "")
         return "\n".join(self._lines) + "\n"
 
@@ -131,7 +131,7 @@ class Writer:
             before = node
 
     def _distance(self, before: ast.stmt, node: ast.stmt, indent: str, *, commented: bool) -> int:
-        """Give how many blank lines stand between two statements of a block."""
+        """Return how many blank lines stand between two statements of a block."""
         if not indent:
             if isinstance(before, ast.FunctionDef) or isinstance(node, ast.FunctionDef):
                 return 2

@@ -1,4 +1,4 @@
-"""`arcor2-hw analyse FILE`: what an object type offers, read from its source without loading it."""
+"""`arcor2-hw analyse FILE`: show the actions and settings of an object type, from its source."""
 
 import ast
 import sys
@@ -60,7 +60,7 @@ def _fail(reason: str, status: ExitStatus) -> ExitStatus:
 
 
 def _dotted(file: Path) -> str:
-    """Give the full name of a file's module; one that is in no package is taken to be in its folder."""
+    """Return the full name of a file's module; one that is in no package is taken to be in its folder."""
     parts = [] if file.stem == "__init__" else [file.stem]
     folder = file.parent
     while (folder / "__init__.py").exists():
@@ -70,7 +70,7 @@ def _dotted(file: Path) -> str:
 
 
 def _show(console: Console, found: TypeAnalysis) -> bool:
-    """Print one type; tells whether it has problems."""
+    """Print one type; return whether it has problems."""
     meta = found.meta
     problems = [] if isinstance(meta.problem, Unset) else [meta.problem]
     problems += [f"{action.name}: {action.problem}" for action in found.actions if action.disabled]

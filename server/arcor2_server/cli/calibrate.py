@@ -1,4 +1,4 @@
-"""`arcor2-hw calibrate`: where cameras and robots stand, from files or on a running server."""
+"""`arcor2-hw calibrate`: find the poses of cameras and robots, from files or on a running server."""
 
 import math
 from pathlib import Path

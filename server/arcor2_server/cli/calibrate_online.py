@@ -1,4 +1,4 @@
-"""`arcor2-hw calibrate online`: cameras and robots of the scene that a running server has in operation."""
+"""`arcor2-hw calibrate online`: calibrate cameras and robots of the online scene of a running server."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -128,16 +128,16 @@ def check(
             present = given or await _present(client, chosen)
             body = {"pose": present, "distance_limit": distance, "angle_limit": angle}
             path = f"/api/calibrations/{quote(chosen.id, safe='')}/check"
-            told: CalibrationCheck = await client.rest.request("PUT", path, CalibrationCheck, body=body)
-        if not told.passed:
-            raise Failed(ExitStatus.DIFFERENT, told.verdict)
-        console().print(escape(told.verdict), soft_wrap=True)
+            on_progress: CalibrationCheck = await client.rest.request("PUT", path, CalibrationCheck, body=body)
+        if not on_progress.passed:
+            raise Failed(ExitStatus.DIFFERENT, on_progress.verdict)
+        console().print(escape(on_progress.verdict), soft_wrap=True)
 
     return calibrated("online check", work)
 
 
 async def _record(client: Client, name: str, key: str) -> CalibrationRecord:
-    """Give the record that is meant. NotFound; InvalidData for one without a pose, or of another object."""
+    """Return the record that is meant. NotFound; raise InvalidData for one without a pose, or of another object."""
     if key:
         path = f"/api/calibrations/{quote(key, safe='')}"
         found: CalibrationRecord = await client.rest.request("GET", path, CalibrationRecord)
@@ -154,7 +154,10 @@ async def _record(client: Client, name: str, key: str) -> CalibrationRecord:
 
 
 async def _present(client: Client, record: CalibrationRecord) -> Pose:
-    """Give where the object of a record is in the open scene. Conflict, NotFound, InvalidData."""
+    """Return where the object of a record is in the open scene.
+
+    Raise Conflict, NotFound or InvalidData if that is impossible.
+    """
     if record.parent != "world":
         raise InvalidData(f"The calibration {record.id} is stated in {record.parent}: give a pose in that with --pose.")
     scene = await _open_scene(client)
@@ -180,7 +183,7 @@ def _show(found: list[CalibrationRecord]) -> None:
 
 # ------------------------------------------------------------------------------------------------ following
 async def _open_scene(client: Client) -> Scene:
-    """Give the scene that is open. Conflict when none is."""
+    """Return the scene that is open. Conflict when none is."""
     try:
         async with asyncio.timeout(GREETING):
             async for event in client.events():
@@ -219,16 +222,16 @@ async def _calibrate(client: Client, found: SceneObject, process: str, begin: Ca
 
 
 async def _followed(client: Client, found: SceneObject, process: str) -> tuple[str, Pose | None]:
-    """Give the verdict of a calibration, and the pose that everybody is told of before. Failed when it failed."""
+    """Return the verdict of a calibration, and the pose that everybody is told of before. Failed when it failed."""
     title = f"Calibration of {found.name}"
     pose: Pose | None = None
     try:
         async with asyncio.timeout(ENDS_WITHIN):
-            with progress(title) as told:
+            with progress(title) as on_progress:
                 async for event in client.events():
                     if event.event == "TaskState" and event.data.title == title:
                         share = 0.0 if isinstance(event.data.progress, Unset) else event.data.progress
-                        told(share, "" if isinstance(event.data.message, Unset) else event.data.message)
+                        on_progress(share, "" if isinstance(event.data.message, Unset) else event.data.message)
                     elif event.event == "SceneObjectChanged" and event.data.id == found.id:
                         pose = event.data.pose
                     elif event.event == "ProcessState" and event.data.id == process:

@@ -1,4 +1,4 @@
-"""What the calibration commands share: files that are read, progress, and how a result is shown."""
+"""Shared by the calibration commands: input files, progress and output of results."""
 
 import math
 import sys
@@ -19,7 +19,7 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.server_connection import Failed, run
-from arcor2_server.compute.process import Told
+from arcor2_server.compute.process import ProgressCallback
 from arcor2_server.compute.workers import Compute
 from arcor2_server.log import setup as server_logging
 
@@ -31,7 +31,7 @@ MAX_FILE: Final = 1 << 20
 
 # ------------------------------------------------------------------------------------------------ files
 def content_of(path: Path, largest: int) -> bytes:
-    """Give a file's bytes. NotFound, InvalidData naming the file."""
+    """Return a file's bytes. NotFound, InvalidData naming the file."""
     try:
         if path.stat().st_size > largest:
             raise InvalidData(f"{path} is larger than {largest} bytes.")
@@ -43,7 +43,7 @@ def content_of(path: Path, largest: int) -> bytes:
 
 
 def picture_of(path: Path) -> bytes:
-    """Give a picture's file. NotFound, InvalidData."""
+    """Return a picture's file. Raise NotFound or InvalidData if that is impossible."""
     return content_of(path, MAX_PICTURE)
 
 
@@ -81,28 +81,28 @@ def calibrated(command: str, work: Callable[[], Awaitable[Any]]) -> int:
 
 
 async def compute(task: Task[R]) -> R:
-    """Give the answer to a task, from a worker of its own, and show how far it is."""
+    """Return the answer to a task, from a worker of its own, and show how far it is."""
     server_logging.set_up("error")
     worker = Compute(idle=60.0)
     try:
-        with progress(task.label) as told:
-            return await worker.run(task, told=told)
+        with progress(task.label) as on_progress:
+            return await worker.run(task, on_progress=on_progress)
     finally:
         await worker.close()
 
 
 @contextmanager
-def progress(what: str) -> Iterator[Told]:
+def progress(what: str) -> Iterator[ProgressCallback]:
     """Show on standard error how far something is, where that is a terminal."""
     console = Console(stderr=True)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
         bar = shown.add_task(what, total=1.0)
 
-        def told(share: float, message: str) -> None:
+        def on_progress(share: float, message: str) -> None:
             shown.update(bar, completed=share, description=message or what)
 
-        yield told
+        yield on_progress
 
 
 # ------------------------------------------------------------------------------------------------ showing
@@ -112,7 +112,7 @@ def show_json(result: Any) -> None:
 
 
 def pose_table(what: str, pose: Pose) -> Table:
-    """Give a pose as a technician reads it, and as it is typed in."""
+    """Return a pose as a technician reads it, and as it is typed in."""
     table = Table(what, "", box=None, pad_edge=False, show_header=True)
     x, y, z = (f"{1e3 * value:.2f}" for value in pose.position)
     table.add_row("position", f"x {x} mm   y {y} mm   z {z} mm")
@@ -123,7 +123,7 @@ def pose_table(what: str, pose: Pose) -> Table:
 
 
 def angles(pose: Pose) -> tuple[float, float, float]:
-    """Give the turns about the fixed axes x, then y, then z, rad."""
+    """Return the turns about the fixed axes x, then y, then z, rad."""
     x, y, z, w = pose.orientation
     pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))

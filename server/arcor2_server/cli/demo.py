@@ -1,4 +1,4 @@
-"""`arcor2-hw demo`: the demo workplace comes up on this machine and runs its program."""
+"""`arcor2-hw demo`: start the demo workplace on this machine and run its program."""
 
 import asyncio
 import random
@@ -27,7 +27,7 @@ def demo(
     fast: bool = False,
     picture: Path | None = None,
 ) -> int:
-    """Bring up the demo workplace and run its program.
+    """Start the demo workplace and run its program.
 
     A cell for testing printed circuit boards: robot, two-axis robot, tester, belt, I/O block with tower light, reader,
     label printer and planning service are simulated at the far end of their real protocols. The program works off an

@@ -1,4 +1,4 @@
-"""`arcor2-hw device`: which devices can be used here, how those in operation are; and the integrator's commands."""
+"""`arcor2-hw device`: list usable devices and the state of running ones; commands for integrators."""
 
 import sys
 from typing import Any

@@ -1,4 +1,4 @@
-"""`arcor2-hw device export | check`: a cell.yaml out of a scene, and a look at the devices that one names."""
+"""`arcor2-hw device export | check`: write a cell.yaml from a scene, and check the devices that one names."""
 
 import subprocess
 import sys
@@ -86,7 +86,7 @@ def checked(file: Path, cell: Cell) -> list[Checked]:
 
 
 def _look(file: Path, *names: str) -> tuple[dict[str, Checked], str]:
-    """Give what one process found, and why it found no more."""
+    """Return what one process found, and why it found no more."""
     command = [sys.executable, "-P", "-m", "arcor2_hw.runtime.checking", str(file), *names]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)  # noqa: S603 - our own words
     why = ""

@@ -1,4 +1,4 @@
-"""`arcor2-hw device new`: a driver, a fake, a test and a page of one's own, which pass the suite as written."""
+"""`arcor2-hw device new`: create a driver, a fake, a test and a documentation page that pass the suite."""
 
 import enum
 import keyword
@@ -101,7 +101,7 @@ NOT_WRITTEN: Final = "there is no starter for this base yet: take --base generic
 
 
 def refusal(base: Base, bus: Bus) -> str:
-    """Give why there is nothing to write for a base on a bus; empty when there is."""
+    """Return why there is nothing to write for a base on a bus; empty when there is."""
     if base in NO_SENSE:
         return NO_SENSE[base]
     if bus not in WIRES:
@@ -169,7 +169,7 @@ def _fill(template: str, words: dict[str, str]) -> str:
 
 
 def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
-    """Give what stands for what in the templates."""
+    """Return what stands for what in the templates."""
     kind, wire = KINDS[base], WIRES[bus]
     class_name = "".join(part.capitalize() for part in module.split("_"))
     title = module.replace("_", " ")

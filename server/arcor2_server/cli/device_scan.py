@@ -1,4 +1,4 @@
-"""`arcor2-hw device scan`: what is connected to this machine, each kind looked for in a process with a deadline."""
+"""`arcor2-hw device scan`: find connected devices; each kind is searched in a process with a deadline."""
 
 import subprocess
 import sys

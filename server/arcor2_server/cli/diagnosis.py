@@ -1,4 +1,4 @@
-"""`arcor2-hw diagnosis`: what somebody who helps wants to know of a running server, in one file."""
+"""`arcor2-hw diagnosis`: write the diagnosis bundle of a running server into one file."""
 
 from pathlib import Path
 from typing import Annotated

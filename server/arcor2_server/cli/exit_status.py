@@ -1,4 +1,4 @@
-"""With which status a command ends, and why."""
+"""Exit statuses of the commands."""
 
 import enum
 

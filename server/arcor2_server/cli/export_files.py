@@ -1,4 +1,4 @@
-"""What `scene`, `project` and `object-type` share: export, import, validate and diff of export files."""
+"""Shared by `scene`, `project` and `object-type`: export, import, validation and comparison of export files."""
 
 import asyncio
 import re
@@ -42,7 +42,7 @@ _LINES: Final = {"+": "green", "-": "red", "@": "cyan"}
 
 
 def out() -> Console:
-    """Give where a command prints; a pipe gets whole lines."""
+    """Return where a command prints; a pipe gets whole lines."""
     return console()
 
 
@@ -57,7 +57,7 @@ def print_json(value: Any) -> None:
 
 
 def installed() -> list[SourceFile]:
-    """Give the sources of the object types that are installed here."""
+    """Return the sources of the object types that are installed here."""
     return [one.file for one in installed_types() if one.file is not None]
 
 
@@ -166,7 +166,7 @@ async def validate(paths: list[Path], kind: Kind, as_json: bool) -> ExitStatus:
 
 
 def _is_file(wanted: str) -> bool:
-    """Tell whether a file is meant, not a name on a server."""
+    """Return whether a file is meant, not a name on a server."""
     return wanted.endswith(".zip") or Path(wanted).is_file()
 
 
@@ -214,5 +214,5 @@ def _show(one: Difference, names: dict[str, str]) -> None:
 
 
 def _indented(line: str) -> str:
-    """Give a line of source as it can be shown: its spaces stay."""
+    """Return a line of source as it can be shown: its spaces stay."""
     return "".join(each if each.isprintable() else "�" for each in line.expandtabs(4))

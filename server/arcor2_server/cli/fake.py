@@ -1,4 +1,4 @@
-"""`arcor2-hw fake`: the fakes that are installed, one of them in the foreground, and faults while one runs."""
+"""`arcor2-hw fake`: list the installed fakes, run one in the foreground, and inject faults while it runs."""
 
 import asyncio
 import contextlib
@@ -93,7 +93,7 @@ def _run(fake: InstalledFake, arguments: tuple[str, ...]) -> int:
 
 
 def _places(name: str, line: str) -> str:
-    """Give the ready line for people: each address on a line of its own."""
+    """Return the ready line for people: each address on a line of its own."""
     ready: dict[str, Any] = msgspec.json.decode(line.removeprefix("ready "))
     places = "".join(f"  {key} {value}\n" for key, value in ready.items() if key != "name" and value is not None)
     return f"{name} is ready; Ctrl-C ends it\n{places}"

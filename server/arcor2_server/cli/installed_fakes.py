@@ -1,4 +1,4 @@
-"""The fakes of installed distributions, found by their entry points and read as source; none is imported."""
+"""The fakes of installed distributions, found by entry point and read as source without importing them."""
 
 import ast
 import importlib.util
@@ -23,7 +23,7 @@ class InstalledFake(Struct, frozen=True):
 
 
 def installed_fakes() -> list[InstalledFake]:
-    """Give the fakes of all installed distributions, by name; of two with one name the first."""
+    """Return the fakes of all installed distributions, by name; of two with one name the first."""
     found: dict[str, InstalledFake] = {}
     for point in entry_points(group=GROUP):
         found.setdefault(point.name, _read(point))

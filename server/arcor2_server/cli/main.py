@@ -1,4 +1,4 @@
-"""The entry point `arcor2-hw`: subcommands are imported only when they are called."""
+"""The entry point `arcor2-hw`. Subcommands are imported only when they are called."""
 
 import gc
 import os

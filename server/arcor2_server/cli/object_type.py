@@ -1,4 +1,4 @@
-"""`arcor2-hw object-type`: bring object types into a running server, list them, take them out, compare them."""
+"""`arcor2-hw object-type`: upload object types to a running server, list, delete and compare them."""
 
 import ast
 from pathlib import Path

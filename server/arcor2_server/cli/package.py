@@ -1,4 +1,4 @@
-"""`arcor2-hw package`: list packages, and run one while following what it does."""
+"""`arcor2-hw package`: list packages, and run one while showing its progress."""
 
 import sys
 from datetime import datetime

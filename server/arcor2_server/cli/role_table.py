@@ -1,4 +1,4 @@
-"""The table of docs/reference/roles.md: which request, event and route needs which role."""
+"""Generates docs/reference/roles.md: the role that each request, event and route needs."""
 
 from collections.abc import Iterable
 from typing import Any, cast
@@ -8,7 +8,7 @@ from litestar import Litestar
 from arcor2_hw.data.events import EVENTS
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
-from arcor2_server.rest.responses import OPEN, ROLE
+from arcor2_server.access.route_options import OPEN, ROLE
 
 _HEAD = """# Roles
 
@@ -40,7 +40,7 @@ def _routes(app: Litestar) -> Iterable[tuple[str, Role]]:
 
 
 def page(app: Litestar) -> str:
-    """Give the page."""
+    """Return the page."""
     lines = _HEAD.splitlines()
     lines += _table("Requests", ((name, rpc.role) for name, rpc in RPCS.items()))
     lines += _table("Events", ((name, event.role) for name, event in EVENTS.items()))
@@ -53,12 +53,12 @@ async def _main() -> None:
     import tempfile
     from pathlib import Path
 
-    from arcor2_server.app import create_app, running_services
+    from arcor2_server.app import create_app, running_server
     from arcor2_server.settings import ServerSettings
 
     with tempfile.TemporaryDirectory() as directory:
-        async with running_services(ServerSettings(data_dir=Path(directory))) as services:
-            sys.stdout.write(page(create_app(services)))
+        async with running_server(ServerSettings(data_dir=Path(directory))) as server:
+            sys.stdout.write(page(create_app(server)))
 
 
 if __name__ == "__main__":

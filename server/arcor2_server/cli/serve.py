@@ -1,4 +1,4 @@
-"""`arcor2-hw serve`: the server, until it is told to end."""
+"""`arcor2-hw serve`: run the server until it is terminated."""
 
 import asyncio
 import contextlib
@@ -156,7 +156,10 @@ def serve(
 
 
 def _markers(given: Path | None, path: Path | None, cell: Cell | None) -> CalibrationConfiguration | None:
-    """Give which markers stand where: as a file of their own says, else as cell.yaml does. NotFound, InvalidData."""
+    """Return which markers stand where: as a file of their own says, else as cell.yaml does.
+
+    Raise NotFound or InvalidData if that is impossible.
+    """
     if given is not None:
         return read_configuration(given)
     if cell is None or path is None or isinstance(cell.calibration, Unset):
@@ -166,7 +169,10 @@ def _markers(given: Path | None, path: Path | None, cell: Cell | None) -> Calibr
 
 
 def check_access(settings: ServerSettings) -> None:
-    """Refuse to be reached by other machines while nobody needs a token. CannotServe, StorageError."""
+    """Refuse to be reached by other machines while nobody needs a token.
+
+    Raise CannotServe or StorageError if that is impossible.
+    """
     tokens = TokenFile(settings.data_dir)
     if is_local(settings) or settings.insecure or tokens.all() or tokens.unusable:
         return
@@ -224,7 +230,7 @@ def _bind_legacy(
 def _certificate(
     settings: ServerSettings, given: tuple[Path, Path] | None, self_signed: bool
 ) -> tuple[ServerSettings, tuple[Path, Path] | None]:
-    """Give the files of certificate and key, None for no TLS, and settings that know the fingerprint.
+    """Return the files of certificate and key, None for no TLS, and settings that know the fingerprint.
 
     CannotServe when they cannot be used.
     """
@@ -251,12 +257,12 @@ async def run(
 
     StorageError when the data cannot be used.
     """
-    from arcor2_server.app import create_app, running_services
-    from arcor2_server.web.connection_limits import ConnectionLimits
+    from arcor2_server.access.connection_limits import ConnectionLimits
+    from arcor2_server.app import create_app, running_server
     from arcor2_server.web.http_server import Server, configuration
 
-    async with running_services(settings) as services:
-        for notice in services.damage.notices:
+    async with running_server(settings) as running:
+        for notice in running.damage.notices:
             sys.stderr.write(f"arcor2-hw serve: {notice}\n")
 
         def when_ready() -> None:
@@ -266,11 +272,11 @@ async def run(
             loop.call_later(PREPARED_AFTER, prepare)
 
         def prepare() -> None:
-            services.cell.hosts.prepare()
+            running.hosts.prepare()
             loop.run_in_executor(None, importlib.import_module, "transforms3d.quaternions")
 
         loop = asyncio.get_running_loop()
-        config = configuration(create_app(services), settings, certificate)
+        config = configuration(create_app(running), settings, certificate)
         server = Server(config, settings, ConnectionLimits.of(settings), legacy, when_ready)
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, server.end)
@@ -285,7 +291,10 @@ async def run(
 
 @contextlib.contextmanager
 def data_directory(directory: Path) -> Generator[IO[bytes], None, None]:
-    """Make sure that the directory is there, can be written, and is ours alone. CannotServe."""
+    """Make sure that the directory is there, can be written, and is ours alone.
+
+    Raise CannotServe if that is impossible.
+    """
     try:
         directory.mkdir(parents=True, exist_ok=True)
         (directory / DEVICE_FILES_NAME).mkdir(mode=0o700, exist_ok=True)
@@ -303,7 +312,10 @@ def data_directory(directory: Path) -> Generator[IO[bytes], None, None]:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Give a socket that is bound; uvicorn listens at it once everything is up. CannotServe."""
+    """Return a socket that is bound; uvicorn listens at it once everything is up.
+
+    Raise CannotServe if that is impossible.
+    """
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         listener = socket.socket(family, kind, protocol)

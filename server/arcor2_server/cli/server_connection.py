@@ -1,4 +1,4 @@
-"""How a command reaches a server, and with which status it ends when that fails."""
+"""How commands connect to a server, and their exit status if that fails."""
 
 import asyncio
 import ssl
@@ -47,11 +47,11 @@ class Server:
     ca: Annotated[Path | None, Parameter(help="Certificate to trust, when the server made its own.")] = None
 
     def client(self) -> Client:
-        """Make a client that gives up at the first loss. Raises Failed when the certificate cannot be used."""
+        """Create a client that gives up at the first loss. Raises Failed when the certificate cannot be used."""
         return Client(self.url, token=self.token, tls=self._tls(), reconnect=False)
 
     def rest(self) -> Rest:
-        """Make a client for HTTP alone. Raises Failed when the certificate cannot be used."""
+        """Create a client for HTTP alone. Raises Failed when the certificate cannot be used."""
         return Rest(self.url, token=self.token, tls=self._tls())
 
     def _tls(self) -> ssl.SSLContext | None:
@@ -75,12 +75,12 @@ _STATUSES: Final[tuple[tuple[tuple[type[Arcor2Error], ...], ExitStatus], ...]] =
 
 
 def status_of(error: Arcor2Error) -> ExitStatus:
-    """Give the status for an error."""
+    """Return the status for an error."""
     return next((status for kinds, status in _STATUSES if isinstance(error, kinds)), ExitStatus.FAILED)
 
 
 def printable(text: str) -> str:
-    """Give a text on one line without what would command a terminal: it may come out of somebody else's file."""
+    """Return a text on one line without what would command a terminal: it may come out of somebody else's file."""
     return "".join(each if each.isprintable() else "�" for each in " ".join(text.split()))
 
 

@@ -1,4 +1,4 @@
-"""The kinds of device that `arcor2-hw device new` knows: what each brings into the texts."""
+"""The kinds of device that `arcor2-hw device new` supports, with their parts of the templates."""
 
 import enum
 from typing import Final, NamedTuple

@@ -1,4 +1,4 @@
-"""Where tables are printed: to a terminal as wide as it is, to a pipe without folding."""
+"""The console for tables: as wide as the terminal, unfolded in a pipe."""
 
 from typing import Final
 
@@ -8,6 +8,6 @@ PIPE_WIDTH: Final = 240
 
 
 def console() -> Console:
-    """Give the console. A pipe has no width: without one, rich would fold columns to 80 characters."""
+    """Return the console. A pipe has no width: without one, rich would fold columns to 80 characters."""
     found = Console(highlight=False)
     return found if found.is_terminal else Console(highlight=False, width=PIPE_WIDTH)

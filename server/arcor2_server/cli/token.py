@@ -1,4 +1,4 @@
-"""`arcor2-hw token`: who may connect to a server, and in which role."""
+"""`arcor2-hw token`: manage the tokens for a server and their roles."""
 
 import sys
 from pathlib import Path
@@ -39,7 +39,7 @@ def add(
     days: Annotated[int | None, Parameter(validator=validators.Number(gte=1, lte=3650))] = None,
     data_dir: DataDir = None,
 ) -> int:
-    """Make a token and print it, once: it is nowhere kept in clear.
+    """Create a token and print it, once: it is nowhere kept in clear.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def list_tokens(*, data_dir: DataDir = None) -> int:
 
 @app.command
 def revoke(which: str, *, data_dir: DataDir = None) -> int:
-    """Make a token, named by its id or its owner, worth nothing; who is connected by it is disconnected.
+    """Create a token, named by its id or its owner, worth nothing; who is connected by it is disconnected.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The table of locks on ids, in trees that are known by their root: what is held, taken, freed, moved (protocol, 6)."""
+"""The table of locks on items, which form trees with a root (protocol, section 6)."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable
@@ -28,10 +28,10 @@ class LockTree(Protocol):
     """How ids hang together; the open document knows it."""
 
     def root_of(self, item: str) -> str:
-        """Give the root of the tree that an id belongs to; NotFound for an id it does not know."""
+        """Return the root of the tree that an id belongs to; raise NotFound for an id it does not know."""
 
     def tree_of(self, root: str) -> Iterable[str]:
-        """Give the ids of everything below a root; nothing when it is none."""
+        """Return the ids of everything below a root; nothing when it is none."""
 
 
 class _Nothing:
@@ -81,7 +81,7 @@ class LockTable:
 
     # ------------------------------------------------------------------------------------------------ what is held
     def holds(self, user: str, item: str, *, tree: bool = False) -> bool:
-        """Tell whether the user holds the write lock of an id; with `tree`, of its tree."""
+        """Return whether the user holds the write lock of an id; with `tree`, of its tree."""
         root = self._roots.get(self._where.get(item) or self._known_root(item))
         if root is None:
             return False
@@ -96,22 +96,22 @@ class LockTable:
             raise Locked(f"{user} does not hold the write lock of the {what}{item!r}.")
 
     def holds_read(self, user: str, item: str) -> bool:
-        """Tell whether the user holds a read lock of an id."""
+        """Return whether the user holds a read lock of an id."""
         root = self._roots.get(self._where.get(item, ""))
         return root is not None and user in root.readers.get(item, ())
 
     def locked_roots(self, besides: Iterable[str] = ()) -> list[str]:
-        """Give the roots in whose trees anything is locked, without the ones named."""
+        """Return the roots in whose trees anything is locked, without the ones named."""
         skipped = set(besides)
         return [name for name in self._roots if name not in skipped]
 
     def write_locked_roots(self, besides: Iterable[str] = ()) -> list[str]:
-        """Give the roots in whose trees anything is write-locked, without the ones named."""
+        """Return the roots in whose trees anything is write-locked, without the ones named."""
         skipped = set(besides)
         return [name for name, root in self._roots.items() if root.writers and name not in skipped]
 
     def writer_of(self, item: str) -> str | None:
-        """Give who may write an id: its writer, or the holder of the tree it is in."""
+        """Return who may write an id: its writer, or the holder of the tree it is in."""
         root = self._roots.get(self._where.get(item) or self._known_root(item))
         if root is None:
             return None
@@ -120,18 +120,18 @@ class LockTable:
         return root.writers.get(item)
 
     def holders_of(self, item: str) -> set[str]:
-        """Give who may write an id, or keeps others from it by a read lock."""
+        """Return who may write an id, or keeps others from it by a read lock."""
         root = self._roots.get(self._where.get(item) or self._known_root(item))
         writer = self.writer_of(item)
         return set(root.readers.get(item, ()) if root else ()) | ({writer} if writer else set())
 
     def announced(self) -> dict[str, list[str]]:
-        """Give the ids that were announced as locked, by owner."""
+        """Return the ids that were announced as locked, by owner."""
         found = {user: sorted(set().union(*ids.values())) for user, ids in self._announced.items()}
         return {user: ids for user, ids in found.items() if ids}
 
     def written_by(self, user: str) -> list[str]:
-        """Give exactly the ids on which the user holds announced write locks, without those locked by a tree."""
+        """Return exactly the ids on which the user holds announced write locks, without those locked by a tree."""
         return list(self._announced.get(user, ()))
 
     def read_by(self, user: str) -> list[str]:
@@ -147,7 +147,7 @@ class LockTable:
         return self._since[user, item]
 
     def could_lock_tree(self, user: str, item: str) -> bool:
-        """Tell whether the user holds the tree of an id, or could lock it now (a dry run asks this)."""
+        """Return whether the user holds the tree of an id, or could lock it now (a dry run asks this)."""
         if self.holds(user, item, tree=True):
             return True
         root = self._roots.get(self._where.get(item) or self._known_root(item))
@@ -157,7 +157,7 @@ class LockTable:
 
     # ------------------------------------------------------------------------------------------------ freed, moved
     def release_announced(self, user: str, ids: Iterable[str]) -> list[str]:
-        """Free the client's locks among `ids`; gives what ObjectsUnlocked has to name, empty when he held none."""
+        """Free the client's locks among `ids`; return what ObjectsUnlocked has to name, empty when he held none."""
         freed: set[str] = set()
         for item in ids:
             if item in self._announced.get(user, ()):
@@ -210,7 +210,7 @@ class LockTable:
         self._notify()
 
     def release_all(self, user: str) -> list[str]:
-        """Free all that a client locked, for one who does not come back; gives the announced ids."""
+        """Free all that a client locked, for one who does not come back; return the announced ids."""
         for item in self._reads.pop(user, []):
             self._since.pop((user, item), None)
             self._free_read(user, item)
@@ -239,7 +239,7 @@ class LockTable:
         return root is not None and root.writers.get(item) == user
 
     def _is_announced(self, user: str, root_id: str, item: str) -> bool:
-        """Tell whether a client asked for the lock that covers an id; one that a request holds will not last."""
+        """Return whether a client asked for the lock that covers an id; one that a request holds will not last."""
         announced = self._announced.get(user, {})
         return item in announced or any(writer in announced for writer in self._roots[root_id].writers)
 

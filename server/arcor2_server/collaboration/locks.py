@@ -1,4 +1,4 @@
-"""Who may change what: locks as clients and requests take them, wait for them and give them back (protocol, 6)."""
+"""Locks as clients and requests acquire, wait for and release them (protocol, section 6)."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterable
@@ -39,7 +39,10 @@ class Locks(LockTable):
 
     # ------------------------------------------------------------------------------------------------ of clients
     async def write_lock(self, user: str, item: str, tree: bool = False) -> list[str]:
-        """Lock for a client. Gives the ids to announce, none when he holds it already. Locked, NotFound."""
+        """Lock for a client. Gives the ids to announce, none when he holds it already.
+
+        Raise Locked or NotFound if that is impossible.
+        """
         root_id = (await self._enter([item]))[item]
         if self.holds(user, item, tree=tree) and self._is_announced(user, root_id, item):
             return []
@@ -59,7 +62,7 @@ class Locks(LockTable):
         return sorted(self._free_write(user, item))
 
     async def read_lock(self, user: str, item: str) -> None:
-        """Lock for reading, for a client. Locked, NotFound."""
+        """Lock for reading, for a client. Raise Locked or NotFound if that is impossible."""
         self._take_read(user, (await self._enter([item]))[item], item)
         self._reads.setdefault(user, []).append(item)
         self._since.setdefault((user, item), now())

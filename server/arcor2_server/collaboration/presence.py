@@ -1,4 +1,4 @@
-"""Who is there, and what each user looks at and edits."""
+"""Presence: connected users, and what each of them views and edits."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -8,7 +8,7 @@ from msgspec import UNSET
 from arcor2_hw.data.editor import Presence, UserPresenceData
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
-from arcor2_server.collaboration.throttle import Newest
+from arcor2_server.collaboration.throttle import Throttle
 from arcor2_server.collaboration.users import Users
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import Connection, EventHub, encode, make_event
@@ -23,13 +23,13 @@ class PresenceBoard:
     def __init__(self, hub: EventHub, users: Users) -> None:
         self._hub = hub
         self._users = users
-        self._said: dict[str, Presence] = {}
-        self._events = Newest(PERIOD, lambda user, event: hub.stream_to_subscribers("UserPresence", user, event))
+        self._presence: dict[str, Presence] = {}
+        self._events = Throttle(PERIOD, lambda user, event: hub.stream_to_subscribers("UserPresence", user, event))
         users.on_enter.append(self._entered)
         users.on_leave.append(self._left)
 
     def everybody(self) -> list[Event]:
-        """Give the events that tell of all who are there."""
+        """Return the events that tell of all who are there."""
         return [self._event(name) for name in self._users.names()]
 
     def users_of(self, documents: Iterable[str]) -> list[str]:
@@ -39,39 +39,41 @@ class PresenceBoard:
         """
         shown, found = set(documents), []
         for name in self._users.names():
-            client, said = self._users.client_of(name), self._said.get(name)
+            client, presence = self._users.client_of(name), self._presence.get(name)
             may_edit = client is not None and client.role >= Role.STANDARD_USER
-            if said.document in shown if said is not None else may_edit:
+            if presence.document in shown if presence is not None else may_edit:
                 found.append(name)
         return found
 
-    def say(self, client: Connection, presence: Presence) -> None:
+    def update(self, client: Connection, presence: Presence) -> None:
         """Take what a user's client says, and tell it. RequestRefused for what cannot be sent on."""
         user = client.user
         assert user is not None
-        before = self._said.get(user)
-        self._said[user] = presence
+        before = self._presence.get(user)
+        self._presence[user] = presence
         try:
             self._events.put(user, encode(self._event(user)))
         except UnicodeEncodeError as error:
-            del self._said[user]
+            del self._presence[user]
             if before is not None:
-                self._said[user] = before
+                self._presence[user] = before
             raise RequestRefused(f"This cannot be sent to others: {error}.") from None
 
     def close(self) -> None:
-        """End with the server."""
+        """Stop when the server ends."""
         self._events.close()
 
     def _event(self, user: str) -> Event:
         client = self._users.client_of(user)
         role = "" if client is None else client.role.name.lower()
-        return make_event("UserPresence", UserPresenceData(user, client is not None, role, self._said.get(user, UNSET)))
+        return make_event(
+            "UserPresence", UserPresenceData(user, client is not None, role, self._presence.get(user, UNSET))
+        )
 
     def _entered(self, user: str) -> None:
-        self._said.pop(user, None)
+        self._presence.pop(user, None)
         self._events.put(user, encode(self._event(user)))
 
     def _left(self, user: str) -> None:
-        self._said.pop(user, None)
+        self._presence.pop(user, None)
         self._events.end(user, encode(make_event("UserPresence", UserPresenceData(user, False, ""))))

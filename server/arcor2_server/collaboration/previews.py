@@ -1,20 +1,19 @@
-"""Where things are while they are dragged: told to the others, never kept."""
+"""Move previews: the positions of items while a user drags them. They are published and never stored."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Final
 
 from msgspec import UNSET
 
 from arcor2_hw.data.editor import MovePreview, MovePreviewData
 from arcor2_server.collaboration.locks import Locks
-from arcor2_server.collaboration.throttle import Newest
-from arcor2_server.documents.changes import Change
+from arcor2_server.collaboration.throttle import Throttle
 from arcor2_server.events import Connection, EventHub, encode, make_event
 
 PERIOD: Final = 1 / 30
 """Seconds between two events of one item."""
-LOOK_PERIOD: Final = 0.1
+CHECK_PERIOD: Final = 0.1
 """Seconds between two looks at whether those who drag something still hold it."""
 NAME: Final = "MovePreview"
 
@@ -36,13 +35,13 @@ class Previews:
         self._hub = hub
         self._locks = locks
         self._dragged: dict[str, _Dragged] = {}
-        self._events = Newest(PERIOD, self._send)
-        self._look: asyncio.TimerHandle | None = None
+        self._events = Throttle(PERIOD, self._send)
+        self._check_timer: asyncio.TimerHandle | None = None
 
     def show(self, client: Connection, user: str, preview: MovePreview, locked: str) -> None:
         """Tell the others where an item is just now; or that it is over; `locked` is what its mover holds."""
         if preview.position is UNSET and preview.orientation is UNSET and preview.joints is UNSET:
-            self._over(preview.id)
+            self._end(preview.id)
             return
         dragged = self._dragged.get(preview.id)
         if dragged is None or dragged.ending or dragged.client is not client or dragged.user != user:
@@ -55,37 +54,37 @@ class Previews:
             user=user,
         )
         self._events.put(preview.id, encode(make_event(NAME, data)))
-        if self._look is None:
-            self._look = asyncio.get_running_loop().call_later(LOOK_PERIOD, self._look_around)
+        if self._check_timer is None:
+            self._check_timer = asyncio.get_running_loop().call_later(CHECK_PERIOD, self._check_holders)
 
-    def changed(self, changes: Sequence[Change]) -> None:
-        """Note that things were changed or removed: that is where their previews lead to."""
+    def changed(self, items: Iterable[str]) -> None:
+        """Note that items were changed or removed: their previews end there."""
         if self._dragged:
-            for change in changes:
-                if (dragged := self._dragged.get(change.id)) is not None:
+            for item in items:
+                if (dragged := self._dragged.get(item)) is not None:
                     dragged.ending = True
 
     def end_changed(self) -> None:
         """End the previews of what was changed or removed."""
         for item in [item for item, dragged in self._dragged.items() if dragged.ending]:
-            self._over(item)
+            self._end(item)
 
     def close(self) -> None:
-        """End with the server."""
+        """Stop when the server ends."""
         self._events.close()
-        if self._look is not None:
-            self._look.cancel()
+        if self._check_timer is not None:
+            self._check_timer.cancel()
 
-    def _look_around(self) -> None:
+    def _check_holders(self) -> None:
         """End the previews of those who are gone, or do not hold the item any more."""
-        self._look = None
+        self._check_timer = None
         for item, dragged in list(self._dragged.items()):
             if dragged.client not in self._hub.clients or not self._locks.holds(dragged.user, dragged.locked):
-                self._over(item)
+                self._end(item)
         if self._dragged:
-            self._look = asyncio.get_running_loop().call_later(LOOK_PERIOD, self._look_around)
+            self._check_timer = asyncio.get_running_loop().call_later(CHECK_PERIOD, self._check_holders)
 
-    def _over(self, item: str) -> None:
+    def _end(self, item: str) -> None:
         if (dragged := self._dragged.get(item)) is None:
             return
         self._events.end(item, encode(make_event(NAME, MovePreviewData(id=item, user=dragged.user))))

@@ -1,4 +1,4 @@
-"""Work that takes its time: what is under way, how far it is, and how it ended."""
+"""Long-running tasks: their progress and outcome."""
 
 import asyncio
 from collections.abc import Iterator
@@ -12,9 +12,8 @@ from arcor2_hw.data.base import new_id, now
 from arcor2_hw.data.editor import TaskKind, TaskProgress, TaskStateData
 from arcor2_hw.data.events import Event
 from arcor2_hw.exceptions import Arcor2Error
-from arcor2_server.collaboration.throttle import Newest
-from arcor2_server.events import encode, make_event
-from arcor2_server.websocket.hub import Hub
+from arcor2_server.collaboration.throttle import Throttle
+from arcor2_server.events import EventHub, encode, make_event
 
 PERIOD: Final = 0.1
 """Seconds between two events of one task."""
@@ -31,7 +30,7 @@ class Task:
     def at(self, progress: float | None, message: str = "") -> None:
         """Say how far it is, 0..1 (None: nobody knows), and what is being done."""
         share = UNSET if progress is None else min(max(progress, 0.0), 1.0)
-        self._tasks._say(self, replace(self.state, progress=share, message=message or self.state.message))
+        self._tasks._update(self, replace(self.state, progress=share, message=message or self.state.message))
 
     def finish(self, message: str = "") -> None:
         """It is done."""
@@ -47,16 +46,16 @@ class Task:
 
     def _end(self, how: TaskProgress, message: str) -> None:
         progress: Any = 1.0 if how is TaskProgress.FINISHED else self.state.progress
-        self._tasks._say(self, replace(self.state, state=how, progress=progress, message=message or UNSET))
+        self._tasks._update(self, replace(self.state, state=how, progress=progress, message=message or UNSET))
 
 
 class Tasks:
     """What is under way. Clients that subscribed to TaskState are told."""
 
-    def __init__(self, hub: Hub) -> None:
+    def __init__(self, hub: EventHub) -> None:
         self._hub = hub
         self._running: dict[str, Task] = {}
-        self._events = Newest(PERIOD, lambda key, event: hub.stream_to_subscribers(NAME, key, event))
+        self._events = Throttle(PERIOD, lambda key, event: hub.stream_to_subscribers(NAME, key, event))
 
     def begin(self, kind: TaskKind, title: str, started_by: str | None = None) -> Task:
         """Tell that something began; `title` is a sentence for people, without a full stop."""
@@ -80,14 +79,14 @@ class Tasks:
         task.finish()
 
     def under_way(self) -> list[Event]:
-        """Give the events that tell of all that is under way."""
+        """Return the events that tell of all that is under way."""
         return [make_event(NAME, task.state) for task in self._running.values()]
 
     def close(self) -> None:
-        """End with the server."""
+        """Stop when the server ends."""
         self._events.close()
 
-    def _say(self, task: Task, state: TaskStateData) -> None:
+    def _update(self, task: Task, state: TaskStateData) -> None:
         if state.id not in self._running:
             return
         task.state = state

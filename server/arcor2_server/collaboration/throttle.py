@@ -1,10 +1,10 @@
-"""Events that come faster than anybody needs them: the first at once, then the newest at a bounded rate."""
+"""Limits the rate of events: the first is sent at once, later ones replace each other until the period ends."""
 
 import asyncio
 from collections.abc import Callable
 
 
-class Newest:
+class Throttle:
     """Passes messages on by `send(key, message)`, of each key at most one in `period` seconds: the newest one."""
 
     def __init__(self, period: float, send: Callable[[str, bytes], None]) -> None:
@@ -29,9 +29,9 @@ class Newest:
         self._send(key, message)
 
     def _start(self, key: str) -> None:
-        self._timers[key] = asyncio.get_running_loop().call_later(self._period, self._over, key)
+        self._timers[key] = asyncio.get_running_loop().call_later(self._period, self._period_ended, key)
 
-    def _over(self, key: str) -> None:
+    def _period_ended(self, key: str) -> None:
         del self._timers[key]
         if (message := self._waiting.pop(key, None)) is not None:
             self._send(key, message)

@@ -1,4 +1,4 @@
-"""Who is logged in at which connection, and what happens to the locks of one who left."""
+"""Registered users and their connections; releases the locks of users who left."""
 
 import asyncio
 from collections.abc import Callable
@@ -41,11 +41,11 @@ class Users:
         """Called with the name of who logged in, or is logged out."""
 
     def client_of(self, user: str) -> Connection | None:
-        """Give the connection of a user."""
+        """Return the connection of a user."""
         return self._clients.get(user)
 
     def names(self) -> list[str]:
-        """Give who is logged in."""
+        """Return who is logged in."""
         return list(self._clients)
 
     def left_at(self, user: str) -> str | None:
@@ -66,7 +66,7 @@ class Users:
         return self._locks.release_all(user)
 
     async def register(self, client: Connection, name: str) -> list[Event]:
-        """Log in; gives the events that tell this connection alone who holds which locks.
+        """Log in; return the events that tell this connection alone who holds which locks.
 
         RequestRefused for an empty name, and for one whose other connection is alive.
         """
@@ -84,8 +84,8 @@ class Users:
         self._clients[name] = client
         client.user = name
         if holder is not client:
-            for tell in self.on_enter:
-                tell(name)
+            for notify in self.on_enter:
+                notify(name)
         self._left.pop(name, None)
         if (handle := self._releases.pop(name, None)) is not None:
             handle.cancel()
@@ -109,8 +109,8 @@ class Users:
     def _leave(self, name: str) -> None:
         del self._clients[name]
         self._left[name] = now()
-        for tell in self.on_leave:
-            tell(name)
+        for notify in self.on_leave:
+            notify(name)
         if (handle := self._releases.pop(name, None)) is not None:
             handle.cancel()
         self._releases[name] = asyncio.get_running_loop().call_later(self._timeout, self._release, name)

@@ -1,4 +1,4 @@
-"""The view state: what a user finds again on another tablet, and what all see alike; nobody here looks into it."""
+"""View states of the clients, per user and shared. The server stores them without interpreting them."""
 
 import asyncio
 import time
@@ -36,7 +36,7 @@ class ViewStates:
         self._turn = asyncio.Lock()
 
     async def get(self, scope: ViewScope, user: str, document: str) -> ViewState:
-        """Give a view; StorageError."""
+        """Return a view. Raise StorageError if that is impossible."""
         async with self._turn:
             values = await self._view(_owner(scope, user), document)
             decoded = {key: msgspec.json.decode(value) for key, value in values.items()}
@@ -45,7 +45,10 @@ class ViewStates:
     async def change(
         self, scope: ViewScope, user: str, document: str, values: Mapping[str, Any], by: Connection
     ) -> int:
-        """Write values, None: take them away, and tell the others; gives the revision. RequestRefused, StorageError."""
+        """Write values, None: take them away, and tell the others; return the revision.
+
+        Raise RequestRefused or StorageError if that is impossible.
+        """
         encoded = {key: _encoded(key, value) for key, value in values.items()}
         owner = _owner(scope, user)
         async with self._turn:
@@ -59,15 +62,15 @@ class ViewStates:
             await self._data.put_view(owner, document, encoded, revision)
             self._revision = revision
             if not before:
-                await self._make_room(owner)
+                await self._drop_oldest(owner)
             if (owner, document) in self._views or not before:
                 self._views[owner, document] = after
         state = ViewState(scope, dict(values), revision, document, user or UNSET)
-        self._tell(scope, user, state, by)
+        self._publish(scope, user, state, by)
         return revision
 
     async def forget(self, document: str) -> None:
-        """Drop all views of a document that is gone; StorageError."""
+        """Drop all views of a document that is gone. Raise StorageError if that is impossible."""
         async with self._turn:
             await self._data.forget_document(document)
             for key in [key for key in self._views if key[1] == document]:
@@ -88,14 +91,14 @@ class ViewStates:
             self._revision = await self._data.newest_revision()
         return self._revision
 
-    async def _make_room(self, owner: str) -> None:
-        gone = await self._data.oldest_views(owner, MOST_DOCUMENTS if owner else MOST_SHARED)
-        if gone:
-            await self._data.forget_views(owner, gone)
-            for document in gone:
+    async def _drop_oldest(self, owner: str) -> None:
+        oldest = await self._data.oldest_views(owner, MOST_DOCUMENTS if owner else MOST_SHARED)
+        if oldest:
+            await self._data.forget_views(owner, oldest)
+            for document in oldest:
                 self._views.pop((owner, document), None)
 
-    def _tell(self, scope: ViewScope, user: str, state: ViewState, by: Connection) -> None:
+    def _publish(self, scope: ViewScope, user: str, state: ViewState, by: Connection) -> None:
         event = encode(make_event("ViewStateChanged", state))
         for client in self._hub.subscribers("ViewStateChanged"):
             concerned = scope is ViewScope.SHARED or user == client.user or user in client.follows

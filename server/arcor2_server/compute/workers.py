@@ -1,4 +1,4 @@
-"""What computes outside the server: one worker process per kind, started on first use, ended when idle."""
+"""The compute workers: one process per package of numerics, started on first use and ended when idle."""
 
 import asyncio
 from collections import deque
@@ -9,7 +9,7 @@ import structlog
 
 from arcor2_hw.collision.description import WorldDescription
 from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, Task, WorkerKind
-from arcor2_server.compute.process import ComputeProcess, Told
+from arcor2_server.compute.process import ComputeProcess, ProgressCallback
 
 log = structlog.get_logger(__name__)
 R = TypeVar("R")
@@ -23,13 +23,13 @@ class _Question:
     task: Task[Any]
     within: float
     world: WorldDescription | None
-    told: Told | None
+    on_progress: ProgressCallback | None
     place: str = ""
     answer: asyncio.Future[Any] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
 
 
 class _Worker:
-    """The tasks for one kind of worker, in order; background tasks run only while no other task waits."""
+    """The questions to one room, in the order in which they came; those in the background only while no other waits."""
 
     def __init__(self, kind: WorkerKind, idle: float) -> None:
         self.kind = kind
@@ -75,7 +75,7 @@ class _Worker:
                 await process.close()
 
     async def _next(self) -> _Question | None:
-        """Give the next question, None when none came for long."""
+        """Return the next question, None when none came for long."""
         while True:
             for queue in self._waiting:
                 if queue:
@@ -91,7 +91,9 @@ class _Worker:
     async def _answer(self, question: _Question) -> None:
         try:
             process = await self._ready()
-            value = await process.ask(question.task, question.within, question.world, question.told, question.place)
+            value = await process.ask(
+                question.task, question.within, question.world, question.on_progress, question.place
+            )
         except asyncio.CancelledError:
             _settle(question, ComputeStopped("The server is ending."))
             raise
@@ -123,7 +125,7 @@ class Compute:
         self._closed = False
 
     def pid(self, kind: WorkerKind) -> int | None:
-        """Give the process id of a kind of worker, None while it is not running."""
+        """Return the process that is there for a room, None while there is none."""
         process = self._workers[kind].process
         return None if process is None or not process.alive else process.process.pid
 
@@ -134,10 +136,10 @@ class Compute:
         within: float | None = None,
         world: WorldDescription | None = None,
         place: str = "",
-        told: Told | None = None,
+        on_progress: ProgressCallback | None = None,
         background: bool = False,
     ) -> R:
-        """Give the answer to a task.
+        """Return the answer to a task.
 
         within: seconds, where not as the task has it. world: what stands in the way, by id, where the task asks for
         it. place: the name of that world; what is kept of it is worth keeping while the same things stand in it. told:
@@ -147,7 +149,7 @@ class Compute:
         """
         if self._closed:
             raise ComputeStopped("The server is ending.")
-        question = _Question(task, task.timeout if within is None else within, world, told, place)
+        question = _Question(task, task.timeout if within is None else within, world, on_progress, place)
         self._workers[task.worker].put(question, background=background)
         answer: R = await question.answer
         return answer

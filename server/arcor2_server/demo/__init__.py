@@ -1,1 +1,1 @@
-"""The demo workplace as data, and the job that brings it up and runs its program."""
+"""The demo workplace as data, and the job that starts it and runs its program."""

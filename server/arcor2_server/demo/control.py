@@ -1,4 +1,4 @@
-"""One question to the control channel of a fake."""
+"""Sends one request to the control channel of a fake."""
 
 import asyncio
 from typing import Any

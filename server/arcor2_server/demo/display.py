@@ -1,4 +1,4 @@
-"""What the demo shows in the terminal: devices, the current action, boards done."""
+"""The terminal output of the demo: devices, the current action, finished boards."""
 
 import asyncio
 import io
@@ -125,7 +125,7 @@ class Display:
                 await asyncio.sleep(period)
 
     def alarms(self) -> list[str]:
-        """Give the alarms that stood when the devices were last asked."""
+        """Return the alarms that stood when the devices were last asked."""
         return [f"{device['name']}: {alarm['text']}" for device in self._devices for alarm in device.get("alarms", [])]
 
     # ------------------------------------------------------------------------------------------------ drawing

@@ -1,4 +1,4 @@
-"""The simulated devices of the demo: how each is started, and where a scene finds it."""
+"""The simulated devices of the demo: how each is started, and its address in the scene."""
 
 import contextlib
 import random
@@ -37,7 +37,7 @@ class Fake(Struct, frozen=True):
     gives_way: bool = False
 
     def command(self) -> list[str]:
-        """Give the command that starts it."""
+        """Return the command that starts it."""
         first = ["nice", "-n", "10"] if self.gives_way else []
         return [*first, *python_module(self.module, *self.arguments, "--control", "127.0.0.1:0")]
 
@@ -55,7 +55,7 @@ def _plain(name: str, key: str, prefix: str = "") -> Callable[[Ready], dict[str,
 
 
 def fakes(boards: int, seed: int, fast: bool) -> list[Fake]:
-    """Give the fakes of one run; `fast` lets the machines among them hurry."""
+    """Return the fakes of one run; `fast` lets the machines among them hurry."""
     robot = free_loopback_address(_UR_PORTS)
     loopback = "127.0.0.1:0"
     hurry = _HURRY if fast else ()
@@ -76,7 +76,7 @@ def fakes(boards: int, seed: int, fast: bool) -> list[Fake]:
 
 
 def wires(started: Mapping[str, tuple[Fake, Ready]]) -> dict[str, str]:
-    """Give where each device is, for people; the tower light hangs on the I/O block."""
+    """Return where each device is, for people; the tower light hangs on the I/O block."""
     found = {name: str(ready[fake.wire]).removeprefix("socket://") for name, (fake, ready) in started.items()}
     return found | {"tower": found["io"]}
 
@@ -84,7 +84,7 @@ def wires(started: Mapping[str, tuple[Fake, Ready]]) -> dict[str, str]:
 def world_arguments(
     started: Mapping[str, tuple[Fake, Ready]], layout: Path | Any, boards: int, seed: int
 ) -> tuple[str, ...]:
-    """Give what the small world is started with."""
+    """Return what the small world is started with."""
     follows = [
         part for fake, ready in started.values() if fake.role for part in (f"--{fake.role}", str(ready["control"]))
     ]

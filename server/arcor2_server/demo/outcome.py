@@ -1,4 +1,4 @@
-"""What came of a run: what the script found, and what the small world and the planning service know."""
+"""The outcome of a run according to the script, the simulated world and the planning service."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -19,16 +19,16 @@ class Outcome:
 
     @property
     def right(self) -> bool:
-        """Tell whether the program ended as meant with every board where it belongs, labelled and reported."""
+        """Return whether the program ended as meant with every board where it belongs, labelled and reported."""
         return self.finished and not self.wrong
 
     def summary(self) -> str:
-        """Give the line that ends the cycle."""
+        """Return the line that ends the cycle."""
         return f"cycle complete: {self.boards} boards, {self.passed} passed, {self.failed} failed, {self.seconds:.1f} s"
 
 
 def wrong_boards(world: Mapping[str, Any]) -> list[str]:
-    """Give a sentence for each board that is not where it belongs, or bears not what it should."""
+    """Return a sentence for each board that is not where it belongs, or bears not what it should."""
     found = []
     for board in world["boards"]:
         code, good, label = board["code"], not board["defect"], board["label"]
@@ -48,7 +48,7 @@ def wrong_boards(world: Mapping[str, Any]) -> list[str]:
 
 
 def wrong_results(world: Mapping[str, Any], erp: Mapping[str, Any]) -> list[str]:
-    """Give a sentence for each board that the planning service was not told of exactly once and rightly."""
+    """Return a sentence for each board that the planning service was not told of exactly once and rightly."""
     told = Counter((result["serial"], result["passed"]) for result in erp["results"])
     found = []
     for board in world["boards"]:

@@ -1,4 +1,4 @@
-"""Child processes of the demo: started together, known by the line they print when ready, ended in order."""
+"""Child processes of the demo: started together, identified by their ready line, terminated in order."""
 
 import asyncio
 import contextlib
@@ -34,7 +34,7 @@ class Child:
 
     @property
     def ended(self) -> bool:
-        """Tell whether it has ended."""
+        """Return whether it has ended."""
         return self._process is not None and self._process.returncode is not None
 
     async def start(self) -> str:
@@ -102,5 +102,5 @@ class Child:
 
 
 def python_module(name: str, *arguments: str) -> list[str]:
-    """Give the command that runs a module with this interpreter."""
+    """Return the command that runs a module with this interpreter."""
     return [sys.executable, "-m", name, *arguments]

@@ -1,4 +1,4 @@
-"""The main job: fakes, server and cell come up, the program runs, and anyone may watch."""
+"""The main job: start the fakes, the server and the cell, and run the program."""
 
 import asyncio
 import contextlib
@@ -40,7 +40,7 @@ class ProgramFailed(Arcor2Error):
 
 
 def first_of(group: BaseExceptionGroup[Any]) -> BaseException:
-    """Give the first error in a group: what a person wants to read is what began it."""
+    """Return the first error in a group: what a person wants to read is what began it."""
     first: BaseException = group.exceptions[0]
     return first_of(first) if isinstance(first, BaseExceptionGroup) else first
 
@@ -156,7 +156,7 @@ class Demo:
         new.replace(self._where)
 
     async def _start_all(self) -> tuple[dict[str, tuple[Fake, Ready]], str]:
-        """Start the fakes and the server, all at once; gives what their ready lines say."""
+        """Start the fakes and the server, all at once; return what their ready lines say."""
         wanted = fakes(self._boards, self._seed, self._fast)
         self._display.note(f"starting {', '.join(fake.name for fake in wanted)} and the server")
         server = self._child(

@@ -1,4 +1,4 @@
-"""The demo workplace: read from workplace.toml, and created through the protocol as any client would."""
+"""The demo workplace: read from workplace.toml and created through the protocol, as a client would."""
 
 import contextlib
 from importlib.resources import files
@@ -94,12 +94,12 @@ def load(file: Path | None = None) -> Workplace:
 
 
 def markers_file() -> Any:
-    """Give the file that says where the markers lie that the camera sees."""
+    """Return the file that says where the markers lie that the camera sees."""
     return files(__package__) / "markers.yaml"
 
 
 def layout_file() -> Any:
-    """Give the file that tells the small world where things physically stand."""
+    """Return the file that tells the small world where things physically stand."""
     return files(__package__) / "layout.json"
 
 
@@ -133,7 +133,7 @@ class Creation:
 
     # ------------------------------------------------------------------------------------------------ scene
     def _settings(self, obj: Object, kinds: dict[str, str]) -> list[Parameter]:
-        """Give an object's settings; `kinds` are the types that its object type declares for them."""
+        """Return an object's settings; `kinds` are the types that its object type declares for them."""
         settings = []
         for name, value in obj.settings.items():
             if isinstance(value, str) and value.startswith("$"):

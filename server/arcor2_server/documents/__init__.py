@@ -1,4 +1,4 @@
-"""The open scene or project: its content, its checks, its journal."""
+"""The open scene or project: content, edits, journal, history and checks."""
 
 from arcor2_server.documents.session import Session
 

@@ -1,4 +1,4 @@
-"""What the open document is made of, and the one way in which it changes."""
+"""Items of the open document and changes to them."""
 
 import enum
 from collections.abc import Iterable
@@ -75,7 +75,7 @@ class Change(Struct, frozen=True, array_like=True):
     after: Any
 
     def inverse(self) -> "Change":
-        """Give the change that takes this one back."""
+        """Return the change that takes this one back."""
         return Change(self.kind, self.id, self.parent, self.rank, self.after, self.before)
 
 
@@ -107,7 +107,7 @@ class Edit(Struct, frozen=True):
 
 
 def net(changes: Iterable[Change]) -> list[Change]:
-    """Give one change for each item: from before the first of the changes to after the last, none without effect."""
+    """Return one change for each item: from before the first of the changes to after the last, none without effect."""
     found: dict[tuple[Kind, str], Change] = {}
     for change in changes:
         key = (change.kind, change.id)

@@ -1,4 +1,4 @@
-"""What is wrong with an object, an action, a scene or a project: pure functions over data and object types."""
+"""Checks of objects, actions, scenes and projects: pure functions over data and object types."""
 
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Protocol
@@ -37,13 +37,13 @@ class Types(Protocol):
     """What the checks need to know of object types (arcor2_server.object_types.registry.ObjectTypes)."""
 
     def meta(self, name: str) -> ObjectTypeMeta:
-        """Give one type; NotFound."""
+        """Return one type. Raise NotFound if there is none."""
 
     def action(self, type_name: str, name: str) -> ObjectAction:
-        """Give one action; NotFound."""
+        """Return one action. Raise NotFound if there is none."""
 
     def robot_meta(self, name: str) -> RobotMeta:
-        """Give the features of a robot type; NotFound when it is none."""
+        """Return the features of a robot type; raise NotFound when it is none."""
 
 
 def check_name(name: str, what: str) -> None:
@@ -58,7 +58,7 @@ def check_name(name: str, what: str) -> None:
 
 # ---------------------------------------------------------------------------------------------- scene
 def object_problems(obj: SceneObject, types: Types) -> list[str]:
-    """Give what is wrong with an object of a scene, empty when all is well."""
+    """Return what is wrong with an object of a scene, empty when all is well."""
     problems = []
     if not is_valid_name(obj.name):
         problems.append(f"{obj.name!r} is no valid name for an object.")
@@ -79,7 +79,7 @@ def object_problems(obj: SceneObject, types: Types) -> list[str]:
 
 
 def settings_problems(name: str, given: Iterable[Parameter], meta: ObjectTypeMeta) -> list[str]:
-    """Give what is wrong with the settings of the object `name`."""
+    """Return what is wrong with the settings of the object `name`."""
     known = {setting.name: setting for setting in meta.settings}
     problems = []
     seen = set()
@@ -107,12 +107,12 @@ def check_setting(parameter: Parameter, meta: ParameterMeta) -> None:
 
 
 def scene_problems(scene: Scene, types: Types) -> list[str]:
-    """Give what is wrong with a scene."""
+    """Return what is wrong with a scene."""
     return [problem for _, problem in scene_findings(scene, types)]
 
 
 def scene_findings(scene: Scene, types: Types) -> Iterator[tuple[str, str]]:
-    """Give what is wrong with a scene, each with the entry of the document that is at fault: `objects[2]`."""
+    """Return what is wrong with a scene, each with the entry of the document that is at fault: `objects[2]`."""
     for index, obj in enumerate(scene.objects):
         for problem in object_problems(obj, types):
             yield f"objects[{index}]", problem
@@ -153,7 +153,7 @@ class _Unparented:
 
 
 def action_meta(action: Action, lookup: ProjectLookup, types: Types) -> ObjectAction:
-    """Give the action of the object type that an action calls; InvalidData, NotFound say what is wrong."""
+    """Return the action of the object type that an action calls; InvalidData, NotFound say what is wrong."""
     try:
         object_id, method = action.parse_type()
     except ValueError as error:
@@ -275,12 +275,12 @@ def check_project_parameter(parameter: ProjectParameter) -> None:
 
 
 def project_problems(scene: Scene, project: Project, types: Types) -> list[str]:
-    """Give what is wrong with a project on its scene. The cost grows with their size, not with its square."""
+    """Return what is wrong with a project on its scene. The cost grows with their size, not with its square."""
     return [problem for _, problem in project_findings(scene, project, types)]
 
 
 def project_findings(scene: Scene, project: Project, types: Types) -> Iterator[tuple[str, str]]:
-    """Give what is wrong with a project on its scene, each with the entry at fault.
+    """Return what is wrong with a project on its scene, each with the entry at fault.
 
     `scene.objects[2]` or `project.action_points[0].actions[1]`.
     """

@@ -1,4 +1,4 @@
-"""History of closed documents: stored when a document is closed, continued when it is opened again."""
+"""Histories of closed documents: stored on close, continued when the document is opened again."""
 
 import asyncio
 import hashlib
@@ -99,7 +99,7 @@ class ClosedHistories:
         return None
 
     async def forget(self, document: str) -> None:
-        """Delete the history of a document. Raises OSError."""
+        """Delete the history of a document. Raise OSError if that is impossible."""
         self._latest = None
         await asyncio.to_thread(self._path(document).unlink, missing_ok=True)
 

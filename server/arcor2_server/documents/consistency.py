@@ -1,4 +1,4 @@
-"""Whether a document holds together after edits were taken back: what the changes touch is checked, not the whole."""
+"""Checks that a document is consistent after an undo. Only what the changes touch is checked."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -42,7 +42,7 @@ def check_sound(document: Document, changes: Sequence[Change], types: Types) -> 
 
 
 def title(change: Change) -> str:
-    """Give what people call the thing that a change is about."""
+    """Return what people call the thing that a change is about."""
     value = change.before if change.after is None else change.after
     name = getattr(value, "name", "")
     what = {Kind.LOGIC: "step of the logic", Kind.OVERRIDE: "override"}.get(change.kind, change.kind.replace("_", " "))

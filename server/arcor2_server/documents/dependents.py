@@ -1,7 +1,6 @@
-"""What saving or deleting a scene means for saved projects and for object types that were made for it."""
+"""Updates saved projects and generated object types after a scene was saved or deleted."""
 
 from collections.abc import Awaitable, Callable, Iterable
-from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
@@ -9,44 +8,14 @@ from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.project import Action, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import NotFound
+from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.reparenting import changes_for_parent
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.storage import Storage
 
 VIRTUAL = "VirtualCollisionObject"
-
-
-async def after_saving(services: "Services", save: Callable[[], Awaitable[None]]) -> list[ObjectTypeMeta]:
-    """Save the open scene; then joints taught at objects that moved become invalid in all its projects.
-
-    What a project has of objects that are gone is taken out of it. Gives the object types that were deleted.
-    """
-    scene = services.session.require_scene()
-    try:
-        before = await services.storage.scene(scene.id)
-    except NotFound:
-        before = replace(scene, objects=[])
-    gone_types = services.session.removed_types | {obj.type for obj in before.objects}
-    await save()
-    await _update_projects(services, before, scene)
-    services.session.removed_types.clear()
-    return await forget_unused_types(services, gone_types - {obj.type for obj in scene.objects})
-
-
-async def _update_projects(services: "Services", before: Scene, after: Scene) -> None:
-    kept = {obj.id: obj for obj in after.objects}
-    removed = [obj.id for obj in before.objects if obj.id not in kept]
-    moved = [obj.id for obj in before.objects if obj.id in kept and kept[obj.id].pose != obj.pose]
-    if not removed and not moved:
-        return
-    for project_id in await services.storage.projects_with_scene(after.id):
-        project = await services.storage.project(project_id)
-        changed = project_after(before, project, removed, moved)
-        if changed is not project:
-            await services.storage.put_project(changed)
 
 
 def project_after(scene: Scene, project: Project, removed: Iterable[str], moved: Iterable[str]) -> Project:
@@ -84,38 +53,75 @@ def _without_action(document: Document, action: Action) -> list[Change]:
     return [*(document.remove(Kind.LOGIC, i) for i in steps), document.remove(Kind.ACTION, action.id)]
 
 
-async def forget_unused_types(services: "Services", candidates: Iterable[str]) -> list[ObjectTypeMeta]:
-    """Delete those of the object types that are virtual collision objects and stand in no scene; gives them."""
-    types = services.types
-    virtual = {
-        name for name in candidates if name != VIRTUAL and types.known(name) and types.derives_from(name, VIRTUAL)
-    }
-    if not virtual:
-        return []
-    if (opened := services.session.scene) is not None:
-        virtual -= {obj.type for obj in opened.objects}
-    for listed in await services.storage.scenes():
-        if not virtual:
-            break
-        virtual -= {obj.type for obj in (await services.storage.scene(listed.id)).objects}
-    return [await types.remove(name) for name in sorted(virtual)]
-
-
-async def uses_object(services: "Services", object_id: str) -> set[str]:
-    """Give the projects of the open scene that use an object: the saved ones, and the open one as it is now."""
-    session = services.session
-    scene, opened = session.require_scene(), session.project
-    found = set()
-    for project_id in await services.storage.projects_with_scene(scene.id):
-        if (opened is None or project_id != opened.id) and _uses(await services.storage.project(project_id), object_id):
-            found.add(project_id)
-    if opened is not None and _uses(opened, object_id):
-        found.add(opened.id)
-    return found
-
-
 def _uses(project: Project, object_id: str) -> bool:
     return any(
         point.parent == object_id or any(action.type.partition("/")[0] == object_id for action in point.actions)
         for point in project.action_points
     )
+
+
+class Dependents:
+    """Saved projects and object types that depend on the open scene."""
+
+    def __init__(self, storage: Storage, types: ObjectTypes, session: Session) -> None:
+        self._storage = storage
+        self._types = types
+        self._session = session
+
+    async def after_saving(self, save: Callable[[], Awaitable[None]]) -> list[ObjectTypeMeta]:
+        """Save the open scene; then joints taught at objects that moved become invalid in all its projects.
+
+        What a project has of objects that are gone is taken out of it. Gives the object types that were deleted.
+        """
+        scene = self._session.require_scene()
+        try:
+            before = await self._storage.scene(scene.id)
+        except NotFound:
+            before = replace(scene, objects=[])
+        gone_types = self._session.removed_types | {obj.type for obj in before.objects}
+        await save()
+        await self._update_projects(before, scene)
+        self._session.removed_types.clear()
+        return await self.forget_unused_types(gone_types - {obj.type for obj in scene.objects})
+
+    async def _update_projects(self, before: Scene, after: Scene) -> None:
+        kept = {obj.id: obj for obj in after.objects}
+        removed = [obj.id for obj in before.objects if obj.id not in kept]
+        moved = [obj.id for obj in before.objects if obj.id in kept and kept[obj.id].pose != obj.pose]
+        if not removed and not moved:
+            return
+        for project_id in await self._storage.projects_with_scene(after.id):
+            project = await self._storage.project(project_id)
+            changed = project_after(before, project, removed, moved)
+            if changed is not project:
+                await self._storage.put_project(changed)
+
+    async def forget_unused_types(self, candidates: Iterable[str]) -> list[ObjectTypeMeta]:
+        """Delete those of the object types that are virtual collision objects and stand in no scene; return them."""
+        types = self._types
+        virtual = {
+            name for name in candidates if name != VIRTUAL and types.known(name) and types.derives_from(name, VIRTUAL)
+        }
+        if not virtual:
+            return []
+        if (opened := self._session.scene) is not None:
+            virtual -= {obj.type for obj in opened.objects}
+        for listed in await self._storage.scenes():
+            if not virtual:
+                break
+            virtual -= {obj.type for obj in (await self._storage.scene(listed.id)).objects}
+        return [await types.remove(name) for name in sorted(virtual)]
+
+    async def uses_object(self, object_id: str) -> set[str]:
+        """Return the projects of the open scene that use an object: the saved ones, and the open one as it is now."""
+        session = self._session
+        scene, opened = session.require_scene(), session.project
+        found = set()
+        for project_id in await self._storage.projects_with_scene(scene.id):
+            if (opened is None or project_id != opened.id) and _uses(
+                await self._storage.project(project_id), object_id
+            ):
+                found.add(project_id)
+        if opened is not None and _uses(opened, object_id):
+            found.add(opened.id)
+        return found

@@ -1,4 +1,4 @@
-"""The open scene and project as items, with the lookups that make every edit cost the same at any size."""
+"""The open scene and project as indexed items, so that an edit costs the same at any size."""
 
 import operator
 from collections.abc import Iterable, Iterator
@@ -41,12 +41,12 @@ _by_rank = operator.attrgetter("rank")
 
 
 def action_of(end: str) -> str:
-    """Give the action id (or START, END) of the start or end of a logic item: it may carry the name of the flow."""
+    """Return the action id (or START, END) of the start or end of a logic item: it may carry the name of the flow."""
     return end.partition("/")[0]
 
 
 def reference(kind: str, value: str) -> str | None:
-    """Give the id that an action parameter refers to, None when it is a plain literal or makes no sense."""
+    """Return the id that an action parameter refers to, None when it is a plain literal or makes no sense."""
     if kind not in REFERRING:
         return None
     try:
@@ -80,13 +80,13 @@ class Document:
 
     @classmethod
     def of(cls, scene: Scene, project: Project | None = None) -> "Document":
-        """Make a document of a scene, and a project on it."""
+        """Create a document of a scene, and a project on it."""
         document = cls()
         document.apply(document.changes_to_fill(scene, project))
         return document
 
     def changes_to_fill(self, scene: Scene, project: Project | None = None) -> list[Change]:
-        """Give the changes that put a scene and project into an empty document."""
+        """Return the changes that put a scene and project into an empty document."""
         add = self.add
         changes = [add(Kind.SCENE, scene.id, replace(scene, objects=[], **UNTIMED))]
         changes += [add(Kind.OBJECT, obj.id, obj) for obj in scene.objects]
@@ -112,13 +112,13 @@ class Document:
         return Change(kind, item_id, parent, self._next_rank, None, value)
 
     def update(self, kind: Kind, item_id: str, value: Any) -> Change:
-        """Give the change that replaces an item's value; NotFound."""
+        """Return the change that replaces an item's value. Raise NotFound if there is none."""
         self._check_open()
         item = self._get(kind, item_id, kind.replace("_", " "))
         return Change(kind, item_id, item.parent, item.rank, item.value, value)
 
     def remove(self, kind: Kind, item_id: str) -> Change:
-        """Give the change that removes an item; NotFound."""
+        """Return the change that removes an item. Raise NotFound if there is none."""
         self._check_open()
         item = self._get(kind, item_id, kind.replace("_", " "))
         return Change(kind, item_id, item.parent, item.rank, item.value, None)
@@ -175,7 +175,7 @@ class Document:
                 del self._owned[item.parent]
 
     def _keys(self, item: Item) -> Iterator[tuple[dict[Any, dict[str, None]], Any]]:
-        """Give each index with the key under which it lists the item; a key comes at most once."""
+        """Return each index with the key under which it lists the item; a key comes at most once."""
         value = item.value
         match item.kind:
             case Kind.OBJECT | Kind.PARAMETER:
@@ -209,11 +209,11 @@ class Document:
         return list(self._items[kind].values())
 
     def items(self) -> list[Item]:
-        """Give all items, kind by kind, in their order."""
+        """Return all items, kind by kind, in their order."""
         return [item for kind in Kind for item in self.of_kind(kind)]
 
     def count(self, kind: Kind) -> int:
-        """Give how many items of a kind there are."""
+        """Return how many items of a kind there are."""
         return len(self._items[kind])
 
     @property
@@ -241,7 +241,7 @@ class Document:
         return next((item.value for item in self._items[kind].values()), None)
 
     def full_point(self, point_id: str) -> ActionPoint:
-        """Give an action point with orientations, joints and actions."""
+        """Return an action point with orientations, joints and actions."""
         point = self.action_point(point_id)
         return ActionPoint(
             **{name: getattr(point, name) for name in BareActionPoint.__struct_fields__},
@@ -252,7 +252,7 @@ class Document:
 
     # ------------------------------------------------------------------------------------------ one item
     def find(self, kind: Kind, item_id: str) -> Item | None:
-        """Give an item, None when there is none."""
+        """Return an item, None if there is none."""
         return self._items[kind].get(item_id)
 
     def _get(self, kind: Kind, item_id: str, what: str) -> Item:
@@ -262,7 +262,7 @@ class Document:
             raise NotFound(f"There is no {what} with the id {item_id!r}.") from None
 
     def scene_object(self, object_id: str) -> SceneObject:
-        """Give an object of the scene."""
+        """Return an object of the scene."""
         value: SceneObject = self._get(Kind.OBJECT, object_id, "object").value
         return value
 
@@ -277,7 +277,7 @@ class Document:
         return self.action_point(item.parent), item.value
 
     def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
-        """Give joints with their action point."""
+        """Return joints with their action point."""
         item = self._get(Kind.JOINTS, joints_id, "joints")
         return self.action_point(item.parent), item.value
 
@@ -287,33 +287,33 @@ class Document:
         return self.action_point(item.parent), item.value
 
     def parameter(self, parameter_id: str) -> ProjectParameter:
-        """Give a project parameter."""
+        """Return a project parameter."""
         value: ProjectParameter = self._get(Kind.PARAMETER, parameter_id, "project parameter").value
         return value
 
     def logic_item(self, logic_item_id: str) -> LogicItem:
-        """Give a logic item."""
+        """Return a logic item."""
         value: LogicItem = self._get(Kind.LOGIC, logic_item_id, "logic item").value
         return value
 
     def override(self, object_id: str) -> SceneObjectOverride:
-        """Give the overrides of an object."""
+        """Return the overrides of an object."""
         value: SceneObjectOverride = self._get(Kind.OVERRIDE, object_id, "override of an object").value
         return value
 
     # ------------------------------------------------------------------------------------------ relations
     def owned(self, point_id: str, kind: Kind) -> list[Item]:
-        """Give what belongs to an action point, in its order."""
+        """Return what belongs to an action point, in its order."""
         ids = self._owned.get(point_id, {}).get(kind, {})
         return sorted((self._items[kind][i] for i in ids), key=_by_rank)
 
     def points_of(self, parent_id: str) -> list[BareActionPoint]:
-        """Give the action points whose parent is this object or action point."""
+        """Return the action points whose parent is this object or action point."""
         ids = self._points.get(parent_id, ())
         return [item.value for item in sorted((self._items[Kind.POINT][i] for i in ids), key=_by_rank)]
 
     def descendants(self, parent_id: str) -> list[BareActionPoint]:
-        """Give the action points below an object or action point, depth first, without itself."""
+        """Return the action points below an object or action point, depth first, without itself."""
         found: list[BareActionPoint] = []
         waiting = self.points_of(parent_id)[::-1]
         while waiting:
@@ -323,7 +323,7 @@ class Document:
         return found
 
     def named(self, kind: Kind | str, name: str, parent: str = "") -> str | None:
-        """Give the id of what has that name, None when the name is free.
+        """Return the id of what has that name, None when the name is free.
 
         Names are unique per kind, those of orientations and joints within their action point. Kind "output": the
         action whose result has that name.
@@ -332,15 +332,15 @@ class Document:
         return next(iter(self._names.get((scope, name), ())), None)
 
     def outgoing(self, start: str) -> list[LogicItem]:
-        """Give the logic items that leave START or an action."""
+        """Return the logic items that leave START or an action."""
         return [self._items[Kind.LOGIC][i].value for i in self._leaving.get(start, ())]
 
     def incoming(self, end: str) -> list[LogicItem]:
-        """Give the logic items that arrive at END or an action."""
+        """Return the logic items that arrive at END or an action."""
         return [self._items[Kind.LOGIC][i].value for i in self._arriving.get(end, ())]
 
     def leads_to(self, origin: str, target: str, without: str = "") -> bool:
-        """Tell whether the logic leads from one action to another when the item `without` is left out.
+        """Return whether the logic leads from one action to another when the item `without` is left out.
 
         Searched from both ends in turns: it is over when the shorter side is, which where a step is added at the
         beginning or the end of a long program is at once.
@@ -367,12 +367,12 @@ class Document:
         return False
 
     def users_of(self, target_id: str) -> list[Action | LogicItem]:
-        """Give the actions with a parameter that refers to this id, and the logic items with a condition on it."""
+        """Return the actions with a parameter that refers to this id, and the logic items with a condition on it."""
         actions, logic = self._items[Kind.ACTION], self._items[Kind.LOGIC]
         return [(actions.get(i) or logic[i]).value for i in self._users.get(target_id, ())]
 
     def root_of(self, item: str) -> str:
-        """Give the root of the tree that an id belongs to (protocol, section 6); NotFound for an unknown id."""
+        """Return the root of the tree that an id belongs to (protocol, section 6); raise NotFound for an unknown id."""
         for kind in OWNED:
             if (owned := self._items[kind].get(item)) is not None:
                 item = owned.parent
@@ -387,7 +387,7 @@ class Document:
         raise NotFound(f"{item!r} is not part of what is open.")
 
     def tree_of(self, root: str) -> list[str]:
-        """Give the ids below a root: the action points and what belongs to them; nothing when it is none."""
+        """Return the ids below a root: the action points and what belongs to them; nothing when it is none."""
         points = [point.id for point in self.descendants(root)]
         below = [i for holder in (root, *points) for kind in OWNED for i in self._owned.get(holder, {}).get(kind, ())]
         return points + below

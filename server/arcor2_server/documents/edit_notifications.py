@@ -1,17 +1,16 @@
-"""What follows from edits of the open document, told a moment later: what one could undo, previews, breakpoints."""
+"""Notifies observers of edits, and users of what they can undo and redo."""
 
 import asyncio
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Sequence
+from typing import Any, Final
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.editor import HistoryChangedData, HistoryStep
 from arcor2_hw.data.events import Event
+from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Edit, How, Kind
 from arcor2_server.documents.history import History
-from arcor2_server.events import Connection, encode, make_event
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
+from arcor2_server.events import Connection, EventHub, encode, make_event
 
 DELAY: Final = 0.005
 """Seconds after an edit: its answer and its own events go out first, and edits in a row are told once."""
@@ -20,56 +19,62 @@ AT_LATEST: Final = 0.1
 NAME: Final = "HistoryChanged"
 
 
-class EditNews:
+class EditNotifications:
     """Collects changes; tells each subscriber of HistoryChanged what he, as his user, could undo and redo."""
 
-    def __init__(self, services: "Services") -> None:
-        self._services = services
+    def __init__(self, hub: EventHub, session: Session) -> None:
+        self.on_edit: list[Callable[[Sequence[Change]], None]] = []
+        """Called with the changes of each edit at once."""
+        self.on_pause: list[Callable[[Sequence[Change]], None]] = []
+        """Called with all changes since the last call, when their own events are out."""
+        self._hub = hub
+        self._session = session
         self._changes: list[Change] = []
         self._timer: asyncio.TimerHandle | None = None
         self._since = 0.0
         self._last = 0.0
-        self._kept = services.session.revision
-        services.session.on_change.append(self._changed)
+        self._stored_revision = session.revision
+        session.on_change.append(self._changed)
 
     def history_of(self, client: Connection) -> Event:
-        """Give the event that tells a client what he could undo and redo now."""
+        """Return the event that tells a client what he could undo and redo now."""
         return self._history(client.user)
 
     def close(self) -> None:
-        """End with the server."""
+        """Stop when the server ends."""
         if self._timer is not None:
             self._timer.cancel()
 
     def _changed(self, edit: Edit | None) -> None:
         loop = asyncio.get_running_loop()
         self._last = loop.time()
-        self._kept = self._services.session.revision if edit is None else edit.number
+        self._stored_revision = self._session.revision if edit is None else edit.number
         if edit is not None:
             self._changes += edit.changes
-            self._services.previews.changed(edit.changes)
+            for notify in self.on_edit:
+                notify(edit.changes)
         if self._timer is None:
             self._since = self._last
-            self._timer = loop.call_later(DELAY, self._tell)
+            self._timer = loop.call_later(DELAY, self._publish)
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         loop = asyncio.get_running_loop()
-        under_way = self._services.session.revision != self._kept or loop.time() < self._last + DELAY
+        under_way = self._session.revision != self._stored_revision or loop.time() < self._last + DELAY
         if under_way and loop.time() < self._since + AT_LATEST:
-            self._timer = loop.call_later(DELAY, self._tell)
+            self._timer = loop.call_later(DELAY, self._publish)
             return
         self._timer = None
         changes, self._changes = self._changes, []
-        self._services.previews.end_changed()
-        self._services.breakpoints.changed(changes)
+        for notify in self.on_pause:
+            notify(changes)
         events: dict[str | None, bytes] = {}
-        for client in self._services.hub.subscribers(NAME):
+        for client in self._hub.subscribers(NAME):
             if client.user not in events:
                 events[client.user] = encode(self._history(client.user))
             client.put_newest(NAME, events[client.user])
 
     def _history(self, user: str | None) -> Event:
-        session = self._services.session
+        session = self._session
         undo: Any = UNSET
         redo: Any = UNSET
         if user is not None:
@@ -109,7 +114,7 @@ _BY_IMPORTANCE: Final = (
 
 
 def _original(edit: Edit, history: History) -> Edit:
-    """Give the edit that an undo or redo is of, as far as it is kept."""
+    """Return the edit that an undo or redo is of, as far as it is kept."""
     while edit.how in (How.UNDO, How.REDO) and (found := history.find(edit.of)) is not None:
         edit = found
     return edit

@@ -1,4 +1,4 @@
-"""The newest edits of the open document, and which of them each user can take back."""
+"""The latest edits of the open document, and which of them each user can undo."""
 
 from collections import defaultdict, deque
 from collections.abc import Iterator
@@ -36,7 +36,7 @@ class History:
         self._note(edit)
 
     def pop(self) -> Edit:
-        """Give back the newest edit: it could not be kept."""
+        """Return back the newest edit: it could not be kept."""
         edit = self._edits.pop()
         kept = list(self._edits)
         self.clear()
@@ -71,34 +71,34 @@ class History:
 
     # ------------------------------------------------------------------------------------------ what is asked
     def find(self, number: int) -> Edit | None:
-        """Give an edit, None when it is not kept."""
+        """Return an edit, None when it is not kept."""
         index = number - self._edits[0].number if self._edits else -1
         return self._edits[index] if 0 <= index < len(self._edits) else None
 
     def in_force(self, edit: Edit) -> bool:
-        """Tell whether an edit was not taken back."""
+        """Return whether an edit was not taken back."""
         return edit.number not in self._taken_back
 
     def undoable(self, user: str) -> Edit | None:
-        """Give the latest edit of a user that is in force, and no undo itself."""
+        """Return the latest edit of a user that is in force, and no undo itself."""
         numbers = self._undoable.get(user)
         return self.find(numbers[-1]) if numbers else None
 
     def redoable(self, user: str) -> Edit | None:
-        """Give the latest undo of a user after which he made no other edit."""
+        """Return the latest undo of a user after which he made no other edit."""
         numbers = self._redoable.get(user)
         return self.find(numbers[-1]) if numbers else None
 
     def can_undo(self, user: str, number: int) -> bool:
-        """Tell whether an edit is one of the user's that are in force, and no undo itself."""
+        """Return whether an edit is one of the user's that are in force, and no undo itself."""
         return number in self._undoable.get(user, ())
 
     def can_redo(self, user: str, number: int) -> bool:
-        """Tell whether an edit is an undo of the user after which he made no other edit."""
+        """Return whether an edit is an undo of the user after which he made no other edit."""
         return number in self._redoable.get(user, ())
 
     def since(self, number: int) -> list[Edit]:
-        """Give the edits after one, oldest first."""
+        """Return the edits after one, oldest first."""
         found = []
         for edit in reversed(self._edits):
             if edit.number <= number:

@@ -1,4 +1,4 @@
-"""Edits of the open document on disk before they are acknowledged; what a restart goes on with."""
+"""The journal: writes edits to the disk before they are acknowledged, and restores them after a restart."""
 
 import asyncio
 import queue

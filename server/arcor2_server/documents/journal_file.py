@@ -236,7 +236,7 @@ class JournalFile:
                 _beside(copy, ending).unlink(missing_ok=True)
 
     def _set_aside(self, copy: Path | None) -> Path:
-        """Move the damaged files to another name; returns that of the database."""
+        """Move the damaged files to another name; return that of the database."""
         stored = aside(self._path, now())
         source = copy or self._path
         for ending in ("", "-wal", "-shm"):

@@ -1,4 +1,4 @@
-"""What the journal holds: documents, edits and the position, each row with a checksum."""
+"""Records of the journal: documents, edits and the position, each with a checksum."""
 
 import sqlite3
 import zlib

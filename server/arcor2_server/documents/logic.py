@@ -1,4 +1,4 @@
-"""What makes a step between two actions right (protocol, section 10.4)."""
+"""Rules for logic items, the connections between actions (protocol, section 10.4)."""
 
 from collections.abc import Callable, Iterable
 
@@ -15,7 +15,9 @@ from arcor2_server.documents.logic_graph import BRANCHABLE
 def check_logic_item(
     document: Document, meta_of: Callable[[Action], ObjectAction], item: LogicItem, *, loops: bool = True
 ) -> None:
-    """Check an item that is to be added, or to replace the one with its id. Raises InvalidData, NotFound.
+    """Check an item that is to be added, or to replace the one with its id.
+
+    Raise InvalidData or NotFound if that is impossible.
 
     Without `loops` it is left to `check_no_loops`, which looks at many items at once.
     """
@@ -63,7 +65,10 @@ def _is_json(condition: ProjectLogicIf) -> bool:
 
 
 def check_no_loops(document: Document, items: Iterable[LogicItem]) -> None:
-    """Check that none of the items, all of which are in the document, is part of a loop; InvalidData."""
+    """Check that none of the items, all of which are in the document, is part of a loop.
+
+    Raise InvalidData if that is impossible.
+    """
     done: set[str] = set()
     for item in items:
         path = [action_of(item.start)]
@@ -87,7 +92,7 @@ def check_no_loops(document: Document, items: Iterable[LogicItem]) -> None:
 
 
 def _place(text: str, border: str) -> str:
-    """Give the action id, or START or END, of one side of an item."""
+    """Return the action id, or START or END, of one side of an item."""
     action_id, slash, flow = text.partition("/")
     if not action_id or (slash and (flow != "default" or action_id == border)):
         raise InvalidData(f"{text!r} names no action: write its id, or {border}.")

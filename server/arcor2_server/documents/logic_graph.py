@@ -1,4 +1,4 @@
-"""The logic of a project as a graph: which action follows which, under which condition."""
+"""The logic of a project as a graph: the successors of each action and their conditions."""
 
 import json
 from collections.abc import Sequence
@@ -117,7 +117,7 @@ def _shown(value: bool | int | str) -> str:
 
 
 def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> list[int]:
-    """Give what can be reached from `first`, each before what follows it, branches in their order."""
+    """Return what can be reached from `first`, each before what follows it, branches in their order."""
     done: list[int] = []
     open_, closed = 1, 2
     state = [0] * len(edges)
@@ -142,7 +142,7 @@ def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> li
 
 
 def read(project: Project) -> Flow:
-    """Give the graph of a project's logic; InvalidProject names the action where it is no program."""
+    """Return the graph of a project's logic; InvalidProject names the action where it is no program."""
     actions = [action for point in project.action_points for action in point.actions]
     known = {action.id: number for number, action in enumerate(actions)}
     starts: list[int] = []

@@ -1,10 +1,8 @@
-"""What is open, to be read: the scene and project, what differs from what is saved, look-ups by id."""
-
-from typing import TYPE_CHECKING
+"""Read access to the open scene and project: content, unsaved changes, look-ups by id."""
 
 from msgspec.structs import replace
 
-from arcor2_hw.data.events import Event, OpenProjectData, OpenSceneData, SceneStateData
+from arcor2_hw.data.events import Event, OpenProjectData, OpenSceneData, SceneStateData, SceneStateEnum
 from arcor2_hw.data.project import (
     Action,
     BareActionPoint,
@@ -22,16 +20,12 @@ from arcor2_server.documents.unsaved import Unsaved
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import make_event
 
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
-
 
 class OpenDocument:
     """The open scene, or project on its scene."""
 
-    def __init__(self, services: "Services") -> None:
+    def __init__(self) -> None:
         self.document = Document()
-        self._services = services
         self._scene_times = Times()
         self._project_times = Times()
         self._unsaved = Unsaved()
@@ -40,52 +34,52 @@ class OpenDocument:
 
     @property
     def scene(self) -> Scene | None:
-        """The open scene as it is now, None when there is none."""
+        """The open scene as it is now, None if there is none."""
         if self._scene is None and (scene := self.document.scene) is not None:
             self._scene = replace(scene, **self._scene_times.fields())
         return self._scene
 
     @property
     def project(self) -> Project | None:
-        """The open project as it is now, None when there is none."""
+        """The open project as it is now, None if there is none."""
         if self._project is None and (project := self.document.project) is not None:
             self._project = replace(project, **self._project_times.fields())
         return self._project
 
     def require_scene(self) -> Scene:
-        """Give the open scene; RequestRefused when there is none."""
+        """Return the open scene; raise RequestRefused when there is none."""
         if (scene := self.scene) is None:
             raise RequestRefused("No scene is open: open one first.")
         return scene
 
     def require_project(self) -> Project:
-        """Give the open project; RequestRefused when there is none."""
+        """Return the open project; raise RequestRefused when there is none."""
         self.require_project_open()
         assert self.project is not None
         return self.project
 
     def require_scene_open(self) -> Document:
-        """Give the document when a scene is open, with or without a project; else RequestRefused."""
+        """Return the document when a scene is open, with or without a project; else RequestRefused."""
         if not self.document.count(Kind.SCENE):
             raise RequestRefused("No scene is open: open one first.")
         return self.document
 
     def require_scene_alone(self) -> Document:
-        """Give the document when a scene is open and no project; else RequestRefused."""
+        """Return the document when a scene is open and no project; else RequestRefused."""
         document = self.require_scene_open()
         if document.count(Kind.PROJECT):
             raise RequestRefused("The scene cannot be changed while a project is open: close the project first.")
         return document
 
     def require_project_open(self) -> Document:
-        """Give the document when a project is open; else RequestRefused."""
+        """Return the document when a project is open; else RequestRefused."""
         self.require_scene_open()
         if not self.document.count(Kind.PROJECT):
             raise RequestRefused("No project is open: open one first.")
         return self.document
 
     def require_nothing_open(self) -> None:
-        """RequestRefused when a scene or project is open."""
+        """Raise RequestRefused when a scene or project is open."""
         if self.document.count(Kind.PROJECT):
             raise RequestRefused(f"The project {self._name(Kind.PROJECT)} is open: close it first.")
         if self.document.count(Kind.SCENE):
@@ -123,14 +117,18 @@ class OpenDocument:
         """Whether closing would lose something."""
         return self.scene_changed or self.project_changed
 
-    def greeting(self) -> list[Event]:
-        """Give the events that tell a new connection what is open; none when nothing is."""
+    def greeting(self, state: SceneStateEnum) -> list[Event]:
+        """Return the events that describe the open document to a new connection; empty if nothing is open.
+
+        Args:
+            state: whether the scene is online.
+        """
         if (scene := self.scene) is None:
             return []
-        state = make_event("SceneState", SceneStateData(self._services.cell.state))
+        scene_state = make_event("SceneState", SceneStateData(state))
         if (project := self.project) is not None:
-            return [make_event("OpenProject", OpenProjectData(scene, project)), state]
-        return [make_event("OpenScene", OpenSceneData(scene)), state]
+            return [make_event("OpenProject", OpenProjectData(scene, project)), scene_state]
+        return [make_event("OpenScene", OpenSceneData(scene)), scene_state]
 
     def _name(self, kind: Kind) -> str | None:
         return next((item.value.name for item in self.document.of_kind(kind)), None)
@@ -141,7 +139,7 @@ class OpenDocument:
 
     # ------------------------------------------------------------------------------------------ look-ups
     def scene_object(self, object_id: str) -> SceneObject:
-        """Give an object of the scene; NotFound."""
+        """Return an object of the scene. Raise NotFound if there is none."""
         return self.document.scene_object(object_id)
 
     def action_point(self, action_point_id: str) -> BareActionPoint:
@@ -153,7 +151,7 @@ class OpenDocument:
         return self.document.orientation(orientation_id)
 
     def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
-        """Give joints with their action point; NotFound."""
+        """Return joints with their action point. Raise NotFound if there is none."""
         return self.document.joints(joints_id)
 
     def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
@@ -161,13 +159,18 @@ class OpenDocument:
         return self.document.action(action_id)
 
     def parameter(self, parameter_id: str) -> ProjectParameter:
-        """Give a project parameter; NotFound."""
+        """Return a project parameter. Raise NotFound if there is none."""
         return self.document.parameter(parameter_id)
 
     def root_of(self, item: str) -> str:
-        """Give the root of the lock tree that an id belongs to; NotFound."""
+        """Return the root of the lock tree that an id belongs to. Raise NotFound if there is none."""
         return self.document.root_of(item)
 
+    def name_of(self, item: str) -> str:
+        """Return the name of an item of the open document; empty if there is no such item."""
+        found = next((each for kind in Kind if (each := self.document.find(kind, item)) is not None), None)
+        return "" if found is None else str(getattr(found.value, "name", ""))
+
     def tree_of(self, root: str) -> list[str]:
-        """Give the ids below a root of a lock tree."""
+        """Return the ids below a root of a lock tree."""
         return self.document.tree_of(root)

@@ -1,4 +1,4 @@
-"""Actions of projects that were made before their object type renamed a method or a parameter."""
+"""Updates actions of projects whose object type has renamed a method or a parameter."""
 
 from typing import Protocol
 
@@ -14,7 +14,7 @@ class Types(Protocol):
     """What is needed of the object types."""
 
     def action(self, type_name: str, name: str) -> ObjectAction:
-        """Return the action that has a name or had it formerly; NotFound."""
+        """Return the action that has a name or had it formerly. Raise NotFound if there is none."""
 
 
 def with_present_name(action: Action, meta: ObjectAction) -> Action:

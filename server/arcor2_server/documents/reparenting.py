@@ -1,4 +1,4 @@
-"""Action points keep their place in the world when they get another parent (protocol, section 10.1)."""
+"""Changes the parent of action points while they keep their pose in the world (protocol, section 10.1)."""
 
 from typing import Final
 
@@ -17,7 +17,10 @@ SAME_ROTATION: Final = 1e-9
 
 
 def check_parent(lookup: ProjectLookup, parent_id: str, name: str) -> None:
-    """Check that an object or action point can be the parent of the action point `name`; InvalidData, NotFound."""
+    """Check that an object or action point can be the parent of the action point `name`.
+
+    Raise InvalidData or NotFound if that is impossible.
+    """
     try:
         lookup.action_point(parent_id)
     except NotFound:
@@ -67,7 +70,10 @@ def _turned(document: Document, point_id: str, turn: Orientation) -> list[Change
 
 
 def check_no_loop(document: Document, point: BareActionPoint, new_parent: str) -> None:
-    """Check that a parent is neither the action point itself nor hangs on it; InvalidData."""
+    """Check that a parent is neither the action point itself nor hangs on it.
+
+    Raise InvalidData if that is impossible.
+    """
     at: str | Unset = new_parent
     while not isinstance(at, Unset):
         if at == point.id:

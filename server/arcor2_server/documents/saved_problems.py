@@ -1,4 +1,4 @@
-"""Problems of saved scenes and projects, for the lists that clients show."""
+"""Problems of saved scenes and projects, for the lists in clients."""
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
@@ -70,7 +70,7 @@ class SavedProblems:
             found = await self._storage.scenes_with_ids(_outdated(sources, known.scenes))
             fresh = await asyncio.to_thread(lambda: {scene.id: scene_problems(scene, self._types) for scene in found})
             checked = _merged(sources, known.scenes, fresh)
-            self._keep(msgspec.structs.replace(known, scenes=checked))
+            self._store(msgspec.structs.replace(known, scenes=checked))
         return {key: each.problems for key, each in checked.items()}
 
     async def of_projects(self, projects: Sequence[BareProject], scenes: Sequence[BareScene]) -> dict[str, list[str]]:
@@ -84,7 +84,7 @@ class SavedProblems:
             used = await self._storage.scenes_with_ids(sorted({project.scene_id for project in found}))
             fresh = await asyncio.to_thread(self._checker({scene.id: scene for scene in used}), found)
             checked = _merged(sources, known.projects, fresh)
-            self._keep(msgspec.structs.replace(known, projects=checked))
+            self._store(msgspec.structs.replace(known, projects=checked))
         return {key: each.problems for key, each in checked.items()}
 
     def _checker(self, scenes: Mapping[str, Scene]) -> Callable[[Sequence[Project]], dict[str, list[str]]]:
@@ -109,7 +109,7 @@ class SavedProblems:
             self._stored = await asyncio.to_thread(self._read)
         return self._stored
 
-    def _keep(self, known: Stored) -> None:
+    def _store(self, known: Stored) -> None:
         if known != self._stored:
             self._stored = known
             self._writing = asyncio.get_running_loop().run_in_executor(None, self._write, known)

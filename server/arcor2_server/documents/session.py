@@ -1,9 +1,10 @@
-"""The one owner of the open scene or project: every edit goes through it, to memory and to the journal."""
+"""The owner of the open scene or project. Every edit passes through it to memory and to the journal."""
 
 import asyncio
+import functools
 from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import structlog
 from msgspec.structs import replace
@@ -22,13 +23,16 @@ from arcor2_server.documents.document import Document
 from arcor2_server.documents.history import History
 from arcor2_server.documents.journal import Journal
 from arcor2_server.documents.journal_records import ALL, Base, Recovered, Times
+from arcor2_server.documents.journal_secrets import hide_in_journal
 from arcor2_server.documents.open_document import OpenDocument
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.documents.unsaved import Unsaved
 from arcor2_server.errors import RequestRefused
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage import Storage
+from arcor2_server.storage.damage_notices import DataDamage
+from arcor2_server.storage.setting_secrets import SettingSecrets
 
 log = structlog.get_logger(__name__)
 
@@ -44,17 +48,26 @@ class _Pending(NamedTuple):
 class Session(OpenDocument):
     """What is open. Between two awaits of a handler nobody else changes it."""
 
-    def __init__(self, services: "Services") -> None:
-        super().__init__(services)
-        settings = services.settings
+    def __init__(
+        self,
+        settings: ServerSettings,
+        storage: Storage,
+        types: ObjectTypes,
+        damage: DataDamage,
+        secrets: SettingSecrets,
+    ) -> None:
+        super().__init__()
+        self._storage = storage
+        self._types = types
+        self._damage = damage
         self.removed_types: set[str] = set()
         """Object types of objects that were removed: those made for one object are deleted when the scene is saved."""
         self.history = History(settings.history_limit)
         self.on_change: list[Callable[[Edit | None], None]] = []
         """Called with each edit once it is on the disk, and with None when another document is open."""
         self._limit = settings.history_limit
-        self._journal = Journal(settings.journal_database, self._take_back, services.secrets.hide_in_journal)
-        self._closed = ClosedHistories(settings.history_dir, services.damage)
+        self._journal = Journal(settings.journal_database, self._take_back, functools.partial(hide_in_journal, secrets))
+        self._closed = ClosedHistories(settings.history_dir, damage)
         self._number = 0
         self._based_on = 0
         self._pending: deque[_Pending] = deque()
@@ -76,7 +89,7 @@ class Session(OpenDocument):
             if loss.incomplete and await self._superseded():
                 await self.discard()
                 notice += " What was saved is newer than the rest of the journal: open it again."
-            self._services.damage.report(notice)
+            self._damage.report(notice)
         if scene := self._name(Kind.SCENE):
             project = self._name(Kind.PROJECT)
             log.info("reopened", scene=scene, project=project, edits=len(self.history), unsaved=self.has_changes)
@@ -114,13 +127,13 @@ class Session(OpenDocument):
 
     async def _find_unsaved(self) -> None:
         """Compare with what is saved: the journal need not know of the last save, nor what was changed since when."""
-        storage, scene, project = self._services.storage, self.require_scene(), self.project
+        storage, scene, project = self._storage, self.require_scene(), self.project
         saved, saved_project = Scene(name="", id=scene.id), None
         try:
             saved = await storage.scene(scene.id)
             self._scene_times = replace(Times.of(saved), changed=self._scene_times.changed)
             if project is not None:
-                saved_project = with_present_names(saved, await storage.project(project.id), self._services.types)
+                saved_project = with_present_names(saved, await storage.project(project.id), self._types)
                 self._project_times = replace(Times.of(saved_project), changed=self._project_times.changed)
         except NotFound:
             pass  # it was never saved, or is deleted
@@ -145,20 +158,20 @@ class Session(OpenDocument):
     async def commit(
         self, user: str, changes: Sequence[Change], request: str = "", how: How = How.EDIT, of: int = 0
     ) -> None:
-        """Make changes as one edit; returns when they are on the disk. `request`, `how`, `of`: see Edit.
+        """Make changes as one edit; return when they are on the disk. `request`, `how`, `of`: see Edit.
 
         Others see them at once. Raises StorageError when they cannot be kept: then they are taken back.
         """
         edit = Edit(self._number + 1, now(), user, list(changes), request, how, of)
-        kept = self._journal.append(edit)
+        stored = self._journal.append(edit)
         self._pending.append(_Pending(edit, self._scene_times, self._project_times))
-        kept.add_done_callback(self._kept)
+        stored.add_done_callback(self._edit_stored)
         self._apply(edit)
         self.history.append(edit)
         if self._number - self._based_on >= self._limit:
             self._shorten()
         # A caller who goes away does not take the edit with him.
-        await asyncio.shield(kept)
+        await asyncio.shield(stored)
 
     def _apply(self, edit: Edit) -> None:
         self.document.apply(edit.changes)
@@ -172,11 +185,11 @@ class Session(OpenDocument):
             self._project_times = self._project_times.touched(edit.time, differs=self._unsaved.project)
         self._forget_snapshots()
 
-    def _kept(self, future: "asyncio.Future[None]") -> None:
+    def _edit_stored(self, future: "asyncio.Future[None]") -> None:
         if future.exception() is None:
             edit = self._pending.popleft().edit
-            for tell in self.on_change:
-                tell(edit)
+            for notify in self.on_change:
+                notify(edit)
 
     def _take_back(self) -> None:
         """Undo all that is not on the disk: the journal cannot be written."""
@@ -232,7 +245,7 @@ class Session(OpenDocument):
         self._replace(Document())
 
     async def forget_history(self, document: str) -> None:
-        """Delete the history of a closed scene or project. Raises OSError."""
+        """Delete the history of a closed scene or project. Raise OSError if that is impossible."""
         await self._closed.forget(document)
 
     def set_aside(self) -> Callable[[], None]:
@@ -268,12 +281,12 @@ class Session(OpenDocument):
     def _show(self, document: Document, unsaved: Unsaved) -> None:
         self.document, self._unsaved = document, unsaved
         self._forget_snapshots()
-        for tell in self.on_change:
-            tell(None)
+        for notify in self.on_change:
+            notify(None)
 
     async def save(self) -> None:
-        """Save what has changes: the scene, the project, or both. Raises StorageError."""
-        storage = self._services.storage
+        """Save what has changes: the scene, the project, or both. Raise StorageError if that is impossible."""
+        storage = self._storage
         if self.scene_changed:
             saved = await self._save(storage.put_scene(self.require_scene()), scene=True)
             self._scene_times = self._scene_times.settled(differs=self._unsaved.scene, saved=saved)
@@ -297,5 +310,5 @@ class Session(OpenDocument):
 
     # ------------------------------------------------------------------------------------------ problems
     def scene_problems(self, scene: Scene) -> list[str]:
-        """Give what is wrong with a scene, empty when it can be opened."""
-        return scene_problems(scene, self._services.types)
+        """Return what is wrong with a scene, empty when it can be opened."""
+        return scene_problems(scene, self._types)

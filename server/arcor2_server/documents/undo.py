@@ -1,11 +1,11 @@
-"""What taking edits back comes to: the changes, the locks and the role that they need, and who stands against it."""
+"""The changes, locks and role that an undo needs, and the later edits that prevent it."""
 
 from collections.abc import Iterable, Sequence
+from typing import Final
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.project import END, START
 from arcor2_hw.data.role import Role
-from arcor2_server.collaboration.lock_table import PROJECT, SCENE
 from arcor2_server.documents.changes import OF_SCENE, Change, Edit, How, Kind, net
 from arcor2_server.documents.checks import Types
 from arcor2_server.documents.consistency import Unsound, check_sound, title
@@ -15,7 +15,7 @@ from arcor2_server.errors import RequestRefused
 
 
 def changes_back(edits: Iterable[Edit]) -> list[Change]:
-    """Give the changes that take back edits, which are given oldest first and follow each other."""
+    """Return the changes that take back edits, which are given oldest first and follow each other."""
     return [change.inverse() for change in net(change for edit in edits for change in edit.changes)]
 
 
@@ -45,7 +45,7 @@ def _by(history: History, ids: set[str], after: int, user: str, opening: str = "
 
 
 def role_for(changes: Iterable[Change]) -> Role:
-    """Give the least role that may make such changes by the ordinary requests."""
+    """Return the least role that may make such changes by the ordinary requests."""
     needed = Role.STANDARD_USER
     for change in changes:
         needed = max(needed, _role_for(change))
@@ -66,13 +66,16 @@ def _role_for(change: Change) -> Role:
 
 # ---------------------------------------------------------------------------------------------- locks
 def ids_to_lock(document: Document, changes: Iterable[Change]) -> list[str]:
-    """Give the ids on which the ordinary requests for such changes take locks, as far as they exist."""
+    """Return the ids on which the ordinary requests for such changes take locks, as far as they exist."""
     found: dict[str, None] = {}
     for change in changes:
         found.update(dict.fromkeys(_places(change)))
     return [key for key in found if key in _OWN or _is_there(document, key)]
 
 
+SCENE: Final = "SCENE"
+PROJECT: Final = "PROJECT"
+"""Ids that are locked while a scene or project as a whole is opened or closed (protocol, section 6)."""
 _OWN = frozenset({SCENE, PROJECT, START, END})
 _LOCKABLE = (Kind.SCENE, Kind.OBJECT, Kind.PROJECT, Kind.POINT, Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
 
@@ -107,7 +110,7 @@ def _parent_changes(change: Change) -> bool:
 
 
 def ids_that_move(document: Document, changes: Iterable[Change]) -> list[str]:
-    """Give the ids of all that hangs on action points that are moved, or hung elsewhere, by the changes."""
+    """Return the ids of all that hangs on action points that are moved, or hung elsewhere, by the changes."""
     found: dict[str, None] = {}
     for change in changes:
         if change.kind is not Kind.POINT or change.before is None or change.after is None:

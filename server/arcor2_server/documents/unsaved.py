@@ -1,4 +1,4 @@
-"""What of the open document differs from what is saved."""
+"""Differences between the open document and its saved version."""
 
 from typing import Any
 
@@ -56,7 +56,7 @@ class Unsaved:
             del values[key]
 
     def begin_saving(self, *, scene: bool) -> _Values:
-        """Count from now on what differs from the present state, which is being saved; gives what differed before."""
+        """Count from now on what differs from the present state, which is being saved; return what differed before."""
         if scene:
             before, self._of_scene = self._of_scene, {}
         else:

@@ -1,7 +1,6 @@
-"""The export file, a zip: documents as JSON, object types as source, models and assets as they are kept."""
+"""The export file, a zip: documents as JSON, object types as source, models and assets."""
 
 import ast
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, Literal, TypeVar
@@ -16,7 +15,8 @@ from arcor2_hw.data.project import Project, ProjectParameter
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import InvalidPackage, NotFound, StorageError, TextTooLong
-from arcor2_server.build import importing, package
+from arcor2_server.build import imported, package
+from arcor2_server.files import replace_file
 
 T = TypeVar("T")
 Kind = Literal["scene", "project", "object-type"]
@@ -87,7 +87,7 @@ def _json(value: Any) -> bytes:
 
 
 def files_of(archive: Archive) -> dict[str, bytes]:
-    """Give the files of an export by path."""
+    """Return the files of an export by path."""
     files: dict[str, bytes] = {}
     types: dict[str, str] = {}
     for name, one in archive.types.items():
@@ -116,14 +116,12 @@ def files_of(archive: Archive) -> dict[str, bytes]:
 
 
 def write(archive: Archive, path: Path) -> None:
-    """Write the file, which appears whole or not at all; the same content gives the same bytes. StorageError."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    """Write the file, which appears whole or not at all; the same content gives the same bytes.
+
+    Raise StorageError if that is impossible.
+    """
     try:
-        try:
-            partial.write_bytes(package.to_zip(files_of(archive)))
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+        replace_file(path, package.to_zip(files_of(archive)), mode=0o666, durable=False)
     except OSError as error:
         raise StorageError(f"{path} cannot be written: {error.strerror or error}") from error
 
@@ -202,7 +200,7 @@ def _model(files: Mapping[str, bytes], name: str) -> ObjectModel | Unset:
 
 def _checked_id(document: Scene | Project, path: str) -> None:
     key = document.id
-    if not key or len(key) > importing.MAX_ID or not key.isprintable() or "/" in key or key in (".", ".."):
+    if not key or len(key) > imported.MAX_ID or not key.isprintable() or "/" in key or key in (".", ".."):
         raise InvalidPackage(f"{path}: {key[:80]!r} is no usable id.")
 
 
@@ -255,7 +253,7 @@ def _assets(files: Mapping[str, bytes], named: Iterable[_Asset]) -> dict[str, As
 
 def _from_package(path: Path) -> Archive:
     """Read an execution package; its script counts only where it is the program itself."""
-    given = importing.read(path)
+    given = imported.read(path)
     return Archive(
         "project",
         given.scene,
@@ -269,7 +267,7 @@ def _from_package(path: Path) -> Archive:
 
 # ------------------------------------------------------------------------------------------------ what is needed
 def needed_modules(source: str) -> set[str]:
-    """Give the neighbours that an object type's module imports (`from .arm import Arm`), as far as it can be read."""
+    """Return the neighbours that an object type's module imports (`from .arm import Arm`), as far as it can be read."""
     found: set[str] = set()
     try:
         tree = ast.parse(source)
@@ -282,7 +280,7 @@ def needed_modules(source: str) -> set[str]:
 
 
 def with_needed(names: Iterable[str], sources: Mapping[str, ObjectTypeSource]) -> dict[str, ObjectTypeSource]:
-    """Give the sources of these types and of the bases, mixins and other modules that they import."""
+    """Return the sources of these types and of the bases, mixins and other modules that they import."""
     of_module = {module_name(name): name for name in sources}
     chosen: dict[str, ObjectTypeSource] = {}
     waiting = sorted(set(names) & sources.keys(), reverse=True)
@@ -296,7 +294,7 @@ def with_needed(names: Iterable[str], sources: Mapping[str, ObjectTypeSource]) -
 
 
 def mesh_of(one: ObjectTypeSource) -> str | None:
-    """Give the id of the asset that the model of a type needs."""
+    """Return the id of the asset that the model of a type needs."""
     if isinstance(one.model, Unset) or one.model.type is not Model3dType.MESH:
         return None
     model = one.model.model()

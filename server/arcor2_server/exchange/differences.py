@@ -1,4 +1,4 @@
-"""What differs between two exports: entry by entry, found by their ids and told by their names."""
+"""Differences between two exports, matched by id and reported by name."""
 
 import difflib
 import hashlib
@@ -38,12 +38,12 @@ class Difference(Data, frozen=True):
 
 
 def differences(old: Archive, new: Archive) -> list[Difference]:
-    """Give what differs. The order of a document's entries, and when it was saved, are no differences."""
+    """Return what differs. The order of a document's entries, and when it was saved, are no differences."""
     return list(_compare(_tree(old), _tree(new), [], names_of(old, new)))
 
 
 def names_of(*archives: Archive) -> dict[str, str]:
-    """Give what people call the things that have an id; the last export counts most."""
+    """Return what people call the things that have an id; the last export counts most."""
     names = {START: START, END: END}
     for archive in archives:
         names |= _names(archive)
@@ -122,7 +122,7 @@ def _is_one_value(old: dict[str, Any], new: dict[str, Any]) -> bool:
 
 
 def _keyed(items: list[Any]) -> dict[str, Any] | None:
-    """Give a list of things with ids, or else names, by these; None for a list of anything else."""
+    """Return a list of things with ids, or else names, by these; None for a list of anything else."""
     for key in ("id", "name"):
         if all(isinstance(item, dict) and item.get(key) for item in items):
             found = {item[key]: item for item in items}
@@ -132,7 +132,7 @@ def _keyed(items: list[Any]) -> dict[str, Any] | None:
 
 
 def _plain(value: Any) -> Any:
-    """Give a value as JSON can hold it: an object type's source is not repeated as a whole."""
+    """Return a value as JSON can hold it: an object type's source is not repeated as a whole."""
     if isinstance(value, _Text):
         return f"{len(value.splitlines())} lines"
     if isinstance(value, dict):
@@ -143,7 +143,7 @@ def _plain(value: Any) -> Any:
 
 
 def told(value: Any, names: Mapping[str, str]) -> str:
-    """Give a value in a few words, with names where it has ids."""
+    """Return a value in a few words, with names where it has ids."""
     match value:
         case dict() if frozenset(value) in WHOLE:
             return f"({', '.join(f'{float(one):g}' for one in value.values())})"

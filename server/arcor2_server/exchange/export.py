@@ -1,4 +1,4 @@
-"""From a server into an export: a saved document, and everything that it needs."""
+"""Exports a saved document from a server, with everything it needs."""
 
 import tempfile
 from collections.abc import Collection, Iterable
@@ -78,7 +78,7 @@ class Source:
         return Archive("object-type", types=types, assets=await self._assets(types, ()))
 
     async def uploaded(self) -> dict[str, ObjectTypeSource]:
-        """Give the object types that were brought in, with their models."""
+        """Return the object types that were brought in, with their models."""
         if self._uploaded is None:
             models = {name.id: name for name in await self._rest.models()}
             self._uploaded = {}

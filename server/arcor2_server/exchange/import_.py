@@ -1,4 +1,4 @@
-"""From an export into a server: what differs from what is there is refused unless it may be replaced."""
+"""Imports an export into a server. Differing items are refused unless they may be overwritten."""
 
 import contextlib
 import hashlib
@@ -42,7 +42,7 @@ class Step(Data, frozen=True):
 
 
 def renamed(archive: Archive, name: str) -> Archive:
-    """Give the export as a copy: its document gets another name and an id of its own. The rest stays what it is."""
+    """Return the export as a copy: its document gets another name and an id of its own. The rest stays what it is."""
     if archive.project is not None:
         return replace(archive, project=replace(archive.project, id=new_id("pro"), name=name))
     if archive.scene is not None:
@@ -67,7 +67,7 @@ class Target:
         self._metas: dict[str, ObjectTypeMeta] = {}
 
     async def plan(self, installed: list[SourceFile]) -> list[Step]:
-        """Give what would be done. Nothing is changed.
+        """Return what would be done. Nothing is changed.
 
         Raises InvalidPackage naming the first entry that is at fault, Conflict naming all that stands in the way.
         """
@@ -156,7 +156,7 @@ class Target:
         self._note(kind, given.name, same, old is None)
 
     async def _same_beside(self, key: str) -> bool:
-        """Tell whether the script and what is kept beside the project are the same, too."""
+        """Return whether the script and what is kept beside the project are the same, too."""
         archive, rest = self._archive, self._rest
         if archive.script is not None:
             try:
@@ -286,5 +286,5 @@ def _file(one: ObjectTypeSource) -> SourceFile:
 
 
 def _bases_first(types: dict[str, ObjectTypeSource]) -> list[str]:
-    """Give the types each behind those that it imports, as far as they do not import each other."""
+    """Return the types each behind those that it imports, as far as they do not import each other."""
     return sorted(types, key=lambda name: len(with_needed([name], types)))

@@ -1,4 +1,4 @@
-"""What an import has done so far on a server, and how that is undone when the rest of it fails."""
+"""Undoes the finished steps of an import if a later step fails."""
 
 from collections.abc import Awaitable, Callable
 from typing import Any
@@ -18,7 +18,7 @@ class Undoing:
         self._done.append((what, undo))
 
     async def take_back(self) -> str:
-        """Undo all, what came last first; gives a sentence that names what was taken back, and what could not be."""
+        """Undo all, what came last first; return a sentence that names what was taken back, and what could not be."""
         undone: list[str] = []
         left: list[str] = []
         while self._done:

@@ -1,4 +1,4 @@
-"""What is wrong with an export file, found without a server: each finding names the entry at fault."""
+"""Validates an export file without a server. Each problem names its entry."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -53,11 +53,11 @@ class Known:
         return name in self._elsewhere and name not in self._given
 
     def meta(self, name: str) -> ObjectTypeMeta:
-        """Give one type; NotFound."""
+        """Return one type. Raise NotFound if there is none."""
         return self._elsewhere[name] if self._from_elsewhere(name) else self.candidates.meta(name)
 
     def action(self, type_name: str, name: str) -> ObjectAction:
-        """Give one action; NotFound."""
+        """Return one action. Raise NotFound if there is none."""
         if not self._from_elsewhere(type_name):
             return self.candidates.action(type_name, name)
         if (action := find_action(self._actions.get(type_name, {}).values(), name)) is not None:
@@ -65,7 +65,7 @@ class Known:
         raise NotFound(f"The object type {type_name} has no action {name!r}.")
 
     def robot_meta(self, name: str) -> RobotMeta:
-        """Give the features of a robot type; NotFound when it is none."""
+        """Return the features of a robot type; raise NotFound when it is none."""
         if not self._from_elsewhere(name):
             return self.candidates.robot_meta(name)
         try:
@@ -75,7 +75,7 @@ class Known:
 
 
 def find(archive: Archive, types: Known, assets: Iterable[str] | None = None) -> Iterator[Finding]:
-    """Give what is wrong with an export. `assets`: ids that the server has already; None where none is asked."""
+    """Return what is wrong with an export. `assets`: ids that the server has already; None where none is asked."""
     there = {*archive.assets, *(assets or ())}
     for name, one in archive.types.items():
         analysis = types.candidates.analysis(name)

@@ -1,4 +1,4 @@
-"""Packages as clients bring them in, name them and delete them, while one of them may be running."""
+"""Uploads, renames and deletes packages while one of them may be running."""
 
 import abc
 import asyncio
@@ -10,7 +10,7 @@ from arcor2_server.events import EventHub, make_event
 from arcor2_server.storage.packages import Packages
 
 
-class KeptPackages(abc.ABC):
+class PackageLibrary(abc.ABC):
     """What may be done with packages on disk; with that which runs, nothing but to give it another name."""
 
     def __init__(self, hub: EventHub, packages: Packages) -> None:
@@ -22,7 +22,7 @@ class KeptPackages(abc.ABC):
         """Raise RequestRefused for the package that runs."""
 
     async def list(self) -> list[PackageSummary]:
-        """Give all packages."""
+        """Return all packages."""
         return await asyncio.to_thread(self.packages.all)
 
     async def upload(self, package_id: str, data: str) -> PackageSummary:
@@ -45,7 +45,7 @@ class KeptPackages(abc.ABC):
         return await asyncio.to_thread(self.packages.rename, package_id, name)
 
     async def added(self, package_id: str) -> None:
-        """Tell everybody of a package that was written among the others, after the answer that is being given."""
+        """Notify all clients of a package that was written among the others, after the answer that is being given."""
         summary = await asyncio.to_thread(self.packages.summary, package_id)
         event = make_event("PackageChanged", summary, ChangeType.ADD)
         asyncio.get_running_loop().call_soon(self._hub.broadcast, event)

@@ -1,4 +1,4 @@
-"""The history of runs: who ran what and how it ended; and the actions of the present or last run, one by one."""
+"""The history of runs, and the trace of actions of the present or last run."""
 
 import asyncio
 from collections import OrderedDict
@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from arcor2_hw.data.base import Unset, now
 from arcor2_hw.data.editor import ActionOfRun, Run, RunEnd, TraceEntry
 from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData
+from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.runtime import messages as m
 from arcor2_server.events import EventHub, make_event
@@ -47,14 +48,14 @@ class _Call:
         self.end: m.ProgramEvent | m.ActionFailed | None = None
 
     def entry(self, run: int) -> TraceEntry:
-        told, end = self.before, self.end
-        before = msgspec.json.decode(told.encoded, type=_Before).data
+        announced, end = self.before, self.end
+        before = msgspec.json.decode(announced.encoded, type=_Before).data
         entry = TraceEntry(
             run,
-            told.number,
+            announced.number,
             "" if isinstance(before.action_id, Unset) else before.action_id,
-            datetime.fromtimestamp(told.time, UTC).isoformat(timespec="microseconds"),
-            told.name,
+            datetime.fromtimestamp(announced.time, UTC).isoformat(timespec="microseconds"),
+            announced.name,
             parameters=before.parameters,
             thread_id=before.thread_id,
         )
@@ -92,7 +93,10 @@ class Runs:
         self._trace_of = 0
 
     async def open(self, data: SharedData) -> None:
-        """Read what was kept; runs that had not ended were lost with the server. StorageError."""
+        """Read what was kept; runs that had not ended were lost with the server.
+
+        Raise StorageError if that is impossible.
+        """
         self._data = data
         for run in await data.runs(KEPT):
             self._runs[run.number] = run
@@ -107,7 +111,7 @@ class Runs:
 
     # -------------------------------------------------------------------------------- a run
     def begin(self, package_id: str, *, by: str, temporary: bool, start_paused: bool) -> int:
-        """Note that a run begins; gives its number."""
+        """Note that a run begins; return its number."""
         number = next(reversed(self._runs), 0) + 1
         run = Run(
             number,
@@ -150,23 +154,23 @@ class Runs:
             )
         )
 
-    def told(self, told: m.ProgramEvent) -> None:
+    def announced(self, announced: m.ProgramEvent) -> None:
         """Note that an action of the present run was announced (ActionStateBefore), or has ended (ActionStateAfter)."""
-        if told.event != "ActionStateBefore":
-            self.ended(told)
+        if announced.event != "ActionStateBefore":
+            self.ended(announced)
             return
-        call = self._trace[told.number] = _Call(told)
+        call = self._trace[announced.number] = _Call(announced)
         if len(self._trace) > KEPT_ACTIONS:
             self._trace.popitem(last=False)
-        self._tell(call)
+        self._publish(call)
 
-    def ended(self, told: m.ProgramEvent | m.ActionFailed) -> None:
+    def ended(self, announced: m.ProgramEvent | m.ActionFailed) -> None:
         """Note that an action of the present run has ended (ActionStateAfter), or failed."""
-        if (call := self._trace.get(told.number)) is not None:
-            call.end = told
-            self._tell(call)
+        if (call := self._trace.get(announced.number)) is not None:
+            call.end = announced
+            self._publish(call)
 
-    def _tell(self, call: "_Call") -> None:
+    def _publish(self, call: "_Call") -> None:
         if self._hub.subscribers(TRACE):
             self._hub.broadcast(make_event(TRACE, call.entry(self._trace_of)))
 
@@ -174,7 +178,7 @@ class Runs:
     def newest(
         self, limit: int, before: int | None = None, package_id: str | None = None, project_id: str | None = None
     ) -> list[Run]:
-        """Give runs, newest first."""
+        """Return runs, newest first."""
         found = (
             self._counted(run)
             for run in reversed(self._runs.values())
@@ -184,8 +188,15 @@ class Runs:
         )
         return [*islice(found, limit)]
 
+    def find(self, args: ListRunsArgs) -> list[Run]:
+        """Return the newest runs that the arguments of ListRuns select."""
+        before = None if isinstance(args.before, Unset) else args.before
+        package = None if isinstance(args.package_id, Unset) else args.package_id
+        project = None if isinstance(args.project_id, Unset) else args.project_id
+        return self.newest(args.limit, before, package, project)
+
     def trace(self, limit: int, before: int | None = None) -> tuple[int, list[TraceEntry]]:
-        """Give the run whose actions are kept (0: there was none), and actions of it, newest first."""
+        """Return the run whose actions are kept (0: there was none), and actions of it, newest first."""
         calls = (call for number, call in reversed(self._trace.items()) if before is None or number < before)
         return self._trace_of, [call.entry(self._trace_of) for call in islice(calls, limit)]
 

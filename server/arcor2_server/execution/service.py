@@ -1,11 +1,10 @@
-"""The Execution service: packages, and the one program that runs (protocol, section 12)."""
+"""The Execution service: packages and the running program (protocol, section 12)."""
 
 import asyncio
 import contextlib
 import time
 from collections.abc import Coroutine
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import msgspec
 import structlog
@@ -24,19 +23,21 @@ from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_hw.runtime import messages as m
 from arcor2_server.errors import RequestRefused
-from arcor2_server.events import make_event
-from arcor2_server.execution.packages import KeptPackages
-from arcor2_server.execution.runs import How
+from arcor2_server.events import EventHub, make_event
+from arcor2_server.execution.breakpoints import SharedBreakpoints
+from arcor2_server.execution.packages import PackageLibrary
+from arcor2_server.execution.run_message import RunMessages
+from arcor2_server.execution.runs import How, Runs
 from arcor2_server.hosts.devices import DeviceBoard, overlay_for
-from arcor2_server.hosts.open_request import shapes_put_in
 from arcor2_server.hosts.process import CellHost
+from arcor2_server.hosts.session import HostSession
 from arcor2_server.hosts.streams import RobotStreams
-from arcor2_server.hosts.workspace_updates import calibrations_of_package, with_world
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.online.online_scene import OnlineScene
+from arcor2_server.settings import ServerSettings
 from arcor2_server.storage.package_versions import check_versions
 from arcor2_server.storage.packages import Packages
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
+from arcor2_server.storage.setting_secrets import SettingSecrets
 
 log = structlog.get_logger(__name__)
 S = PackageStateEnum
@@ -49,26 +50,39 @@ RUN_STATES: Final = frozenset({S.RUNNING, S.PAUSING, S.PAUSED, S.RESUMING})
 _IDLE: Final = frozenset({S.UNDEFINED, S.STOPPED})
 
 
-class Execution(KeptPackages):
+class Execution(PackageLibrary):
     """Runs one package at a time, in a cell host of its own. Requests that a state forbids raise RequestRefused."""
 
-    def __init__(self, services: "Services") -> None:
-        super().__init__(services.hub, Packages(services.settings.packages_dir, services.secrets.hide_in_package))
+    def __init__(
+        self,
+        packages: Packages,
+        host: HostSession,
+        online: OnlineScene,
+        settings: ServerSettings,
+        hub: EventHub,
+        types: ObjectTypes,
+        runs: Runs,
+        breakpoints: SharedBreakpoints,
+        secrets: SettingSecrets,
+        messages: RunMessages,
+    ) -> None:
+        super().__init__(hub, packages)
         self.state = S.UNDEFINED
         self.package_id = ""
         self.stop_within = STOP_WITHIN
         self.reserved = False
         """Whether a project is closed only for the time of its program."""
         self.last_error: m.ErrorData | None = None
-        """What ended the last program, None when it ended as meant or was stopped."""
-        self._services = services
-        self._host: CellHost | None = None
-        self._info: bytes | None = None
+        """What ended the last program, None when it ended by itself or was stopped."""
+        self._host = host
+        self._online = online
+        self._settings = settings
+        self._types = types
+        self._runs = runs
+        self._secrets = secrets
+        self._messages = messages
         self._before: bytes | None = None
         self._exception: ProjectExceptionData | None = None
-        self.board = DeviceBoard(services.hub)
-        self.streams = RobotStreams(services.hub, self.say, everybody=True)
-        services.hub.on_leave.append(self.streams.forget)
         self._run_number = 0
         self._stopped_by: str | None = None
         self._shared_of = ""
@@ -76,31 +90,49 @@ class Execution(KeptPackages):
         self._over: asyncio.Future[None] | None = None
         self._killing: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
-        services.breakpoints.on_change.append(self._breakpoints_changed)
+        host.on_message = self._handle
+        host.on_end = self._host_ended
+        online.before_start.append(self.require_no_program)
+        breakpoints.on_change.append(self._breakpoints_changed)
 
     # -------------------------------------------------------------------------------- state
     @property
     def running(self) -> bool:
-        """Tell whether a program is in a run state: running, pausing, paused or resuming."""
+        """Return whether a program is in a run state: running, pausing, paused or resuming."""
         return self.state in RUN_STATES
 
     @property
     def busy(self) -> bool:
-        """Tell whether nothing else may be opened or run: from a program's start until what follows it is over."""
+        """Return whether nothing else may be opened or run: from a program's start until what follows it is over."""
         return self.reserved or self.active
 
     @property
     def active(self) -> bool:
-        """Tell whether a program is starting, running or ending."""
+        """Return whether a program is starting, running or ending."""
         return self.state not in _IDLE
+
+    @property
+    def board(self) -> DeviceBoard:
+        """The states of the program's devices."""
+        return self._host.board
+
+    @property
+    def streams(self) -> RobotStreams:
+        """The subscriptions to joints and end effector poses."""
+        return self._host.streams
+
+    def require_no_program(self) -> None:
+        """Raise RequestRefused while a program runs."""
+        if self.busy:
+            raise RequestRefused("A program is running: stop it first.")
 
     def streams_of(self, robot_id: str) -> RobotStreams:
         """Give who is sent what of a robot of the running program. NotFound; RequestRefused while it comes up."""
-        if self._info is None:
+        if self._host.package_info is None:
             raise RequestRefused("The devices of the program are not there yet: ask again once PackageInfo has come.")
         found = self.board.object(robot_id)
         with contextlib.suppress(NotFound):  # a package may bring a type that is not known here
-            if not self._services.types.derives_from(found.type, "Robot"):
+            if not self._types.derives_from(found.type, "Robot"):
                 raise RequestRefused(f"{found.name} is not a robot.")
         return self.streams
 
@@ -110,14 +142,14 @@ class Execution(KeptPackages):
         return self._before
 
     def state_and_info(self) -> tuple[Event, bytes | None]:
-        """Give the present PackageState, and the PackageInfo as it was sent while a program runs."""
-        return self._state_event(), self._info
+        """Return the present PackageState, and the PackageInfo as it was sent while a program runs."""
+        return self._state_event(), self._host.package_info
 
     def greeting(self) -> list[Event]:
         """Give the events that tell a new connection of the running program; none when none runs."""
-        if self._info is None:
+        if self._host.package_info is None:
             return []
-        known = [encoded for encoded in (self._info, self._before) if encoded is not None]
+        known = [encoded for encoded in (self._host.package_info, self._before) if encoded is not None]
         return [self._state_event(), *(msgspec.json.decode(encoded, type=Event) for encoded in known)]
 
     def _state_event(self) -> Event:
@@ -126,7 +158,7 @@ class Execution(KeptPackages):
     def _enter(self, state: PackageStateEnum) -> None:
         self.state = state
         log.info("package", id=self.package_id, state=state.value)
-        self._services.hub.broadcast(self._state_event())
+        self._hub.broadcast(self._state_event())
 
     # -------------------------------------------------------------------------------- commands
     def _require_not_used(self, package_id: str) -> None:
@@ -157,27 +189,16 @@ class Execution(KeptPackages):
         directory = await asyncio.to_thread(self.packages.directory, package_id)
         project_id = await asyncio.to_thread(self.packages.project_id, package_id) if how.shared_breakpoints else ""
         self._require_idle()
-        self._services.cell.last_stop.require_none_since(requested_at)
+        self._online.last_stop.require_none_since(requested_at)
         self.package_id = package_id
         self._shared_of = project_id
         self._stopped_by = None
         self.last_error = None
-        self._info = self._before = self._exception = None
+        self._host.package_info = self._before = self._exception = None
         self.board.clear()
         self._enter(S.STARTED)
-        period = self._services.settings.streaming_period
-        message = m.RunPackage(
-            package_id,
-            str(directory.resolve()),
-            how.start_paused,
-            sorted(how.breakpoints),
-            period,
-            self._services.settings.cell,
-            assets=shapes_put_in(self._services),
-        )
-        self._run_number = self._services.runs.begin(
-            package_id, by=how.by, temporary=temporary, start_paused=how.start_paused
-        )
+        message = self._messages.prepare(package_id, directory, how)
+        self._run_number = self._runs.begin(package_id, by=how.by, temporary=temporary, start_paused=how.start_paused)
         self._spawn(self._begin(message), "program start")
         self._spawn(self._note_run(package_id, self._run_number), "note of the run")
 
@@ -188,19 +209,13 @@ class Execution(KeptPackages):
     def _require_idle(self) -> None:
         if self.state not in _IDLE:
             raise RequestRefused(f"A package is {self.state.value}: stop it first.")
-        if self._services.cell.state.value != "stopped":
+        if self._online.state.value != "stopped":
             raise RequestRefused("The scene is online: stop it first, its devices are in use.")
 
     async def _begin(self, message: m.RunPackage) -> None:
         try:
-            host = await self._services.cell.hosts.take(self)
-            values = self._services.secrets.values_for_package
-            secrets = await asyncio.to_thread(values, Path(message.directory))
-            message = msgspec.structs.replace(message, secrets=secrets)
-            if self._shared_of:  # at the last moment: a change after this is told to the program
-                shared = await self._services.breakpoints.ids(self._shared_of)
-                message = msgspec.structs.replace(message, shared_breakpoints=sorted(shared))
-            measured = await calibrations_of_package(self._services, Path(message.directory))
+            host = await self._host.take()
+            message = await self._messages.complete(message, self._shared_of)
         except Arcor2Error as error:
             self._fail(str(error), type(error).__name__)
             self._ended()
@@ -209,8 +224,8 @@ class Execution(KeptPackages):
             await host.close()
             self._ended()
             return
-        self._host = host
-        host.send(with_world(self._services, message, measured))
+        self._host.host = host
+        host.send(message)
 
     async def _note_run(self, package_id: str, number: int) -> None:
         try:
@@ -219,7 +234,7 @@ class Execution(KeptPackages):
             of: dict[str, Any] = {}
             if not isinstance(project, Unset):
                 of = {"project_id": project.id, "project_name": project.name, "project_modified": project.modified}
-            self._services.runs.describe(number, package_name=summary.package_meta.name, **of)
+            self._runs.describe(number, package_name=summary.package_meta.name, **of)
             directory = self.packages.checked(package_id)
             for difference in await asyncio.to_thread(check_versions, directory):
                 log.warning("package was built with another version", package=package_id, difference=difference)
@@ -238,14 +253,14 @@ class Execution(KeptPackages):
     def _stop(self, by: str) -> None:
         self._stopped_by = by
         self._enter(S.STOPPING)
-        if self._host is not None:
-            self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, self._host)
+        if self._host.host is not None:
+            self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, self._host.host)
 
     def begin_stop_all(self, by: str) -> CellHost | None:
         """Stop the program in every state; return the host that is to stop it and its devices, None without one."""
         if self.state in RUN_STATES | {S.STARTED}:
             self._stop(by)
-        return self._host
+        return self._host.host
 
     def pause(self) -> None:
         """Let no further action begin."""
@@ -265,19 +280,15 @@ class Execution(KeptPackages):
         self._enter(S.RESUMING)
         host.send(m.Step())
 
-    def say(self, message: m.ToHost) -> None:
-        """Tell the program's host, when there is one."""
-        if self._host is not None:
-            self._host.send(message)
-
     def _breakpoints_changed(self, project_id: str, ids: set[str]) -> None:
-        if self._host is not None and self._shared_of == project_id and self.state not in _IDLE:
+        if self._shared_of == project_id and self.state not in _IDLE:
             self._host.send(m.SetBreakpoints(sorted(ids)))
 
     def _require(self, states: "set[PackageStateEnum] | frozenset[PackageStateEnum]", what: str) -> CellHost:
-        if self.state not in states or self._host is None:
+        host = self._host.host
+        if self.state not in states or host is None:
             raise RequestRefused(f"The package is {self.state.value} and cannot be {what}.")
-        return self._host
+        return host
 
     def _kill(self, host: CellHost) -> None:
         log.warning("program killed: it did not stop", package=self.package_id, within=self.stop_within)
@@ -285,10 +296,10 @@ class Execution(KeptPackages):
 
     async def close(self) -> None:
         """End with the server; the hosts, which the cell ends, stop motion and disconnect by themselves."""
-        self._host = None  # its end is meant now
+        self._host.host = None  # its end is intended
         if self.state not in _IDLE:
             error = "The server ended in mid-run."
-            self._services.runs.end(self._run_number, RunEnd.LOST, error=error, error_type="ConnectionLost")
+            self._runs.end(self._run_number, RunEnd.LOST, error=error, error_type="ConnectionLost")
             self.state = S.STOPPED
         if self._killing is not None:
             self._killing.cancel()
@@ -297,35 +308,28 @@ class Execution(KeptPackages):
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     # -------------------------------------------------------------------------------- from the host
-    def host_said(self, host: CellHost, message: m.ServerBound) -> None:
-        """Take a message of the program's host."""
-        hub = self._services.hub
+    def _handle(self, host: CellHost, message: m.ServerBound) -> None:
         match message:
-            case m.StreamEvent():
-                if host is self._host:
-                    self.streams.heard(message)
             case m.ProgramEvent():
-                self._remember(message)
-                hub.broadcast_encoded(message.event, message.encoded)
+                self._take_over(message)
+                self._hub.broadcast_encoded(message.event, message.encoded)
             case m.ActionFailed():
-                self._services.runs.ended(message)
+                self._runs.ended(message)
             case m.ProgramChanged():
                 self._program_changed(host, message)
-            case m.DeviceChanged():
-                self.board.changed(message)
-            case m.LogLine():
-                log.info("program", level=message.level, text=message.text, object=message.object_id)
+            case _:
+                pass
 
-    def _remember(self, message: m.ProgramEvent) -> None:
+    def _take_over(self, message: m.ProgramEvent) -> None:
         if message.number:
-            self._services.runs.told(message)
+            self._runs.announced(message)
         match message.event:
             case "PackageInfo":
-                self._info = message.encoded
+                self._host.package_info = message.encoded
                 info = msgspec.json.decode(message.encoded, type=_InfoEvent)
-                _, overlaid = overlay_for(self._services, info.data.scene)
+                _, overlaid = overlay_for(self._settings.cell, self._secrets.is_secret, info.data.scene)
                 self.board.show(info.data.scene.objects, overlaid)
-                asyncio.get_running_loop().call_later(SPARE_AFTER, self._services.cell.hosts.prepare)
+                asyncio.get_running_loop().call_later(SPARE_AFTER, self._host.prepare)
             case "ActionStateBefore":
                 self._before = message.encoded
             case "ActionStateAfter":
@@ -337,8 +341,8 @@ class Execution(KeptPackages):
         if message.state == "stopped":
             self.last_error = message.error
             if message.error is not None and self._exception is not None:  # as it was told: with the device
-                told = self._exception
-                self.last_error = msgspec.structs.replace(message.error, type=told.type, message=told.message)
+                announced = self._exception
+                self.last_error = msgspec.structs.replace(message.error, type=announced.type, message=announced.message)
             self._ended()
             self._spawn(host.gone(), "end of the program's host")
         elif self.state is not S.STOPPING:
@@ -346,47 +350,39 @@ class Execution(KeptPackages):
             if self.state is not state:
                 self._enter(state)
 
-    def host_silent(self, host: CellHost, silent: bool) -> None:
-        """Note that the host does not answer, or answers again."""
-        if host is self._host:
-            self.board.set_answering(not silent)
-            log.warning("program does not answer" if silent else "program answers again", package=self.package_id)
-
-    def host_ended(self, host: CellHost, reason: str) -> None:
-        """Report a program whose host is gone although the program had not ended."""
-        if host is not self._host:
-            return
+    def _host_ended(self, reason: str) -> None:
+        """Report a program whose host has ended before the program."""
         if self.state is not S.STOPPING:
             self._fail(f"The program was lost: {reason}.", "ConnectionLost")
         self._ended(lost=True)
 
     def _fail(self, message: str, kind: str) -> None:
         self.last_error = m.ErrorData("error", kind, message)
-        self._services.hub.broadcast(make_event("ProjectException", ProjectExceptionData(message, kind)))
+        self._hub.broadcast(make_event("ProjectException", ProjectExceptionData(message, kind)))
 
     def _ended(self, *, lost: bool = False) -> None:
-        self._host = None
+        self._host.host = None
         self._note_end(lost)
         self.streams.clear()
         self.board.clear("" if self.last_error is None else self.last_error.message)
-        self._info = self._before = None
+        self._host.package_info = self._before = None
         if self._killing is not None:
             self._killing.cancel()
             self._killing = None
         self._enter(S.STOPPED)
         if self._over is None:
             screen = ShowMainScreenData(MainScreen.PACKAGES_LIST, self.package_id)
-            self._services.hub.broadcast(make_event("ShowMainScreen", screen))
+            self._hub.broadcast(make_event("ShowMainScreen", screen))
         elif not self._over.done():
             self._over.set_result(None)
-        self._services.cell.hosts.prepare()
+        self._host.prepare()
 
     def _note_end(self, lost: bool) -> None:
         error = self.last_error
         end = RunEnd.FINISHED if error is None else RunEnd.LOST if lost else RunEnd.FAILED
         if self._stopped_by is not None:
             end = RunEnd.STOPPED
-        self._services.runs.end(
+        self._runs.end(
             self._run_number,
             end,
             error="" if error is None else error.message,

@@ -1,13 +1,12 @@
-"""What is known of the devices that a cell host holds: connection, health, alarms, control."""
+"""States of the devices of a cell host: connection, health, alarms and control."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING
 
 import msgspec
 import structlog
 
 from arcor2_hw.data.base import UNSET, Data
-from arcor2_hw.data.cell import overlay, strangers
+from arcor2_hw.data.cell import Cell, overlay, strangers
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.events import ObjectStateData
 from arcor2_hw.data.operation import ObjectHealthData
@@ -17,9 +16,6 @@ from arcor2_hw.exceptions import NotFound
 from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
 
 log = structlog.get_logger(__name__)
 
@@ -42,19 +38,26 @@ class DeviceStatus(Data, frozen=True):
     overlaid: list[str] = msgspec.field(default_factory=list)
 
 
-def overlay_for(services: "Services", scene: Scene) -> tuple[list[SceneObjectOverride], dict[str, list[str]]]:
-    """Return what the server's cell file lays over a scene, and the names of these settings by object; logged.
+def overlay_for(
+    cell: Cell | None, is_secret: Callable[[str, str], bool], scene: Scene
+) -> tuple[list[SceneObjectOverride], dict[str, list[str]]]:
+    """Return the settings that the cell file overrides in a scene, and the names of these settings by object.
 
-    Raises InvalidData naming the object whose type is another one.
+    Args:
+        cell: the cell file of the server, if there is one.
+        is_secret: returns whether the setting of a type is secret. Secret values are not logged.
+        scene: the scene.
+
+    Raises:
+        InvalidData: an object has another type in the cell file.
     """
-    cell = services.settings.cell
     if cell is None:
         return [], {}
     overrides = overlay(cell, scene)
     objects = {scene_object.id: scene_object for scene_object in scene.objects}
     for override in overrides:
-        of, secret = objects[override.id], services.secrets.is_secret
-        laid = {each.name: HIDDEN if secret(of.type, each.name) else each.value for each in override.parameters}
+        of = objects[override.id]
+        laid = {each.name: HIDDEN if is_secret(of.type, each.name) else each.value for each in override.parameters}
         log.info("settings from the cell file", object=of.name, settings=laid)
     if unknown := strangers(cell, scene):
         log.warning("the cell file names what is not in the scene", objects=unknown, scene=scene.name)
@@ -62,24 +65,23 @@ def overlay_for(services: "Services", scene: Scene) -> tuple[list[SceneObjectOve
 
 
 class DeviceBoard:
-    """Keeps the newest word of each device, and tells clients each change of a connection or of health, once.
+    """Keeps the newest word of each device, and tells clients each change of a connection or of health, once."""
 
-    told: called after a change of a connection was told.
-    """
-
-    def __init__(self, hub: EventHub, told: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, hub: EventHub) -> None:
+        self.on_connection: list[Callable[[], None]] = []
+        """Called after each change of a connection."""
         self.on_obstacles_changed: list[Callable[[], None]] = []
         """Called when a collision object was enabled or disabled, or a robot gripped or released a part."""
         self._hub = hub
-        self._told = told
         self._overlaid: Mapping[str, list[str]] = {}
         self._objects: dict[str, SceneObject] = {}
-        self._said: dict[str, DeviceChanged] = {}
+        self._reports: dict[str, DeviceChanged] = {}
         self.answering = True
 
-    def _tell(self, data: ObjectStateData) -> None:
+    def _publish(self, data: ObjectStateData) -> None:
         self._hub.broadcast(make_event("ObjectState", data))
-        self._told()
+        for notify in self.on_connection:
+            notify()
 
     def set_answering(self, answering: bool) -> None:
         """Note whether the process that controls the devices answers, and publish it with the state of each device."""
@@ -87,15 +89,15 @@ class DeviceBoard:
             return
         self.answering = answering
         for state in self.states():
-            self._tell(state)
+            self._publish(state)
 
     def clear(self, reason: str = "") -> None:
         """Begin anew: what was connected is offline now, for a reason."""
-        before, self._said = self._said, {}
-        for said in before.values():
-            if said.connection is not Connection.OFFLINE:
-                self._tell(ObjectStateData(said.object_id, Connection.OFFLINE, reason or UNSET))
-        if any(_obstacles(said) != _obstacles(None) for said in before.values()):
+        before, self._reports = self._reports, {}
+        for report in before.values():
+            if report.connection is not Connection.OFFLINE:
+                self._publish(ObjectStateData(report.object_id, Connection.OFFLINE, reason or UNSET))
+        if any(_obstacles(report) != _obstacles(None) for report in before.values()):
             self._notify_obstacles()
         self._objects.clear()
         self._overlaid = {}
@@ -114,82 +116,84 @@ class DeviceBoard:
         self._overlaid = overlaid
 
     def object(self, object_id: str) -> SceneObject:
-        """Give an object of the scene that is shown; NotFound."""
+        """Return an object of the scene that is shown. Raise NotFound if there is none."""
         if (found := self._objects.get(object_id)) is None:
             raise NotFound(f"There is no object {object_id!r} in operation.")
         return found
 
     def changed(self, message: DeviceChanged) -> None:
         """Take what a device says."""
-        before = self._said.get(message.object_id)
-        self._said[message.object_id] = message
+        before = self._reports.get(message.object_id)
+        self._reports[message.object_id] = message
         if before is None or before.connection is not message.connection:
-            self._tell(self._state(message))
+            self._publish(self._state(message))
         if before is None or _health(before) != _health(message):
             self._hub.broadcast(make_event("ObjectHealth", _health(message)))
         if _obstacles(before) != _obstacles(message):
             self._notify_obstacles()
 
     def healths(self) -> list[ObjectHealthData]:
-        """Give the health of every object, in the order of the scene."""
-        return [_health(self._word(object_id)) for object_id in self._objects]
+        """Return the health of every object, in the order of the scene."""
+        return [_health(self._report(object_id)) for object_id in self._objects]
 
     def failed(self) -> list[str]:
         """Name the objects that have failed, in the order of the scene."""
-        return [one.name for one in self._objects.values() if self._word(one.id).connection is Connection.FAILED]
+        return [one.name for one in self._objects.values() if self._report(one.id).connection is Connection.FAILED]
 
     def require_not_failed(self, object_id: str) -> None:
-        """RequestRefused when an object has failed, with its name and why."""
-        said, known = self._said.get(object_id), self._objects.get(object_id)
-        if said is not None and known is not None and said.connection is Connection.FAILED:
-            raise RequestRefused(f"{known.name} is not there: {said.reason or 'it could not be connected'}.")
+        """Raise RequestRefused when an object has failed, with its name and why."""
+        report, known = self._reports.get(object_id), self._objects.get(object_id)
+        if report is not None and known is not None and report.connection is Connection.FAILED:
+            raise RequestRefused(f"{known.name} is not there: {report.reason or 'it could not be connected'}.")
 
     def states(self) -> list[ObjectStateData]:
-        """Give the connection of every object, in the order of the scene."""
-        return [self._state(self._word(object_id)) for object_id in self._objects]
+        """Return the connection of every object, in the order of the scene."""
+        return [self._state(self._report(object_id)) for object_id in self._objects]
 
     def not_in_the_way(self) -> frozenset[str]:
-        """Give the collision objects that do not count for now."""
-        return frozenset(said.object_id for said in self._said.values() if not said.in_the_way)
+        """Return the collision objects that do not count for now."""
+        return frozenset(report.object_id for report in self._reports.values() if not report.in_the_way)
 
     def held_parts(self) -> dict[str, tuple[str, HeldPart]]:
         """Return the parts that robots hold, by name, each with the id of its robot."""
-        return {part.name: (said.object_id, part) for said in self._said.values() for part in said.held}
+        return {part.name: (report.object_id, part) for report in self._reports.values() for part in report.held}
 
-    def _word(self, object_id: str) -> DeviceChanged:
-        return self._said.get(object_id) or DeviceChanged(object_id, Connection.OFFLINE, Health.NORMAL)
+    def _report(self, object_id: str) -> DeviceChanged:
+        return self._reports.get(object_id) or DeviceChanged(object_id, Connection.OFFLINE, Health.NORMAL)
 
-    def _state(self, said: DeviceChanged) -> ObjectStateData:
-        overlaid = self._overlaid.get(said.object_id)
+    def _state(self, report: DeviceChanged) -> ObjectStateData:
+        overlaid = self._overlaid.get(report.object_id)
         answering = UNSET if self.answering else False
-        return ObjectStateData(said.object_id, said.connection, said.reason or UNSET, overlaid or UNSET, answering)
+        return ObjectStateData(
+            report.object_id, report.connection, report.reason or UNSET, overlaid or UNSET, answering
+        )
 
     def statuses(self) -> list[DeviceStatus]:
-        """Give all objects in the order of the scene."""
+        """Return all objects in the order of the scene."""
         found = []
         for obj in self._objects.values():
-            said = self._word(obj.id)
+            report = self._report(obj.id)
             found.append(
                 DeviceStatus(
                     obj.id,
                     obj.name,
                     obj.type,
-                    said.connection,
-                    said.health,
-                    said.alarms,
-                    said.control_owner,
+                    report.connection,
+                    report.health,
+                    report.alarms,
+                    report.control_owner,
                     self.answering,
-                    said.reason,
+                    report.reason,
                     list(self._overlaid.get(obj.id, ())),
                 )
             )
         return found
 
 
-def _obstacles(said: DeviceChanged | None) -> tuple[bool, list[HeldPart]]:
+def _obstacles(report: DeviceChanged | None) -> tuple[bool, list[HeldPart]]:
     """Return what a device contributes to the obstacles: whether it counts, and the parts that it holds."""
-    return (True, []) if said is None else (said.in_the_way, said.held)
+    return (True, []) if report is None else (report.in_the_way, report.held)
 
 
-def _health(said: DeviceChanged) -> ObjectHealthData:
-    return ObjectHealthData(said.object_id, said.health, said.alarms, said.control_owner or UNSET)
+def _health(report: DeviceChanged) -> ObjectHealthData:
+    return ObjectHealthData(report.object_id, report.health, report.alarms, report.control_owner or UNSET)

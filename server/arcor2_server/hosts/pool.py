@@ -1,4 +1,4 @@
-"""Cell hosts in store: one spare stands by with the common imports done, so that a start costs no start of Python."""
+"""The pool of cell hosts: one spare has its imports done, so that a start does not wait for Python."""
 
 import asyncio
 import contextlib
@@ -40,7 +40,7 @@ class CellHosts:
             self._spare.add_done_callback(_look)
 
     async def take(self, user: HostUser) -> CellHost:
-        """Give a host that is ready, started now if there is no spare. Arcor2Error when none can be started."""
+        """Return a host that is ready, started now if there is no spare. Arcor2Error when none can be started."""
         while True:
             self.prepare()
             if self._spare is None:

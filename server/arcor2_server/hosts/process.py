@@ -1,11 +1,9 @@
-"""One cell host as the server sees it: a process, a socket, what it says, and when it falls silent or ends."""
+"""One cell host process: its socket, calls, heartbeat and end."""
 
 import asyncio
 import itertools
 import os
-import signal
 import socket
-import sys
 from collections.abc import Mapping
 from typing import Any, Final, Protocol, TypeVar, cast
 
@@ -16,12 +14,12 @@ from arcor2_hw.actions.json_values import encode
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
 from arcor2_hw.runtime import messages as m
+from arcor2_server.child_process import ChildProcess, describe_exit
 
 log = structlog.get_logger(__name__)
 T = TypeVar("T", bound=m.ToServer)
 
-LONGEST_LINE: Final = 64 * 1024
-"""Bytes of one line of a program's or driver's output that are kept."""
+COMMAND: Final = ("-P", "-m", "arcor2_hw.runtime.host")
 GOES_WITHIN: Final = 3.0
 """Seconds a host has to end by itself once it should; then it is killed."""
 LAST_WORDS: Final = 0.2
@@ -47,7 +45,7 @@ class CellError(Arcor2Error):
 class HostUser(Protocol):
     """Who uses a host: told of everything that answers no question."""
 
-    def host_said(self, host: "CellHost", message: m.ServerBound) -> None:
+    def host_message(self, host: "CellHost", message: m.ServerBound) -> None:
         """Take a message."""
 
     def host_silent(self, host: "CellHost", silent: bool) -> None:
@@ -57,7 +55,7 @@ class HostUser(Protocol):
         """Learn that the host is gone; called once, with nothing after it."""
 
 
-class _Wire(asyncio.Protocol):
+class _Connection(asyncio.Protocol):
     """Cuts the stream into messages."""
 
     def __init__(self) -> None:
@@ -82,7 +80,7 @@ class _Wire(asyncio.Protocol):
                 end = start + m.PREFIX_SIZE + m.body_length(bytes(buffer[start : start + m.PREFIX_SIZE]))
                 if len(buffer) < end:
                     break
-                host._heard(m.decode_server_bound(bytes(buffer[start + m.PREFIX_SIZE : end])))
+                host._receive(m.decode_server_bound(bytes(buffer[start + m.PREFIX_SIZE : end])))
                 start = end
         except (msgspec.MsgspecError, ValueError):
             log.exception("the cell host sent what is no message", pid=host.pid)
@@ -98,18 +96,18 @@ class _Wire(asyncio.Protocol):
 class CellHost:
     """A running host. `user` is set by who takes it."""
 
-    def __init__(self, process: asyncio.subprocess.Process, wire: _Wire) -> None:
+    def __init__(self, process: ChildProcess, connection: _Connection) -> None:
         self.process = process
         self.user: HostUser | None = None
         self.ready: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.reason = ""
         """Why the host is gone; empty while it is not."""
-        self._wire = wire
+        self._connection = connection
         self._number = itertools.count(1)
         self._calls: dict[int, asyncio.Future[bytes]] = {}
         self._waiting: list[tuple[type[m.ToServer], asyncio.Future[Any]]] = []
-        self._heard_at = asyncio.get_running_loop().time()
+        self._received_at = asyncio.get_running_loop().time()
         self._silent = False
         self._lost = asyncio.Event()
         self._tasks: list[asyncio.Task[None]] = []
@@ -118,56 +116,46 @@ class CellHost:
     async def start(cls, environment: Mapping[str, str] = os.environ) -> "CellHost":
         """Start the process; it is usable once `ready` is done."""
         ours, theirs = socket.socketpair()
-        wire = _Wire()
+        connection = _Connection()
         try:
             # First the wire, then the process: nothing is awaited between a process and the tasks that look after it.
-            await asyncio.get_running_loop().create_unix_connection(lambda: wire, sock=ours)
-            process = await asyncio.create_subprocess_exec(
-                sys.executable, "-P", "-m", "arcor2_hw.runtime.host", "--fd", str(theirs.fileno()),
-                pass_fds=[theirs.fileno()],
-                stdin=asyncio.subprocess.DEVNULL,
-                stdout=asyncio.subprocess.PIPE,
-                stderr=asyncio.subprocess.STDOUT,
-                # One thread per device is what the host is built of; a pool of the linear algebra only costs memory.
-                env={"OPENBLAS_NUM_THREADS": "1", **environment},
-                start_new_session=True,  # Ctrl-C is for the server, which ends the host in order
-            )  # fmt: skip
+            await asyncio.get_running_loop().create_unix_connection(lambda: connection, sock=ours)
+            process = await ChildProcess.start(COMMAND, theirs, environment)
         except BaseException:
-            if wire.transport is not None:
-                wire.transport.abort()
+            if connection.transport is not None:
+                connection.transport.abort()
             ours.close()
-            raise
-        finally:
             theirs.close()
-        host = cls(process, wire)
-        wire.host = host
+            raise
+        host = cls(process, connection)
+        connection.host = host
         host._tasks = [
             asyncio.create_task(host._read_output(), name=f"output of cell host {process.pid}"),
             asyncio.create_task(host._watch_end(), name=f"end of cell host {process.pid}"),
             asyncio.create_task(host._watch_silence(), name=f"silence of cell host {process.pid}"),
         ]
-        wire.data_received(b"")
+        connection.data_received(b"")
         return host
 
     @property
     def pid(self) -> int:
-        """Give the process id."""
+        """Return the process id."""
         return self.process.pid
 
     @property
     def alive(self) -> bool:
-        """Tell whether the host has not ended."""
+        """Return whether the host has not ended."""
         return not self.reason
 
     # -------------------------------------------------------------------------------- saying
     def send(self, message: m.ToHost) -> None:
         """Say something; dropped when the host is gone, which its user learns anyway."""
-        transport = self._wire.transport
+        transport = self._connection.transport
         if transport is not None and not transport.is_closing():
             transport.write(m.encode(message))
 
     async def expect(self, kind: type[T], timeout: float | None = None) -> T:
-        """Wait for the next message of a kind; ConnectionLost when the host ends before, TimeoutError."""
+        """Wait for the next message of a kind; raise ConnectionLost when the host ends before, TimeoutError."""
         future: asyncio.Future[T] = asyncio.get_running_loop().create_future()
         if self.reason:
             raise ConnectionLost(self.reason)
@@ -185,7 +173,7 @@ class CellHost:
         cancel: bool = False,
         deadline: float | None = None,
     ) -> bytes:
-        """Call a method of a device, or with `cancel` what cancels it; gives the result as JSON, empty for None.
+        """Call a method of a device, or with `cancel` what cancels it; return the result as JSON, empty for None.
 
         Raises CellError with what the device said, ConnectionLost when the host ends meanwhile.
         """
@@ -194,12 +182,15 @@ class CellHost:
         return await self._ask(number, message, deadline)
 
     async def stop_motion(self, object_id: str) -> None:
-        """Stop a device past whatever it does. CellError, ConnectionLost."""
+        """Stop a device past whatever it does. Raise CellError or ConnectionLost if that is impossible."""
         number = next(self._number)
         await self._ask(number, m.StopMotion(number, object_id), None)
 
     async def stop_all(self) -> list[m.DeviceStop]:
-        """Stop the program and all devices; return what became of each. ConnectionLost, DeviceTimeout."""
+        """Stop the program and all devices; return what became of each.
+
+        Raise ConnectionLost or DeviceTimeout if that is impossible.
+        """
         number = next(self._number)
         try:
             async with asyncio.timeout(STOPPED_WITHIN):
@@ -217,7 +208,7 @@ class CellHost:
         return await self._ask(number, m.Lease(number, object_id, hold, kind, until, **motion), HELD_WITHIN)
 
     async def retry(self, object_id: str) -> None:
-        """Make and connect an object anew that has failed. CellError, ConnectionLost."""
+        """Make and connect an object anew that has failed. Raise CellError or ConnectionLost if that is impossible."""
         number = next(self._number)
         await self._ask(number, m.RetryObject(number, object_id), None)
 
@@ -238,13 +229,12 @@ class CellHost:
     # -------------------------------------------------------------------------------- ending
     def kill(self) -> None:
         """Kill the process."""
-        if self.process.returncode is None:
-            self.process.kill()
+        self.process.kill()
 
     async def close(self, timeout: float = GOES_WITHIN) -> None:
         """Close the socket: the host stops motion, disconnects and ends; killed when it does not. Waits for the end."""
-        if self._wire.transport is not None:
-            self._wire.transport.close()
+        if self._connection.transport is not None:
+            self._connection.transport.close()
         await self.gone(timeout)
 
     async def gone(self, timeout: float = GOES_WITHIN) -> None:
@@ -269,26 +259,26 @@ class CellHost:
         try:
             await asyncio.wait({waiting, lost}, return_when=asyncio.FIRST_COMPLETED)
             # What it said last is still on its way when the process is gone; the exit status when the socket is.
-            heard = -1
-            while not (lost.done() and waiting.done()) and heard != self._wire.pieces:
+            received = -1
+            while not (lost.done() and waiting.done()) and received != self._connection.pieces:
                 # A busy server may have much to take in yet.
-                heard = self._wire.pieces
+                received = self._connection.pieces
                 await asyncio.wait({waiting if lost.done() else lost}, timeout=LAST_WORDS)
             if not waiting.done():
-                self._tell_end("the cell host closed its connection")
+                self._report_end("the cell host closed its connection")
                 _, late = await asyncio.wait({waiting}, timeout=GOES_WITHIN)
                 if late:
                     self.kill()
-            self._tell_end(_reason(await waiting))
+            self._report_end(f"the cell host {describe_exit(await waiting)}")
         finally:
             self.kill()
             waiting.cancel()
             lost.cancel()
-            if self._wire.transport is not None:
-                self._wire.transport.abort()
+            if self._connection.transport is not None:
+                self._connection.transport.abort()
             self.ended.set_result(None)
 
-    def _tell_end(self, reason: str) -> None:
+    def _report_end(self, reason: str) -> None:
         if self.reason:
             return
         self.reason = reason
@@ -302,10 +292,10 @@ class CellHost:
             self.user.host_ended(self, reason)
 
     # -------------------------------------------------------------------------------- hearing
-    def _heard(self, message: m.ServerBound) -> None:
-        self._heard_at = asyncio.get_running_loop().time()
+    def _receive(self, message: m.ServerBound) -> None:
+        self._received_at = asyncio.get_running_loop().time()
         if self._silent:
-            self._tell_silence(False)
+            self._report_silence(False)
         match message:
             case m.Heartbeat():
                 return
@@ -329,59 +319,35 @@ class CellHost:
                     expected.set_result(message)
                 break
         if self.user is not None:
-            self.user.host_said(self, message)
+            self.user.host_message(self, message)
 
     async def _watch_silence(self) -> None:
         loop = asyncio.get_running_loop()
         while self.alive and not self._lost.is_set():
-            if not self._silent and self.ready.done() and loop.time() - self._heard_at > m.SILENCE_LIMIT:
-                self._tell_silence(True)
+            if not self._silent and self.ready.done() and loop.time() - self._received_at > m.SILENCE_LIMIT:
+                self._report_silence(True)
             try:
                 async with asyncio.timeout(m.HEARTBEAT_PERIOD):
                     await self._lost.wait()
             except TimeoutError:
                 continue
 
-    def _tell_silence(self, silent: bool) -> None:
+    def _report_silence(self, silent: bool) -> None:
         self._silent = silent
         if self.user is not None:
             self.user.host_silent(self, silent)
 
     async def _read_output(self) -> None:
-        """Take what script, drivers and vendor libraries print; a line of any length is taken in pieces."""
-        stream = self.process.stdout
-        assert stream is not None
-        line = bytearray()
-        while chunk := await stream.read(65536):
-            *whole, rest = chunk.split(b"\n")
-            for part in whole:
-                line += part[: LONGEST_LINE - len(line)]
-                self._heard_line(bytes(line))
-                line.clear()
-            line += rest[: LONGEST_LINE - len(line)]
-        if line:
-            self._heard_line(bytes(line))
-
-    def _heard_line(self, line: bytes) -> None:
-        message = m.LogLine("info", line.decode(errors="backslashreplace"))
-        if self.user is not None:
-            self.user.host_said(self, message)
-        else:
-            log.info("cell host", pid=self.pid, text=message.text)
-
-
-def _reason(code: int) -> str:
-    if code < 0:
-        try:
-            name = signal.Signals(-code).name
-        except ValueError:
-            name = f"signal {-code}"
-        return f"the cell host was killed by {name}"
-    return f"the cell host ended with status {code}" if code else "the cell host ended"
+        """Log what the script, the drivers and vendor libraries print."""
+        async for line in self.process.output():
+            if self.user is not None:
+                self.user.host_message(self, m.LogLine("info", line))
+            else:
+                log.info("cell host", pid=self.pid, text=line)
 
 
 def json_of(value: Any) -> bytes:
-    """Give an argument of a call as it travels."""
+    """Return an argument of a call as it travels."""
     if isinstance(value, msgspec.Raw):
         return bytes(value)
     return encode(value).encode()

@@ -1,4 +1,4 @@
-"""Who is sent the joints and end effectors of which robot: at the streaming period, or at a rate of his own."""
+"""Subscriptions to joints and end effector poses, at the streaming period or at the rate of a client."""
 
 from collections.abc import Callable
 from typing import Final
@@ -17,15 +17,15 @@ class RobotStreams:
     everybody: what comes at the streaming period goes to all, as in the protocol while a program runs.
     """
 
-    def __init__(self, hub: EventHub, say: Callable[[m.ToHost], None], *, everybody: bool = False) -> None:
+    def __init__(self, hub: EventHub, send_message: Callable[[m.ToHost], None], *, everybody: bool = False) -> None:
         self._hub = hub
-        self._say = say
+        self._send = send_message
         self._everybody = everybody
         self._subscribers: dict[tuple[str, RobotEventKind], set[Connection]] = {}
         self._rates: dict[tuple[str, RobotEventKind], dict[Connection, float]] = {}
 
     def subscribe(self, client: Connection, robot_id: str, what: RobotEventKind, send: bool) -> None:
-        """Send a robot's state to a client, or no longer; RequestRefused when it was not sent."""
+        """Send a robot's state to a client, or no longer; raise RequestRefused when it was not sent."""
         clients = self._subscribers.setdefault((robot_id, what), set())
         if send:
             clients.add(client)
@@ -33,7 +33,7 @@ class RobotStreams:
             raise RequestRefused("This was not subscribed to.")
         else:
             clients.discard(client)
-        self._tell(robot_id)
+        self._update_host(robot_id)
 
     def at_rate(self, client: Connection, robot_id: str, what: RobotEventKind, rate: float, send: bool) -> None:
         """Send a robot's state to a client `rate` times a second, or no longer; RequestRefused when it was not sent."""
@@ -42,9 +42,9 @@ class RobotStreams:
             rates[client] = rate
         elif rates.pop(client, None) is None:
             raise RequestRefused("This was not streamed.")
-        self._tell_rates(robot_id)
+        self._update_host_rates(robot_id)
 
-    def heard(self, message: m.StreamEvent) -> None:
+    def publish(self, message: m.StreamEvent) -> None:
         """Pass on what the host has read, encoded once for all who are sent it."""
         kind = _KINDS.get(message.event)
         if kind is None:
@@ -64,20 +64,20 @@ class RobotStreams:
         for (robot_id, _), clients in list(self._subscribers.items()):
             if client in clients:
                 clients.discard(client)
-                self._tell(robot_id)
+                self._update_host(robot_id)
         for (robot_id, _), rates in list(self._rates.items()):
             if rates.pop(client, None) is not None:
-                self._tell_rates(robot_id)
+                self._update_host_rates(robot_id)
 
     def clear(self) -> None:
         """Forget all: the scene is offline, or the program over."""
         self._subscribers.clear()
         self._rates.clear()
 
-    def _tell(self, robot_id: str) -> None:
+    def _update_host(self, robot_id: str) -> None:
         wanted = {what: bool(self._subscribers.get((robot_id, what))) for what in RobotEventKind}
-        self._say(m.Subscribe(robot_id, wanted[RobotEventKind.JOINTS], wanted[RobotEventKind.EEF_POSE]))
+        self._send(m.Subscribe(robot_id, wanted[RobotEventKind.JOINTS], wanted[RobotEventKind.EEF_POSE]))
 
-    def _tell_rates(self, robot_id: str) -> None:
+    def _update_host_rates(self, robot_id: str) -> None:
         rates = {what: sorted(set(self._rates.get((robot_id, what), {}).values())) for what in RobotEventKind}
-        self._say(m.Stream(robot_id, rates[RobotEventKind.JOINTS], rates[RobotEventKind.EEF_POSE]))
+        self._send(m.Stream(robot_id, rates[RobotEventKind.JOINTS], rates[RobotEventKind.EEF_POSE]))

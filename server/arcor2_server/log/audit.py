@@ -1,4 +1,4 @@
-"""One log line for each request that is refused by role, and for each command that moves or changes something."""
+"""The audit log: one line for each request refused by role, and for each command that moves or changes something."""
 
 from typing import Any, Final
 
@@ -66,7 +66,7 @@ LONGEST_TARGET: Final = 100
 
 
 def is_command(rpc: Rpc) -> bool:
-    """Tell whether a request moves or changes something."""
+    """Return whether a request moves or changes something."""
     return not (rpc.name.startswith(("Get", "List")) or rpc.name in READING or rpc.name in OF_THE_SCREEN)
 
 

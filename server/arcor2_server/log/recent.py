@@ -1,4 +1,4 @@
-"""The last lines that were logged, kept in memory for whoever has to find out what happened."""
+"""The latest log lines, stored in memory for the diagnosis."""
 
 import threading
 from collections import deque
@@ -30,7 +30,7 @@ class RecentLog:
                 self._size -= len(self._lines.popleft())
 
     def lines(self) -> list[str]:
-        """Give what is kept."""
+        """Return what is kept."""
         with self._lock:
             kept = list(self._lines)
         return [line.decode(errors="replace") for line in kept]

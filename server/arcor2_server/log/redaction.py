@@ -1,4 +1,4 @@
-"""Takes secrets out of what leaves the workplace for somebody who helps."""
+"""Redaction of secrets in logs and in files that leave the workplace."""
 
 import re
 from collections.abc import Callable, Iterator, MutableMapping, Set
@@ -20,7 +20,7 @@ _IN_TEXT: Final = (
 
 
 def hide(value: Any) -> Any:
-    """Give JSON data with the values of secrets hidden: by the key, or by the `name` that stands beside a `value`."""
+    """Return JSON data with the values of secrets hidden: by the key, or by the `name` that stands beside a `value`."""
     if isinstance(value, list):
         return [hide(item) for item in value]
     if not isinstance(value, dict):
@@ -30,7 +30,7 @@ def hide(value: Any) -> Any:
 
 
 def secrets_in(value: Any) -> Iterator[str]:
-    """Give the secrets that `hide` hides, where they are texts."""
+    """Return the secrets that `hide` hides, where they are texts."""
     if isinstance(value, list):
         for item in value:
             yield from secrets_in(item)
@@ -44,7 +44,7 @@ def secrets_in(value: Any) -> Iterator[str]:
 
 
 def clean(text: str, secrets: set[str]) -> str:
-    """Give a text without these secrets, and without what looks like a token or the password of an address."""
+    """Return a text without these secrets, and without what looks like a token or the password of an address."""
     for secret in sorted(secrets, key=len, reverse=True):
         if len(secret) >= SHORTEST:
             text = text.replace(secret, HIDDEN)

@@ -1,4 +1,4 @@
-"""Logging: one line per event on standard error, for people on a terminal and as JSON elsewhere."""
+"""Set-up of the log: one line per event on standard error, readable on a terminal, JSON elsewhere."""
 
 import contextlib
 import logging

@@ -1,4 +1,4 @@
-"""Changes of object types that clients have not been notified of yet."""
+"""Changes of object types of which clients have not been notified yet."""
 
 from collections.abc import Mapping
 

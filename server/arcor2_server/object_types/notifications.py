@@ -1,46 +1,58 @@
-"""Tells clients of object types that came in by other ways than theirs: soon, and all of them at once."""
+"""Notifies the clients of object types that were added or changed outside of their requests."""
 
 import asyncio
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
+from arcor2_hw.data.events import ChangeType, Event
+from arcor2_server.events import EventHub, make_event
+from arcor2_server.object_types.changes import Changes
+from arcor2_server.object_types.registry import ObjectTypes
 
 QUIET: Final = 0.5
-"""Seconds after the last upload: who uploads twenty types tells of them once. Opening a scene tells at once."""
+"""Seconds without an upload before the clients are notified of all uploads at once."""
 
 
-class TypeNews:
-    """Waits for the end of a series of uploads."""
+def change_events(changes: Changes) -> list[Event]:
+    """Return the events that tell clients what changed among the object types."""
+    kinds = (
+        (ChangeType.REMOVE, changes.removed),
+        (ChangeType.UPDATE, changes.updated),
+        (ChangeType.ADD, changes.added),
+    )
+    return [make_event("ChangedObjectTypes", metas, change) for change, metas in kinds if metas]
 
-    def __init__(self) -> None:
+
+class TypeNotifications:
+    """Publishes new and changed object types: at once when a document is opened, else after a series of uploads."""
+
+    def __init__(self, types: ObjectTypes, hub: EventHub) -> None:
+        self._types = types
+        self._hub = hub
         self._timer: asyncio.TimerHandle | None = None
-        self._telling: set[asyncio.Task[None]] = set()
+        self._publishing: set[asyncio.Task[None]] = set()
 
-    async def taken(self, services: "Services") -> None:
-        """Take in what was written to storage; clients are told when it has been quiet for a while."""
-        await services.types.take_in()
+    async def uploaded(self) -> None:
+        """Take over the object types that were written to the storage; notify the clients when uploads pause."""
+        await self._types.take_in()
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = asyncio.get_running_loop().call_later(QUIET, self._begin, services)
+        self._timer = asyncio.get_running_loop().call_later(QUIET, self._start)
 
-    def _begin(self, services: "Services") -> None:
+    async def publish(self) -> None:
+        """Look for new and changed object types and notify the clients of them."""
+        for event in change_events(await self._types.refresh()):
+            self._hub.broadcast(event)
+
+    def _start(self) -> None:
         self._timer = None
-        task = asyncio.create_task(self._tell(services), name="news of object types")
-        self._telling.add(task)
-        task.add_done_callback(self._telling.discard)
-
-    @staticmethod
-    async def _tell(services: "Services") -> None:
-        from arcor2_server.rpc.object_types import change_events  # it needs Services, of which this is a part
-
-        for event in change_events(await services.types.refresh()):
-            services.hub.broadcast(event)
+        task = asyncio.create_task(self.publish(), name="notification of object types")
+        self._publishing.add(task)
+        task.add_done_callback(self._publishing.discard)
 
     async def close(self) -> None:
-        """End with the server."""
+        """Cancel notifications that are due."""
         if self._timer is not None:
             self._timer.cancel()
-        for task in self._telling:
+        for task in self._publishing:
             task.cancel()
-        await asyncio.gather(*self._telling, return_exceptions=True)
+        await asyncio.gather(*self._publishing, return_exceptions=True)

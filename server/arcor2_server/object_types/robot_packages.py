@@ -15,7 +15,7 @@ _LONG_AGO: Final = (1980, 1, 1, 0, 0, 0)
 
 
 def robot_packages(driver: Path) -> dict[str, bytes]:
-    """Give the assets in a driver's folder, by id; none when it has no models. OSError when they cannot be read."""
+    """Return the assets in a driver's folder, by id; none when it has no models. OSError when they cannot be read."""
     folder = driver / FOLDER
     if not folder.is_dir():
         return {}

@@ -1,1 +1,1 @@
-"""The server's side of the cell host: its processes, the scene when it is online."""
+"""The online scene: single actions, robot motion and hold-to-run."""

@@ -1,8 +1,9 @@
-"""One action executed by itself, online: its arguments worked out, its result told and kept."""
+"""Execution of a single action in the online scene."""
 
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 import msgspec
 import structlog
@@ -14,9 +15,6 @@ from arcor2_hw.data.project import Action, ActionParameter, ActionParameterType,
 from arcor2_hw.data.project_index import ProjectLookup
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, InvalidData
 from arcor2_server.errors import RequestRefused
-
-if TYPE_CHECKING:
-    from arcor2_server.online.online_scene import OnlineCell
 
 log = structlog.get_logger(__name__)
 
@@ -61,17 +59,20 @@ class PreparedAction(Data, frozen=True):
 
 
 def argument(parameter: ActionParameter, lookup: ProjectLookup, results: dict[str, list[str]]) -> Any:
-    """Give what a parameter stands for at execution. RequestRefused for a link without a result, InvalidData."""
+    """Return what a parameter stands for at execution. RequestRefused for a link without a result.
+
+    Raise InvalidData if that is impossible.
+    """
     if parameter.type == ActionParameterType.LINK:
         try:
             action_id, _, index = parse_link(read_reference(parameter))
         except ValueError as error:
             raise InvalidData(f"parameter {parameter.name}: {error}") from error
-        kept = results.get(action_id)
-        if kept is None or index >= len(kept):
+        stored = results.get(action_id)
+        if stored is None or index >= len(stored):
             name = lookup.action(action_id)[1].name
             raise RequestRefused(f"Parameter {parameter.name} needs a result of the action {name}: execute that first.")
-        return msgspec.Raw(kept[index].encode())
+        return msgspec.Raw(stored[index].encode())
     if parameter.type == ActionParameterType.PROJECT_PARAMETER:
         return msgspec.Raw(lookup.parameter(read_reference(parameter)).value.encode())
     return parameter_type(parameter.type).value(parameter, lookup)
@@ -88,7 +89,7 @@ def prepare(action: Action, meta: ObjectAction, lookup: ProjectLookup, results: 
 
 
 def split_results(raw: bytes, returns: int) -> list[str]:
-    """Give the results of a call as the protocol lists them."""
+    """Return the results of a call as the protocol lists them."""
     if not raw:
         return []
     if returns > 1:
@@ -96,12 +97,31 @@ def split_results(raw: bytes, returns: int) -> list[str]:
     return [raw.decode()]
 
 
-async def execute(cell: "OnlineCell", prepared: PreparedAction, running: RunningAction) -> None:
-    """Call the method and tell how it ended."""
+class ActionScene(Protocol):
+    """The online scene, as far as the execution of one action needs it."""
+
+    async def call(
+        self,
+        object_id: str,
+        method: str,
+        args: Mapping[str, Any] | None = None,
+        *,
+        control: bool = False,
+        deadline: float | None = None,
+        requested_at: float | None = None,
+    ) -> bytes:
+        """Call a method of an object; return the result as JSON."""
+
+    def action_ended(self, action: RunningAction, results: list[str] | None, error: str | None) -> None:
+        """Take over the end of an action."""
+
+
+async def execute(scene: ActionScene, prepared: PreparedAction, running: RunningAction) -> None:
+    """Call the method of an action and report how it ended."""
     results: list[str] | None = None
     error: str | None = None
     try:
-        raw = await cell.call(
+        raw = await scene.call(
             prepared.object_id, prepared.method, prepared.arguments, control=True, requested_at=running.requested_at
         )
         results = split_results(raw, prepared.returns)
@@ -111,4 +131,4 @@ async def execute(cell: "OnlineCell", prepared: PreparedAction, running: Running
     except msgspec.MsgspecError as caught:
         error = f"The action gave something else than it declares: {caught}"
     finally:
-        cell.action_ended(running, results, error)
+        scene.action_ended(running, results, error)

@@ -1,13 +1,13 @@
-"""Held motion in the server: who holds which robot, which press of the button it is, and what comes too late.
+"""Hold-to-run: which user holds which robot, and which messages arrive too late.
 
-The end of a lease is kept by the cell host; here is only what concerns people and their connections.
+The cell host ends a lease by itself (deadman timeout). This module handles users, presses and connections.
 """
 
 import asyncio
 import itertools
 import math
-from collections.abc import Awaitable, Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from typing import Any, Final
 
 import msgspec
 import structlog
@@ -19,18 +19,17 @@ from arcor2_hw.data.rpc import HoldHandTeachingArgs, JogRobotArgs
 from arcor2_hw.data.rpc.operation import LONGEST_LEASE_MS
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.runtime import messages as m
+from arcor2_server.collaboration.locks import Locks
 from arcor2_server.errors import RequestRefused
-from arcor2_server.events import Connection, make_event
-from arcor2_server.hosts.process import CellHost
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
+from arcor2_server.events import Connection, EventHub, make_event
+from arcor2_server.hosts.session import HostSession
+from arcor2_server.workspace.robots import SceneRobots
 
 log = structlog.get_logger(__name__)
 
 QUICKEST_OF: Final = 30.0
 """Seconds; the quickest message of the last one or two of these spans is what others are compared with."""
-RESTS_WITHIN: Final = 5.0
+STOPS_WITHIN: Final = 5.0
 """Seconds for a robot that is let go to come to rest; a stop that is obeyed takes a tenth of that."""
 
 Held = JogRobotArgs | HoldHandTeachingArgs
@@ -47,7 +46,7 @@ class Delay:
         self._quickest = [math.inf, math.inf]
 
     def of(self, sent_ms: float, arrived: float) -> float:
-        """Give the delay, s, of a message sent at `sent_ms` (their clock) that arrived at `arrived` (s, ours)."""
+        """Return the delay, s, of a message sent at `sent_ms` (their clock) that arrived at `arrived` (s, ours)."""
         offset = arrived - sent_ms / 1e3
         spans = (arrived - self._begin) / QUICKEST_OF
         if spans >= 1.0:
@@ -77,7 +76,7 @@ class _Press:
         self.ended: asyncio.Future[None] = loop.create_future()
 
     def state(self, held: bool, reason: str = "") -> RobotHoldData:
-        """Give what RobotHold tells."""
+        """Return what RobotHold tells."""
         return RobotHoldData(self.robot_id, self.kind, self.user, held, reason or UNSET, self.arm_id)
 
 
@@ -85,13 +84,24 @@ class _Scale(Data, frozen=True):
     scale: float
 
 
-class HeldRobots:
+class HoldToRun:
     """At most one press of each robot. `host` gives the cell host, RequestRefused when the scene is offline."""
 
-    def __init__(self, services: "Services", host: Callable[[], CellHost], moving: set[str]) -> None:
-        self._services = services
+    def __init__(
+        self,
+        host: HostSession,
+        hub: EventHub,
+        locks: Locks,
+        robots: SceneRobots,
+        moving: set[str],
+        spawn: Callable[[Coroutine[Any, Any, None], str], None],
+    ) -> None:
         self._host = host
+        self._hub = hub
+        self._locks = locks
+        self._robots = robots
         self._moving = moving
+        self._spawn = spawn
         self._numbers = itertools.count(1)
         self._held: dict[str, _Press] = {}
         self._spent: dict[Connection, int] = {}
@@ -104,7 +114,7 @@ class HeldRobots:
         return None if press is None else press.user
 
     def states(self) -> list[RobotHoldData]:
-        """Give the holds that have begun."""
+        """Return the holds that have begun."""
         return [press.state(True) for press in self._held.values() if press.begun]
 
     # -------------------------------------------------------------------------------- leases
@@ -117,10 +127,10 @@ class HeldRobots:
         motion: Mapping[str, Any],
         allow: Callable[[], Awaitable[None]],
     ) -> float:
-        """Begin, renew or end a hold; gives the scale of the motion, 0 when it was let go.
+        """Begin, renew or end a hold; return the scale of the motion, 0 when it was let go.
 
         motion: what the host's lease has beside. allow: raises what speaks against a new hold.
-        RequestRefused, CellError.
+        RequestRefused. Raise CellError if that is impossible.
         """
         arrived = asyncio.get_running_loop().time()
         if not 0 <= args.valid_ms <= LONGEST_LEASE_MS:
@@ -135,18 +145,18 @@ class HeldRobots:
         press = self._held.get(args.robot_id)
         if press is None or press.client is not client or press.press != args.hold or press.kind is not kind:
             press = await self._begin(client, user, args, kind, until, allow)
-        elif not self._services.locks.holds(user, args.robot_id):
+        elif not self._locks.holds(user, args.robot_id):
             self._end(press, f"{user} does not hold the lock any more")
             self._require_lock(user, args.robot_id)
         else:
             await asyncio.shield(press.allowed)
-        return await self._say(press, until, motion)
+        return await self._send_lease(press, until, motion)
 
-    async def _say(self, press: _Press, until: float, motion: Mapping[str, Any]) -> float:
+    async def _send_lease(self, press: _Press, until: float, motion: Mapping[str, Any]) -> float:
         if press.over:
             raise RequestRefused(f"The hold was ended: {press.reason or 'it was let go'}.")
         try:
-            raw = await self._host().lease(
+            raw = await self._host.require_online().lease(
                 press.robot_id,
                 press.number,
                 press.kind,
@@ -161,7 +171,7 @@ class HeldRobots:
             raise
         if not press.begun and not press.over:
             press.begun = True
-            self._tell(press, True)
+            self._publish(press, True)
         return msgspec.json.decode(raw, type=_Scale).scale
 
     async def _begin(
@@ -175,7 +185,7 @@ class HeldRobots:
     ) -> _Press:
         """Take hold of a robot; waits for the one before of the same client to come to rest."""
         robot_id, loop = args.robot_id, asyncio.get_running_loop()
-        name = self._services.cell.robot(robot_id).name
+        name = self._robots.robot(robot_id).name
         self._require_unspent(client, args.hold)
         if (former := self._held.get(robot_id)) is not None and former.client is client:
             self._end(former, "" if former.press < args.hold else "another button was pressed")
@@ -193,8 +203,8 @@ class HeldRobots:
                 raise RequestRefused(f"The hold was ended: {press.reason}.")
         except BaseException as error:
             self._finish(press, "")
-            told = error if isinstance(error, Arcor2Error) else RequestRefused("The hold could not begin.")
-            press.allowed.set_exception(told)
+            refusal = error if isinstance(error, Arcor2Error) else RequestRefused("The hold could not begin.")
+            press.allowed.set_exception(refusal)
             press.allowed.exception()  # nobody may be waiting
             raise
         self._moving.add(robot_id)
@@ -206,9 +216,9 @@ class HeldRobots:
             raise RequestRefused("That hold has ended: let go, and press again.")
 
     def _require_lock(self, user: str, robot_id: str) -> None:
-        locks = self._services.locks
+        locks = self._locks
         if not locks.holds(user, robot_id):
-            name, writer = self._services.cell.robot(robot_id).name, locks.writer_of(robot_id)
+            name, writer = self._robots.robot(robot_id).name, locks.writer_of(robot_id)
             raise RequestRefused(f"{name} is locked by {writer}." if writer else f"Lock {name} before you move it.")
 
     # -------------------------------------------------------------------------------- ends
@@ -224,12 +234,12 @@ class HeldRobots:
         """Begin to bring the robot to rest, for a reason that is told."""
         if not press.over:
             press.over, press.reason = True, press.reason or reason
-            self._services.cell.spawn(self._release(press, quietly=True), f"end of a hold of {press.robot_id}")
+            self._spawn(self._release(press, quietly=True), f"end of a hold of {press.robot_id}")
 
     async def _release(self, press: _Press, *, quietly: bool = False) -> None:
         press.over = True
         try:
-            await self._host().lease(press.robot_id, press.number, press.kind, 0.0)
+            await self._host.require_online().lease(press.robot_id, press.number, press.kind, 0.0)
         except Arcor2Error as error:
             log.warning("held robot", robot=press.robot_id, reason=str(error), detail=error.detail)
             if not quietly:
@@ -238,7 +248,7 @@ class HeldRobots:
             self._finish(press, press.reason)  # unless the host has told
 
     def ended(self, message: m.HoldEnded) -> None:
-        """Take note that a robot is at rest."""
+        """Note that a robot is at rest."""
         press = self._held.get(message.object_id)
         if press is not None and press.number == message.hold:
             self._finish(press, "" if message.error is None else message.error.message)
@@ -253,13 +263,13 @@ class HeldRobots:
         if self._held.get(press.robot_id) is press:
             del self._held[press.robot_id]
             self._moving.discard(press.robot_id)
-        if press.client not in self._services.hub.clients:
+        if press.client not in self._hub.clients:
             self._spent.pop(press.client, None)
         if press.begun:
-            self._tell(press, False, press.reason)
+            self._publish(press, False, press.reason)
 
-    def _tell(self, press: _Press, held: bool, reason: str = "") -> None:
-        hub = self._services.hub
+    def _publish(self, press: _Press, held: bool, reason: str = "") -> None:
+        hub = self._hub
         log.info("held robot", robot=press.robot_id, kind=press.kind.value, user=press.user, held=held, reason=reason)
         hub.broadcast(make_event("RobotHold", press.state(held, reason)))
         if press.kind is HoldKind.HAND_TEACHING:
@@ -268,7 +278,7 @@ class HeldRobots:
 
     def teaching_ended(self, message: m.HandTeachingEnded) -> None:
         """Publish that hand teaching, which was on until switched off, has ended without a request."""
-        hub = self._services.hub
+        hub = self._hub
         log.warning("hand teaching ended", robot=message.object_id, reason=message.error.message)
         data = HandTeachingModeData(message.object_id, False, message.arm_id or UNSET)
         hub.broadcast(make_event("HandTeachingMode", data))

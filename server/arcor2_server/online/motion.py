@@ -1,19 +1,24 @@
-"""A motion of a robot on a person's request: checked, told from start to end, its lock held until it has ended."""
+"""Robot motion requested by users: checks, events and the end of the motion."""
 
 import asyncio
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import structlog
 
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.events import MoveEventType
-from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.rpc import InverseKinematicsArgs
+from arcor2_hw.exceptions import Arcor2Error, NotInControl
+from arcor2_server.documents import Session
 from arcor2_server.errors import RequestRefused
-from arcor2_server.events import make_event
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
+from arcor2_server.events import EventHub, make_event
+from arcor2_server.hosts.process import CellError
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.online.online_scene import OnlineScene
+from arcor2_server.workspace.kinematics import Kinematics
+from arcor2_server.workspace.robots import SceneRobots, optional
 
 log = structlog.get_logger(__name__)
 
@@ -28,79 +33,127 @@ FEATURES = {
     "acknowledge_stop": "be acknowledged from here: do it at the robot",
 }
 
-Told = Callable[[MoveEventType, str | Unset], Any]
+MoveEventData = Callable[[MoveEventType, str | Unset], Any]
 """Makes the data of the event that tells a phase of the motion."""
 
 
-def require_feature(services: "Services", robot_id: str, feature: str) -> None:
-    """RequestRefused when the robot's type does not have the feature."""
-    robot = services.cell.robot(robot_id)
-    if not getattr(services.types.robot_meta(robot.type).features, feature):
-        raise RequestRefused(f"{robot.name} cannot {FEATURES[feature]}.")
-
-
 def require_speed(speed: float) -> None:
-    """RequestRefused unless the speed is a fraction of the maximum."""
+    """Raise RequestRefused unless the speed is a fraction of the maximum."""
     if not 0.0 < speed <= 1.0:
         raise RequestRefused(f"The speed must be more than 0 and at most 1, not {speed:g}.")
 
 
-def require_not_moving(services: "Services", robot_id: str, *, held: bool = False) -> None:
-    """RequestRefused while the robot moves by a request, is held, or executes the running action; or is not there.
+class RobotMotion:
+    """Robot motion requested by a user."""
 
-    held: whether the caller is the one who holds it.
-    """
-    cell = services.cell
-    name = cell.robot(robot_id).name
-    cell.board.require_not_failed(robot_id)
-    if not held and (holder := cell.held.holder(robot_id)) is not None:
-        raise RequestRefused(f"{name} is held by {holder}.")
-    if robot_id in cell.moving:
-        raise RequestRefused(f"{name} is moving.")
-    if cell.running_action is not None and cell.running_action.object_id == robot_id:
-        raise RequestRefused(f"{name} is executing an action.")
+    def __init__(
+        self,
+        hub: EventHub,
+        types: ObjectTypes,
+        session: Session,
+        online: OnlineScene,
+        robots: SceneRobots,
+        kinematics: Kinematics,
+    ) -> None:
+        self._hub = hub
+        self._types = types
+        self._session = session
+        self._online = online
+        self._robots = robots
+        self._kinematics = kinematics
 
+    def require_feature(self, robot_id: str, feature: str) -> None:
+        """Raise RequestRefused when the robot's type does not have the feature."""
+        robot = self._online.robot(robot_id)
+        if not getattr(self._types.robot_meta(robot.type).features, feature):
+            raise RequestRefused(f"{robot.name} cannot {FEATURES[feature]}.")
 
-async def require_ready(services: "Services", robot_id: str, feature: str, arm_id: str | None) -> None:
-    """RequestRefused unless the robot may begin a motion now."""
-    cell = services.cell
-    arm = cell.arm(robot_id, arm_id)
-    require_not_moving(services, robot_id)
-    require_feature(services, robot_id, feature)
-    robot = cell.robot(robot_id)
-    if services.types.robot_meta(robot.type).features.hand_teaching and await cell.ask(
-        bool, robot_id, "get_hand_teaching_mode", arm
-    ):
-        raise RequestRefused(f"{robot.name} is being moved by hand.")
+    def require_not_moving(self, robot_id: str, *, held: bool = False) -> None:
+        """RequestRefused while the robot moves by a request, is held, or executes the running action; or is not there.
 
+        held: whether the caller is the one who holds it.
+        """
+        cell = self._online
+        name = cell.robot(robot_id).name
+        cell.board.require_not_failed(robot_id)
+        if not held and (holder := cell.held.holder(robot_id)) is not None:
+            raise RequestRefused(f"{name} is held by {holder}.")
+        if robot_id in cell.moving:
+            raise RequestRefused(f"{name} is moving.")
+        if cell.running_action is not None and cell.running_action.object_id == robot_id:
+            raise RequestRefused(f"{name} is executing an action.")
 
-async def take_control(services: "Services", robot_id: str, arm_id: str | None) -> None:
-    """Take control before a goal is computed from where the robot is: with control comes the tool of its settings.
+    async def require_ready(self, robot_id: str, feature: str, arm_id: str | None) -> None:
+        """Raise RequestRefused unless the robot may begin a motion now."""
+        cell = self._online
+        arm = cell.arm(robot_id, arm_id)
+        self.require_not_moving(robot_id)
+        self.require_feature(robot_id, feature)
+        robot = cell.robot(robot_id)
+        if self._types.robot_meta(robot.type).features.hand_teaching and await cell.ask(
+            bool, robot_id, "get_hand_teaching_mode", arm
+        ):
+            raise RequestRefused(f"{robot.name} is being moved by hand.")
 
-    Raises what the robot refuses with.
-    """
-    if arm_id is None:  # of several arms each has its own tool all the time
-        await services.cell.call(robot_id, "check_if_ready_to_move", control=True)
+    async def take_control(self, robot_id: str, arm_id: str | None) -> None:
+        """Take control before a goal is computed from where the robot is: with control comes the tool of its settings.
 
+        Raises what the robot refuses with.
+        """
+        if arm_id is None:  # of several arms each has its own tool all the time
+            await self._online.call(robot_id, "check_if_ready_to_move", control=True)
 
-async def move(
-    services: "Services",
-    robot_id: str,
-    method: str,
-    arguments: Mapping[str, Any],
-    event: str,
-    told: Told,
-    requested_at: float,
-) -> None:
-    """Move, and publish the end or the failure. The robot counts as moving from the request on (`cell.moving`)."""
-    phase, problem = MoveEventType.END, ""
-    try:
-        await services.cell.call(robot_id, method, arguments, control=True, requested_at=requested_at)
-    except asyncio.CancelledError:
-        raise
-    except Arcor2Error as error:
-        phase, problem = MoveEventType.FAILED, str(error)
-        log.info("motion failed", robot=robot_id, reason=problem, detail=error.detail)
-    finally:
-        services.cell.moving.discard(robot_id)
-    services.hub.broadcast(make_event(event, told(phase, problem or UNSET)))
+    async def move(
+        self,
+        robot_id: str,
+        method: str,
+        arguments: Mapping[str, Any],
+        event: str,
+        event_data: MoveEventData,
+        requested_at: float,
+    ) -> None:
+        """Move, and publish the end or the failure. The robot counts as moving from the request on (`cell.moving`)."""
+        phase, problem = MoveEventType.END, ""
+        try:
+            await self._online.call(robot_id, method, arguments, control=True, requested_at=requested_at)
+        except asyncio.CancelledError:
+            raise
+        except Arcor2Error as error:
+            phase, problem = MoveEventType.FAILED, str(error)
+            log.info("motion failed", robot=robot_id, reason=problem, detail=error.detail)
+        finally:
+            self._online.moving.discard(robot_id)
+        self._hub.broadcast(make_event(event, event_data(phase, problem or UNSET)))
+
+    def require_robot_online(self, robot_id: str) -> OnlineScene:
+        """Return the cell when it is online and the object is a robot; else RequestRefused.
+
+        Raise NotFound if there is none.
+        """
+        self._session.require_scene_open()
+        self._online.require_online()
+        self._online.robot(robot_id)
+        return self._online
+
+    async def solve_inverse(self, args: InverseKinematicsArgs) -> list[Joint]:
+        """Give joints that reach a pose; RequestRefused when the robot cannot compute that, CellError when none do."""
+        cell = self._online
+        arguments: dict[str, Any] = cell.arm(args.robot_id, optional(args.arm_id))
+        self.require_feature(args.robot_id, "inverse_kinematics")
+        arguments |= {
+            "end_effector_id": args.end_effector_id,
+            "pose": args.pose,
+            "avoid_collisions": args.avoid_collisions,
+        }
+        if not isinstance(args.start_joints, Unset):
+            arguments["start_joints"] = args.start_joints
+        joints: list[Joint]
+        try:
+            joints = await cell.ask(list[Joint], args.robot_id, "inverse_kinematics", arguments)
+        except CellError as error:
+            robot = cell.robot(args.robot_id)
+            # Some controllers answer only whom they obey. The question moves nothing: its model answers as well.
+            if error.code != NotInControl.code or self._robots.model_of_type(robot.type) is None:
+                raise
+            return await self._kinematics.inverse(robot, args)
+        return joints

@@ -1,10 +1,9 @@
-"""The scene when it is online: its state, its host, calls to its devices, streams to those who subscribed."""
+"""The online scene: going online and offline, calls to devices, running actions."""
 
 import asyncio
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Mapping
+from typing import Any, Final
 
-import msgspec
 import structlog
 
 from arcor2_hw.data.base import UNSET
@@ -14,21 +13,21 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost
 from arcor2_hw.runtime import messages as m
-from arcor2_server.collaboration.locks import PROJECT, SCENE, SERVER
+from arcor2_server.collaboration.locks import PROJECT, SCENE, SERVER, Locks
+from arcor2_server.collaboration.tasks import Tasks
+from arcor2_server.documents import Session
 from arcor2_server.errors import RequestRefused
-from arcor2_server.events import make_event
+from arcor2_server.events import EventHub, make_event
 from arcor2_server.hosts.devices import DeviceBoard
-from arcor2_server.hosts.open_request import opening
-from arcor2_server.hosts.pool import CellHosts
-from arcor2_server.hosts.process import CellHost, json_of
+from arcor2_server.hosts.process import CellHost
+from arcor2_server.hosts.session import OBSERVE_WITHIN, HostSession
 from arcor2_server.hosts.streams import RobotStreams
-from arcor2_server.hosts.workspace_updates import calibrations, with_world
 from arcor2_server.online.actions import LastStop, RunningAction
-from arcor2_server.online.hold_to_run import HeldRobots
+from arcor2_server.online.hold_to_run import HoldToRun
+from arcor2_server.online.opening import SceneOpening
 from arcor2_server.online.progress import SceneTask
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
+from arcor2_server.workspace.robot_calibrations import RobotCalibrations
+from arcor2_server.workspace.robots import SceneRobots
 
 log = structlog.get_logger(__name__)
 
@@ -40,51 +39,77 @@ STOP_WITHIN: Final = 5.0
 """Seconds in which the host says that it has closed the devices; it allows itself two."""
 
 
-class OnlineCell:
+class OnlineScene:
     """One scene, offline or online. Made inside the event loop.
 
     What is asked of devices raises CellError, ConnectionLost, DeviceTimeout.
     """
 
-    def __init__(self, services: "Services") -> None:
-        self.hosts = CellHosts(services.settings.device_files_dirs)
+    def __init__(
+        self,
+        host: HostSession,
+        opening: SceneOpening,
+        hub: EventHub,
+        locks: Locks,
+        session: Session,
+        robots: SceneRobots,
+        tasks: Tasks,
+        robot_calibrations: RobotCalibrations,
+    ) -> None:
         self.state = SceneStateEnum.STOPPED
         self.running_action: RunningAction | None = None
         self.results: dict[str, list[str]] = {}
         """Results of executed actions by action id, as JSON; forgotten when the scene goes offline."""
         self.last_stop = LastStop()
         self.moving: set[str] = set()
-        """Robots that move because a request said so."""
-        self._services = services
-        self._host: CellHost | None = None
+        """Robots that move on request."""
+        self.before_start: list[Callable[[], None]] = []
+        """Called before the scene goes online; may raise RequestRefused."""
+        self.held = HoldToRun(host, hub, locks, robots, self.moving, self.spawn)
+        self.task = SceneTask(tasks)
+        self._host = host
+        self._opening = opening
+        self._hub = hub
+        self._locks = locks
+        self._session = session
+        self._robots = robots
+        self._robot_calibrations = robot_calibrations
         self._task: asyncio.Task[None] | None = None
         self._answer: asyncio.Future[m.ErrorData | None] | None = None
-        self.streams = RobotStreams(services.hub, self.say)
-        self.held = HeldRobots(services, self._online_host, self.moving)
-        self.task = SceneTask(services.tasks)
-        self.board = DeviceBoard(services.hub, self._one_connected)
         self._background: set[asyncio.Task[None]] = set()
-        self._preparing = asyncio.get_running_loop().call_later(SPARE_AFTER, self.hosts.prepare)
-        services.hub.on_leave += [self.streams.forget, self.held.forget]
+        self._preparing = asyncio.get_running_loop().call_later(SPARE_AFTER, host.prepare)
+        host.on_message = self._handle
+        host.on_end = self._host_ended
+        host.board.on_connection.append(self._one_connected)
+        hub.on_leave.append(self.held.forget)
 
     # -------------------------------------------------------------------------------- state
     @property
+    def board(self) -> DeviceBoard:
+        """The states of the devices."""
+        return self._host.board
+
+    @property
+    def streams(self) -> RobotStreams:
+        """The subscriptions to joints and end effector poses."""
+        return self._host.streams
+
+    @property
     def online(self) -> bool:
-        """Tell whether the scene is online."""
-        return self.state is SceneStateEnum.STARTED
+        """Whether the scene is online."""
+        return self._host.online
 
     def require_online(self) -> None:
-        """RequestRefused unless the scene is online."""
-        if not self.online:
-            raise RequestRefused("The scene is offline: start it first.")
+        """Raise RequestRefused unless the scene is online."""
+        self._host.require_online()
 
     def require_offline(self) -> None:
-        """RequestRefused unless the scene is offline."""
+        """Raise RequestRefused unless the scene is offline."""
         if self.state is not SceneStateEnum.STOPPED:
             raise RequestRefused("The scene is online: stop it first.")
 
     async def settled(self) -> SceneStateEnum:
-        """Wait until the scene neither comes up nor goes down; gives its state then."""
+        """Wait until the scene neither comes up nor goes down; return its state then."""
         while self._task is not None:
             await asyncio.wait([self._task])
         return self.state
@@ -92,15 +117,16 @@ class OnlineCell:
     def _one_connected(self) -> None:
         if self.state is SceneStateEnum.STARTING:
             self.task.connected(self.board.states())
-        self._services.arm_calibrations.look()
+        self._robot_calibrations.read_connected()
 
-    def _tell(self, state: SceneStateEnum, message: str = "") -> None:
+    def _publish(self, state: SceneStateEnum, message: str = "") -> None:
         self.state = state
-        scene = self._services.session.scene
+        self._host.online = state is SceneStateEnum.STARTED
+        scene = self._session.scene
         self.task.entered(state, "" if scene is None else scene.name, message)
         log.info("scene", state=state.value, reason=message)
-        self._services.hub.broadcast(make_event("SceneState", SceneStateData(state, message or UNSET)))
-        self._services.arm_calibrations.look()
+        self._hub.broadcast(make_event("SceneState", SceneStateData(state, message or UNSET)))
+        self._robot_calibrations.read_connected()
 
     # -------------------------------------------------------------------------------- going online
     async def begin_start(self, *, dry_run: bool = False, keep_going: bool = False) -> None:
@@ -108,27 +134,26 @@ class OnlineCell:
 
         keep_going: objects that cannot be made or connected are left out. RequestRefused, Locked.
         """
-        services = self._services
-        services.session.require_scene_open()
+        self._session.require_scene_open()
         self.require_offline()
-        if services.execution.busy:
-            raise RequestRefused("A program is running: stop it first.")
-        if services.session.project is None and (locked := services.locks.write_locked_roots()):
+        for check in self.before_start:
+            check()
+        if self._session.project is None and (locked := self._locks.write_locked_roots()):
             raise RequestRefused(f"Something is being edited: {', '.join(locked)}.")
-        await services.locks.acquire(SERVER, SCENE, PROJECT)
+        await self._locks.acquire(SERVER, SCENE, PROJECT)
         try:
             self.require_offline()
             if not dry_run:
                 self.state = SceneStateEnum.STARTING
                 self._task = asyncio.create_task(
-                    self._start(services.session.require_scene(), keep_going), name="scene start"
+                    self._start(self._session.require_scene(), keep_going), name="scene start"
                 )
         finally:
             if self._task is None:
-                services.locks.release(SERVER, SCENE, PROJECT)
+                self._locks.release(SERVER, SCENE, PROJECT)
 
     async def _start(self, scene: Scene, keep_going: bool) -> None:
-        self._tell(SceneStateEnum.STARTING)
+        self._publish(SceneStateEnum.STARTING)
         self.board.clear()
         try:
             problem = await self._bring_up(scene, keep_going)
@@ -140,23 +165,22 @@ class OnlineCell:
         if problem is None:
             failed = self.board.failed()
             self._done(SceneStateEnum.STARTED, f"Not there: {', '.join(failed)}." if failed else "")
-            self.hosts.prepare()
+            self._host.prepare()
             return
-        self._tell(SceneStateEnum.STOPPING, problem)
-        host, self._host = self._host, None
+        self._publish(SceneStateEnum.STOPPING, problem)
+        host, self._host.host = self._host.host, None
         if host is not None:
             await host.close()
         self._gone_offline(problem)
 
     async def _bring_up(self, scene: Scene, keep_going: bool) -> str | None:
-        """Give why the scene did not come up, None when it did."""
+        """Return why the scene did not come up, None when it did."""
         self.board.show(scene.objects, {})
-        message, overlaid = opening(self._services, scene, keep_going)
-        await self._services.secrets.store.flush()
+        message, overlaid = await self._opening.prepare(scene, keep_going)
         self.board.show(scene.objects, overlaid)
         self._answer = asyncio.get_running_loop().create_future()
-        host = self._host = await self.hosts.take(self)
-        host.send(with_world(self._services, message, calibrations(self._services, scene.objects)))
+        host = self._host.host = await self._host.take()
+        host.send(self._opening.with_workspace(message, scene))
         try:
             async with asyncio.timeout(START_WITHIN):
                 error = await self._answer
@@ -172,29 +196,28 @@ class OnlineCell:
     def _done(self, state: SceneStateEnum, message: str = "") -> None:
         self._task = None
         self._answer = None
-        self._services.locks.release(SERVER, SCENE, PROJECT)
-        self._tell(state, message)
+        self._locks.release(SERVER, SCENE, PROJECT)
+        self._publish(state, message)
 
     def _gone_offline(self, message: str = "") -> None:
-        self._host = None
+        self._host.host = None
         self.board.clear(message)
         self.results.clear()
         self.held.offline(message)
         self.moving.clear()
         self.streams.clear()
         self._done(SceneStateEnum.STOPPED, message)
-        self.hosts.prepare()
+        self._host.prepare()
 
     # -------------------------------------------------------------------------------- going offline
     async def begin_stop(self, *, dry_run: bool = False) -> None:
         """Begin to take the scene down: returns when that is allowed, the rest is told by SceneState."""
-        services = self._services
-        services.session.require_scene_open()
+        self._session.require_scene_open()
         if not self.online:
             raise RequestRefused("The scene is not online.")
         if self.running_action is not None and not self.running_action.stop_requested:
             raise RequestRefused("An action is running: wait for it, or stop it.")
-        await services.locks.acquire(SERVER, SCENE, PROJECT)
+        await self._locks.acquire(SERVER, SCENE, PROJECT)
         try:
             self.require_online()
             if not dry_run:
@@ -202,11 +225,11 @@ class OnlineCell:
                 self._task = asyncio.create_task(self._stop(), name="scene stop")
         finally:
             if self._task is None:
-                services.locks.release(SERVER, SCENE, PROJECT)
+                self._locks.release(SERVER, SCENE, PROJECT)
 
     async def _stop(self) -> None:
-        self._tell(SceneStateEnum.STOPPING)
-        host = self._host
+        self._publish(SceneStateEnum.STOPPING)
+        host = self._host.host
         problem = ""
         if host is not None:
             self._answer = asyncio.get_running_loop().create_future()
@@ -226,21 +249,15 @@ class OnlineCell:
     async def close(self) -> None:
         """End with the server, and the program with it: the hosts stop motion and disconnect by themselves."""
         self._preparing.cancel()
-        self._host = None  # its end is meant now
-        await self._services.execution.close()
+        await self._host.close()
         tasks = [task for task in (self._task, *self._background) if task is not None]
-        await self.hosts.close()
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
     # -------------------------------------------------------------------------------- from the host
-    def host_said(self, host: CellHost, message: m.ServerBound) -> None:
-        """Take a message of the host."""
+    def _handle(self, host: CellHost, message: m.ServerBound) -> None:  # noqa: ARG002
         match message:
-            case m.StreamEvent():
-                if host is self._host:
-                    self.streams.heard(message)
             case m.HoldEnded():
                 self.held.ended(message)
             case m.HandTeachingEnded():
@@ -249,47 +266,23 @@ class OnlineCell:
                 self._answered(None)
             case m.SceneFailed() | m.SceneClosed():
                 self._answered(message.error)
-            case m.DeviceChanged():
-                self.board.changed(message)
-                log.info(
-                    "device",
-                    id=message.object_id,
-                    connection=message.connection.value,
-                    reason=message.reason,
-                    health=message.health.value,
-                    alarms=[alarm.text for alarm in message.alarms],
-                    control=message.control_owner,
-                )
-            case m.LogLine():
-                log.info("cell host", level=message.level, text=message.text, object=message.object_id)
+            case _:
+                pass
 
     def _answered(self, error: m.ErrorData | None) -> None:
         if self._answer is not None and not self._answer.done():
             self._answer.set_result(error)
 
-    def host_silent(self, host: CellHost, silent: bool) -> None:
-        """Note that the host does not answer, or answers again."""
-        if host is self._host:
-            self.board.set_answering(not silent)
-            log.warning("cell host does not answer" if silent else "cell host answers again", pid=host.pid)
-
-    def host_ended(self, host: CellHost, reason: str) -> None:
-        """Go offline with the reason when the host is gone."""
-        if host is not self._host:
-            return
+    def _host_ended(self, reason: str) -> None:
+        """Go offline."""
         if self._answer is not None and not self._answer.done():
             self._answer.set_exception(ConnectionLost(reason[:1].upper() + reason[1:] + "."))
         elif self.online:
             message = f"Lost the devices: {reason}."
-            self._tell(SceneStateEnum.STOPPING, message)
+            self._publish(SceneStateEnum.STOPPING, message)
             self._gone_offline(message)
 
     # -------------------------------------------------------------------------------- calls
-    def _online_host(self) -> CellHost:
-        self.require_online()
-        assert self._host is not None
-        return self._host
-
     async def call(
         self,
         object_id: str,
@@ -300,83 +293,57 @@ class OnlineCell:
         deadline: float | None = None,
         requested_at: float | None = None,
     ) -> bytes:
-        """Call a method of an object; return the result as JSON, empty for None.
+        """Call a method of an object, as HostSession.call does.
 
         requested_at: when the motion was requested, s of the monotonic clock; Cancelled if all was stopped since.
         """
         self.last_stop.require_none_since(requested_at)
-        encoded = {name: json_of(value) for name, value in (args or {}).items()}
-        return await self._online_host().call(object_id, method, encoded, control=control, deadline=deadline)
+        return await self._host.call(object_id, method, args, control=control, deadline=deadline)
 
     async def cancel(self, object_id: str, action: str) -> None:
-        """Call what cancels an action of an object, past the action."""
-        await self._online_host().call(object_id, action, cancel=True, deadline=STOP_WITHIN)
+        """Cancel an action of an object while it runs."""
+        await self._host.cancel(object_id, action)
 
     async def retry(self, object_id: str) -> None:
-        """Make and connect an object anew that has failed."""
-        await self._online_host().retry(object_id)
+        """Create and connect a failed object again."""
+        await self._host.retry(object_id)
 
     async def stop_motion(self, object_id: str) -> None:
-        """Stop an object past whatever it does."""
-        await self._online_host().stop_motion(object_id)
+        """Stop an object, whatever it does."""
+        await self._host.stop_motion(object_id)
 
     def begin_stop_all(self, by: str) -> CellHost | None:
-        """End holds and what is about to start; return the host whose devices are to be stopped, None without one."""
+        """End holds and pending motions; return the host whose devices are to be stopped, None without one."""
         self.last_stop.note()
         self.held.stop(by)
         if self.running_action is not None:
             self.running_action.stop_requested = True
             self.running_action.cancelled = True  # its end is published as ActionCancelled, unless it goes on
-        return self._host
+        return self._host.host
 
     async def ask(self, kind: type[Any], object_id: str, method: str, args: Mapping[str, Any] | None = None) -> Any:
-        """Call a method that only observes, and read its result as `kind`."""
-        raw = await self.call(object_id, method, args, deadline=OBSERVE_WITHIN)
-        try:
-            return msgspec.json.decode(raw, type=kind)
-        except msgspec.MsgspecError as error:
-            raise Arcor2Error(f"{method} gave something else than it should.", str(error)) from error
+        """Call a method that only observes, and decode its result as `kind`."""
+        return await self._host.ask(kind, object_id, method, args)
 
     async def robot_joints(self, robot_id: str, arm_id: str | None = None, *, gripper: bool = False) -> list[Joint]:
-        """Give the present joint values of a robot."""
-        args: dict[str, Any] = {"include_gripper": gripper} | self.arm(robot_id, arm_id)
-        joints: list[Joint] = await self.ask(list[Joint], robot_id, "robot_joints", args)
-        return joints
+        """Return the present joint values of a robot."""
+        return await self._robots.robot_joints(robot_id, arm_id, gripper=gripper)
 
     async def end_effector_pose(self, robot_id: str, end_effector: str, arm_id: str | None = None) -> Pose:
-        """Give the present pose of an end effector in the world."""
-        arm = self.arm(robot_id, arm_id)
-        if end_effector not in await self.ask(set[str], robot_id, "get_end_effectors_ids", arm):
-            raise RequestRefused(f"{self.robot(robot_id).name} has no end effector {end_effector!r}.")
-        args = {"end_effector": end_effector} | arm
-        pose: Pose = await self.ask(Pose, robot_id, "get_end_effector_pose", args)
-        return pose
+        """Return the present pose of an end effector in the world."""
+        return await self._robots.end_effector_pose(robot_id, end_effector, arm_id)
 
     async def object_pose_changed(self, object_id: str, pose: Pose) -> None:
-        """Tell the live instance that it stands elsewhere."""
+        """Update the pose of the live object."""
         await self.call(object_id, "set_pose", {"pose": pose}, deadline=OBSERVE_WITHIN)
 
     def robot(self, robot_id: str) -> SceneObject:
-        """Give the scene object of a robot; NotFound, RequestRefused when it is none."""
-        found = self._services.session.scene_object(robot_id)
-        if not self._services.types.derives_from(found.type, "Robot"):
-            raise RequestRefused(f"{found.name} is not a robot.")
-        return found
+        """Return the scene object of a robot; NotFound, RequestRefused when it is none."""
+        return self._robots.robot(robot_id)
 
     def arm(self, robot_id: str, arm_id: str | None) -> dict[str, Any]:
-        """Give the argument that names the arm; RequestRefused unless it is there exactly for multi-arm robots."""
-        robot = self.robot(robot_id)
-        multi_arm = self._services.types.robot_meta(robot.type).multi_arm
-        if multi_arm and arm_id is None:
-            raise RequestRefused(f"{robot.name} has several arms: name one.")
-        if not multi_arm and arm_id is not None:
-            raise RequestRefused(f"{robot.name} has one arm: do not name it.")
-        return {} if arm_id is None else {"arm_id": arm_id}
-
-    def say(self, message: m.ToHost) -> None:
-        """Tell the scene's host, when there is one."""
-        if self._host is not None:
-            self._host.send(message)
+        """Return the argument that names the arm; RequestRefused unless it is set exactly for multi-arm robots."""
+        return self._robots.arm(robot_id, arm_id)
 
     # -------------------------------------------------------------------------------- in the background
     def spawn(self, work: Any, name: str) -> None:
@@ -392,8 +359,4 @@ class OnlineCell:
             self.results[action.action_id] = results
         if not action.cancelled:
             data = ActionResultData(action.action_id, results or UNSET, error or UNSET)
-            self._services.hub.broadcast(Event("ActionResult", data=data))
-
-
-OBSERVE_WITHIN: Final = 5.0
-"""Seconds for reading a value; a device on a local network answers within one."""
+            self._hub.broadcast(Event("ActionResult", data=data))

@@ -1,4 +1,4 @@
-"""Bringing a scene up and taking it down, as a task that people can follow."""
+"""Shows the start and stop of a scene as a task."""
 
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.editor import TaskKind
@@ -38,7 +38,7 @@ class SceneTask:
                 pass
 
     def connected(self, states: list[ObjectStateData]) -> None:
-        """Tell how many of the scene's objects are connected."""
+        """Return how many of the scene's objects are connected."""
         if self._task is None or not self._starting or not states:
             return
         up = sum(state.state in _UP for state in states)

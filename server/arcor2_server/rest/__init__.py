@@ -1,8 +1,11 @@
-"""The REST operations of all services; each declares the least role that may use it."""
+"""The REST operations of all services; each declares the role that it needs."""
 
+from collections.abc import Iterable
 from typing import Final
 
 from litestar.handlers import HTTPRouteHandler
+
+from arcor2_server.collaboration.tasks import Tasks
 
 # Imported for their operations.
 from arcor2_server.rest import (  # noqa: F401
@@ -25,12 +28,17 @@ from arcor2_server.rest import (  # noqa: F401
     scene,
     scenes,
 )
-from arcor2_server.rest.operations import OPERATIONS, route
+from arcor2_server.rest.operations import OPERATIONS, bound, route
 
 
-def routes() -> list[HTTPRouteHandler]:
-    """Make the routes of one application."""
-    return [route(declared) for declared in OPERATIONS]
+def routes(groups: Iterable[object], tasks: Tasks) -> list[HTTPRouteHandler]:
+    """Return the routes of one application.
+
+    Args:
+        groups: the objects on which the operations are declared as methods.
+        tasks: where the progress of uploads is shown.
+    """
+    return [route(declared, tasks) for declared in bound(OPERATIONS, groups)]
 
 
 __all__: Final = ["OPERATIONS", "routes"]

@@ -1,4 +1,4 @@
-"""A page to read and try the REST operations, made from their OpenAPI document; it loads nothing from elsewhere."""
+"""A page for reading and trying the REST operations, generated from their OpenAPI document."""
 
 import base64
 import functools
@@ -16,7 +16,7 @@ PAGE: Final = Path(__file__).with_name("api_page.html")
 
 @functools.cache
 def page() -> str:
-    """Give the page; its policy allows its own style and script by their digests, and nothing else."""
+    """Return the page; its policy allows its own style and script by their digests, and nothing else."""
     text = PAGE.read_text(encoding="utf-8")
     for kind, place in (("style", "STYLE"), ("script", "SCRIPT")):
         (content,) = re.findall(rf"<{kind}>(.*?)</{kind}>", text, re.DOTALL)
@@ -25,7 +25,10 @@ def page() -> str:
     return text
 
 
-@operation("GET", "/swagger", SERVER, Role.OPERATOR, open=True, media_type="text/html")
-async def swagger_page() -> str:
-    """Answer with a page on which all operations can be read and tried."""
-    return page()
+class ApiPageOperations:
+    """The page for reading and trying the REST operations."""
+
+    @operation("GET", "/swagger", SERVER, Role.OPERATOR, open=True, media_type="text/html")
+    async def swagger_page(self) -> str:
+        """Answer with a page on which all operations can be read and tried."""
+        return page()

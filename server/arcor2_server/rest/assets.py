@@ -1,4 +1,4 @@
-"""Assets over REST: files that come and go as streams (protocol, section 13)."""
+"""Assets over REST, streamed in both directions (protocol, section 13)."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -8,10 +8,10 @@ from msgspec import UNSET
 
 from arcor2_hw.data.base import Data, Timestamp, Unset
 from arcor2_hw.data.role import Role
+from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.rest.operations import MIB, Binary, Upload, operation
 from arcor2_server.rest.scenes import STORAGE, check_id
-from arcor2_server.services import Services
-from arcor2_server.storage import Asset
+from arcor2_server.storage import Asset, AssetStore
 from arcor2_server.storage.assets import CHUNK, MAX_ASSET
 
 
@@ -42,54 +42,57 @@ async def _pieces(file: IO[bytes]) -> AsyncIterator[bytes]:
         yield chunk
 
 
-@operation(
-    "POST",
-    "/assets",
-    STORAGE,
-    Role.TECHNICIAN,
-    file="assetData",
-    title="Taking in a file",
-    told_from=MIB,
-    limit=MAX_ASSET + MIB,
-)
-async def post_asset(services: Services, query: AssetQuery, upload: Upload) -> AssetInfo:
-    """Take in a file, a mesh or a robot's description."""
-    key = None if isinstance(query.id, Unset) else query.id
-    if key is not None:
-        check_id(key, "asset")
-    asset = await services.assets.put(
-        _pieces(upload.file),
-        key,
-        file_name=upload.filename or UNSET,
-        description=query.description,
-        upsert=query.upsert,
+class AssetOperations:
+    """Assets over REST: files that come and go as streams (protocol, section 13)."""
+
+    def __init__(self, assets: AssetStore, type_notifications: TypeNotifications) -> None:
+        self._assets = assets
+        self._type_notifications = type_notifications
+
+    @operation(
+        "POST",
+        "/assets",
+        STORAGE,
+        Role.TECHNICIAN,
+        file="assetData",
+        title="Taking in a file",
+        shown_from=MIB,
+        limit=MAX_ASSET + MIB,
     )
-    await services.type_news.taken(services)
-    return _info(asset)
+    async def post_asset(self, query: AssetQuery, upload: Upload) -> AssetInfo:
+        """Take in a file, a mesh or a robot's description."""
+        key = None if isinstance(query.id, Unset) else query.id
+        if key is not None:
+            check_id(key, "asset")
+        asset = await self._assets.put(
+            _pieces(upload.file),
+            key,
+            file_name=upload.filename or UNSET,
+            description=query.description,
+            upsert=query.upsert,
+        )
+        await self._type_notifications.uploaded()
+        return _info(asset)
 
+    @operation("GET", "/assets/info", STORAGE, Role.OPERATOR)
+    async def list_assets(self) -> list[AssetInfo]:
+        """List the assets."""
+        return [_info(asset) for asset in self._assets.infos()]
 
-@operation("GET", "/assets/info", STORAGE, Role.OPERATOR)
-async def list_assets(services: Services) -> list[AssetInfo]:
-    """List the assets."""
-    return [_info(asset) for asset in services.assets.infos()]
+    @operation("GET", "/assets/{asset_id}/exists", STORAGE, Role.OPERATOR)
+    async def asset_exists(self, asset_id: str) -> bool:
+        """Return whether there is such an asset."""
+        return self._assets.exists(asset_id)
 
+    @operation("GET", "/assets/{asset_id}/data", STORAGE, Role.OPERATOR, media_type="application/octet-stream")
+    async def asset_data(self, asset_id: str) -> Binary:
+        """Return the content of an asset."""
+        asset = self._assets.info(asset_id)
+        name = asset.id if isinstance(asset.file_name, Unset) else asset.file_name
+        return Binary(self._assets.read(asset), "application/octet-stream", name, asset.size)
 
-@operation("GET", "/assets/{asset_id}/exists", STORAGE, Role.OPERATOR)
-async def asset_exists(services: Services, asset_id: str) -> bool:
-    """Tell whether there is such an asset."""
-    return services.assets.exists(asset_id)
-
-
-@operation("GET", "/assets/{asset_id}/data", STORAGE, Role.OPERATOR, media_type="application/octet-stream")
-async def asset_data(services: Services, asset_id: str) -> Binary:
-    """Give the content of an asset."""
-    asset = services.assets.info(asset_id)
-    name = asset.id if isinstance(asset.file_name, Unset) else asset.file_name
-    return Binary(services.assets.read(asset), "application/octet-stream", name, asset.size)
-
-
-@operation("DELETE", "/assets/{asset_id}", STORAGE, Role.TECHNICIAN)
-async def delete_asset(services: Services, asset_id: str) -> None:
-    """Delete an asset; a type that needs it has a problem from then on."""
-    await services.assets.delete(asset_id)
-    await services.type_news.taken(services)
+    @operation("DELETE", "/assets/{asset_id}", STORAGE, Role.TECHNICIAN)
+    async def delete_asset(self, asset_id: str) -> None:
+        """Delete an asset; a type that needs it has a problem from then on."""
+        await self._assets.delete(asset_id)
+        await self._type_notifications.uploaded()

@@ -1,4 +1,4 @@
-"""The Calibration service over REST as the original has it (protocol, section 15)."""
+"""The Calibration service over REST (protocol, section 15)."""
 
 import asyncio
 from typing import Final, TypeVar
@@ -12,11 +12,10 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.compute.calibration import RobotView
 from arcor2_server.rest.field_names import camelized_names, snaked
 from arcor2_server.rest.operations import MIB, Upload, operation
-from arcor2_server.services import Services
-from arcor2_server.workspace.robot_models import model_of_uri
+from arcor2_server.workspace.calibration import Calibration, RobotView
+from arcor2_server.workspace.robots import SceneRobots
 
 T = TypeVar("T")
 CALIBRATION = "Calibration"
@@ -35,7 +34,7 @@ class CameraQuery(Data, frozen=True, rename="camel"):
     dist_coefs: list[float]
 
     def parameters(self) -> CameraParameters:
-        """Give them as the rest of the server has them. InvalidData."""
+        """Return them as the rest of the server has them. Raise InvalidData if that is impossible."""
         if len(self.dist_coefs) not in COEFFICIENTS:
             raise InvalidData(f"distCoefs needs 4, 5, 8 or 12 numbers, not {len(self.dist_coefs)}.")
         return CameraParameters(self.fx, self.fy, self.cx, self.cy, list(self.dist_coefs))
@@ -57,37 +56,45 @@ class CalibrateRobotArgs(Data, frozen=True):
     urdf_uri: str
 
 
-@operation("PUT", "/calibrate/camera", CALIBRATION, Role.TECHNICIAN, file="image", limit=MAX_IMAGE)
-async def calibrate_camera(services: Services, query: CameraPoseQuery, upload: Upload) -> EstimatedPose:
-    """Give the pose of the camera, which sees markers whose poses are known."""
-    parameters = query.parameters()
-    image = await asyncio.to_thread(upload.file.read)
-    return (await services.calibration.camera(parameters, [image])).estimated(inverse=query.inverse)
-
-
-@operation("PUT", "/markers/corners", CALIBRATION, Role.TECHNICIAN, file="image", limit=MAX_IMAGE, plain=True)
-async def marker_corners(services: Services, query: CameraQuery, upload: Upload) -> list[MarkerCorners]:
-    """Give the corners of the markers in a picture, pixels."""
-    parameters = query.parameters()
-    image = await asyncio.to_thread(upload.file.read)
-    return await services.calibration.markers(parameters, image)
-
-
-@operation("PUT", "/calibrate/robot", CALIBRATION, Role.TECHNICIAN, file="image", parts=("args",), limit=MAX_IMAGE)
-async def calibrate_robot(services: Services, upload: Upload) -> Pose:
-    """Give the pose of a robot that a depth camera of known pose sees (16 bit, mm)."""
-    args = read_args(upload.fields["args"], CalibrateRobotArgs)
-    view = RobotView(args.robot_joints, args.robot_pose, args.camera_pose, args.camera_parameters)
-    model = model_of_uri(services, args.urdf_uri)
-    depth = await asyncio.to_thread(upload.file.read)
-    return (await services.calibration.robot(model, view, [depth])).pose
-
-
 def read_args(text: str, kind: type[T]) -> T:
-    """Read the part `args` of a multipart body, JSON in either spelling of names. InvalidData."""
+    """Read the part `args` of a multipart body, JSON in either spelling of names.
+
+    Raise InvalidData if that is impossible.
+    """
     try:
         args = msgspec.convert(snaked(msgspec.json.decode(text)), kind)
     except (msgspec.DecodeError, RecursionError) as error:
         raise InvalidData(f"The part args is wrong: {camelized_names(str(error))}.") from None
     check_texts(args)
     return args
+
+
+class CalibrationOperations:
+    """The Calibration service over REST as the original has it (protocol, section 15)."""
+
+    def __init__(self, calibration: Calibration, robots: SceneRobots) -> None:
+        self._calibration = calibration
+        self._robots = robots
+
+    @operation("PUT", "/calibrate/camera", CALIBRATION, Role.TECHNICIAN, file="image", limit=MAX_IMAGE)
+    async def calibrate_camera(self, query: CameraPoseQuery, upload: Upload) -> EstimatedPose:
+        """Return the pose of the camera, which sees markers whose poses are known."""
+        parameters = query.parameters()
+        image = await asyncio.to_thread(upload.file.read)
+        return (await self._calibration.camera(parameters, [image])).estimated(inverse=query.inverse)
+
+    @operation("PUT", "/markers/corners", CALIBRATION, Role.TECHNICIAN, file="image", limit=MAX_IMAGE, plain=True)
+    async def marker_corners(self, query: CameraQuery, upload: Upload) -> list[MarkerCorners]:
+        """Return the corners of the markers in a picture, pixels."""
+        parameters = query.parameters()
+        image = await asyncio.to_thread(upload.file.read)
+        return await self._calibration.markers(parameters, image)
+
+    @operation("PUT", "/calibrate/robot", CALIBRATION, Role.TECHNICIAN, file="image", parts=("args",), limit=MAX_IMAGE)
+    async def calibrate_robot(self, upload: Upload) -> Pose:
+        """Return the pose of a robot that a depth camera of known pose sees (16 bit, mm)."""
+        args = read_args(upload.fields["args"], CalibrateRobotArgs)
+        view = RobotView(args.robot_joints, args.robot_pose, args.camera_pose, args.camera_parameters)
+        model = self._robots.model_of_uri(args.urdf_uri)
+        depth = await asyncio.to_thread(upload.file.read)
+        return (await self._calibration.robot(model, view, [depth])).pose

@@ -1,4 +1,4 @@
-"""Records of calibrations over REST (docs/protocol.md): kept, listed, checked later."""
+"""Calibration records over REST (docs/protocol.md)."""
 
 from typing import Annotated, Any
 
@@ -18,7 +18,7 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.role import Role
 from arcor2_server.rest.calibration import CALIBRATION
 from arcor2_server.rest.operations import operation
-from arcor2_server.services import Services
+from arcor2_server.storage.calibrations import Calibrations
 
 
 class RecordAs(Data, frozen=True):
@@ -31,8 +31,8 @@ class RecordAs(Data, frozen=True):
     applied: bool = False
 
 
-async def keep(
-    services: Services,
+async def store_record(
+    records: Calibrations,
     person: str,
     under: RecordAs | Unset,
     kind: CalibrationKind,
@@ -49,7 +49,7 @@ async def keep(
     result: dict[str, Any] = msgspec.to_builtins(found)
     result.pop("picture", None)  # what can be drawn again
     inputs = [CalibrationInput.of(f"picture {number}", each) for number, each in enumerate(pictures, 1)]
-    await services.calibration_records.put(
+    await records.put(
         CalibrationRecord(
             kind,
             person,
@@ -69,13 +69,13 @@ async def keep(
     )
 
 
-async def keep_touched(
-    services: Services, person: str, body: Any, kind: CalibrationKind, found: Any, after: Pose
+async def store_touch_record(
+    records: Calibrations, person: str, body: Any, kind: CalibrationKind, found: Any, after: Pose
 ) -> None:
     """Keep a record of what was found by touch, where one is wanted."""
     unit = "rad" if kind is CalibrationKind.TOOL_ORIENTATION else "m"
     details = {"args": replace(body, record=UNSET)}
-    await keep(services, person, body.record, kind, found, found.residual, unit, [], details, after)
+    await store_record(records, person, body.record, kind, found, found.residual, unit, [], details, after)
 
 
 # ------------------------------------------------------------------------------------------------ records
@@ -107,38 +107,41 @@ class CheckArgs(Data, frozen=True):
     angle_limit: Annotated[float, Meta(gt=0)] = 0.0035
 
 
-@operation("GET", "/api/calibrations", CALIBRATION, Role.OPERATOR, plain=True)
-async def list_calibrations(services: Services, query: RecordsQuery) -> list[CalibrationRecord]:
-    """List the records of calibrations, newest first."""
-    given = {name: value for name, value in msgspec.structs.asdict(query).items() if not isinstance(value, Unset)}
-    return await services.calibration_records.find(**given)
+class CalibrationRecordOperations:
+    """Records of calibrations over REST (docs/protocol.md): kept, listed, checked later."""
 
+    def __init__(self, calibration_records: Calibrations) -> None:
+        self._calibration_records = calibration_records
 
-@operation("POST", "/api/calibrations", CALIBRATION, Role.TECHNICIAN, plain=True)
-async def record_by_hand(services: Services, body: ByHandArgs, person: str) -> CalibrationRecord:
-    """Keep a record of a pose that somebody typed in."""
-    record = CalibrationRecord(
-        CalibrationKind.BY_HAND,
-        person,
-        body.object_id,
-        body.object_name,
-        body.parent,
-        body.remark or "Typed in by hand.",
-        before=body.before,
-        after=body.pose,
-    )
-    await services.calibration_records.put(record)
-    return record
+    @operation("GET", "/api/calibrations", CALIBRATION, Role.OPERATOR, plain=True)
+    async def list_calibrations(self, query: RecordsQuery) -> list[CalibrationRecord]:
+        """List the records of calibrations, newest first."""
+        given = {name: value for name, value in msgspec.structs.asdict(query).items() if not isinstance(value, Unset)}
+        return await self._calibration_records.find(**given)
 
+    @operation("POST", "/api/calibrations", CALIBRATION, Role.TECHNICIAN, plain=True)
+    async def record_by_hand(self, body: ByHandArgs, person: str) -> CalibrationRecord:
+        """Keep a record of a pose that somebody typed in."""
+        record = CalibrationRecord(
+            CalibrationKind.BY_HAND,
+            person,
+            body.object_id,
+            body.object_name,
+            body.parent,
+            body.remark or "Typed in by hand.",
+            before=body.before,
+            after=body.pose,
+        )
+        await self._calibration_records.put(record)
+        return record
 
-@operation("GET", "/api/calibrations/{calibration_id}", CALIBRATION, Role.OPERATOR, plain=True)
-async def get_calibration(services: Services, calibration_id: str) -> CalibrationRecord:
-    """Give the record of a calibration."""
-    return await services.calibration_records.get(calibration_id)
+    @operation("GET", "/api/calibrations/{calibration_id}", CALIBRATION, Role.OPERATOR, plain=True)
+    async def get_calibration(self, calibration_id: str) -> CalibrationRecord:
+        """Return the record of a calibration."""
+        return await self._calibration_records.get(calibration_id)
 
-
-@operation("PUT", "/api/calibrations/{calibration_id}/check", CALIBRATION, Role.OPERATOR, plain=True)
-async def check_calibration(services: Services, calibration_id: str, body: CheckArgs) -> CalibrationCheck:
-    """Compare a pose measured now with that of a record."""
-    record = await services.calibration_records.get(calibration_id)
-    return check_against(record, body.pose, distance_limit=body.distance_limit, angle_limit=body.angle_limit)
+    @operation("PUT", "/api/calibrations/{calibration_id}/check", CALIBRATION, Role.OPERATOR, plain=True)
+    async def check_calibration(self, calibration_id: str, body: CheckArgs) -> CalibrationCheck:
+        """Compare a pose measured now with that of a record."""
+        record = await self._calibration_records.get(calibration_id)
+        return check_against(record, body.pose, distance_limit=body.distance_limit, angle_limit=body.angle_limit)

@@ -1,4 +1,4 @@
-"""Calibrations beyond the original's, over REST (docs/protocol.md): whole results, and more kinds."""
+"""Further calibrations over REST, with complete results (docs/protocol.md)."""
 
 import asyncio
 from typing import Annotated, Any, Final
@@ -26,30 +26,19 @@ from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
+from arcor2_server.compute.workers import Compute
 from arcor2_server.rest.calibration import CALIBRATION, CalibrateRobotArgs, read_args
-from arcor2_server.rest.calibration_records import RecordAs, keep, keep_touched
+from arcor2_server.rest.calibration_records import RecordAs, store_record, store_touch_record
 from arcor2_server.rest.operations import MIB, Binary, Upload, Uploads, operation
-from arcor2_server.services import Services
-from arcor2_server.workspace.robot_models import model_of_uri
+from arcor2_server.storage.calibrations import Calibrations
+from arcor2_server.workspace.markers import Markers
+from arcor2_server.workspace.robots import SceneRobots
 
 MAX_PICTURES: Final = 256 * MIB
 """Bytes of all pictures together."""
 MOST_POINTS: Final = 1000
 
 Points = Annotated[list[Position], Meta(max_length=MOST_POINTS)]
-
-
-# ------------------------------------------------------------------------------------------------ markers
-@operation("GET", "/api/calibration/markers", CALIBRATION, Role.OPERATOR, plain=True)
-async def get_markers(services: Services) -> CalibrationConfiguration:
-    """Give which markers and boards stand where in this workplace."""
-    return services.markers.configuration
-
-
-@operation("PUT", "/api/calibration/markers", CALIBRATION, Role.TECHNICIAN, plain=True)
-async def put_markers(services: Services, body: CalibrationConfiguration) -> None:
-    """Say which markers and boards stand where, in place of what was said before."""
-    await services.markers.set(body)
 
 
 # ------------------------------------------------------------------------------------------------ pictures
@@ -101,90 +90,7 @@ async def _pictures(uploads: Uploads) -> list[bytes]:
     return [await asyncio.to_thread(file.read) for file in uploads.files]
 
 
-def _configured(services: Services, given: CalibrationConfiguration | Unset) -> CalibrationConfiguration:
-    return services.markers.configuration if isinstance(given, Unset) else given
-
-
 _MANY: Final[dict[str, Any]] = {"file": "image", "parts": ("args",), "limit": MAX_PICTURES, "plain": True}
-
-
-@operation("PUT", "/api/calibration/camera", CALIBRATION, Role.TECHNICIAN, **_MANY)
-async def find_camera_pose(services: Services, uploads: Uploads, person: str) -> CameraPose:
-    """Give where a camera stands, from one picture of markers or several of the same view, with all errors."""
-    args = read_args(uploads.fields["args"], CameraArgs)
-    configuration = _configured(services, args.markers)
-    options = configuration.options if isinstance(args.options, Unset) else args.options
-    pictures = await _pictures(uploads)
-    task = t.FindCameraPose(pictures, args.camera_parameters, configuration.layout, options)
-    found = await services.compute.run(task)
-    details = {"camera_parameters": args.camera_parameters, "markers": configuration, "options": options}
-    kind = CalibrationKind.CAMERA_POSE
-    await keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, found.pose)
-    return found
-
-
-@operation(
-    "PUT",
-    "/api/calibration/camera/picture",
-    CALIBRATION,
-    Role.TECHNICIAN,
-    file="image",
-    parts=("args",),
-    limit=64 * MIB,
-    media_type="image/png",
-)
-async def draw_camera_pose(services: Services, upload: Upload) -> Binary:
-    """Draw where the markers should be with a camera's pose onto its picture; PNG."""
-    args = read_args(upload.fields["args"], CameraPictureArgs)
-    picture = await asyncio.to_thread(upload.file.read)
-    layout = _configured(services, args.markers).layout
-    drawn = await services.compute.run(t.DrawCameraPose(picture, args.camera_parameters, layout, args.result))
-    return Binary(drawn, "image/png", "camera-pose.png")
-
-
-@operation("PUT", "/api/calibration/robot", CALIBRATION, Role.TECHNICIAN, **_MANY)
-async def find_robot_pose(services: Services, uploads: Uploads, person: str) -> RobotPose:
-    """Give where a robot stands that a depth camera of known pose sees (16 bit, mm), with all figures."""
-    args = read_args(uploads.fields["args"], RobotArgs)
-    pictures = await _pictures(uploads)
-    model = replace(model_of_uri(services, args.urdf_uri), base=args.robot_pose)
-    found = await services.compute.run(
-        t.FindRobotPose(
-            model, args.robot_joints, pictures, args.camera_parameters, args.camera_pose, args.distance, args.angle
-        )
-    )
-    details = {"view": replace(args, record=UNSET)}
-    kind = CalibrationKind.ROBOT_POSE
-    await keep(services, person, args.record, kind, found, found.residual, "m", pictures, details, found.pose)
-    return found
-
-
-@operation("PUT", "/api/calibration/hand-eye", CALIBRATION, Role.TECHNICIAN, **_MANY)
-async def find_hand_eye(services: Services, uploads: Uploads, person: str) -> HandEye:
-    """Give where a camera sits on a robot's flange, or beside the robot."""
-    args = read_args(uploads.fields["args"], HandEyeArgs)
-    pictures = await _pictures(uploads)
-    if len(pictures) != len(args.flanges):
-        raise InvalidData(f"There are {len(pictures)} pictures, but {len(args.flanges)} poses of the flange.")
-    samples = [HandEyeSample(flange, picture) for flange, picture in zip(args.flanges, pictures, strict=True)]
-    task = t.FindHandEye(samples, args.camera_parameters, args.target, args.mounting, args.options)
-    found = await services.compute.run(task)
-    details = {"args": replace(args, record=UNSET)}
-    kind = CalibrationKind.HAND_EYE
-    await keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, found.pose)
-    return found
-
-
-@operation("PUT", "/api/calibration/intrinsics", CALIBRATION, Role.TECHNICIAN, **_MANY)
-async def find_intrinsics(services: Services, uploads: Uploads, person: str) -> Intrinsics:
-    """Give the focal lengths, the centre and the distortion of a camera, from pictures of a ChArUco board."""
-    args = read_args(uploads.fields["args"], IntrinsicsArgs)
-    pictures = await _pictures(uploads)
-    found = await services.compute.run(t.FindIntrinsics(pictures, args.board, args.options))
-    details = {"args": replace(args, record=UNSET)}
-    kind = CalibrationKind.INTRINSICS
-    await keep(services, person, args.record, kind, found, found.residual, "px", pictures, details, UNSET)
-    return found
 
 
 # ------------------------------------------------------------------------------------------------ by touch
@@ -230,43 +136,179 @@ class DirectionsArgs(Data, frozen=True):
     record: RecordAs | Unset = UNSET
 
 
-@operation("PUT", "/api/calibration/touch/frame-by-axes", CALIBRATION, Role.TECHNICIAN, plain=True)
-async def frame_by_axes(services: Services, body: FrameByAxesArgs, person: str) -> TouchedFrame:
-    """Give a frame from three touched points or more: origin, x axis, xy plane."""
-    found = await services.compute.run(t.FrameByAxes(body.origin, body.on_x, body.in_plane))
-    await keep_touched(services, person, body, CalibrationKind.USER_FRAME, found, found.pose)
-    return found
+class MeasurementCalibrationOperations:
+    """Calibrations beyond the original's, over REST (docs/protocol.md): whole results, and more kinds."""
 
+    def __init__(
+        self, calibration_records: Calibrations, compute: Compute, markers: Markers, robots: SceneRobots
+    ) -> None:
+        self._calibration_records = calibration_records
+        self._compute = compute
+        self._markers = markers
+        self._robots = robots
 
-@operation("PUT", "/api/calibration/touch/frame-by-points", CALIBRATION, Role.TECHNICIAN, plain=True)
-async def frame_by_points(services: Services, body: FrameByPointsArgs, person: str) -> TouchedFrame:
-    """Give a frame from three points or more that are known in it, and were touched: a robot's base, or an object."""
-    found = await services.compute.run(t.FrameByPoints(body.known, body.touched))
-    await keep_touched(services, person, body, CalibrationKind.BASE_FRAME, found, found.pose)
-    return found
+    # ------------------------------------------------------------------------------------------------ markers
+    @operation("GET", "/api/calibration/markers", CALIBRATION, Role.OPERATOR, plain=True)
+    async def get_markers(self) -> CalibrationConfiguration:
+        """Return which markers and boards stand where in this workplace."""
+        return self._markers.configuration
 
+    @operation("PUT", "/api/calibration/markers", CALIBRATION, Role.TECHNICIAN, plain=True)
+    async def put_markers(self, body: CalibrationConfiguration) -> None:
+        """Say which markers and boards stand where, in place of what was said before."""
+        await self._markers.set(body)
 
-@operation("PUT", "/api/calibration/touch/tip", CALIBRATION, Role.TECHNICIAN, plain=True)
-async def tip_by_touches(services: Services, body: TipArgs, person: str) -> TouchedTip:
-    """Give a tool's tip on the flange, from one point touched in four orientations or more."""
-    found = await services.compute.run(t.TipByTouches(body.flanges))
-    await keep_touched(services, person, body, CalibrationKind.TOOL_TIP, found, Pose(found.position))
-    return found
+    def _configured(self, given: CalibrationConfiguration | Unset) -> CalibrationConfiguration:
+        return self._markers.configuration if isinstance(given, Unset) else given
 
+    @operation("PUT", "/api/calibration/camera", CALIBRATION, Role.TECHNICIAN, **_MANY)
+    async def find_camera_pose(self, uploads: Uploads, person: str) -> CameraPose:
+        """Return where a camera stands, from one picture of markers or several of the same view, with all errors."""
+        args = read_args(uploads.fields["args"], CameraArgs)
+        configuration = self._configured(args.markers)
+        options = configuration.options if isinstance(args.options, Unset) else args.options
+        pictures = await _pictures(uploads)
+        task = t.FindCameraPose(pictures, args.camera_parameters, configuration.layout, options)
+        found = await self._compute.run(task)
+        details = {"camera_parameters": args.camera_parameters, "markers": configuration, "options": options}
+        kind = CalibrationKind.CAMERA_POSE
+        await store_record(
+            self._calibration_records,
+            person,
+            args.record,
+            kind,
+            found,
+            found.residual,
+            "px",
+            pictures,
+            details,
+            found.pose,
+        )
+        return found
 
-@operation("PUT", "/api/calibration/touch/orientation-by-alignment", CALIBRATION, Role.TECHNICIAN, plain=True)
-async def orientation_by_alignment(services: Services, body: AlignmentArgs, person: str) -> TouchedOrientation:
-    """Give a tool's orientation on the flange, from aligning it with a reference."""
-    found = await services.compute.run(t.OrientationByAlignment(body.flanges, body.reference))
-    turned = Pose(orientation=found.orientation)
-    await keep_touched(services, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned)
-    return found
+    @operation(
+        "PUT",
+        "/api/calibration/camera/picture",
+        CALIBRATION,
+        Role.TECHNICIAN,
+        file="image",
+        parts=("args",),
+        limit=64 * MIB,
+        media_type="image/png",
+    )
+    async def draw_camera_pose(self, upload: Upload) -> Binary:
+        """Draw where the markers should be with a camera's pose onto its picture; PNG."""
+        args = read_args(upload.fields["args"], CameraPictureArgs)
+        picture = await asyncio.to_thread(upload.file.read)
+        layout = self._configured(args.markers).layout
+        drawn = await self._compute.run(t.DrawCameraPose(picture, args.camera_parameters, layout, args.result))
+        return Binary(drawn, "image/png", "camera-pose.png")
 
+    @operation("PUT", "/api/calibration/robot", CALIBRATION, Role.TECHNICIAN, **_MANY)
+    async def find_robot_pose(self, uploads: Uploads, person: str) -> RobotPose:
+        """Return where a robot stands that a depth camera of known pose sees (16 bit, mm), with all figures."""
+        args = read_args(uploads.fields["args"], RobotArgs)
+        pictures = await _pictures(uploads)
+        model = replace(self._robots.model_of_uri(args.urdf_uri), base=args.robot_pose)
+        found = await self._compute.run(
+            t.FindRobotPose(
+                model, args.robot_joints, pictures, args.camera_parameters, args.camera_pose, args.distance, args.angle
+            )
+        )
+        details = {"view": replace(args, record=UNSET)}
+        kind = CalibrationKind.ROBOT_POSE
+        await store_record(
+            self._calibration_records,
+            person,
+            args.record,
+            kind,
+            found,
+            found.residual,
+            "m",
+            pictures,
+            details,
+            found.pose,
+        )
+        return found
 
-@operation("PUT", "/api/calibration/touch/orientation-by-points", CALIBRATION, Role.TECHNICIAN, plain=True)
-async def orientation_by_points(services: Services, body: DirectionsArgs, person: str) -> TouchedOrientation:
-    """Give a tool's orientation on the flange, from moving its tip along its +z and to its +x side."""
-    found = await services.compute.run(t.OrientationByPoints(body.flange, body.tip, body.along_z, body.on_x))
-    turned = Pose(orientation=found.orientation)
-    await keep_touched(services, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned)
-    return found
+    @operation("PUT", "/api/calibration/hand-eye", CALIBRATION, Role.TECHNICIAN, **_MANY)
+    async def find_hand_eye(self, uploads: Uploads, person: str) -> HandEye:
+        """Return where a camera sits on a robot's flange, or beside the robot."""
+        args = read_args(uploads.fields["args"], HandEyeArgs)
+        pictures = await _pictures(uploads)
+        if len(pictures) != len(args.flanges):
+            raise InvalidData(f"There are {len(pictures)} pictures, but {len(args.flanges)} poses of the flange.")
+        samples = [HandEyeSample(flange, picture) for flange, picture in zip(args.flanges, pictures, strict=True)]
+        task = t.FindHandEye(samples, args.camera_parameters, args.target, args.mounting, args.options)
+        found = await self._compute.run(task)
+        details = {"args": replace(args, record=UNSET)}
+        kind = CalibrationKind.HAND_EYE
+        await store_record(
+            self._calibration_records,
+            person,
+            args.record,
+            kind,
+            found,
+            found.residual,
+            "px",
+            pictures,
+            details,
+            found.pose,
+        )
+        return found
+
+    @operation("PUT", "/api/calibration/intrinsics", CALIBRATION, Role.TECHNICIAN, **_MANY)
+    async def find_intrinsics(self, uploads: Uploads, person: str) -> Intrinsics:
+        """Return the focal lengths, the centre and the distortion of a camera, from pictures of a ChArUco board."""
+        args = read_args(uploads.fields["args"], IntrinsicsArgs)
+        pictures = await _pictures(uploads)
+        found = await self._compute.run(t.FindIntrinsics(pictures, args.board, args.options))
+        details = {"args": replace(args, record=UNSET)}
+        kind = CalibrationKind.INTRINSICS
+        await store_record(
+            self._calibration_records, person, args.record, kind, found, found.residual, "px", pictures, details, UNSET
+        )
+        return found
+
+    @operation("PUT", "/api/calibration/touch/frame-by-axes", CALIBRATION, Role.TECHNICIAN, plain=True)
+    async def frame_by_axes(self, body: FrameByAxesArgs, person: str) -> TouchedFrame:
+        """Return a frame from three touched points or more: origin, x axis, xy plane."""
+        found = await self._compute.run(t.FrameByAxes(body.origin, body.on_x, body.in_plane))
+        await store_touch_record(self._calibration_records, person, body, CalibrationKind.USER_FRAME, found, found.pose)
+        return found
+
+    @operation("PUT", "/api/calibration/touch/frame-by-points", CALIBRATION, Role.TECHNICIAN, plain=True)
+    async def frame_by_points(self, body: FrameByPointsArgs, person: str) -> TouchedFrame:
+        """Compute a frame, such as a robot base, from three or more points that are known in it and were touched."""
+        found = await self._compute.run(t.FrameByPoints(body.known, body.touched))
+        await store_touch_record(self._calibration_records, person, body, CalibrationKind.BASE_FRAME, found, found.pose)
+        return found
+
+    @operation("PUT", "/api/calibration/touch/tip", CALIBRATION, Role.TECHNICIAN, plain=True)
+    async def tip_by_touches(self, body: TipArgs, person: str) -> TouchedTip:
+        """Return a tool's tip on the flange, from one point touched in four orientations or more."""
+        found = await self._compute.run(t.TipByTouches(body.flanges))
+        await store_touch_record(
+            self._calibration_records, person, body, CalibrationKind.TOOL_TIP, found, Pose(found.position)
+        )
+        return found
+
+    @operation("PUT", "/api/calibration/touch/orientation-by-alignment", CALIBRATION, Role.TECHNICIAN, plain=True)
+    async def orientation_by_alignment(self, body: AlignmentArgs, person: str) -> TouchedOrientation:
+        """Return a tool's orientation on the flange, from aligning it with a reference."""
+        found = await self._compute.run(t.OrientationByAlignment(body.flanges, body.reference))
+        turned = Pose(orientation=found.orientation)
+        await store_touch_record(
+            self._calibration_records, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned
+        )
+        return found
+
+    @operation("PUT", "/api/calibration/touch/orientation-by-points", CALIBRATION, Role.TECHNICIAN, plain=True)
+    async def orientation_by_points(self, body: DirectionsArgs, person: str) -> TouchedOrientation:
+        """Return a tool's orientation on the flange, from moving its tip along its +z and to its +x side."""
+        found = await self._compute.run(t.OrientationByPoints(body.flange, body.tip, body.along_z, body.on_x))
+        turned = Pose(orientation=found.orientation)
+        await store_touch_record(
+            self._calibration_records, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned
+        )
+        return found

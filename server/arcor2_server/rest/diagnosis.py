@@ -1,4 +1,4 @@
-"""The bundle for diagnosis over REST."""
+"""The diagnosis bundle over REST."""
 
 import asyncio
 
@@ -6,29 +6,34 @@ import msgspec
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.rest.diagnosis_bundle import LARGEST_NOTES, ClientNotes, packed, parts
+from arcor2_server.rest.diagnosis_bundle import LARGEST_NOTES, ClientNotes, Diagnosis, packed
 from arcor2_server.rest.general import SERVER
 from arcor2_server.rest.operations import Binary, operation
-from arcor2_server.services import Services
+from arcor2_server.storage.setting_secrets import SettingSecrets
 
 ZIP = "application/zip"
 FILE = "diagnosis.zip"
 
 
-@operation("GET", "/api/diagnosis", SERVER, Role.TECHNICIAN, media_type=ZIP)
-async def diagnosis(services: Services) -> Binary:
-    """Give a zip for whoever has to find out what is wrong: documents, types, devices, log; without secrets."""
-    return Binary(await asyncio.to_thread(packed, parts(services), None, stored(services)), ZIP, FILE)
+class DiagnosisOperations:
+    """The bundle for diagnosis over REST."""
 
+    def __init__(self, secrets: SettingSecrets, diagnosis: Diagnosis) -> None:
+        self._secrets = secrets
+        self._diagnosis = diagnosis
 
-def stored(services: Services) -> frozenset[str]:
-    """Return the secrets of settings."""
-    return services.secrets.store.values
+    @operation("GET", "/api/diagnosis", SERVER, Role.TECHNICIAN, media_type=ZIP)
+    async def diagnosis(self) -> Binary:
+        """Return a zip for whoever has to find out what is wrong: documents, types, devices, log; without secrets."""
+        return Binary(
+            await asyncio.to_thread(packed, self._diagnosis.parts(), None, self._secrets.store.values), ZIP, FILE
+        )
 
-
-@operation("POST", "/api/diagnosis", SERVER, Role.TECHNICIAN, media_type=ZIP, plain=True)
-async def diagnosis_with_notes(services: Services, body: ClientNotes) -> Binary:
-    """Give the same with what a client says of itself in it, at most 256 KiB of JSON."""
-    if len(msgspec.json.encode(body.client)) > LARGEST_NOTES:
-        raise InvalidData(f"A client may add {LARGEST_NOTES} bytes of JSON, not more.")
-    return Binary(await asyncio.to_thread(packed, parts(services), body.client, stored(services)), ZIP, FILE)
+    @operation("POST", "/api/diagnosis", SERVER, Role.TECHNICIAN, media_type=ZIP, plain=True)
+    async def diagnosis_with_notes(self, body: ClientNotes) -> Binary:
+        """Return the same with what a client says of itself in it, at most 256 KiB of JSON."""
+        if len(msgspec.json.encode(body.client)) > LARGEST_NOTES:
+            raise InvalidData(f"A client may add {LARGEST_NOTES} bytes of JSON, not more.")
+        return Binary(
+            await asyncio.to_thread(packed, self._diagnosis.parts(), body.client, self._secrets.store.values), ZIP, FILE
+        )

@@ -1,6 +1,6 @@
-"""A bundle for diagnosis: what is open, which types and versions there are, how devices are, the log's last lines.
+"""The diagnosis bundle: open documents, object types, versions, device states and the latest log lines.
 
-It is made when somebody asks for it, and goes to him alone. Secrets are left out, and its size is bounded.
+It is created on request and sent only to the caller. Secrets are removed and its size is limited.
 """
 
 import io
@@ -14,9 +14,15 @@ from typing import Any, Final
 import msgspec
 
 from arcor2_hw.data.base import Data, Unset, now
+from arcor2_server.documents import Session
+from arcor2_server.events import EventHub
+from arcor2_server.execution.runs import Runs
+from arcor2_server.execution.service import Execution
 from arcor2_server.log.recent import RECENT
 from arcor2_server.log.redaction import clean, hide, secrets_in
-from arcor2_server.services import Services
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.online.online_scene import OnlineScene
+from arcor2_server.settings import API_VERSION, VERSION, ServerSettings
 
 LARGEST_PART: Final = 4 * 1024 * 1024
 """Bytes of one file in it, unpacked; a larger one is left out, and said to be."""
@@ -44,46 +50,6 @@ class ClientNotes(Data, frozen=True):
     """What a client adds of itself: its version, the browser, its last events and errors."""
 
     client: dict[str, Any]
-
-
-def parts(services: Services) -> dict[str, Any]:
-    """Give the content of the bundle by file; to be called where the services live. Quick: nothing is encoded yet."""
-    from arcor2_server.rpc.general import API_VERSION, VERSION  # which needs access, and that the routes
-
-    session, cell, execution = services.session, services.cell, services.execution
-    return {
-        "about.json": {
-            "time": now(),
-            "version": VERSION,
-            "api_version": API_VERSION,
-            "settings": services.settings,
-            "people": sorted(client.user for client in services.hub.clients if client.user),
-        },
-        "types.json": [_type(services, name) for name in services.types.names()],
-        "scene.json": session.scene,
-        "project.json": session.project,
-        "devices.json": {
-            "scene": cell.state,
-            "package": execution.state,
-            "devices": execution.board.statuses() or cell.board.statuses(),
-            "objects": execution.board.states() or cell.board.states(),
-            "unsaved": session.has_changes,
-        },
-        "runs.json": services.runs.newest(RUNS, None, None, None),
-    }
-
-
-def _type(services: Services, name: str) -> dict[str, Any]:
-    meta = services.types.meta(name)
-    own = next((each for each in services.types.sources_for([name]) if each.name == name), None)
-    return {
-        "type": name,
-        "base": meta.base,
-        "from": "the server" if own is None else own.distribution or "uploaded",
-        "version": "" if own is None else own.version,
-        "disabled": meta.disabled,
-        "problem": "" if isinstance(meta.problem, Unset) else meta.problem,
-    }
 
 
 def packed(content: dict[str, Any], notes: Any = None, stored: Set[str] = frozenset()) -> bytes:
@@ -118,3 +84,62 @@ def _lines(lines: Iterable[str], secrets: set[str]) -> str:
 
 def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else repr(value)
+
+
+class Diagnosis:
+    """Collects the content of the diagnosis bundle."""
+
+    def __init__(
+        self,
+        settings: ServerSettings,
+        hub: EventHub,
+        types: ObjectTypes,
+        session: Session,
+        online: OnlineScene,
+        execution: Execution,
+        runs: Runs,
+    ) -> None:
+        self._settings = settings
+        self._hub = hub
+        self._types = types
+        self._session = session
+        self._online = online
+        self._execution = execution
+        self._runs = runs
+
+    def parts(self) -> dict[str, Any]:
+        """Return the content of the bundle by file name, not yet encoded. Call this on the event loop."""
+
+        session, cell, execution = self._session, self._online, self._execution
+        return {
+            "about.json": {
+                "time": now(),
+                "version": VERSION,
+                "api_version": API_VERSION,
+                "settings": self._settings,
+                "people": sorted(client.user for client in self._hub.clients if client.user),
+            },
+            "types.json": [self._type(name) for name in self._types.names()],
+            "scene.json": session.scene,
+            "project.json": session.project,
+            "devices.json": {
+                "scene": cell.state,
+                "package": execution.state,
+                "devices": execution.board.statuses() or cell.board.statuses(),
+                "objects": execution.board.states() or cell.board.states(),
+                "unsaved": session.has_changes,
+            },
+            "runs.json": self._runs.newest(RUNS, None, None, None),
+        }
+
+    def _type(self, name: str) -> dict[str, Any]:
+        meta = self._types.meta(name)
+        own = next((each for each in self._types.sources_for([name]) if each.name == name), None)
+        return {
+            "type": name,
+            "base": meta.base,
+            "from": "the server" if own is None else own.distribution or "uploaded",
+            "version": "" if own is None else own.version,
+            "disabled": meta.disabled,
+            "problem": "" if isinstance(meta.problem, Unset) else meta.problem,
+        }

@@ -1,4 +1,4 @@
-"""The OpenAPI documents: one of all operations, and one of each service; made from what the operations declare."""
+"""The OpenAPI documents, one of all operations and one per service, generated from the declarations."""
 
 import functools
 import typing
@@ -12,7 +12,6 @@ from arcor2_hw.data.role import Role
 from arcor2_server.rest.field_names import camel
 from arcor2_server.rest.operations import OPERATIONS, Operation, operation
 from arcor2_server.rest.responses import WebApiError
-from arcor2_server.services import Services
 from arcor2_server.settings import ServerSettings
 
 OPENAPI: Final = "3.0.3"
@@ -21,7 +20,7 @@ _TIMESTAMP: Final = r"^\d{4}-"
 
 
 def document(service: str = "") -> dict[str, Any]:
-    """Give the document of one service, or of all."""
+    """Return the document of one service, or of all."""
     chosen = [one for one in OPERATIONS if service in ("", one.service)]
     schemas, components = _schemas(chosen)
     paths: dict[str, dict[str, Any]] = {}
@@ -39,7 +38,7 @@ def document(service: str = "") -> dict[str, Any]:
 
 
 def _types(one: Operation) -> Iterable[tuple[Any, bool]]:
-    """Give the types of an operation, and whether their fields keep their names."""
+    """Return the types of an operation, and whether their fields keep their names."""
     if "body" in one.takes:
         yield one.takes["body"], False
     if one.media_type == "application/json" and one.gives not in (None, type(None)):
@@ -56,7 +55,7 @@ Schemas = dict[tuple[str, bool], dict[str, Any]]
 
 
 def _schemas(chosen: list[Operation]) -> tuple[Schemas, dict[str, Any]]:
-    """Give the schemas of all types, by their representation, and the components that they refer to."""
+    """Return the schemas of all types, by their representation, and the components that they refer to."""
     schemas: Schemas = {}
     components: dict[str, Any] = {}
     wanted = [pair for one in chosen for pair in _types(one)] + [(WebApiError, False)]
@@ -75,7 +74,7 @@ def _schemas(chosen: list[Operation]) -> tuple[Schemas, dict[str, Any]]:
 
 
 def _lowered(schema: Any, plain: bool) -> Any:
-    """Give a schema of JSON Schema 2020-12 as OpenAPI 3.0 has it, with the names of fields as on the wire."""
+    """Return a schema of JSON Schema 2020-12 as OpenAPI 3.0 has it, with the names of fields as on the wire."""
     if isinstance(schema, list):
         return [_lowered(item, plain) for item in schema]
     if not isinstance(schema, dict):
@@ -190,19 +189,23 @@ def service_at(settings: ServerSettings, port: int) -> str:
 SERVER: Final = "ARCOR2-HW"
 
 
-@operation("GET", "/openapi", SERVER, Role.OPERATOR, plain=True)
-async def openapi() -> dict[str, Any]:
-    """Give the OpenAPI document of all services."""
-    return _kept()
+class ApiDocumentOperations:
+    """The OpenAPI documents."""
 
+    def __init__(self, settings: ServerSettings) -> None:
+        self._settings = settings
 
-@operation("GET", "/openapi/openapi.json", SERVER, Role.OPERATOR, plain=True)
-async def openapi_file() -> dict[str, Any]:
-    """Give the OpenAPI document of all services."""
-    return _kept()
+    @operation("GET", "/openapi", SERVER, Role.OPERATOR, plain=True)
+    async def openapi(self) -> dict[str, Any]:
+        """Return the OpenAPI document of all services."""
+        return _kept()
 
+    @operation("GET", "/openapi/openapi.json", SERVER, Role.OPERATOR, plain=True)
+    async def openapi_file(self) -> dict[str, Any]:
+        """Return the OpenAPI document of all services."""
+        return _kept()
 
-@operation("GET", "/swagger/api/swagger.json", SERVER, Role.OPERATOR, plain=True)
-async def swagger(services: Services, port: int) -> dict[str, Any]:
-    """Give the OpenAPI document of all services; on a classic port, of the service that has it."""
-    return _kept(service_at(services.settings, port))
+    @operation("GET", "/swagger/api/swagger.json", SERVER, Role.OPERATOR, plain=True)
+    async def swagger(self, port: int) -> dict[str, Any]:
+        """Return the OpenAPI document of all services; on a classic port, of the service that has it."""
+        return _kept(service_at(self._settings, port))

@@ -1,4 +1,4 @@
-"""The Execution service over REST: packages, the program that runs, and the tables of the original (section 16)."""
+"""The Execution service over REST: packages, the running program, tokens and breakpoints (section 16)."""
 
 import asyncio
 import enum
@@ -14,14 +14,15 @@ from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.events import make_event
+from arcor2_server.events import EventHub, make_event
+from arcor2_server.execution.package_runs import PackageRuns
 from arcor2_server.execution.runs import How
+from arcor2_server.execution.service import Execution
 from arcor2_server.rest.build import ZIP
 from arcor2_server.rest.operations import MIB, Binary, Upload, operation
-from arcor2_server.rpc import left_open
-from arcor2_server.services import Services
+from arcor2_server.storage import Storage
 from arcor2_server.storage.packages import MAX_UPLOAD
-from arcor2_server.storage.project_tables import Beside, ExecutionToken
+from arcor2_server.storage.project_tables import ExecutionToken, ProjectTables
 
 EXECUTION = "Execution"
 LONGEST_NAME: Final = 100
@@ -101,98 +102,10 @@ def _summary(package: PackageSummary) -> SummaryPackage:
     )
 
 
-@operation("GET", "/packages", EXECUTION, Role.OPERATOR)
-async def list_packages(services: Services) -> list[SummaryPackage]:
-    """List the packages."""
-    return [_summary(package) for package in await services.execution.list()]
-
-
-@operation(
-    "POST",
-    "/packages/{id}",
-    EXECUTION,
-    Role.PROGRAMMER,
-    file="executionPackage",
-    title="Taking in the package {id}",
-    limit=MAX_UPLOAD + MIB,
-)
-async def upload_package(services: Services, id: str, upload: Upload) -> None:  # noqa: A002
-    """Take in a package as a zip, in place of one of that id."""
-    summary = await services.execution.take(id, upload.file)
-    services.hub.broadcast(make_event("PackageChanged", summary, ChangeType.ADD))
-
-
-@operation("GET", "/packages/{id}", EXECUTION, Role.OPERATOR, media_type=ZIP)
-async def download_package(services: Services, id: str) -> Binary:  # noqa: A002
-    """Give a package as a zip."""
-    file = await asyncio.to_thread(services.execution.packages.zipped, id)
-    return Binary(_pieces(file), ZIP, f"{id}.zip", os.fstat(file.fileno()).st_size)
-
-
 async def _pieces(file: IO[bytes]) -> AsyncIterator[bytes]:
     with file:
         while chunk := await asyncio.to_thread(file.read, MIB):
             yield chunk
-
-
-@operation("DELETE", "/packages/{id}", EXECUTION, Role.ADVANCED_USER)
-async def delete_package(services: Services, id: str) -> None:  # noqa: A002
-    """Delete a package that does not run, with its breakpoints."""
-    summary = await services.execution.delete(id)
-    await Beside(services.storage).forget_breakpoints(id)
-    services.hub.broadcast(make_event("PackageChanged", summary, ChangeType.REMOVE))
-
-
-# ------------------------------------------------------------------------------------------------ the program
-@operation("PUT", "/packages/{id}/start", EXECUTION, Role.OPERATOR)
-async def start_package(services: Services, id: str, person: str) -> None:  # noqa: A002
-    """Run a package; a scene or project that nobody uses any more does not prevent it."""
-    await left_open.run_package(services, id, How(by=person))
-
-
-@operation("PUT", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
-async def put_breakpoints(services: Services, id: str, query: BreakpointsQuery) -> None:  # noqa: A002
-    """Keep the action points at which a package pauses when it is debugged."""
-    await asyncio.to_thread(services.execution.packages.directory, id)
-    await Beside(services.storage).put_breakpoints(id, query.breakpoints)
-
-
-@operation("GET", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
-async def get_breakpoints(services: Services, id: str) -> list[str]:  # noqa: A002
-    """Give the action points at which a package pauses when it is debugged."""
-    await asyncio.to_thread(services.execution.packages.directory, id)
-    return await Beside(services.storage).breakpoints(id)
-
-
-@operation("PUT", "/packages/{id}/debug", EXECUTION, Role.OPERATOR)
-async def debug_package(services: Services, id: str, query: DebugQuery, person: str) -> None:  # noqa: A002
-    """Run a package with its breakpoints."""
-    breakpoints = await Beside(services.storage).breakpoints(id)
-    await left_open.run_package(services, id, How(query.break_on_first_action, breakpoints, by=person))
-
-
-@operation("PUT", "/packages/stop", EXECUTION, Role.OPERATOR)
-async def stop_package(services: Services, person: str) -> None:
-    """Stop the program."""
-    services.execution.stop(person)
-
-
-@operation("PUT", "/packages/pause", EXECUTION, Role.OPERATOR)
-async def pause_package(services: Services) -> None:
-    """Pause the program before its next action."""
-    services.execution.pause()
-
-
-@operation("PUT", "/packages/resume", EXECUTION, Role.OPERATOR)
-async def resume_package(services: Services) -> None:
-    """Let the paused program go on."""
-    services.execution.resume()
-
-
-@operation("PUT", "/packages/step", EXECUTION, Role.OPERATOR)
-async def step_package(services: Services) -> None:
-    """Let the paused program go on for one action."""
-    services.execution.step()
 
 
 class _Before(msgspec.Struct):
@@ -210,51 +123,131 @@ _STATES: Final = {
 }
 
 
-@operation("GET", "/packages/state", EXECUTION, Role.OPERATOR)
-async def execution_state(services: Services) -> ExecutionInfo:
-    """Give the state of the program."""
-    execution = services.execution
-    state = _STATES.get(execution.state, ExecutionState.PENDING)
-    error: str | Unset = UNSET
-    if state is ExecutionState.COMPLETED and execution.last_error is not None:
-        state, error = ExecutionState.FAULTED, execution.last_error.message
-    points: Any = UNSET
-    if (before := execution.action_in_progress) is not None:
-        points = msgspec.json.decode(before, type=_Before).data.action_point_ids
-    return ExecutionInfo(state, execution.package_id or UNSET, error, points)
+class ExecutionOperations:
+    """The Execution service over REST."""
 
+    def __init__(self, hub: EventHub, storage: Storage, execution: Execution, package_runs: PackageRuns) -> None:
+        self._hub = hub
+        self._storage = storage
+        self._execution = execution
+        self._package_runs = package_runs
 
-# ------------------------------------------------------------------------------------------------ tokens
-@operation("POST", "/tokens/create", EXECUTION, Role.PROGRAMMER)
-async def create_token(services: Services, query: NameQuery) -> ExecutionToken:
-    """Put an entry into the table of the original, which lets nobody in: `arcor2-hw token add` makes real tokens."""
-    if not query.name or len(query.name) > LONGEST_NAME or not query.name.isprintable():
-        raise InvalidData(f"A token needs a name of 1 to {LONGEST_NAME} printable characters.")
-    token = ExecutionToken(new_id("tkn"), query.name)
-    await Beside(services.storage).put_token(token)
-    return token
+    @operation("GET", "/packages", EXECUTION, Role.OPERATOR)
+    async def list_packages(self) -> list[SummaryPackage]:
+        """List the packages."""
+        return [_summary(package) for package in await self._execution.list()]
 
+    @operation(
+        "POST",
+        "/packages/{id}",
+        EXECUTION,
+        Role.PROGRAMMER,
+        file="executionPackage",
+        title="Taking in the package {id}",
+        limit=MAX_UPLOAD + MIB,
+    )
+    async def upload_package(self, id: str, upload: Upload) -> None:  # noqa: A002
+        """Take in a package as a zip, in place of one of that id."""
+        summary = await self._execution.take(id, upload.file)
+        self._hub.broadcast(make_event("PackageChanged", summary, ChangeType.ADD))
 
-@operation("GET", "/tokens", EXECUTION, Role.PROGRAMMER)
-async def list_tokens(services: Services) -> list[ExecutionToken]:
-    """Give the table of the original."""
-    return await Beside(services.storage).tokens()
+    @operation("GET", "/packages/{id}", EXECUTION, Role.OPERATOR, media_type=ZIP)
+    async def download_package(self, id: str) -> Binary:  # noqa: A002
+        """Return a package as a zip."""
+        file = await asyncio.to_thread(self._execution.packages.zipped, id)
+        return Binary(_pieces(file), ZIP, f"{id}.zip", os.fstat(file.fileno()).st_size)
 
+    @operation("DELETE", "/packages/{id}", EXECUTION, Role.ADVANCED_USER)
+    async def delete_package(self, id: str) -> None:  # noqa: A002
+        """Delete a package that does not run, with its breakpoints."""
+        summary = await self._execution.delete(id)
+        await ProjectTables(self._storage).forget_breakpoints(id)
+        self._hub.broadcast(make_event("PackageChanged", summary, ChangeType.REMOVE))
 
-@operation("DELETE", "/tokens/{id}", EXECUTION, Role.PROGRAMMER)
-async def delete_token(services: Services, id: str) -> None:  # noqa: A002
-    """Delete an entry."""
-    await Beside(services.storage).delete_token(id)
+    # ------------------------------------------------------------------------------------------------ the program
+    @operation("PUT", "/packages/{id}/start", EXECUTION, Role.OPERATOR)
+    async def start_package(self, id: str, person: str) -> None:  # noqa: A002
+        """Run a package; a scene or project that nobody uses any more does not prevent it."""
+        await self._package_runs.run_package(id, How(by=person))
 
+    @operation("PUT", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
+    async def put_breakpoints(self, id: str, query: BreakpointsQuery) -> None:  # noqa: A002
+        """Keep the action points at which a package pauses when it is debugged."""
+        await asyncio.to_thread(self._execution.packages.directory, id)
+        await ProjectTables(self._storage).put_breakpoints(id, query.breakpoints)
 
-@operation("PUT", "/tokens/{id}/access", EXECUTION, Role.PROGRAMMER)
-async def put_access(services: Services, id: str, query: AccessQuery) -> None:  # noqa: A002
-    """Set the flag of an entry."""
-    beside = Beside(services.storage)
-    await beside.put_token(msgspec.structs.replace(await beside.token(id), access=query.access))
+    @operation("GET", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
+    async def get_breakpoints(self, id: str) -> list[str]:  # noqa: A002
+        """Return the action points at which a package pauses when it is debugged."""
+        await asyncio.to_thread(self._execution.packages.directory, id)
+        return await ProjectTables(self._storage).breakpoints(id)
 
+    @operation("PUT", "/packages/{id}/debug", EXECUTION, Role.OPERATOR)
+    async def debug_package(self, id: str, query: DebugQuery, person: str) -> None:  # noqa: A002
+        """Run a package with its breakpoints."""
+        breakpoints = await ProjectTables(self._storage).breakpoints(id)
+        await self._package_runs.run_package(id, How(query.break_on_first_action, breakpoints, by=person))
 
-@operation("GET", "/tokens/{id}/access", EXECUTION, Role.PROGRAMMER)
-async def get_access(services: Services, id: str) -> bool:  # noqa: A002
-    """Give the flag of an entry."""
-    return (await Beside(services.storage).token(id)).access
+    @operation("PUT", "/packages/stop", EXECUTION, Role.OPERATOR)
+    async def stop_package(self, person: str) -> None:
+        """Stop the program."""
+        self._execution.stop(person)
+
+    @operation("PUT", "/packages/pause", EXECUTION, Role.OPERATOR)
+    async def pause_package(self) -> None:
+        """Pause the program before its next action."""
+        self._execution.pause()
+
+    @operation("PUT", "/packages/resume", EXECUTION, Role.OPERATOR)
+    async def resume_package(self) -> None:
+        """Let the paused program go on."""
+        self._execution.resume()
+
+    @operation("PUT", "/packages/step", EXECUTION, Role.OPERATOR)
+    async def step_package(self) -> None:
+        """Let the paused program go on for one action."""
+        self._execution.step()
+
+    @operation("GET", "/packages/state", EXECUTION, Role.OPERATOR)
+    async def execution_state(self) -> ExecutionInfo:
+        """Return the state of the program."""
+        execution = self._execution
+        state = _STATES.get(execution.state, ExecutionState.PENDING)
+        error: str | Unset = UNSET
+        if state is ExecutionState.COMPLETED and execution.last_error is not None:
+            state, error = ExecutionState.FAULTED, execution.last_error.message
+        points: Any = UNSET
+        if (before := execution.action_in_progress) is not None:
+            points = msgspec.json.decode(before, type=_Before).data.action_point_ids
+        return ExecutionInfo(state, execution.package_id or UNSET, error, points)
+
+    # ------------------------------------------------------------------------------------------------ tokens
+    @operation("POST", "/tokens/create", EXECUTION, Role.PROGRAMMER)
+    async def create_token(self, query: NameQuery) -> ExecutionToken:
+        """Add an entry to the token table of the protocol. It grants no access: `arcor2-hw token add` makes tokens."""
+        if not query.name or len(query.name) > LONGEST_NAME or not query.name.isprintable():
+            raise InvalidData(f"A token needs a name of 1 to {LONGEST_NAME} printable characters.")
+        token = ExecutionToken(new_id("tkn"), query.name)
+        await ProjectTables(self._storage).put_token(token)
+        return token
+
+    @operation("GET", "/tokens", EXECUTION, Role.PROGRAMMER)
+    async def list_tokens(self) -> list[ExecutionToken]:
+        """Return the table of the original."""
+        return await ProjectTables(self._storage).tokens()
+
+    @operation("DELETE", "/tokens/{id}", EXECUTION, Role.PROGRAMMER)
+    async def delete_token(self, id: str) -> None:  # noqa: A002
+        """Delete an entry."""
+        await ProjectTables(self._storage).delete_token(id)
+
+    @operation("PUT", "/tokens/{id}/access", EXECUTION, Role.PROGRAMMER)
+    async def put_access(self, id: str, query: AccessQuery) -> None:  # noqa: A002
+        """Set the flag of an entry."""
+        beside = ProjectTables(self._storage)
+        await beside.put_token(msgspec.structs.replace(await beside.token(id), access=query.access))
+
+    @operation("GET", "/tokens/{id}/access", EXECUTION, Role.PROGRAMMER)
+    async def get_access(self, id: str) -> bool:  # noqa: A002
+        """Return the flag of an entry."""
+        return (await ProjectTables(self._storage).token(id)).access

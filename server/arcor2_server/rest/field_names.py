@@ -1,4 +1,4 @@
-"""Names of fields on REST: camelCase where the Structs, and the websocket, have snake_case."""
+"""Field names on REST: camelCase for the snake_case of Structs and websocket."""
 
 import functools
 import re
@@ -11,19 +11,19 @@ _NAMES: Final = re.compile(r"`(?:\$[^`]*|\w+)`")
 
 @functools.lru_cache(maxsize=4096)
 def camel(name: str) -> str:
-    """Give a name as REST writes it: size_x as sizeX."""
+    """Return a name as REST writes it: size_x as sizeX."""
     first, *others = name.split("_")
     return first + "".join(other[:1].upper() + other[1:] for other in others)
 
 
 @functools.lru_cache(maxsize=4096)
 def snake(name: str) -> str:
-    """Give a name as the Structs have it; both spellings are taken: sizeX and size_x as size_x."""
+    """Return a name as the Structs have it; both spellings are taken: sizeX and size_x as size_x."""
     return _HUMP.sub(r"_\1", name).lower()
 
 
 def camelized(value: Any) -> Any:
-    """Give JSON data with its fields renamed for REST."""
+    """Return JSON data with its fields renamed for REST."""
     if isinstance(value, dict):
         return {camel(key): camelized(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -32,7 +32,7 @@ def camelized(value: Any) -> Any:
 
 
 def snaked(value: Any) -> Any:
-    """Give JSON data with its fields renamed for the Structs."""
+    """Return JSON data with its fields renamed for the Structs."""
     if isinstance(value, dict):
         return {snake(key): snaked(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -41,5 +41,5 @@ def snaked(value: Any) -> Any:
 
 
 def camelized_names(text: str) -> str:
-    """Give a message of msgspec with the fields that it names as REST has them."""
+    """Return a message of msgspec with the fields that it names as REST has them."""
     return _NAMES.sub(lambda name: camel(name[0]), text)

@@ -1,12 +1,12 @@
-"""Which kinematics of a robot are in force, over REST (docs/protocol.md)."""
+"""The kinematic calibration of a robot that is in use, over REST (docs/protocol.md)."""
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.role import Role
+from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rest.general import SERVER
 from arcor2_server.rest.operations import operation
-from arcor2_server.services import Services
-from arcor2_server.workspace.robot_calibrations import InForce
-from arcor2_server.workspace.robot_models import model_of_type
+from arcor2_server.workspace.robot_calibrations import InForce, RobotCalibrations
+from arcor2_server.workspace.robots import SceneRobots
 
 
 class RobotKinematics(Data, frozen=True):
@@ -23,15 +23,23 @@ class RobotKinematics(Data, frozen=True):
     refused: str | Unset = UNSET
 
 
-@operation("GET", "/api/robots/{object_id}/kinematics", SERVER, Role.OPERATOR, plain=True)
-async def robot_kinematics(services: Services, object_id: str) -> RobotKinematics:
-    """Tell with which kinematics those of a robot of the open scene are computed, and since when."""
-    robot = services.cell.robot(object_id)
-    if model_of_type(services, robot.type) is None:
-        return RobotKinematics(robot.id, robot.name, InForce.NONE)
-    kept = services.arm_calibrations.kept(robot)
-    if kept is None:
-        return RobotKinematics(robot.id, robot.name, InForce.NOMINAL)
-    state = InForce.NOMINAL if kept.refused else InForce.MEASURED
-    checksum, refused = kept.calibration.checksum, kept.refused or UNSET
-    return RobotKinematics(robot.id, robot.name, state, kept.read, checksum, refused)
+class KinematicsOperations:
+    """Which kinematics of a robot are in force, over REST (docs/protocol.md)."""
+
+    def __init__(self, online: OnlineScene, robot_calibrations: RobotCalibrations, robots: SceneRobots) -> None:
+        self._online = online
+        self._robot_calibrations = robot_calibrations
+        self._robots = robots
+
+    @operation("GET", "/api/robots/{object_id}/kinematics", SERVER, Role.OPERATOR, plain=True)
+    async def robot_kinematics(self, object_id: str) -> RobotKinematics:
+        """Tell with which kinematics those of a robot of the open scene are computed, and since when."""
+        robot = self._online.robot(object_id)
+        if self._robots.model_of_type(robot.type) is None:
+            return RobotKinematics(robot.id, robot.name, InForce.NONE)
+        kept = self._robot_calibrations.stored(robot)
+        if kept is None:
+            return RobotKinematics(robot.id, robot.name, InForce.NOMINAL)
+        state = InForce.NOMINAL if kept.refused else InForce.MEASURED
+        checksum, refused = kept.calibration.checksum, kept.refused or UNSET
+        return RobotKinematics(robot.id, robot.name, state, kept.read, checksum, refused)

@@ -1,4 +1,4 @@
-"""Object types over REST: uploaded as source, listed, read, deleted (protocol, sections 9.1 and 13)."""
+"""Object types over REST (protocol, sections 9.1 and 13)."""
 
 from typing import Final
 
@@ -9,10 +9,12 @@ from arcor2_hw.data.base import Data, Timestamp, Unset, is_valid_name
 from arcor2_hw.data.object_type import Model3dType, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
+from arcor2_server.object_types.notifications import TypeNotifications
+from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.rest.models import MetaModel3d
 from arcor2_server.rest.operations import operation
 from arcor2_server.rest.scenes import STORAGE, IdDesc
-from arcor2_server.services import Services
+from arcor2_server.storage import Storage
 from arcor2_server.storage.assets import TooLarge
 
 MAX_SOURCE: Final = 1024 * 1024
@@ -36,51 +38,56 @@ def _document(stored: ObjectTypeSource) -> ObjectType:
     return ObjectType(stored.id, stored.id, stored.source, stored.description, model, stored.created, stored.modified)
 
 
-@operation("GET", "/object-types", STORAGE, Role.OPERATOR)
-async def list_object_types(services: Services) -> list[IdDesc]:
-    """List the uploaded object types."""
-    stored = await services.storage.object_types()
-    return [IdDesc(one.id, one.id, str(one.created), str(one.modified), one.description) for one in stored]
+class ObjectTypeOperations:
+    """Object types over REST: uploaded as source, listed, read, deleted (protocol, sections 9.1 and 13)."""
 
+    def __init__(self, storage: Storage, types: ObjectTypes, type_notifications: TypeNotifications) -> None:
+        self._storage = storage
+        self._types = types
+        self._type_notifications = type_notifications
 
-@operation("GET", "/object-types/{obj_type_id}", STORAGE, Role.OPERATOR)
-async def get_object_type(services: Services, obj_type_id: str) -> ObjectType:
-    """Give one uploaded object type with its source."""
-    return _document(await services.storage.object_type(obj_type_id))
+    @operation("GET", "/object-types", STORAGE, Role.OPERATOR)
+    async def list_object_types(self) -> list[IdDesc]:
+        """List the uploaded object types."""
+        stored = await self._storage.object_types()
+        return [IdDesc(one.id, one.id, str(one.created), str(one.modified), one.description) for one in stored]
 
+    @operation("GET", "/object-types/{obj_type_id}", STORAGE, Role.OPERATOR)
+    async def get_object_type(self, obj_type_id: str) -> ObjectType:
+        """Return one uploaded object type with its source."""
+        return _document(await self._storage.object_type(obj_type_id))
 
-@operation("PUT", "/object-types", STORAGE, Role.PROGRAMMER, limit=2 * MAX_SOURCE)
-async def put_object_type(services: Services, body: ObjectType) -> Timestamp:
-    """Upload an object type, or a module that others need, new or changed; answers the time.
+    @operation("PUT", "/object-types", STORAGE, Role.PROGRAMMER, limit=2 * MAX_SOURCE)
+    async def put_object_type(self, body: ObjectType) -> Timestamp:
+        """Upload an object type, or a module that others need, new or changed; answers the time.
 
-    The source is read, never imported. It takes the place of an installed type of the same name until it is deleted.
-    Clients are notified of what changed at the latest half a second after the last upload, and before a scene is
-    opened.
-    """
-    if body.id != body.name or not is_valid_name(body.id):
-        raise InvalidData(f"{body.id[:80]!r} cannot name an object type: id and name are the name of its class.")
-    if len(body.source.encode()) > MAX_SOURCE:
-        raise TooLarge(f"The source of {body.id} has more than {MAX_SOURCE} bytes.")
-    services.types.require_replaceable(body.id)
-    source = ObjectTypeSource(body.id, body.source, body.description)
-    if not isinstance(body.model, Unset) and body.model.type is not Model3dType.NONE:
-        if body.model.id != body.id:
-            raise InvalidData(f"The model of {body.id} has to have its id, not {body.model.id[:80]!r}.")
-        model = await services.storage.model(body.id)
-        if model.type() is not body.model.type:
-            raise InvalidData(f"The model {body.id} is a {model.type().value}, not a {body.model.type.value}.")
-        source = replace(source, model=ObjectModel.of(model))
-    saved = await services.storage.put_object_type(source)
-    await services.type_news.taken(services)
-    return str(saved.modified)
+        The source is analysed, never imported. It replaces an installed type of the same name until it is deleted.
+        Clients are notified of what changed at the latest half a second after the last upload, and before a scene is
+        opened.
+        """
+        if body.id != body.name or not is_valid_name(body.id):
+            raise InvalidData(f"{body.id[:80]!r} cannot name an object type: id and name are the name of its class.")
+        if len(body.source.encode()) > MAX_SOURCE:
+            raise TooLarge(f"The source of {body.id} has more than {MAX_SOURCE} bytes.")
+        self._types.require_replaceable(body.id)
+        source = ObjectTypeSource(body.id, body.source, body.description)
+        if not isinstance(body.model, Unset) and body.model.type is not Model3dType.NONE:
+            if body.model.id != body.id:
+                raise InvalidData(f"The model of {body.id} has to have its id, not {body.model.id[:80]!r}.")
+            model = await self._storage.model(body.id)
+            if model.type() is not body.model.type:
+                raise InvalidData(f"The model {body.id} is a {model.type().value}, not a {body.model.type.value}.")
+            source = replace(source, model=ObjectModel.of(model))
+        saved = await self._storage.put_object_type(source)
+        await self._type_notifications.uploaded()
+        return str(saved.modified)
 
+    @operation("DELETE", "/object-types/{obj_type_id}", STORAGE, Role.PROGRAMMER)
+    async def delete_object_type(self, obj_type_id: str) -> None:
+        """Delete an uploaded object type; an installed type of that name is in its place again.
 
-@operation("DELETE", "/object-types/{obj_type_id}", STORAGE, Role.PROGRAMMER)
-async def delete_object_type(services: Services, obj_type_id: str) -> None:
-    """Delete an uploaded object type; an installed type of that name is in its place again.
-
-    A scene that uses a type that no longer exists has a problem from then on.
-    """
-    services.types.require_deletable(obj_type_id)
-    await services.storage.delete_object_type(obj_type_id)
-    await services.type_news.taken(services)
+        A scene that uses a type that no longer exists has a problem from then on.
+        """
+        self._types.require_deletable(obj_type_id)
+        await self._storage.delete_object_type(obj_type_id)
+        await self._type_notifications.uploaded()

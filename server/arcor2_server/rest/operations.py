@@ -1,12 +1,12 @@
-"""How a REST operation is declared: once, by its function, from which come both the route and its OpenAPI."""
+"""Declaration of REST operations. Route and OpenAPI are derived from the signature of the handler."""
 
 import asyncio
 import inspect
 import math
 import secrets
 import typing
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import IO, Any, Final, Literal, TypeVar
 from urllib.parse import quote
 
@@ -22,11 +22,13 @@ from litestar.response import Stream
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
+from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE
+from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.log import audit
-from arcor2_server.rest.encodings import accepted_encodings
 from arcor2_server.rest.field_names import camelized, camelized_names, snake, snaked
-from arcor2_server.rest.responses import AS_ROLE, OPEN, PERSON, ROLE, SERVICE, InternalError, Unsupported, refusal
+from arcor2_server.rest.responses import SERVICE, InternalError, Unsupported, refusal
 from arcor2_server.rest.uploads import receiving
+from arcor2_server.web.encodings import accepted_encodings
 
 log = structlog.get_logger(__name__)
 F = TypeVar("F", bound=Callable[..., Awaitable[Any]])
@@ -49,7 +51,7 @@ class Binary(msgspec.Struct, frozen=True):
     size: int | None = None
 
 
-class Kept(msgspec.Struct, frozen=True):
+class CacheableContent(msgspec.Struct, frozen=True):
     """An answer that clients keep, and ask for again by its `etag`: `read(gzipped)` gives it, also compressed where
     `gzipped` says so.
     """
@@ -77,7 +79,7 @@ class Uploads(msgspec.Struct):
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """One operation. The handler's own parameters say what it takes: `services`, `query` (a Struct), `body` (a type
+    """One operation. The handler's own parameters say what it takes: `query` (a Struct), `body` (a type
     that msgspec reads), `upload`, `uploads`, `port` (on
     which it was asked), `person` (whose token it is, empty where none is asked for); all others are parts of the path.
     """
@@ -95,7 +97,7 @@ class Operation:
     """The names of further parts that have to be there."""
     title: str = ""
     """What is told of the file while it comes and is kept (TaskState); `{name}` stands for a part of the path."""
-    told_from: int = 0
+    shown_from: int = 0
     """Bytes of a body below which nothing is told."""
     limit: int = LARGEST_BODY
     plain: bool = False
@@ -106,7 +108,7 @@ class Operation:
     path_names: tuple[str, ...] = field(default=())
 
 
-SPECIAL: Final = frozenset({"services", "query", "body", "upload", "uploads", "port", "person"})
+SPECIAL: Final = frozenset({"query", "body", "upload", "uploads", "port", "person"})
 """Parameters of a handler that are no parts of the path."""
 OPERATIONS: Final[list[Operation]] = []
 
@@ -130,13 +132,30 @@ def operation(
     return register
 
 
-def route(declared: Operation) -> HTTPRouteHandler:
-    """Make the route of an operation."""
+def bound(operations: Iterable[Operation], groups: Iterable[object]) -> Iterator[Operation]:
+    """Return the operations with their handlers bound to the objects on which they are declared as methods.
+
+    Raises:
+        KeyError: a group is missing.
+    """
+    by_class = {type(group).__qualname__: group for group in groups}
+    for declared in operations:
+        owner, _, method = declared.handler.__qualname__.rpartition(".")
+        yield replace(declared, handler=getattr(by_class[owner], method))
+
+
+def route(declared: Operation, tasks: Tasks) -> HTTPRouteHandler:
+    """Return the route of an operation whose handler is bound.
+
+    Args:
+        declared: the operation.
+        tasks: where the progress of uploads is shown.
+    """
 
     async def handle(request: Request[Any, Any, Any]) -> Response[Any]:
         uploads: list[UploadFile] = []
         try:
-            with receiving(request, declared.title, declared.told_from):
+            with receiving(request, tasks, declared.title, declared.shown_from):
                 done = await declared.handler(**await _arguments(declared, request, uploads))
             _note("done", declared, request)
             return await _response(declared, request, done)
@@ -186,9 +205,7 @@ def _note(outcome: str, declared: Operation, request: Request[Any, Any, Any]) ->
 async def _arguments(declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]) -> dict[str, Any]:
     given: dict[str, Any] = {name: request.path_params[name] for name in declared.path_names}
     for name, kind in declared.takes.items():
-        if name == "services":
-            given[name] = request.app.state.services
-        elif name == "port":
+        if name == "port":
             given[name] = (request.scope.get("server") or ("", 0))[1]
         elif name == "query":
             given[name] = _query(kind, request)
@@ -278,7 +295,7 @@ async def _uploads(declared: Operation, request: Request[Any, Any, Any], uploads
 async def _multipart(
     declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]
 ) -> tuple[list[tuple[str, Any]], dict[str, str]]:
-    """Give all parts of a body in their order, and those that are text, or have to be."""
+    """Return all parts of a body in their order, and those that are text, or have to be."""
     if request.content_type[0] != "multipart/form-data":
         raise Unsupported(f"The body has to be multipart/form-data with the file {declared.file}.")
     try:
@@ -309,8 +326,8 @@ def _as_file(part: Any, uploads: list[UploadFile]) -> UploadFile | None:
 
 
 async def _response(declared: Operation, request: Request[Any, Any, Any], given: Any) -> Response[Any]:
-    if isinstance(given, Kept):
-        return await _kept(request, given)
+    if isinstance(given, CacheableContent):
+        return await _cacheable(request, given)
     if isinstance(given, Binary):
         # RFC 6266: the name in UTF-8, since it may be anything.
         headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(given.filename, safe='')}"}
@@ -327,7 +344,7 @@ async def _response(declared: Operation, request: Request[Any, Any, Any], given:
     return Response(content, media_type=MediaType.JSON)
 
 
-async def _kept(request: Request[Any, Any, Any], given: Kept) -> Response[Any]:
+async def _cacheable(request: Request[Any, Any, Any], given: CacheableContent) -> Response[Any]:
     gzipped = given.gzipped and "gzip" in accepted_encodings(request)
     # Each encoding is a representation of its own, with a tag of its own.
     etag = f'{given.etag[:-1]}.gz"' if gzipped else given.etag

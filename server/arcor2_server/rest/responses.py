@@ -1,4 +1,4 @@
-"""What a route answers: JSON by msgspec, errors as the protocol's WebApiError; the keys of a route's options."""
+"""Responses of routes: JSON by msgspec, errors as the WebApiError of the protocol."""
 
 from typing import Any, Final
 
@@ -18,17 +18,8 @@ from arcor2_hw.exceptions import (
 )
 from arcor2_server.storage.assets import TooLarge
 
-ROLE: Final = "role"
-"""The key of a route's `opt` under which it declares the least role that may use it."""
-OPEN: Final = "open"
-"""The key of a route's `opt` that says that it asks nobody for a token: it tells nothing."""
 SERVICE: Final = "service"
 """The key of a route's `opt` that names the service it belongs to."""
-PERSON: Final = "person"
-"""The key of a request's state under which the name on its token is, where it has one."""
-AS_ROLE: Final = "as_role"
-"""The key of a request's state under which the role of the sender is."""
-
 _encode = msgspec.json.Encoder().encode
 
 

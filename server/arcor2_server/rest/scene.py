@@ -1,4 +1,4 @@
-"""The Scene service: collision models, lines through them, where an object stands (protocol, section 14)."""
+"""The Scene service: collision models, line checks, poses from focus points (protocol, section 14)."""
 
 from arcor2_hw.compute.kinematics_tasks import ReadMesh
 from arcor2_hw.data.base import UNSET, Data, Unset
@@ -6,12 +6,14 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, Sphere
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
+from arcor2_server.compute.workers import Compute
+from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rest.operations import operation
 from arcor2_server.rest.scenes import check_id
-from arcor2_server.services import Services
+from arcor2_server.storage import AssetStore
 from arcor2_server.workspace import point_registration
-from arcor2_server.workspace.collisions import Placed
-from arcor2_server.workspace.scene_collisions import attach, detach, hit, kept_mesh
+from arcor2_server.workspace.collisions import CollisionWorld, Placed
+from arcor2_server.workspace.scene_collisions import SceneCollisions
 
 SCENE = "Scene"
 
@@ -78,99 +80,103 @@ class HolderQuery(Data, frozen=True, rename="camel"):
     link: str
 
 
-def _put(services: Services, kind: type[Models], pose: Pose, key: str, *sizes: float | str) -> str:
-    check_id(key, "collision model")
-    try:
-        model = kind(key, *sizes)  # type: ignore[arg-type]
-    except ValueError as error:
-        raise InvalidData(f"{error}.") from None
-    services.collisions.put(Placed(model, pose))
-    return "ok"
+class SceneServiceOperations:
+    """The Scene service."""
 
+    def __init__(
+        self,
+        assets: AssetStore,
+        online: OnlineScene,
+        compute: Compute,
+        collisions: CollisionWorld,
+        scene_collisions: SceneCollisions,
+    ) -> None:
+        self._assets = assets
+        self._online = online
+        self._compute = compute
+        self._collisions = collisions
+        self._scene_collisions = scene_collisions
 
-@operation("PUT", "/collisions/box", SCENE, Role.TECHNICIAN)
-async def put_box(services: Services, query: BoxQuery, body: Pose) -> str:
-    """Put a box in the way."""
-    return _put(services, Box, body, query.box_id, query.size_x, query.size_y, query.size_z)
+    def _put(self, kind: type[Models], pose: Pose, key: str, *sizes: float | str) -> str:
+        check_id(key, "collision model")
+        try:
+            model = kind(key, *sizes)  # type: ignore[arg-type]
+        except ValueError as error:
+            raise InvalidData(f"{error}.") from None
+        self._collisions.put(Placed(model, pose))
+        return "ok"
 
+    @operation("PUT", "/collisions/box", SCENE, Role.TECHNICIAN)
+    async def put_box(self, query: BoxQuery, body: Pose) -> str:
+        """Put a box in the way."""
+        return self._put(Box, body, query.box_id, query.size_x, query.size_y, query.size_z)
 
-@operation("PUT", "/collisions/sphere", SCENE, Role.TECHNICIAN)
-async def put_sphere(services: Services, query: SphereQuery, body: Pose) -> str:
-    """Put a sphere in the way."""
-    return _put(services, Sphere, body, query.sphere_id, query.radius)
+    @operation("PUT", "/collisions/sphere", SCENE, Role.TECHNICIAN)
+    async def put_sphere(self, query: SphereQuery, body: Pose) -> str:
+        """Put a sphere in the way."""
+        return self._put(Sphere, body, query.sphere_id, query.radius)
 
+    @operation("PUT", "/collisions/cylinder", SCENE, Role.TECHNICIAN)
+    async def put_cylinder(self, query: CylinderQuery, body: Pose) -> str:
+        """Put a cylinder in the way."""
+        return self._put(Cylinder, body, query.cylinder_id, query.radius, query.height)
 
-@operation("PUT", "/collisions/cylinder", SCENE, Role.TECHNICIAN)
-async def put_cylinder(services: Services, query: CylinderQuery, body: Pose) -> str:
-    """Put a cylinder in the way."""
-    return _put(services, Cylinder, body, query.cylinder_id, query.radius, query.height)
+    @operation("PUT", "/collisions/mesh", SCENE, Role.TECHNICIAN)
+    async def put_mesh(self, query: MeshQuery, body: Pose) -> str:
+        """Put a mesh in the way, which is an asset; each axis may be scaled."""
+        check_id(query.mesh_id, "collision model")
+        scale = (query.mesh_scale_x, query.mesh_scale_y, query.mesh_scale_z)
+        if 0.0 in scale:
+            raise InvalidData("A mesh cannot be scaled to nothing.")
+        self._assets.info(query.mesh_file_id)
+        await self._compute.run(ReadMesh(self._scene_collisions.mesh_file(query.mesh_file_id), scale))
+        self._collisions.put(Placed(Mesh(query.mesh_id, query.mesh_file_id), body, scale))
+        return "ok"
 
+    @operation("GET", "/collisions", SCENE, Role.OPERATOR)
+    async def list_collisions(self) -> list[str]:
+        """Return the ids of all that is in the way: what was put in, and the objects of the scene that is online."""
+        return sorted(self._scene_collisions.in_operation())
 
-@operation("PUT", "/collisions/mesh", SCENE, Role.TECHNICIAN)
-async def put_mesh(services: Services, query: MeshQuery, body: Pose) -> str:
-    """Put a mesh in the way, which is an asset; each axis may be scaled."""
-    check_id(query.mesh_id, "collision model")
-    scale = (query.mesh_scale_x, query.mesh_scale_y, query.mesh_scale_z)
-    if 0.0 in scale:
-        raise InvalidData("A mesh cannot be scaled to nothing.")
-    services.assets.info(query.mesh_file_id)
-    await services.compute.run(ReadMesh(kept_mesh(services, query.mesh_file_id), scale))
-    services.collisions.put(Placed(Mesh(query.mesh_id, query.mesh_file_id), body, scale))
-    return "ok"
+    @operation("DELETE", "/collisions/{id}", SCENE, Role.TECHNICIAN)
+    async def delete_collision(self, id: str) -> None:  # noqa: A002 - the protocol calls it so
+        """Take out of the way what was put in."""
+        self._collisions.remove(id)
 
+    @operation("PUT", "/system/start", SCENE, Role.TECHNICIAN)
+    async def start_system(self) -> None:
+        """Note that the scene is started; no device is touched, which the websocket's StartScene does."""
+        self._collisions.started = True
 
-@operation("GET", "/collisions", SCENE, Role.OPERATOR)
-async def list_collisions(services: Services) -> list[str]:
-    """Give the ids of all that is in the way: what was put in, and the objects of the scene that is online."""
-    return sorted(services.collisions.everything(services))
+    @operation("PUT", "/system/stop", SCENE, Role.TECHNICIAN)
+    async def stop_system(self) -> None:
+        """Note that the scene is stopped, and take out of the way all that was put in."""
+        self._collisions.stop()
 
+    @operation("GET", "/system/running", SCENE, Role.OPERATOR)
+    async def system_running(self) -> bool:
+        """Return whether the scene is started: over REST, or because it is online."""
+        return self._collisions.started or self._online.online
 
-@operation("DELETE", "/collisions/{id}", SCENE, Role.TECHNICIAN)
-async def delete_collision(services: Services, id: str) -> None:  # noqa: A002 - the protocol calls it so
-    """Take out of the way what was put in."""
-    services.collisions.remove(id)
+    @operation("PUT", "/utils/focus", SCENE, Role.OPERATOR)
+    async def find_by_focus(self, body: MeshFocusAction) -> Pose:
+        """Return where an object stands of which a robot touched at least three points: by least squares."""
+        return point_registration.fit(body.mesh_focus_points, body.robot_space_points).pose
 
+    @operation("PUT", "/utils/line-safe", SCENE, Role.OPERATOR, plain=True)
+    async def check_line(self, body: LineCheck) -> LineCheckResult:
+        """Return whether a straight line is free of all that stands in the way, each a little larger than stated."""
+        found = await self._scene_collisions.hit(body.pt1, body.pt2)
+        return LineCheckResult(True) if found is None else LineCheckResult(False, found.id)
 
-@operation("PUT", "/system/start", SCENE, Role.TECHNICIAN)
-async def start_system(services: Services) -> None:
-    """Note that the scene is started; no device is touched, which the websocket's StartScene does."""
-    services.collisions.started = True
+    @operation("PUT", "/collisions/{id}/attach", SCENE, Role.TECHNICIAN)
+    async def attach_collision(self, id: str, query: HolderQuery) -> None:  # noqa: A002 - as above
+        """Let a robot hold what was put in, from where it is now: it moves with a link of the robot's model."""
+        self._online.require_online()
+        await self._scene_collisions.attach(id, self._online.robot(query.robot_id), query.link)
 
-
-@operation("PUT", "/system/stop", SCENE, Role.TECHNICIAN)
-async def stop_system(services: Services) -> None:
-    """Note that the scene is stopped, and take out of the way all that was put in."""
-    services.collisions.stop()
-
-
-@operation("GET", "/system/running", SCENE, Role.OPERATOR)
-async def system_running(services: Services) -> bool:
-    """Tell whether the scene is started: over REST, or because it is online."""
-    return services.collisions.started or services.cell.online
-
-
-@operation("PUT", "/utils/focus", SCENE, Role.OPERATOR)
-async def find_by_focus(body: MeshFocusAction) -> Pose:
-    """Give where an object stands of which a robot touched at least three points: by least squares."""
-    return point_registration.fit(body.mesh_focus_points, body.robot_space_points).pose
-
-
-@operation("PUT", "/utils/line-safe", SCENE, Role.OPERATOR, plain=True)
-async def check_line(services: Services, body: LineCheck) -> LineCheckResult:
-    """Tell whether a straight line is free of all that stands in the way, each a little larger than stated."""
-    found = await hit(services, body.pt1, body.pt2)
-    return LineCheckResult(True) if found is None else LineCheckResult(False, found.id)
-
-
-@operation("PUT", "/collisions/{id}/attach", SCENE, Role.TECHNICIAN)
-async def attach_collision(services: Services, id: str, query: HolderQuery) -> None:  # noqa: A002 - as above
-    """Let a robot hold what was put in, from where it is now: it moves with a link of the robot's model."""
-    services.cell.require_online()
-    await attach(services, id, services.cell.robot(query.robot_id), query.link)
-
-
-@operation("PUT", "/collisions/{id}/detach", SCENE, Role.TECHNICIAN)
-async def detach_collision(services: Services, id: str) -> Pose:  # noqa: A002 - as above
-    """Let go of what a robot holds; it stays where it is now, which is the answer."""
-    services.cell.require_online()
-    return await detach(services, id)
+    @operation("PUT", "/collisions/{id}/detach", SCENE, Role.TECHNICIAN)
+    async def detach_collision(self, id: str) -> Pose:  # noqa: A002 - as above
+        """Let go of what a robot holds; it stays where it is now, which is the answer."""
+        self._online.require_online()
+        return await self._scene_collisions.detach(id)

@@ -4,8 +4,9 @@ from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.rest.operations import operation
-from arcor2_server.services import Services
+from arcor2_server.storage import Storage
 
 STORAGE = "Storage"
 LONGEST_ID = 255
@@ -22,39 +23,43 @@ class IdDesc(Data, frozen=True):
 
 
 def check_id(key: str, what: str) -> None:
-    """Refuse an id under which nothing could be asked for later; InvalidData."""
+    """Refuse an id under which nothing could be asked for later. Raise InvalidData if that is impossible."""
     if not key or len(key) > LONGEST_ID or not key.isprintable() or "/" in key or key in (".", ".."):
         raise InvalidData(
             f"{key[:80]!r} cannot be the id of a {what}: 1 to {LONGEST_ID} printable characters, no slash."
         )
 
 
-@operation("GET", "/scenes", STORAGE, Role.OPERATOR)
-async def list_scenes(services: Services) -> list[IdDesc]:
-    """List the saved scenes."""
-    return [
-        IdDesc(one.id, one.name, str(one.created), str(one.modified), one.description or UNSET)
-        for one in await services.storage.scenes()
-    ]
+class SceneOperations:
+    """Scenes over REST (protocol, section 13)."""
 
+    def __init__(self, storage: Storage, types: ObjectTypes) -> None:
+        self._storage = storage
+        self._types = types
 
-@operation("GET", "/scenes/{scene_id}", STORAGE, Role.OPERATOR)
-async def get_scene(services: Services, scene_id: str) -> Scene:
-    """Give a saved scene."""
-    return await services.storage.scene(scene_id)
+    @operation("GET", "/scenes", STORAGE, Role.OPERATOR)
+    async def list_scenes(self) -> list[IdDesc]:
+        """List the saved scenes."""
+        return [
+            IdDesc(one.id, one.name, str(one.created), str(one.modified), one.description or UNSET)
+            for one in await self._storage.scenes()
+        ]
 
+    @operation("GET", "/scenes/{scene_id}", STORAGE, Role.OPERATOR)
+    async def get_scene(self, scene_id: str) -> Scene:
+        """Return a saved scene."""
+        return await self._storage.scene(scene_id)
 
-@operation("PUT", "/scenes", STORAGE, Role.TECHNICIAN)
-async def put_scene(services: Services, body: Scene) -> Timestamp:
-    """Save a scene, new or changed; answers the time. All object types in it have to be known."""
-    check_id(body.id, "scene")
-    for placed in body.objects:
-        if not services.types.known(placed.type):
-            raise NotFound(f"The object {placed.name} is of a type {placed.type!r}, which there is not.")
-    return str((await services.storage.put_scene(body)).modified)
+    @operation("PUT", "/scenes", STORAGE, Role.TECHNICIAN)
+    async def put_scene(self, body: Scene) -> Timestamp:
+        """Save a scene, new or changed; answers the time. All object types in it have to be known."""
+        check_id(body.id, "scene")
+        for placed in body.objects:
+            if not self._types.known(placed.type):
+                raise NotFound(f"The object {placed.name} is of a type {placed.type!r}, which there is not.")
+        return str((await self._storage.put_scene(body)).modified)
 
-
-@operation("DELETE", "/scenes/{scene_id}", STORAGE, Role.TECHNICIAN)
-async def delete_scene(services: Services, scene_id: str) -> None:
-    """Delete a saved scene; its projects then cannot be opened."""
-    await services.storage.delete_scene(scene_id)
+    @operation("DELETE", "/scenes/{scene_id}", STORAGE, Role.TECHNICIAN)
+    async def delete_scene(self, scene_id: str) -> None:
+        """Delete a saved scene; its projects then cannot be opened."""
+        await self._storage.delete_scene(scene_id)

@@ -1,4 +1,4 @@
-"""A file that comes in over REST, as a task that people can follow: how much of it is there, then that it is kept."""
+"""Shows an upload over REST as a task."""
 
 import asyncio
 from collections.abc import Iterator
@@ -10,25 +10,25 @@ from litestar.exceptions import HTTPException
 
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import Arcor2Error
-from arcor2_server.collaboration.tasks import Task
-from arcor2_server.rest.responses import PERSON
+from arcor2_server.access.route_options import PERSON
+from arcor2_server.collaboration.tasks import Task, Tasks
 
 RECEIVED: Final = 0.9
 """How far the task is when all has come: what came is checked and kept then."""
 
 
 @contextmanager
-def receiving(request: Request[Any, Any, Any], title: str, told_from: int) -> Iterator[None]:
+def receiving(request: Request[Any, Any, Any], tasks: Tasks, title: str, shown_from: int) -> Iterator[None]:
     """Tell of what is received and done inside; not without a title, nor of a body below `told_from` bytes.
 
     title: a sentence, in which `{name}` stands for a part of the path.
     """
     size = request.content_length
-    if not title or (size is not None and size < told_from):
+    if not title or (size is not None and size < shown_from):
         yield
         return
     named = title.format(**request.path_params)
-    task = request.app.state.services.tasks.begin(TaskKind.UPLOAD, named, request.state.get(PERSON, ""))
+    task = tasks.begin(TaskKind.UPLOAD, named, request.state.get(PERSON, ""))
     _count(request, task, size)
     try:
         yield

@@ -1,4 +1,4 @@
-"""The events of the protocol that tell of changes, whatever request made them (protocol, section 8)."""
+"""The events of the protocol for changed items, whatever request changed them (protocol, section 8)."""
 
 from collections.abc import Sequence
 from typing import Any, Final
@@ -9,6 +9,7 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import BareAction
+from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.document import OWNED, Document
 from arcor2_server.rpc.registry import Context
@@ -30,29 +31,8 @@ _ORDER: Final = (
 )
 
 
-def tell_changes(context: Context, changes: Sequence[Change]) -> None:
-    """Tell everybody, after the response, of changes that are made, one for each item.
-
-    The steps of the logic that go are told first, since one place leads on only once; then what comes or changes, an
-    action point before what hangs on it; then what goes, what hangs on an action point before it.
-    """
-    document = context.services.session.document
-    stays = sorted(
-        (change for change in changes if change.after is not None),
-        key=lambda change: (_ORDER.index(change.kind), _depth(document, change), change.rank),
-    )
-    goes = _gone(changes)
-    for change in goes:
-        if change.kind is Kind.LOGIC:
-            _tell_gone(context, change)
-    _tell_what_stays(context, document, stays)
-    for change in goes:
-        if change.kind is not Kind.LOGIC:
-            _tell_gone(context, change)
-
-
 def _depth(document: Document, change: Change) -> int:
-    """Give how many action points are above one."""
+    """Return how many action points are above one."""
     depth = 0
     if change.kind is Kind.POINT:
         parent = change.after.parent
@@ -62,8 +42,8 @@ def _depth(document: Document, change: Change) -> int:
 
 
 # ---------------------------------------------------------------------------------------------- what goes
-def _gone(changes: Sequence[Change]) -> list[Change]:
-    """Give what goes, innermost first; what belongs to an action point that goes needs no event of its own."""
+def _removed(changes: Sequence[Change]) -> list[Change]:
+    """Return what goes, innermost first; what belongs to an action point that goes needs no event of its own."""
     gone = [change for change in changes if change.after is None]
     points = {change.id: change.before.parent for change in gone if change.kind is Kind.POINT}
 
@@ -76,9 +56,9 @@ def _gone(changes: Sequence[Change]) -> list[Change]:
     return sorted((c for c in gone if c.kind not in OWNED or c.parent not in points), key=place)
 
 
-def _tell_gone(context: Context, change: Change) -> None:
+def _emit_removed(context: Context, change: Change) -> None:
     if change.kind is Kind.OVERRIDE:
-        _tell_overrides(context, change)
+        _emit_overrides(context, change)
         return
     data: Any = change.before
     if change.kind is Kind.ACTION:
@@ -86,34 +66,7 @@ def _tell_gone(context: Context, change: Change) -> None:
     context.emit(_EVENTS[change.kind], data, ChangeType.REMOVE)
 
 
-# ---------------------------------------------------------------------------------------------- what comes or changes
-def _tell_what_stays(context: Context, document: Document, changes: Sequence[Change]) -> None:
-    session = context.services.session
-    moves = any(change.kind is Kind.POINT for change in changes)
-    whole: set[str] = set()
-    for change in changes:
-        match change.kind:
-            case Kind.SCENE:
-                context.emit("SceneChanged", session.bare_scene(), ChangeType.UPDATE_BASE)
-            case Kind.PROJECT:
-                context.emit("ProjectChanged", session.bare_project(), ChangeType.UPDATE_BASE)
-            case Kind.OVERRIDE:
-                _tell_overrides(context, change)
-            case Kind.POINT if change.before is not None:
-                if change.before.parent == change.after.parent:
-                    context.emit("ActionPointChanged", change.after, ChangeType.UPDATE_BASE)
-                elif document.find(Kind.POINT, change.id) is not None:
-                    # As UpdateActionPointParent tells it: with orientations and joints, without actions.
-                    whole.add(change.id)
-                    point = replace(document.full_point(change.id), actions=[])
-                    context.emit("ActionPointChanged", point, ChangeType.UPDATE)
-            case Kind.ORIENTATION | Kind.JOINTS if change.parent in whole:
-                pass  # told with its point
-            case _:
-                _tell_one(context, change, moves=moves)
-
-
-def _tell_one(context: Context, change: Change, *, moves: bool) -> None:
+def _emit_one(context: Context, change: Change, *, moves: bool) -> None:
     parent = change.parent if change.kind in OWNED else None
     how = ChangeType.ADD
     if change.before is not None:
@@ -124,7 +77,7 @@ def _tell_one(context: Context, change: Change, *, moves: bool) -> None:
     context.emit(_EVENTS[change.kind], change.after, how, parent)
 
 
-def _tell_overrides(context: Context, change: Change) -> None:
+def _emit_overrides(context: Context, change: Change) -> None:
     before, after = _by_name(change.before), _by_name(change.after)
     for name, parameter in before.items():
         if name not in after:
@@ -138,3 +91,56 @@ def _tell_overrides(context: Context, change: Change) -> None:
 
 def _by_name(override: Any) -> dict[str, Parameter]:
     return {} if override is None else {parameter.name: parameter for parameter in override.parameters}
+
+
+class ChangeEvents:
+    """Publishes changes of the open document, whatever request made them."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def emit_all(self, context: Context, changes: Sequence[Change]) -> None:
+        """Send one event for each changed item after the response.
+
+        Removed logic items come first, since one node has only one next step. Then come added and changed items, an
+        action point before its children, and at last the other removed items, children before their action point.
+        """
+        document = self._session.document
+        stays = sorted(
+            (change for change in changes if change.after is not None),
+            key=lambda change: (_ORDER.index(change.kind), _depth(document, change), change.rank),
+        )
+        goes = _removed(changes)
+        for change in goes:
+            if change.kind is Kind.LOGIC:
+                _emit_removed(context, change)
+        self._emit_remaining(context, document, stays)
+        for change in goes:
+            if change.kind is not Kind.LOGIC:
+                _emit_removed(context, change)
+
+    # ------------------------------------------------------------------------------ added and changed items
+    def _emit_remaining(self, context: Context, document: Document, changes: Sequence[Change]) -> None:
+        session = self._session
+        moves = any(change.kind is Kind.POINT for change in changes)
+        whole: set[str] = set()
+        for change in changes:
+            match change.kind:
+                case Kind.SCENE:
+                    context.emit("SceneChanged", session.bare_scene(), ChangeType.UPDATE_BASE)
+                case Kind.PROJECT:
+                    context.emit("ProjectChanged", session.bare_project(), ChangeType.UPDATE_BASE)
+                case Kind.OVERRIDE:
+                    _emit_overrides(context, change)
+                case Kind.POINT if change.before is not None:
+                    if change.before.parent == change.after.parent:
+                        context.emit("ActionPointChanged", change.after, ChangeType.UPDATE_BASE)
+                    elif document.find(Kind.POINT, change.id) is not None:
+                        # As UpdateActionPointParent tells it: with orientations and joints, without actions.
+                        whole.add(change.id)
+                        point = replace(document.full_point(change.id), actions=[])
+                        context.emit("ActionPointChanged", point, ChangeType.UPDATE)
+                case Kind.ORIENTATION | Kind.JOINTS if change.parent in whole:
+                    pass  # told with its point
+                case _:
+                    _emit_one(context, change, moves=moves)

@@ -1,4 +1,4 @@
-"""The request that copies an action point with all that hangs on it (protocol, 7.4)."""
+"""The request that copies an action point with its children (protocol, 7.4)."""
 
 import itertools
 from collections.abc import Callable
@@ -11,36 +11,19 @@ from arcor2_hw.data.base import new_id
 from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.project import Action, ActionParameter, ActionParameterType
 from arcor2_hw.data.rpc import CopyActionPointArgs
+from arcor2_server.collaboration.locks import Locks
+from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.document import OWNED, Document, reference
-from arcor2_server.rpc.editing import commit
+from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
 
 _EVENTS = {Kind.POINT: "ActionPointChanged", Kind.ORIENTATION: "OrientationChanged", Kind.JOINTS: "JointsChanged"}
 _PREFIXES = {Kind.POINT: "acp", Kind.ORIENTATION: "ori", Kind.JOINTS: "joi", Kind.ACTION: "act"}
 
 
-@rpc("CopyActionPoint")
-async def copy_action_point(context: Context, args: CopyActionPointArgs) -> None:
-    """Copy an action point with its descendants; what refers to something copied refers to the copy."""
-    session = context.services.session
-    document = session.require_project_open()
-    user = context.user
-    document.action_point(args.id)
-    below = [args.id, *(point.id for point in document.descendants(args.id))]
-    async with context.services.locks.read(user, *below):
-        places, actions = _copy(document, args)
-        if not await commit(context, [*places, *actions]):
-            return
-    for change in places:
-        parent = None if change.kind is Kind.POINT else change.parent
-        context.emit_first(_EVENTS[change.kind], change.after, ChangeType.ADD, parent)
-    for change in actions:
-        context.emit_first("ActionChanged", change.after, ChangeType.ADD, change.parent)
-
-
 def _copy(document: Document, args: CopyActionPointArgs) -> tuple[list[Change], list[Change]]:
-    """Give the changes that add the points with orientations and joints, and those that add the actions."""
+    """Return the changes that add the points with orientations and joints, and those that add the actions."""
     points = [document.action_point(args.id), *document.descendants(args.id)]
     owned = {point.id: [item for kind in OWNED for item in document.owned(point.id, kind)] for point in points}
     new_ids = {point.id: new_id("acp") for point in points}
@@ -65,7 +48,7 @@ def _copy(document: Document, args: CopyActionPointArgs) -> tuple[list[Change], 
 
 
 def _names(document: Document, kind: Kind | str) -> Callable[[str], str]:
-    """Give what makes names of copies: `_copy`, then `_copy_1` and on, whichever is free."""
+    """Return what makes names of copies: `_copy`, then `_copy_1` and on, whichever is free."""
     taken: set[str] = set()
 
     def free(name: str) -> str:
@@ -92,3 +75,30 @@ def _redirected(parameter: ActionParameter, new_ids: dict[str, str]) -> ActionPa
     text = msgspec.json.decode(parameter.value, type=str)
     new = new_ids[target] + text[len(target) :] if parameter.type == ActionParameterType.LINK else new_ids[target]
     return replace(parameter, value=msgspec.json.encode(new).decode())
+
+
+class CopyRequests:
+    """The request that copies an action point with all that hangs on it (protocol, 7.4)."""
+
+    def __init__(self, locks: Locks, session: Session, editing: Editing) -> None:
+        self._locks = locks
+        self._session = session
+        self._editing = editing
+
+    @rpc("CopyActionPoint")
+    async def copy_action_point(self, context: Context, args: CopyActionPointArgs) -> None:
+        """Copy an action point with its descendants; what refers to something copied refers to the copy."""
+        session = self._session
+        document = session.require_project_open()
+        user = context.user
+        document.action_point(args.id)
+        below = [args.id, *(point.id for point in document.descendants(args.id))]
+        async with self._locks.read(user, *below):
+            places, actions = _copy(document, args)
+            if not await self._editing.commit(context, [*places, *actions]):
+                return
+        for change in places:
+            parent = None if change.kind is Kind.POINT else change.parent
+            context.emit_first(_EVENTS[change.kind], change.after, ChangeType.ADD, parent)
+        for change in actions:
+            context.emit_first("ActionChanged", change.after, ChangeType.ADD, change.parent)

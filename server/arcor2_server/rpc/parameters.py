@@ -1,4 +1,4 @@
-"""Requests about project parameters and about settings that a project overrides (protocol, 7.3, 7.4 and 10.5)."""
+"""Requests about project parameters and overridden settings (protocol, 7.3, 7.4 and 10.5)."""
 
 from msgspec.structs import replace
 
@@ -16,102 +16,18 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_hw.data.scene import SceneObjectOverride
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server.collaboration.locks import PROJECT
+from arcor2_server.collaboration.locks import PROJECT, Locks
+from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks import check_project_parameter, check_setting
 from arcor2_server.documents.document import Document
 from arcor2_server.errors import RequestRefused
-from arcor2_server.rpc.editing import commit, drop_locks, hide_secrets, require_free, require_held, tell, unlock
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.rpc.editing import (
+    Editing,
+    emit_changes,
+)
 from arcor2_server.rpc.registry import Context, rpc
-
-
-@rpc("AddProjectParameter")
-async def add_project_parameter(context: Context, args: AddProjectParameterArgs) -> None:
-    """Add a constant of the project."""
-    document = context.services.session.require_project_open()
-    async with context.services.locks.auto(context.user, PROJECT):
-        parameter = ProjectParameter(args.name, args.type, args.value, id=new_id("pco"))
-        check_project_parameter(parameter)
-        require_free(context, Kind.PARAMETER, args.name, "a project parameter")
-        changes = [document.add(Kind.PARAMETER, parameter.id, parameter)]
-        if await commit(context, changes):
-            tell(context, changes, "ProjectParameterChanged", ChangeType.ADD)
-
-
-@rpc("UpdateProjectParameter")
-async def update_project_parameter(context: Context, args: UpdateProjectParameterArgs) -> None:
-    """Give a constant of the project another name, another value, or both."""
-    document = context.services.session.require_project_open()
-    parameter = document.parameter(args.id)
-    require_held(context, args.id)
-    updated = parameter
-    if not isinstance(args.name, Unset) and args.name != parameter.name:
-        require_free(context, Kind.PARAMETER, args.name, "a project parameter")
-        updated = replace(updated, name=args.name)
-    if not isinstance(args.value, Unset):
-        updated = replace(updated, value=args.value)
-    check_project_parameter(updated)
-    changes = [document.update(Kind.PARAMETER, args.id, updated)]
-    if await commit(context, changes):
-        tell(context, changes, "ProjectParameterChanged", ChangeType.UPDATE)
-        unlock(context, args.id)
-
-
-@rpc("RemoveProjectParameter")
-async def remove_project_parameter(context: Context, args: RemoveProjectParameterArgs) -> None:
-    """Remove a constant of the project; refused while an action uses it."""
-    services = context.services
-    document = services.session.require_project_open()
-    async with services.locks.auto_skip_held(context.user, args.id):
-        parameter = document.parameter(args.id)
-        for user in document.users_of(args.id):
-            name = user.name if isinstance(user, Action) else ""
-            raise RequestRefused(f"The action {name} uses the project parameter {parameter.name}.")
-        changes = [document.remove(Kind.PARAMETER, args.id)]
-        if await commit(context, changes):
-            tell(context, changes, "ProjectParameterChanged", ChangeType.REMOVE)
-            drop_locks(context, args.id)
-
-
-# ---------------------------------------------------------------------------------------------- overrides
-def _overrides(context: Context, object_id: str, given: Parameter) -> tuple[Document, list[Parameter]]:
-    """Check that the object has such a setting; give its overrides as they are."""
-    document = context.services.session.require_project_open()
-    obj = document.scene_object(object_id)
-    settings = {setting.name: setting for setting in context.services.types.meta(obj.type).settings}
-    if given.name not in settings:
-        raise NotFound(f"{obj.type} has no setting {given.name}.")
-    check_setting(given, settings[given.name])
-    item = document.find(Kind.OVERRIDE, object_id)
-    return document, [] if item is None else list(item.value.parameters)
-
-
-async def _set_overrides(
-    context: Context, document: Document, object_id: str, overrides: list[Parameter], given: Parameter, how: ChangeType
-) -> None:
-    require_held(context, object_id)
-    value = SceneObjectOverride(object_id, overrides)
-    change: Change
-    if document.find(Kind.OVERRIDE, object_id) is None:
-        change = document.add(Kind.OVERRIDE, object_id, value)
-    elif overrides:
-        change = document.update(Kind.OVERRIDE, object_id, value)
-    else:
-        change = document.remove(Kind.OVERRIDE, object_id)
-    if await commit(context, [change]):
-        context.emit("OverrideUpdated", given, how, object_id)
-
-
-async def _without_secret(context: Context, object_id: str, given: Parameter) -> Parameter:
-    """Store the value of an override that is secret; returns it with a reference. InvalidData when it has no value."""
-    document, overrides = _overrides(context, object_id, given)
-    require_held(context, object_id)
-    others = [override for override in overrides if override.name != given.name]
-    obj = document.scene_object(object_id)
-    hidden = await hide_secrets(context, obj, [*others, given], overrides, of_project=True)
-    if not hidden or hidden[-1].name != given.name:
-        raise InvalidData(f"Enter a value for the secret setting {given.name}: none is stored.")
-    return hidden[-1]
 
 
 def _index(overrides: list[Parameter], name: str) -> int:
@@ -121,28 +37,123 @@ def _index(overrides: list[Parameter], name: str) -> int:
     raise NotFound(f"The setting {name} is not overridden.")
 
 
-@rpc("AddOverride")
-async def add_override(context: Context, args: AddOverrideArgs) -> None:
-    """Let the project replace a setting of an object."""
-    given = await _without_secret(context, args.id, args.override)
-    document, overrides = _overrides(context, args.id, given)
-    if any(override.name == args.override.name for override in overrides):
-        raise InvalidData(f"The setting {args.override.name} is overridden already: update the override.")
-    await _set_overrides(context, document, args.id, [*overrides, given], given, ChangeType.ADD)
+class ParameterRequests:
+    """Requests about project parameters and about settings that a project overrides (protocol, 7.3, 7.4 and 10.5)."""
 
+    def __init__(self, locks: Locks, types: ObjectTypes, session: Session, editing: Editing) -> None:
+        self._locks = locks
+        self._types = types
+        self._session = session
+        self._editing = editing
 
-@rpc("UpdateOverride")
-async def update_override(context: Context, args: UpdateOverrideArgs) -> None:
-    """Change the value by which the project replaces a setting."""
-    given = await _without_secret(context, args.id, args.override)
-    document, overrides = _overrides(context, args.id, given)
-    overrides[_index(overrides, given.name)] = given
-    await _set_overrides(context, document, args.id, overrides, given, ChangeType.UPDATE)
+    @rpc("AddProjectParameter")
+    async def add_project_parameter(self, context: Context, args: AddProjectParameterArgs) -> None:
+        """Add a constant of the project."""
+        document = self._session.require_project_open()
+        async with self._locks.auto(context.user, PROJECT):
+            parameter = ProjectParameter(args.name, args.type, args.value, id=new_id("pco"))
+            check_project_parameter(parameter)
+            self._editing.require_free(context, Kind.PARAMETER, args.name, "a project parameter")
+            changes = [document.add(Kind.PARAMETER, parameter.id, parameter)]
+            if await self._editing.commit(context, changes):
+                emit_changes(context, changes, "ProjectParameterChanged", ChangeType.ADD)
 
+    @rpc("UpdateProjectParameter")
+    async def update_project_parameter(self, context: Context, args: UpdateProjectParameterArgs) -> None:
+        """Give a constant of the project another name, another value, or both."""
+        document = self._session.require_project_open()
+        parameter = document.parameter(args.id)
+        self._editing.require_held(context, args.id)
+        updated = parameter
+        if not isinstance(args.name, Unset) and args.name != parameter.name:
+            self._editing.require_free(context, Kind.PARAMETER, args.name, "a project parameter")
+            updated = replace(updated, name=args.name)
+        if not isinstance(args.value, Unset):
+            updated = replace(updated, value=args.value)
+        check_project_parameter(updated)
+        changes = [document.update(Kind.PARAMETER, args.id, updated)]
+        if await self._editing.commit(context, changes):
+            emit_changes(context, changes, "ProjectParameterChanged", ChangeType.UPDATE)
+            self._editing.unlock(context, args.id)
 
-@rpc("DeleteOverride")
-async def delete_override(context: Context, args: DeleteOverrideArgs) -> None:
-    """Let the setting of the scene count again."""
-    document, overrides = _overrides(context, args.id, args.override)
-    del overrides[_index(overrides, args.override.name)]
-    await _set_overrides(context, document, args.id, overrides, args.override, ChangeType.REMOVE)
+    @rpc("RemoveProjectParameter")
+    async def remove_project_parameter(self, context: Context, args: RemoveProjectParameterArgs) -> None:
+        """Remove a constant of the project; refused while an action uses it."""
+        document = self._session.require_project_open()
+        async with self._locks.auto_skip_held(context.user, args.id):
+            parameter = document.parameter(args.id)
+            for user in document.users_of(args.id):
+                name = user.name if isinstance(user, Action) else ""
+                raise RequestRefused(f"The action {name} uses the project parameter {parameter.name}.")
+            changes = [document.remove(Kind.PARAMETER, args.id)]
+            if await self._editing.commit(context, changes):
+                emit_changes(context, changes, "ProjectParameterChanged", ChangeType.REMOVE)
+                self._editing.drop_locks(context, args.id)
+
+    # ---------------------------------------------------------------------------------------------- overrides
+    def _overrides(self, context: Context, object_id: str, given: Parameter) -> tuple[Document, list[Parameter]]:
+        """Check that the object has such a setting; give its overrides as they are."""
+        document = self._session.require_project_open()
+        obj = document.scene_object(object_id)
+        settings = {setting.name: setting for setting in self._types.meta(obj.type).settings}
+        if given.name not in settings:
+            raise NotFound(f"{obj.type} has no setting {given.name}.")
+        check_setting(given, settings[given.name])
+        item = document.find(Kind.OVERRIDE, object_id)
+        return document, [] if item is None else list(item.value.parameters)
+
+    async def _set_overrides(
+        self,
+        context: Context,
+        document: Document,
+        object_id: str,
+        overrides: list[Parameter],
+        given: Parameter,
+        how: ChangeType,
+    ) -> None:
+        self._editing.require_held(context, object_id)
+        value = SceneObjectOverride(object_id, overrides)
+        change: Change
+        if document.find(Kind.OVERRIDE, object_id) is None:
+            change = document.add(Kind.OVERRIDE, object_id, value)
+        elif overrides:
+            change = document.update(Kind.OVERRIDE, object_id, value)
+        else:
+            change = document.remove(Kind.OVERRIDE, object_id)
+        if await self._editing.commit(context, [change]):
+            context.emit("OverrideUpdated", given, how, object_id)
+
+    async def _without_secret(self, context: Context, object_id: str, given: Parameter) -> Parameter:
+        """Store the value of a secret override; return it with a reference. Raise InvalidData if it has no value."""
+        document, overrides = self._overrides(context, object_id, given)
+        self._editing.require_held(context, object_id)
+        others = [override for override in overrides if override.name != given.name]
+        obj = document.scene_object(object_id)
+        hidden = await self._editing.hide_secrets(context, obj, [*others, given], overrides, of_project=True)
+        if not hidden or hidden[-1].name != given.name:
+            raise InvalidData(f"Enter a value for the secret setting {given.name}: none is stored.")
+        return hidden[-1]
+
+    @rpc("AddOverride")
+    async def add_override(self, context: Context, args: AddOverrideArgs) -> None:
+        """Let the project replace a setting of an object."""
+        given = await self._without_secret(context, args.id, args.override)
+        document, overrides = self._overrides(context, args.id, given)
+        if any(override.name == args.override.name for override in overrides):
+            raise InvalidData(f"The setting {args.override.name} is overridden already: update the override.")
+        await self._set_overrides(context, document, args.id, [*overrides, given], given, ChangeType.ADD)
+
+    @rpc("UpdateOverride")
+    async def update_override(self, context: Context, args: UpdateOverrideArgs) -> None:
+        """Change the value by which the project replaces a setting."""
+        given = await self._without_secret(context, args.id, args.override)
+        document, overrides = self._overrides(context, args.id, given)
+        overrides[_index(overrides, given.name)] = given
+        await self._set_overrides(context, document, args.id, overrides, given, ChangeType.UPDATE)
+
+    @rpc("DeleteOverride")
+    async def delete_override(self, context: Context, args: DeleteOverrideArgs) -> None:
+        """Let the setting of the scene count again."""
+        document, overrides = self._overrides(context, args.id, args.override)
+        del overrides[_index(overrides, args.override.name)]
+        await self._set_overrides(context, document, args.id, overrides, args.override, ChangeType.REMOVE)

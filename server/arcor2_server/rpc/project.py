@@ -20,15 +20,21 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import NotFound
-from arcor2_server.collaboration.locks import PROJECT
+from arcor2_server.collaboration.locks import PROJECT, Locks
+from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks import project_problems
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.errors import RequestRefused
-from arcor2_server.rpc.editing import commit, opening_allowed, require_held, require_name_free, require_no_program
-from arcor2_server.rpc.object_types import notice_new_types
+from arcor2_server.object_types.notifications import TypeNotifications
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.online.online_scene import OnlineScene
+from arcor2_server.rpc.editing import (
+    Editing,
+)
 from arcor2_server.rpc.registry import Context, rpc
-from arcor2_server.rpc.scene import save_open_scene
+from arcor2_server.rpc.scene import SceneRequests
+from arcor2_server.storage import Storage
 
 _BARE = BareProject.__struct_fields__
 
@@ -42,183 +48,197 @@ def _given(parameter: str, value: str) -> ProjectParameter:
     return ProjectParameter(parameter, "string", msgspec.json.encode(value).decode(), id=new_id("pco"))
 
 
-def _tell_opened(context: Context) -> None:
-    session = context.services.session
-    context.emit("OpenProject", OpenProjectData(session.require_scene(), session.require_project()))
-    context.emit("SceneState", SceneStateData(context.services.cell.state))
+class ProjectRequests:
+    """Requests that open, save, close, rename, copy and delete projects (protocol, 7.4)."""
 
+    def __init__(
+        self,
+        locks: Locks,
+        storage: Storage,
+        types: ObjectTypes,
+        session: Session,
+        online: OnlineScene,
+        type_notifications: TypeNotifications,
+        editing: Editing,
+        scene_requests: SceneRequests,
+    ) -> None:
+        self._locks = locks
+        self._storage = storage
+        self._types = types
+        self._session = session
+        self._online = online
+        self._type_notifications = type_notifications
+        self._editing = editing
+        self._scene_requests = scene_requests
 
-def _require_no_project(context: Context) -> None:
-    if (project := context.services.session.project) is not None:
-        raise RequestRefused(f"The project {project.name} is open: close it first.")
+    def _emit_opened(self, context: Context) -> None:
+        session = self._session
+        context.emit("OpenProject", OpenProjectData(session.require_scene(), session.require_project()))
+        context.emit("SceneState", SceneStateData(self._online.state))
 
+    def _require_no_project(self, context: Context) -> None:
+        if (project := self._session.project) is not None:
+            raise RequestRefused(f"The project {project.name} is open: close it first.")
 
-async def _scene_for(context: Context, scene_id: str) -> Scene:
-    """Give the open scene, which has to be that one, or the saved one when none is open."""
-    if (opened := context.services.session.scene) is None:
-        return await context.services.storage.scene(scene_id)
-    if opened.id != scene_id:
-        raise RequestRefused(f"The project belongs to another scene than {opened.name}, which is open: close it first.")
-    return opened
+    async def _scene_for(self, context: Context, scene_id: str) -> Scene:
+        """Return the open scene, which has to be that one, or the saved one when none is open."""
+        if (opened := self._session.scene) is None:
+            return await self._storage.scene(scene_id)
+        if opened.id != scene_id:
+            raise RequestRefused(
+                f"The project belongs to another scene than {opened.name}, which is open: close it first."
+            )
+        return opened
 
+    async def _save_scene_changes(self, context: Context) -> None:
+        """Save an open scene that has changes: a project can only be stored on a stored scene."""
+        if self._session.scene_changed:
+            await self._scene_requests.save_open_scene(context)
 
-async def _save_scene_changes(context: Context) -> None:
-    """Save an open scene that has changes: a project can only be stored on a stored scene."""
-    if context.services.session.scene_changed:
-        await save_open_scene(context)
+    @rpc("NewProject")
+    async def new_project(self, context: Context, args: NewProjectArgs) -> None:
+        """Open a new project, which exists in memory alone until it is saved."""
+        session = self._session
+        self._require_no_project(context)
+        async with self._locks.auto(context.user, PROJECT):
+            self._editing.require_no_program(context)
+            await self._editing.require_name_free(context, args.name, "project")
+            if self._locks.write_locked_roots(besides=(PROJECT,)):
+                raise RequestRefused("Something is locked: all locks have to be given back first.")
+            scene = await self._scene_for(context, args.scene_id)
+            if problems := session.scene_problems(scene):
+                raise RequestRefused(f"{scene.name} cannot be opened. {' '.join(problems)}")
+            # Another request may have opened something meanwhile.
+            self._require_no_project(context)
+            if context.dry_run:
+                return
+            await self._save_scene_changes(context)
+            key = new_id("pro")
+            project = Project(
+                name=args.name,
+                scene_id=args.scene_id,
+                description=args.description,
+                has_logic=args.has_logic,
+                int_modified=now(),
+                id=key,
+                parameters=[_given("scene_id", args.scene_id), _given("project_id", key)],
+            )
+            await session.show(session.scene or scene, project)
+            self._emit_opened(context)
 
+    @rpc("OpenProject")
+    async def open_project(self, context: Context, args: IdArgs) -> None:
+        """Open a saved project with its scene."""
+        session = self._session
+        async with self._editing.opening_allowed(context):
+            self._require_no_project(context)
+            project = await self._storage.project(args.id)
+            scene = await self._scene_for(context, project.scene_id)
+            await self._type_notifications.publish()
+            if problems := project_problems(scene, project, self._types):
+                raise RequestRefused(f"{project.name} cannot be opened. {' '.join(problems)}")
+            await self._save_scene_changes(context)
+            await session.show(session.scene or scene, with_present_names(scene, project, self._types))
+            self._emit_opened(context)
 
-@rpc("NewProject")
-async def new_project(context: Context, args: NewProjectArgs) -> None:
-    """Open a new project, which exists in memory alone until it is saved."""
-    services, session = context.services, context.services.session
-    _require_no_project(context)
-    async with services.locks.auto(context.user, PROJECT):
-        require_no_program(context)
-        await require_name_free(context, args.name, "project")
-        if services.locks.write_locked_roots(besides=(PROJECT,)):
-            raise RequestRefused("Something is locked: all locks have to be given back first.")
-        scene = await _scene_for(context, args.scene_id)
-        if problems := session.scene_problems(scene):
-            raise RequestRefused(f"{scene.name} cannot be opened. {' '.join(problems)}")
-        # Another request may have opened something meanwhile.
-        _require_no_project(context)
-        if context.dry_run:
+    @rpc("SaveProject")
+    async def save_project(self, context: Context, args: None) -> None:
+        """Save the open project."""
+        session = self._session
+        async with self._locks.exclusive():
+            project = session.require_project()
+            if not session.has_changes:
+                raise RequestRefused(f"{project.name} has no changes to save.")
+            if context.dry_run:
+                return
+            await session.save()
+        context.emit("ProjectSaved")
+
+    @rpc("CloseProject")
+    async def close_project(self, context: Context, args: CloseProjectArgs) -> None:
+        """Close the project and its scene."""
+        session = self._session
+        async with self._locks.exclusive():
+            project = session.require_project()
+            self._online.require_offline()
+            if session.has_changes and not args.force:
+                raise RequestRefused(f"{project.name} has changes that are not saved: save it, or close it by force.")
+            if context.dry_run:
+                return
+            ids = [item.id for item in session.document.items()]
+            await session.discard()
+            # Read locks keep nobody from closing; what they were on is gone.
+            self._locks.drop(ids)
+        context.emit("ProjectClosed")
+        context.emit("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id))
+
+    @rpc("RenameProject")
+    async def rename_project(self, context: Context, args: RenameProjectArgs) -> None:
+        """Give a project another name."""
+        await self._editing.require_name_free(context, args.new_name, "project")
+        self._editing.require_held(context, args.project_id)
+        await self._update_base(context, args.project_id, name=args.new_name)
+        if not context.dry_run:
+            self._locks.release_announced(context.user, [args.project_id])
+
+    @rpc("UpdateProjectDescription")
+    async def update_project_description(self, context: Context, args: UpdateProjectDescriptionArgs) -> None:
+        """Give a project another description."""
+        async with self._locks.auto(context.user, args.project_id):
+            await self._update_base(context, args.project_id, description=args.new_description)
+
+    @rpc("UpdateProjectHasLogic")
+    async def update_project_has_logic(self, context: Context, args: UpdateProjectHasLogicArgs) -> None:
+        """Return whether a project's program is made from its logic; without, the logic is dropped."""
+        async with self._locks.auto(context.user, args.project_id):
+            await self._update_base(context, args.project_id, has_logic=args.new_has_logic)
+
+    async def _update_base(self, context: Context, project_id: str, **fields: str | bool) -> None:
+        session, storage = self._session, self._storage
+        without_logic = fields.get("has_logic") is False
+        document = session.document
+        if (item := document.find(Kind.PROJECT, project_id)) is not None:
+            changes = [document.update(Kind.PROJECT, project_id, replace(item.value, **fields))]
+            if without_logic:
+                changes += [document.remove(Kind.LOGIC, step.id) for step in document.of_kind(Kind.LOGIC)]
+            if await self._editing.commit(context, changes):
+                context.emit_first("ProjectChanged", session.bare_project(), ChangeType.UPDATE_BASE)
             return
-        await _save_scene_changes(context)
-        key = new_id("pro")
-        project = Project(
-            name=args.name,
-            scene_id=args.scene_id,
-            description=args.description,
-            has_logic=args.has_logic,
-            int_modified=now(),
-            id=key,
-            parameters=[_given("scene_id", args.scene_id), _given("project_id", key)],
-        )
-        await session.show(session.scene or scene, project)
-        _tell_opened(context)
+        project = await storage.project(project_id)
+        if not context.dry_run:
+            changed = replace(project, **fields, **({"logic": []} if without_logic else {}))
+            context.emit_first("ProjectChanged", bare(await storage.put_project(changed)), ChangeType.UPDATE_BASE)
 
+    @rpc("CopyProject")
+    async def copy_project(self, context: Context, args: CopyProjectArgs) -> None:
+        """Copy a saved project. What is in it keeps its ids; existing clients expect to be told by update_base."""
+        storage = self._storage
+        async with self._locks.auto(context.user, args.source_id):
+            await self._editing.require_name_free(context, args.target_name, "copy of the project")
+            source = await storage.project(args.source_id)
+            key = new_id("pro")
+            parameters = [
+                replace(p, value=msgspec.json.encode(key).decode()) if p.name == "project_id" else p
+                for p in source.parameters
+            ]
+            copied = replace(
+                source, id=key, name=args.target_name, parameters=parameters, created=UNSET, modified=UNSET
+            )
+            if context.dry_run:
+                return
+            saved = await storage.put_project(copied)
+            with contextlib.suppress(NotFound):  # it has logic, or no script was stored yet
+                await storage.put_project_source(key, await storage.project_source(source.id))
+            context.emit_first("ProjectChanged", bare(saved), ChangeType.UPDATE_BASE)
 
-@rpc("OpenProject")
-async def open_project(context: Context, args: IdArgs) -> None:
-    """Open a saved project with its scene."""
-    services, session = context.services, context.services.session
-    async with opening_allowed(context):
-        _require_no_project(context)
-        project = await services.storage.project(args.id)
-        scene = await _scene_for(context, project.scene_id)
-        await notice_new_types(context)
-        if problems := project_problems(scene, project, services.types):
-            raise RequestRefused(f"{project.name} cannot be opened. {' '.join(problems)}")
-        await _save_scene_changes(context)
-        await session.show(session.scene or scene, with_present_names(scene, project, services.types))
-        _tell_opened(context)
-
-
-@rpc("SaveProject")
-async def save_project(context: Context, args: None) -> None:  # noqa: ARG001
-    """Save the open project."""
-    session = context.services.session
-    async with context.services.locks.exclusive():
-        project = session.require_project()
-        if not session.has_changes:
-            raise RequestRefused(f"{project.name} has no changes to save.")
-        if context.dry_run:
-            return
-        await session.save()
-    context.emit("ProjectSaved")
-
-
-@rpc("CloseProject")
-async def close_project(context: Context, args: CloseProjectArgs) -> None:
-    """Close the project and its scene."""
-    session = context.services.session
-    async with context.services.locks.exclusive():
-        project = session.require_project()
-        context.services.cell.require_offline()
-        if session.has_changes and not args.force:
-            raise RequestRefused(f"{project.name} has changes that are not saved: save it, or close it by force.")
-        if context.dry_run:
-            return
-        ids = [item.id for item in session.document.items()]
-        await session.discard()
-        # Read locks keep nobody from closing; what they were on is gone.
-        context.services.locks.drop(ids)
-    context.emit("ProjectClosed")
-    context.emit("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id))
-
-
-@rpc("RenameProject")
-async def rename_project(context: Context, args: RenameProjectArgs) -> None:
-    """Give a project another name."""
-    await require_name_free(context, args.new_name, "project")
-    require_held(context, args.project_id)
-    await _update_base(context, args.project_id, name=args.new_name)
-    if not context.dry_run:
-        context.services.locks.release_announced(context.user, [args.project_id])
-
-
-@rpc("UpdateProjectDescription")
-async def update_project_description(context: Context, args: UpdateProjectDescriptionArgs) -> None:
-    """Give a project another description."""
-    async with context.services.locks.auto(context.user, args.project_id):
-        await _update_base(context, args.project_id, description=args.new_description)
-
-
-@rpc("UpdateProjectHasLogic")
-async def update_project_has_logic(context: Context, args: UpdateProjectHasLogicArgs) -> None:
-    """Say whether a project's program is made from its logic; without, the logic is dropped."""
-    async with context.services.locks.auto(context.user, args.project_id):
-        await _update_base(context, args.project_id, has_logic=args.new_has_logic)
-
-
-async def _update_base(context: Context, project_id: str, **fields: str | bool) -> None:
-    session, storage = context.services.session, context.services.storage
-    without_logic = fields.get("has_logic") is False
-    document = session.document
-    if (item := document.find(Kind.PROJECT, project_id)) is not None:
-        changes = [document.update(Kind.PROJECT, project_id, replace(item.value, **fields))]
-        if without_logic:
-            changes += [document.remove(Kind.LOGIC, step.id) for step in document.of_kind(Kind.LOGIC)]
-        if await commit(context, changes):
-            context.emit_first("ProjectChanged", session.bare_project(), ChangeType.UPDATE_BASE)
-        return
-    project = await storage.project(project_id)
-    if not context.dry_run:
-        changed = replace(project, **fields, **({"logic": []} if without_logic else {}))
-        context.emit_first("ProjectChanged", bare(await storage.put_project(changed)), ChangeType.UPDATE_BASE)
-
-
-@rpc("CopyProject")
-async def copy_project(context: Context, args: CopyProjectArgs) -> None:
-    """Copy a saved project. What is in it keeps its ids; existing clients expect to be told by update_base."""
-    storage = context.services.storage
-    async with context.services.locks.auto(context.user, args.source_id):
-        await require_name_free(context, args.target_name, "copy of the project")
-        source = await storage.project(args.source_id)
-        key = new_id("pro")
-        parameters = [
-            replace(p, value=msgspec.json.encode(key).decode()) if p.name == "project_id" else p
-            for p in source.parameters
-        ]
-        copied = replace(source, id=key, name=args.target_name, parameters=parameters, created=UNSET, modified=UNSET)
-        if context.dry_run:
-            return
-        saved = await storage.put_project(copied)
-        with contextlib.suppress(NotFound):  # it has logic, or no script was stored yet
-            await storage.put_project_source(key, await storage.project_source(source.id))
-        context.emit_first("ProjectChanged", bare(saved), ChangeType.UPDATE_BASE)
-
-
-@rpc("DeleteProject")
-async def delete_project(context: Context, args: IdArgs) -> None:
-    """Delete a saved project."""
-    storage = context.services.storage
-    _require_no_project(context)
-    async with context.services.locks.auto(context.user, args.id):
-        project = await storage.project(args.id)
-        if context.dry_run:
-            return
-        await storage.delete_project(args.id)
-        context.emit("ProjectChanged", bare(project), ChangeType.REMOVE)
+    @rpc("DeleteProject")
+    async def delete_project(self, context: Context, args: IdArgs) -> None:
+        """Delete a saved project."""
+        storage = self._storage
+        self._require_no_project(context)
+        async with self._locks.auto(context.user, args.id):
+            project = await storage.project(args.id)
+            if context.dry_run:
+                return
+            await storage.delete_project(args.id)
+            context.emit("ProjectChanged", bare(project), ChangeType.REMOVE)

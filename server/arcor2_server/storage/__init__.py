@@ -1,4 +1,4 @@
-"""Saved documents: scenes, projects with their sources, object types, collision models; and assets as files."""
+"""Stores: saved documents, assets, packages and secrets."""
 
 from arcor2_server.storage.assets import Asset, AssetStore
 from arcor2_server.storage.store import DocumentId, Storage

@@ -19,6 +19,7 @@ from msgspec import UNSET
 
 from arcor2_hw.data.base import Data, Timestamp, Unset, new_id, now
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound, StorageError
+from arcor2_server.files import replace_file, sync_directory
 
 log = structlog.get_logger(__name__)
 
@@ -68,7 +69,7 @@ class AssetStore:
     async def open(cls, directory: Path, limit: int = MAX_ASSET) -> Self:
         """Open, or create, the store; what a crash left half written is removed."""
         store = cls(directory, limit)
-        with store._told("use"):
+        with store._storage_errors("use"):
             store._assets = await asyncio.to_thread(store._load)
         return store
 
@@ -93,31 +94,34 @@ class AssetStore:
 
     # ------------------------------------------------------------------------------------------------ look-ups
     def infos(self) -> list[Asset]:
-        """Give all assets that were put in, by id; those that are offered are not listed."""
+        """Return all assets that were put in, by id; those that are offered are not listed."""
         return [self._assets[key] for key in sorted(self._assets)]
 
     def exists(self, key: str) -> bool:
-        """Tell whether there is such an asset."""
+        """Return whether there is such an asset."""
         return key in self._assets or key in self._offered
 
     def info(self, key: str) -> Asset:
-        """Give what is known of an asset; NotFound."""
+        """Return what is known of an asset. Raise NotFound if there is none."""
         found = self._assets.get(key) or self._offered.get(key)
         if found is None:
             raise NotFound(f"There is no asset {key!r}.")
         return found
 
     def file(self, key: str) -> Path:
-        """Give the file of an asset's present content, which never changes, and goes with it; NotFound."""
+        """Return the file of an asset's present content, which never changes, and goes with it.
+
+        Raise NotFound if there is none.
+        """
         return self._path(self.info(key).digest).absolute()
 
     async def read(self, asset: Asset) -> AsyncIterator[bytes]:
-        """Give the content of an asset in pieces, of the very version that `info` told of."""
-        with self._told("read"):
+        """Return the content of an asset in pieces, of the very version that `info` told of."""
+        with self._storage_errors("read"):
             file = await asyncio.to_thread(self._path(asset.digest).open, "rb")
         with file:
             while True:
-                with self._told("read"):
+                with self._storage_errors("read"):
                     chunk = await asyncio.to_thread(file.read, CHUNK)
                 if not chunk:
                     return
@@ -135,11 +139,11 @@ class AssetStore:
     ) -> Asset:
         """Take in an asset as it arrives; without `key` it is given an id.
 
-        Conflict when there is one of that id, unless `upsert`; InvalidData for an impossible id; TooLarge.
+        Conflict when there is one of that id, unless `upsert`; raise InvalidData for an impossible id; TooLarge.
         """
         key = new_id("asset") if key is None else _checked(key)
         self._refuse_known(key, upsert)
-        with self._told("write"):
+        with self._storage_errors("write"):
             descriptor, name = await asyncio.to_thread(tempfile.mkstemp, dir=self._incoming)
         try:
             size, digest = await self._receive(content, descriptor)
@@ -148,7 +152,7 @@ class AssetStore:
                 old = self._assets.get(key)
                 stamp = now()
                 asset = Asset(key, old.created if old else stamp, stamp, size, digest, file_name, description)
-                with self._told("write"):
+                with self._storage_errors("write"):
                     await asyncio.to_thread(self._place, Path(name), asset)
                 self._assets[key] = asset
                 self.revision += 1
@@ -167,14 +171,14 @@ class AssetStore:
         """
         key, digest = _checked(key), hashlib.sha256(content).hexdigest()
         async with self._changing:
-            with self._told("write"):
-                await asyncio.to_thread(self._keep, content, digest)
+            with self._storage_errors("write"):
+                await asyncio.to_thread(self._store, content, digest)
             stamp = now()
             self._offered[key] = Asset(key, stamp, stamp, len(content), digest, key, description)
             self.revision += 1
 
     async def delete(self, key: str) -> None:
-        """Delete; NotFound. What is being read at this moment is read to its end.
+        """Delete. Raise NotFound if there is none. What is being read at this moment is read to its end.
 
         Conflict for one that is offered by an installed distribution.
         """
@@ -182,9 +186,9 @@ class AssetStore:
             asset = self.info(key)
             if key not in self._assets:
                 raise Conflict(f"The asset {key!r} belongs to an installed driver and cannot be deleted.")
-            with self._told("write"):
+            with self._storage_errors("write"):
                 await asyncio.to_thread(self._record(key).unlink, missing_ok=True)
-                await asyncio.to_thread(_flush, self._records)
+                await asyncio.to_thread(sync_directory, self._records)
             del self._assets[key]
             self.revision += 1
             await self._drop_unused(asset.digest)
@@ -201,9 +205,9 @@ class AssetStore:
             size += len(chunk)
             if size > self.limit:
                 raise TooLarge(f"An asset has at most {self.limit} bytes.")
-            with self._told("write"):
+            with self._storage_errors("write"):
                 await asyncio.to_thread(_append, descriptor, chunk, hashed)
-        with self._told("write"):
+        with self._storage_errors("write"):
             await asyncio.to_thread(os.fsync, descriptor)
         return size, hashed.hexdigest()
 
@@ -211,29 +215,21 @@ class AssetStore:
         place = self._path(asset.digest)
         place.parent.mkdir(exist_ok=True)
         received.replace(place)
-        _flush(place.parent)
-        _flush(self._content)
-        descriptor, name = tempfile.mkstemp(dir=self._incoming)
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(msgspec.json.encode(asset))
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).replace(self._record(asset.id))
-        _flush(self._records)
+        sync_directory(place.parent)
+        sync_directory(self._content)
+        replace_file(self._record(asset.id), msgspec.json.encode(asset), temporary=self._incoming / "record")
+        sync_directory(self._records)
 
-    def _keep(self, content: bytes, digest: str) -> None:
+    def _store(self, content: bytes, digest: str) -> None:
         place = self._path(digest)
         if place.is_file() and place.stat().st_size == len(content):
             return
         place.parent.mkdir(exist_ok=True)
-        descriptor, name = tempfile.mkstemp(dir=self._incoming)
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-        Path(name).replace(place)
+        replace_file(place, content, durable=False, temporary=self._incoming / "offered")
 
     async def _drop_unused(self, digest: str) -> None:
         if all(asset.digest != digest for asset in [*self._assets.values(), *self._offered.values()]):
-            with self._told("write"):
+            with self._storage_errors("write"):
                 await asyncio.to_thread(self._path(digest).unlink, missing_ok=True)
 
     def _path(self, digest: str) -> Path:
@@ -243,7 +239,7 @@ class AssetStore:
         return self._records / f"{hashlib.sha256(key.encode()).hexdigest()}.json"
 
     @contextlib.contextmanager
-    def _told(self, what: str) -> Iterator[None]:
+    def _storage_errors(self, what: str) -> Iterator[None]:
         try:
             yield
         except OSError as error:
@@ -262,12 +258,3 @@ def _append(descriptor: int, chunk: bytes, hashed: "hashlib._Hash") -> None:
     rest = memoryview(chunk)
     while rest:
         rest = rest[os.write(descriptor, rest) :]
-
-
-def _flush(folder: Path) -> None:
-    """Make sure that what was put into, or taken out of, a folder stays so."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -1,4 +1,4 @@
-"""Records of calibrations: the newest are kept, and the newest of every object always."""
+"""Calibration records. The latest are stored, and always the latest of every object."""
 
 from typing import Final
 
@@ -50,7 +50,7 @@ class Calibrations:
                 await session.execute(delete(CalibrationRow).where(CalibrationRow.id.in_(oldest)))
 
     async def get(self, key: str) -> CalibrationRecord:
-        """Give a record; NotFound."""
+        """Return a record. Raise NotFound if there is none."""
         async with self._storage.reading() as session:
             row = await Storage.one(session, CalibrationRow, key, "calibration")
             return _decode(row.document)
@@ -63,7 +63,7 @@ class Calibrations:
         before: str | None = None,
         limit: int = 100,
     ) -> list[CalibrationRecord]:
-        """Give records, newest first: of an object, of a kind, older than a date."""
+        """Return records, newest first: of an object, of a kind, older than a date."""
         chosen = select(CalibrationRow.document).order_by(CalibrationRow.date.desc()).limit(min(max(limit, 0), MOST))
         if object_id is not None:
             chosen = chosen.where(CalibrationRow.object_id == object_id)

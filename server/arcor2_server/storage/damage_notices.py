@@ -1,4 +1,4 @@
-"""Files of the data directory that were found damaged: the users are notified until somebody has seen it."""
+"""Notices about damaged files of the data directory, shown until a user has received them."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -56,7 +56,7 @@ class DataDamage:
             log.error("notices of damaged files cannot be stored", file=str(self._path), reason=str(error))
 
     def set_aside(self, path: Path, what: str, reason: object) -> Path | None:
-        """Move a damaged file to another name and report it; returns that name, None when it cannot be moved.
+        """Move a damaged file to another name and report it; return that name, None when it cannot be moved.
 
         what: sentences about what is lost and what to do.
         """

@@ -1,4 +1,4 @@
-"""The tables. A document is kept whole as JSON; what lists and look-ups need stands in columns beside it."""
+"""The database tables. A document is stored as JSON; columns hold what lists and look-ups need."""
 
 from sqlalchemy import BigInteger, Boolean, ForeignKey, Integer, LargeBinary, String, Text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
@@ -68,7 +68,7 @@ class ModelRow(Base):
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
 
-class ProjectBesideRow(Base):
+class ProjectTablesRow(Base):
     """What REST keeps beside a project's document: lists of parameters and of overrides, as JSON."""
 
     __tablename__ = "project_beside"

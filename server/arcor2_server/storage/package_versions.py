@@ -1,4 +1,4 @@
-"""Versions of what a package does not carry: Python, this library, and the distributions that its drivers import."""
+"""Versions of what a package does not contain: Python, this library, and distributions that drivers import."""
 
 import importlib.metadata
 import inspect
@@ -32,7 +32,7 @@ class Versions(Data, frozen=True):
 
 @cache
 def _distributions() -> dict[str, str]:
-    """Give for every importable name the distribution that it comes from.
+    """Return for every importable name the distribution that it comes from.
 
     importlib.metadata.packages_distributions of Python 3.11 does not see compiled modules that stand alone.
     """
@@ -48,7 +48,7 @@ def _distributions() -> dict[str, str]:
 
 
 def present(imported: Iterable[str]) -> Versions:
-    """Give the versions in use here, of the distributions that give the packages `imported`."""
+    """Return the versions in use here, of the distributions that give the packages `imported`."""
     # What sources import from ARCOR2 is ours when they run, whatever is installed.
     foreign = set(imported) - sys.stdlib_module_names - {"arcor2_hw"} - OLDER_PACKAGES
     # Reading what is installed takes 0.1 s the first time, and many packages need none of it.
@@ -62,7 +62,7 @@ def present(imported: Iterable[str]) -> Versions:
 
 
 def check_versions(package: Path) -> list[str]:
-    """Give a sentence for each difference between what a package was built with and what is here.
+    """Return a sentence for each difference between what a package was built with and what is here.
 
     A package without versions.json (an older one, or one built elsewhere) has none.
     """

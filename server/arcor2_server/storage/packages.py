@@ -1,8 +1,7 @@
-"""Packages on disk: one directory each, by id; uploads are checked before anything of them is in place."""
+"""Packages on disk, one directory each. Uploads are checked before they are put in place."""
 
 import base64
 import binascii
-import os
 import re
 import shutil
 import stat
@@ -21,6 +20,7 @@ from arcor2_hw.data.base import UNSET, Unset, now
 from arcor2_hw.data.package import PackageMeta, PackageSummary, ProjectMeta
 from arcor2_hw.data.project import BareProject
 from arcor2_hw.exceptions import InvalidPackage, NotFound, StorageError
+from arcor2_server.files import replace_file
 
 log = structlog.get_logger(__name__)
 
@@ -47,20 +47,20 @@ class Packages:
         """Replaces secrets in the documents of a package by references."""
 
     def checked(self, package_id: str) -> Path:
-        """Give where a package of that id is, or would be; InvalidPackage for what is no id."""
+        """Return where a package of that id is, or would be; raise InvalidPackage for what is no id."""
         if not _ID.fullmatch(package_id):
             raise InvalidPackage(f"{package_id[:80]!r} is no id of a package.")
         return self._root / package_id
 
     def directory(self, package_id: str) -> Path:
-        """Give the directory of a package; NotFound when there is none."""
+        """Return the directory of a package; raise NotFound when there is none."""
         path = self.checked(package_id)
         if not (path / "script.py").is_file():
             raise NotFound(f"There is no package {package_id}.")
         return path
 
     def all(self) -> list[PackageSummary]:
-        """Give all packages, newest first."""
+        """Return all packages, newest first."""
         if not self._root.is_dir():
             return []
         found = [
@@ -71,7 +71,7 @@ class Packages:
         return sorted(found, key=lambda summary: summary.package_meta.built, reverse=True)
 
     def summary(self, package_id: str) -> PackageSummary:
-        """Give one package; NotFound."""
+        """Return one package. Raise NotFound if there is none."""
         path = self.directory(package_id)
         try:
             meta = msgspec.json.decode((path / "package.json").read_bytes(), type=PackageMeta)
@@ -87,12 +87,15 @@ class Packages:
         return self.summary(package_id)
 
     def mark_executed(self, package_id: str) -> PackageSummary:
-        """Note that a package was run now; gives it. NotFound, StorageError."""
+        """Note that a package was run now; return it. Raise NotFound or StorageError if that is impossible."""
         self._set(package_id, executed=now())
         return self.summary(package_id)
 
     def project_id(self, package_id: str) -> str:
-        """Give the id of the project that a package was built from, empty where it does not say; NotFound."""
+        """Return the id of the project that a package was built from, empty where it does not say.
+
+        Raise NotFound if there is none.
+        """
         project = _project_meta(self.directory(package_id) / "data" / "project.json")
         return "" if isinstance(project, Unset) else project.id
 
@@ -105,12 +108,12 @@ class Packages:
         if not isinstance(known, dict):
             known = msgspec.to_builtins(_NEVER_BUILT)
         try:
-            _write_whole(path, msgspec.json.format(msgspec.json.encode(known | values), indent=2))
+            replace_file(path, msgspec.json.format(msgspec.json.encode(known | values), indent=2), mode=0o666)
         except OSError as error:
             raise StorageError(f"The package {package_id} cannot be written: {error.strerror}.") from error
 
     def delete(self, package_id: str) -> PackageSummary:
-        """Delete a package; gives what it was. NotFound, StorageError."""
+        """Delete a package; return what it was. Raise NotFound or StorageError if that is impossible."""
         summary = self.summary(package_id)
         try:
             self._discard(self.directory(package_id))
@@ -120,15 +123,21 @@ class Packages:
         return summary
 
     def note_temporary(self, package_id: str, project_id: str) -> None:
-        """Note that a package will be there for one run of a project: after a crash `sweep` takes it. StorageError."""
+        """Note that a package will be there for one run of a project: after a crash `sweep` takes it.
+
+        Raise StorageError if that is impossible.
+        """
         try:
             self._root.mkdir(parents=True, exist_ok=True)
-            _write_whole(self._mark(package_id), project_id.encode())
+            replace_file(self._mark(package_id), project_id.encode(), mode=0o666)
         except OSError as error:
             raise StorageError(f"Packages cannot be written: {error.strerror}.") from error
 
     def forget_temporary(self, package_id: str) -> None:
-        """Take back `note_temporary`; the package, if there is one, is deleted. StorageError."""
+        """Take back `note_temporary`; the package, if there is one, is deleted.
+
+        Raise StorageError if that is impossible.
+        """
         try:
             if (path := self.checked(package_id)).exists():
                 self._discard(path)
@@ -137,7 +146,10 @@ class Packages:
             raise StorageError(f"The package {package_id} cannot be deleted: {error.strerror}.") from error
 
     def sweep(self) -> list[str]:
-        """Delete what a crash left behind, at the start; gives the projects that were being run. StorageError."""
+        """Delete what a crash left behind, at the start; return the projects that were being run.
+
+        Raise StorageError if that is impossible.
+        """
         projects: list[str] = []
         try:
             for mark in sorted(self._root.glob(f"{_TEMPORARY}*")):
@@ -151,7 +163,10 @@ class Packages:
         return projects
 
     def hide_secrets(self) -> int:
-        """Replace secrets in all packages by references; returns how many packages held one. StorageError."""
+        """Replace secrets in all packages by references; return how many packages held one.
+
+        Raise StorageError if that is impossible.
+        """
         try:
             return sum(self._hide_secrets(self.directory(summary.id)) for summary in self.all())
         except OSError as error:
@@ -161,7 +176,10 @@ class Packages:
         return self._root / f"{_TEMPORARY}{package_id}"
 
     def zipped(self, package_id: str) -> IO[bytes]:
-        """Give a package as a zip, in a file that is gone when it is closed; NotFound, StorageError."""
+        """Return a package as a zip, in a file that is gone when it is closed.
+
+        Raise NotFound or StorageError if that is impossible.
+        """
         directory = self.directory(package_id)
         file = tempfile.TemporaryFile()  # noqa: SIM115 - the caller reads it
         try:
@@ -182,7 +200,10 @@ class Packages:
         shutil.rmtree(grave, ignore_errors=True)
 
     def upload(self, package_id: str, data: str) -> PackageSummary:
-        """Put a zip (base64) in the place of a package. InvalidPackage says what is wrong with it, StorageError."""
+        """Put a zip (base64) in the place of a package. InvalidPackage says what is wrong with it.
+
+        Raise StorageError if that is impossible.
+        """
         self.checked(package_id)
         try:
             content = base64.b64decode(data, validate=True)
@@ -269,13 +290,3 @@ def _project_meta(path: Path) -> ProjectMeta | Unset:
     if isinstance(project.modified, Unset):
         return UNSET
     return ProjectMeta(project.id, project.name, project.description, project.modified)
-
-
-def _write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is either the old or the new one, whatever happens."""
-    temporary = path.with_name(f".{path.name}.new")
-    with temporary.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)

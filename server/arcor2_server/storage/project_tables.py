@@ -1,4 +1,4 @@
-"""What REST keeps beside the documents: lists of a project, tokens and breakpoints of the Execution service."""
+"""Tables that REST keeps next to the documents: project parameters, tokens and breakpoints."""
 
 from collections.abc import Iterable
 from typing import Any, Literal
@@ -9,8 +9,8 @@ from sqlalchemy import delete, select
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.project import ProjectParameter
 from arcor2_hw.data.scene import SceneObjectOverride
-from arcor2_server.documents.setting_secrets import objects_of
-from arcor2_server.storage.models import BreakpointsRow, ExecutionTokenRow, ProjectBesideRow, ProjectRow
+from arcor2_server.storage.models import BreakpointsRow, ExecutionTokenRow, ProjectRow, ProjectTablesRow
+from arcor2_server.storage.setting_secrets import objects_of
 from arcor2_server.storage.store import Storage
 
 
@@ -22,7 +22,7 @@ class ExecutionToken(Data, frozen=True):
     access: bool = False
 
 
-class Beside:
+class ProjectTables:
     """All methods may raise StorageError, and NotFound for a project or token that is not there."""
 
     def __init__(self, storage: Storage) -> None:
@@ -30,7 +30,7 @@ class Beside:
 
     # ------------------------------------------------------------------------------------------------ projects
     async def parameters(self, project_id: str) -> list[ProjectParameter]:
-        """Give the parameters that are kept beside a project."""
+        """Return the parameters that are kept beside a project."""
         return msgspec.json.decode(await self._read(project_id, "parameters"), type=list[ProjectParameter])
 
     async def put_parameters(self, project_id: str, parameters: list[ProjectParameter]) -> None:
@@ -38,7 +38,7 @@ class Beside:
         await self._write(project_id, "parameters", parameters)
 
     async def object_parameters(self, project_id: str) -> list[SceneObjectOverride]:
-        """Give the overrides of objects that are kept beside a project."""
+        """Return the overrides of objects that are kept beside a project."""
         return msgspec.json.decode(await self._read(project_id, "object_parameters"), type=list[SceneObjectOverride])
 
     async def put_object_parameters(self, project_id: str, overrides: list[SceneObjectOverride]) -> None:
@@ -53,28 +53,28 @@ class Beside:
     async def _read(self, project_id: str, what: Literal["parameters", "object_parameters"]) -> bytes:
         async with self._storage.reading() as session:
             await Storage.one(session, ProjectRow, project_id, "project")
-            row = await session.get(ProjectBesideRow, project_id)
+            row = await session.get(ProjectTablesRow, project_id)
             content: bytes = b"[]" if row is None else getattr(row, what)
         return content
 
     async def _write(self, project_id: str, what: Literal["parameters", "object_parameters"], value: Any) -> None:
         async with self._storage.writing() as session:
             await Storage.one(session, ProjectRow, project_id, "project")
-            row = await session.get(ProjectBesideRow, project_id)
+            row = await session.get(ProjectTablesRow, project_id)
             if row is None:
-                row = ProjectBesideRow(id=project_id, parameters=b"[]", object_parameters=b"[]")
+                row = ProjectTablesRow(id=project_id, parameters=b"[]", object_parameters=b"[]")
                 session.add(row)
             setattr(row, what, msgspec.json.encode(value))
 
     # ------------------------------------------------------------------------------------------------ tokens
     async def tokens(self) -> list[ExecutionToken]:
-        """Give the table of tokens."""
+        """Return the table of tokens."""
         async with self._storage.reading() as session:
             rows = await session.scalars(select(ExecutionTokenRow).order_by(ExecutionTokenRow.name))
             return [ExecutionToken(row.id, row.name, row.access) for row in rows]
 
     async def token(self, key: str) -> ExecutionToken:
-        """Give one token."""
+        """Return one token."""
         async with self._storage.reading() as session:
             row = await Storage.one(session, ExecutionTokenRow, key, "token")
             return ExecutionToken(row.id, row.name, row.access)
@@ -91,7 +91,7 @@ class Beside:
 
     # ------------------------------------------------------------------------------ lists of breakpoints
     async def breakpoints(self, package_id: str) -> list[str]:
-        """Give the breakpoints of a package, none where none were kept."""
+        """Return the breakpoints of a package, none where none were kept."""
         async with self._storage.reading() as session:
             row = await session.get(BreakpointsRow, package_id)
             return [] if row is None else msgspec.json.decode(row.ids, type=list[str])

@@ -1,4 +1,4 @@
-"""Brings a database to the present schema: creates it, migrates it by Alembic, or says what is wrong with it."""
+"""Creates the database or migrates it to the present schema."""
 
 from pathlib import Path
 from typing import Any, Final
@@ -45,7 +45,7 @@ def _reason(error: SQLAlchemyError) -> str:
 
 
 def _examine(connection: Connection) -> str | None:
-    """Give the revision of the schema, None when the database is empty; check file databases for damage."""
+    """Return the revision of the schema, None when the database is empty; check file databases for damage."""
     if connection.dialect.name == "sqlite":
         pages = connection.scalar(text("PRAGMA page_count")) or 0
         size = connection.scalar(text("PRAGMA page_size")) or 0
@@ -80,7 +80,7 @@ def migrate(connection: Connection, target: str = "head") -> None:
 
 
 def alembic_config() -> Any:
-    """Give the configuration of Alembic for our migrations."""
+    """Return the configuration of Alembic for our migrations."""
     from alembic.config import Config
 
     config = Config()

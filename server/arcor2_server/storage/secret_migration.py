@@ -1,23 +1,29 @@
-"""Moves secrets that stored documents hold in clear to the store of secrets."""
+"""Moves secrets that saved documents and packages contain in clear into the secret store."""
 
+import asyncio
 from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
+import structlog
 from sqlalchemy import select
 
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
-from arcor2_server.documents.setting_secrets import SettingSecrets, objects_of
-from arcor2_server.storage.models import ProjectBesideRow, ProjectRow, SceneRow
+from arcor2_server.storage.models import ProjectRow, ProjectTablesRow, SceneRow
+from arcor2_server.storage.packages import Packages
+from arcor2_server.storage.setting_secrets import SettingSecrets, objects_of
 
 if TYPE_CHECKING:
     from arcor2_server.storage.store import Storage
 
+log = structlog.get_logger(__name__)
 T = TypeVar("T")
 
 
 async def hide_stored(storage: "Storage", secrets: SettingSecrets) -> int:
-    """Replace secrets in all saved documents by references; returns how many documents held one. StorageError.
+    """Replace secrets in all saved documents by references; return how many documents held one.
+
+    Raise StorageError if that is impossible.
 
     Documents that cannot be read are left as they are.
     """
@@ -39,7 +45,7 @@ async def hide_stored(storage: "Storage", secrets: SettingSecrets) -> int:
             if overrides != project.object_overrides:
                 fresh = msgspec.structs.replace(project, object_overrides=overrides)
                 project_row.document, changed = msgspec.json.encode(fresh), changed + 1
-        for beside_row in await session.scalars(select(ProjectBesideRow)):
+        for beside_row in await session.scalars(select(ProjectTablesRow)):
             given = _decoded(beside_row.object_parameters, list[SceneObjectOverride])
             if given and (overrides := secrets.hide_in_overrides(given, objects)) != given:
                 beside_row.object_parameters, changed = msgspec.json.encode(overrides), changed + 1
@@ -54,3 +60,20 @@ def _decoded(content: bytes, kind: type[T]) -> T | None:
         return msgspec.json.decode(content, type=kind)
     except msgspec.DecodeError:
         return None
+
+
+async def migrate_secrets(storage: "Storage", packages: Packages, secrets: SettingSecrets) -> None:
+    """Move the secrets. Search documents once, and again when object types declare further secret settings.
+
+    Raises:
+        StorageError: a document or the secret store cannot be written.
+    """
+    store, declared = secrets.store, secrets.declared()
+    if store.scanned is not None and declared <= store.scanned:
+        return
+    with secrets.migrating():
+        found = await hide_stored(storage, secrets) + await asyncio.to_thread(packages.hide_secrets)
+    store.note_scanned(declared | (store.scanned or set()))
+    await store.flush()
+    if found:
+        log.info("secrets moved out of documents", documents=found)

@@ -1,4 +1,4 @@
-"""Values of secret settings, stored apart from the documents that refer to them."""
+"""Values of secret settings, stored separately from the documents that refer to them."""
 
 import asyncio
 import threading
@@ -70,7 +70,7 @@ class SecretStore:
         return self._content.secrets.get(reference)
 
     def bind(self, reference: str, address: str) -> Secret | None:
-        """Note the address of a secret that has none yet; returns the secret, None when it is not stored."""
+        """Note the address of a secret that has none yet; return the secret, None when it is not stored."""
         with self._lock:
             secret = self._content.secrets.get(reference)
             if secret is not None and secret.address is None:
@@ -79,7 +79,7 @@ class SecretStore:
             return secret
 
     def add(self, secret: Secret, *, reuse: bool = False) -> str:
-        """Store a secret; returns the reference to it. `reuse`: the same one for an equal secret."""
+        """Store a secret; return the reference to it. `reuse`: the same one for an equal secret."""
         with self._lock:
             if reuse:
                 for reference, stored in self._content.secrets.items():
@@ -92,7 +92,7 @@ class SecretStore:
         return reference
 
     def save(self) -> None:
-        """Write what was added. StorageError."""
+        """Write what was added. Raise StorageError if that is impossible."""
         with self._lock:
             if not self._changed:
                 return
@@ -103,6 +103,6 @@ class SecretStore:
             self._changed = False
 
     async def flush(self) -> None:
-        """Write what was added, without blocking the event loop. StorageError."""
+        """Write what was added, without blocking the event loop. Raise StorageError if that is impossible."""
         if self._changed:
             await asyncio.to_thread(self.save)

@@ -1,4 +1,4 @@
-"""What clients share through the server, and the history of runs, in the database."""
+"""What clients share, and the history of runs, in the database."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -19,7 +19,7 @@ class SharedData:
 
     # ------------------------------------------------------------------------------------------------ view state
     async def newest_revision(self) -> int:
-        """Give the highest revision of a view value, 0 when there is none."""
+        """Return the highest revision of a view value, 0 when there is none."""
         async with self._storage.reading() as session:
             return await session.scalar(select(func.max(ViewValueRow.revision))) or 0
 
@@ -43,7 +43,7 @@ class SharedData:
                 await session.execute(delete(ViewValueRow).where(*where))
 
     async def oldest_views(self, user: str, beyond: int) -> list[str]:
-        """Give the documents of a user's views but the `beyond` ones that were written last."""
+        """Return the documents of a user's views but the `beyond` ones that were written last."""
         written = func.max(ViewValueRow.revision)
         query = select(ViewValueRow.document).where(ViewValueRow.user == user)
         async with self._storage.reading() as session:
@@ -64,7 +64,7 @@ class SharedData:
 
     # ------------------------------------------------------------------------------------------ shared breakpoints
     async def breakpoints(self, project_id: str) -> tuple[set[str], str]:
-        """Give the breakpoints of a project, and who set them last."""
+        """Return the breakpoints of a project, and who set them last."""
         async with self._storage.reading() as session:
             row = await session.get(SharedBreakpointsRow, project_id)
             return (set(), "") if row is None else (msgspec.json.decode(row.ids, type=set[str]), row.user)
@@ -78,7 +78,7 @@ class SharedData:
 
     # ------------------------------------------------------------------------------------------------ runs
     async def runs(self, limit: int) -> list[Run]:
-        """Give the newest runs, oldest first; those that cannot be read are left out."""
+        """Return the newest runs, oldest first; those that cannot be read are left out."""
         async with self._storage.reading() as session:
             rows = await session.scalars(select(RunRow.document).order_by(RunRow.number.desc()).limit(limit))
             found = [_run(document) for document in rows]

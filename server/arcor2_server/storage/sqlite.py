@@ -1,4 +1,4 @@
-"""What SQLite needs beside SQLAlchemy: a look whether the file opens, and how it is to keep what is written."""
+"""Settings of SQLite: integrity check and write durability."""
 
 import contextlib
 import sqlite3

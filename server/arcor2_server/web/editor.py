@@ -1,4 +1,4 @@
-"""Serves the web editor: one page at `/`, its hashed files below `/editor`, as built from the folder `editor`."""
+"""Serves the web editor: one page at `/` and its hashed files below `/editor`."""
 
 import asyncio
 import hashlib
@@ -13,8 +13,8 @@ from litestar.handlers import HTTPRouteHandler
 
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
-from arcor2_server.rest.encodings import accepted_encodings
-from arcor2_server.rest.responses import OPEN, ROLE
+from arcor2_server.access.route_options import OPEN, ROLE
+from arcor2_server.web.encodings import accepted_encodings
 
 FILES: Final = Path(__file__).parents[1] / "editor_files"
 """Where the build puts the editor; absent in a checkout where it was not built."""
@@ -73,7 +73,7 @@ def read_file(file: Path) -> EditorFile:
 
 
 def page_policy(nonce: str) -> str:
-    """Give the content security policy of the page: nothing from elsewhere, no script that is not a file of ours."""
+    """Return the content security policy of the page: nothing from elsewhere, no script that is not a file of ours."""
     return (
         "default-src 'none'; script-src 'self'; connect-src 'self'; img-src 'self' data: blob:; "
         f"style-src 'self' 'nonce-{nonce}'; font-src 'self'; worker-src 'self' blob:; media-src 'self' blob:; "

@@ -1,4 +1,4 @@
-"""One HTTP connection, with deadlines for what the other side has to send and to take."""
+"""One HTTP connection, with deadlines for sending and receiving."""
 
 import asyncio
 import functools
@@ -6,8 +6,8 @@ from typing import Any, Final, cast
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from arcor2_server.web.connection_limits import CONNECTION, Connection
-from arcor2_server.websocket.transport import WireProtocol
+from arcor2_server.access.connection_limits import CONNECTION, Connection
+from arcor2_server.web.websocket_transport import WireProtocol
 
 SLOWEST: Final = 500
 """Bytes per second that the other side must send of a body, or take of an answer, at least."""

@@ -1,4 +1,4 @@
-"""uvicorn's server with listeners of our own: connections are counted when they are accepted, before TLS."""
+"""The HTTP server: uvicorn with connection limits that apply before TLS."""
 
 import asyncio
 import contextlib
@@ -12,10 +12,10 @@ from typing import Any, Final, cast
 import structlog
 import uvicorn
 
+from arcor2_server.access.connection_limits import Connection, ConnectionLimits
 from arcor2_server.settings import ServerSettings
-from arcor2_server.web.connection_limits import Connection, ConnectionLimits
 from arcor2_server.web.http_protocol import HttpProtocol
-from arcor2_server.websocket.transport import WireProtocol
+from arcor2_server.web.websocket_transport import WireProtocol
 
 log = structlog.get_logger(__name__)
 

@@ -1,4 +1,4 @@
-"""The headers that every HTTP answer has, whatever answers it."""
+"""Headers of every HTTP response."""
 
 from typing import Final
 from urllib.parse import parse_qsl

@@ -1,4 +1,4 @@
-"""The ports on which the original has its services, from the same variables (protocol, section 1)."""
+"""Ports of the services as in ARCOR2, from the same environment variables (protocol, section 1)."""
 
 import os
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""One connected client: who it is, and what waits to be sent to it."""
+"""One connected client and its queue of messages."""
 
 import asyncio
 import enum
@@ -36,7 +36,7 @@ class Wire(Protocol):
     """What a client needs of its connection."""
 
     def send_now(self, message: bytes) -> bool:
-        """Send one text message if the connection takes it at once; tells whether it did."""
+        """Send one text message if the connection takes it at once; return whether it did."""
 
     async def send(self, message: bytes) -> None:
         """Send one text message when the connection takes it. ConnectionError when it is closed."""
@@ -97,12 +97,12 @@ class Client:
 
     @property
     def name(self) -> str:
-        """Give who it is: the user, else whose token it showed; empty where neither is known."""
+        """Return who it is: the user, else whose token it showed; empty where neither is known."""
         return self.user or ("" if self.token is None else self.token.name)
 
     @property
     def closed(self) -> bool:
-        """Tell whether nothing more will be sent."""
+        """Return whether nothing more will be sent."""
         return self._closing is not None
 
     def put(self, message: bytes) -> None:
@@ -163,7 +163,7 @@ class Client:
         self._bytes = 0
 
     async def ping(self, within: float) -> bool:
-        """Tell whether the other side answers a ping within that many seconds."""
+        """Return whether the other side answers a ping within that many seconds."""
         try:
             async with asyncio.timeout(within):
                 await self._wire.ping()

@@ -1,30 +1,33 @@
-"""The websocket endpoint: reads messages, gives each request to its handler, answers every message."""
+"""The websocket endpoint: decodes requests, calls their handlers and answers every message."""
 
 import asyncio
 import logging
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 from weakref import WeakKeyDictionary
 
 import msgspec
 import structlog
 from litestar import WebSocket
-from msgspec import UNSET, Raw, Struct
+from msgspec import UNSET, Struct
 
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS, Request, Response, Rpc
 from arcor2_hw.data.texts import SHORTEST, check_texts
 from arcor2_hw.exceptions import Arcor2Error, StorageError, TextTooLong
-from arcor2_server.access.admission import AccessRefused, address_of
+from arcor2_server.access.admission import Access, AccessRefused, address_of
+from arcor2_server.collaboration.users import Users
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import encode
 from arcor2_server.log import audit
-from arcor2_server.rpc.registry import AT_ONCE, HANDLERS, Context, Handler
-from arcor2_server.services import Services
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage.damage_notices import DataDamage
+from arcor2_server.web.websocket_transport import EXTENSION, WireProtocol
 from arcor2_server.websocket.client import Client, CloseCode
-from arcor2_server.websocket.transport import EXTENSION, WireProtocol
+from arcor2_server.websocket.hub import Hub
+from arcor2_server.websocket.request import CachedAnswer, Context, Handler
 
 log = structlog.get_logger(__name__)
 
@@ -66,14 +69,14 @@ class Route(Struct, frozen=True):
 
     rpc: Rpc
     handler: Handler | None
-    at_once: Callable[[Services], Raw | None] | None
+    cached: CachedAnswer | None
     decode: Any
     default: Any
     """What the handler gets when the arguments are left out; UNSET when they must not be."""
 
 
-def routes() -> dict[str, Route]:
-    """Give a route for each request of the protocol, with its handler where there is one."""
+def routes(handlers: Mapping[str, Handler], cached: Mapping[str, CachedAnswer]) -> dict[str, Route]:
+    """Return a route for each request of the protocol, with its handler where there is one."""
     table = {}
     for name, rpc in RPCS.items():
         default: Any = None
@@ -83,12 +86,12 @@ def routes() -> dict[str, Route]:
                 is_struct = isinstance(rpc.args, type) and issubclass(rpc.args, Struct)
                 default = rpc.args() if is_struct else None
         decode = None if rpc.args is None else msgspec.json.Decoder(rpc.args).decode
-        table[name] = Route(rpc, HANDLERS.get(name), AT_ONCE.get(name), decode, default)
+        table[name] = Route(rpc, handlers.get(name), cached.get(name), decode, default)
     return table
 
 
-class Speech(Struct, frozen=True):
-    """What an endpoint serves: requests, what a client is sent first, and which events it gets (None: all)."""
+class Service(Struct, frozen=True):
+    """What an endpoint serves: its requests, the greeting of a client, and the events for clients (None: all)."""
 
     routes: dict[str, Route]
     greeting: Callable[[], list[Event]]
@@ -117,12 +120,21 @@ class _SocketWire:
 class Endpoint:
     """Serves all connections of one server."""
 
-    def __init__(self, services: Services, speech: Speech | None = None) -> None:
-        self._services = services
-        self._settings = services.settings
-        self._hub = services.hub
-        self._speech = speech or Speech(routes(), services.greeting)
-        self._routes = self._speech.routes
+    def __init__(
+        self,
+        service: Service,
+        settings: ServerSettings,
+        access: Access,
+        hub: Hub,
+        users: Users,
+        damage: DataDamage,
+    ) -> None:
+        self.service = service
+        self._settings = settings
+        self._access = access
+        self._hub = hub
+        self._users = users
+        self._damage = damage
         self._tasks: set[asyncio.Task[None]] = set()
         self._watch: asyncio.Task[None] | None = None
         self._holds: WeakKeyDictionary[Client, tuple[str, str, int, str]] = WeakKeyDictionary()
@@ -141,14 +153,14 @@ class Endpoint:
         deadline: asyncio.TimerHandle | None = None
         try:
             try:
-                admission = self._services.access.admit(socket)
+                admission = self._access.admit(socket)
             except AccessRefused as error:
                 client.close(CloseCode.NOT_ADMITTED, str(error))
                 await writer
                 return
             client.address = address
-            client.greeting = self._speech.greeting
-            client.events = self._speech.events
+            client.greeting = self.service.greeting
+            client.events = self.service.events
             if admission.role is not None:
                 client.admit(admission.role, admission.token)
                 for event in client.greeting():
@@ -162,7 +174,7 @@ class Endpoint:
             if deadline is not None:
                 deadline.cancel()
             self._hub.remove(client)
-            self._services.users.disconnected(client)
+            self._users.disconnected(client)
             client.lost()
             writer.cancel()
             await asyncio.gather(writer, return_exceptions=True)
@@ -170,19 +182,19 @@ class Endpoint:
 
     async def _watch_tokens(self) -> None:
         """End the connections whose token is not valid any more, and report damage of the file of tokens."""
-        reported = self._services.access.damage
+        reported = self._access.damage
         while True:
             await asyncio.sleep(TOKENS_PERIOD)
             for client in tuple(self._hub.clients):
                 try:
-                    valid = client.token is None or self._services.access.valid(client.token)
+                    valid = client.token is None or self._access.valid(client.token)
                 except StorageError as error:
                     log.error("tokens cannot be read", error=str(error))
                     break
                 if not valid:
                     client.close(CloseCode.NOT_ADMITTED, "the token is not valid any more")
-            if reported != (reported := self._services.access.damage) and reported:
-                self._services.damage.report(reported)
+            if reported != (reported := self._access.damage) and reported:
+                self._damage.report(reported)
 
     async def close(self) -> None:
         """Cancel the requests that are still being worked on."""
@@ -222,14 +234,14 @@ class Endpoint:
             except (msgspec.DecodeError, RecursionError) as error:
                 self._refuse(client, _read_head(text), f"This is no request: {error}.")
                 continue
-            route = self._routes.get(request.request)
+            route = self.service.routes.get(request.request)
             if route is None:
                 self._refuse(client, request, f"There is no request {request.request!r}.", "unknown_request")
                 continue
             if not client.admitted and request.request != AUTHENTICATE:
                 self._refuse(client, request, f"A token is needed: send {AUTHENTICATE} first.", "token_needed")
                 continue
-            if route.at_once is not None and self._answer_at_once(client, request, route):
+            if route.cached is not None and self._answer_from_cache(client, request, route):
                 continue
             if len(mine) >= in_flight:
                 await asyncio.wait(mine, return_when=asyncio.FIRST_COMPLETED)
@@ -238,12 +250,12 @@ class Endpoint:
                 held.add(task)
                 task.add_done_callback(held.discard)
 
-    def _answer_at_once(self, client: Client, request: Request, route: Route) -> bool:
-        """Send a kept answer; tells whether there was one."""
-        if client.role < route.rpc.role or route.at_once is None:
+    def _answer_from_cache(self, client: Client, request: Request, route: Route) -> bool:
+        """Send a kept answer; return whether there was one."""
+        if client.role < route.rpc.role or route.cached is None:
             return False
         try:
-            data = route.at_once(self._services)
+            data = route.cached()
         except Exception:
             # The handler meets the same trouble, and answers it.
             log.exception("no kept answer", request=request.request)
@@ -290,7 +302,7 @@ class Endpoint:
         if route.handler is None:
             self._refuse(client, request, f"{rpc.name} is not available in this version.", "not_available")
             return
-        context = Context(self._services, client, request.dry_run and rpc.dry_run, rpc.name)
+        context = Context(client, request.dry_run and rpc.dry_run, rpc.name)
         try:
             data = await route.handler(context, args)
         except RequestRefused as error:

@@ -1,5 +1,6 @@
-"""The Execution service's own websocket (protocol, section 12): packages and the running program, nothing else."""
+"""The websocket of the Execution service: packages and the running program (protocol, section 12)."""
 
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import msgspec
@@ -8,9 +9,8 @@ from arcor2_hw.data.base import Data
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import Rpc
-from arcor2_server.rpc.registry import Context
-from arcor2_server.services import Services
-from arcor2_server.websocket.endpoint import AUTHENTICATE, Endpoint, Route, Speech, routes
+from arcor2_server.websocket.endpoint import AUTHENTICATE, Route, Service
+from arcor2_server.websocket.request import Context
 
 API_VERSION: Final = "1.2.0"
 """Of the Execution service whose behaviour this is: an ARServer of the original refuses another major version."""
@@ -50,14 +50,18 @@ async def _version(context: Context, args: Any) -> VersionData:  # noqa: ARG001
     return VersionData(API_VERSION)
 
 
-def execution_endpoint(services: Services) -> Endpoint:
-    """Make the endpoint of the Execution service."""
-    known = routes()
-    table = {name: known[name] for name in (*REQUESTS, AUTHENTICATE)}
+def execution_service(routes: Mapping[str, Route], state_and_info: Callable[[], tuple[Event, bytes | None]]) -> Service:
+    """Return what the websocket of the Execution service serves.
+
+    Args:
+        routes: the routes of all requests.
+        state_and_info: returns the PackageState, and the encoded PackageInfo while a program runs.
+    """
+    table = {name: routes[name] for name in (*REQUESTS, AUTHENTICATE)}
     table["Version"] = Route(Rpc("Version", None, VersionData, Role.OPERATOR), _version, None, None, None)
 
     def greeting() -> list[Event]:
-        state, info = services.execution.state_and_info()
+        state, info = state_and_info()
         return [state] if info is None else [state, msgspec.json.decode(info, type=Event)]
 
-    return Endpoint(services, Speech(table, greeting, EVENTS))
+    return Service(table, greeting, EVENTS)

@@ -1,4 +1,4 @@
-"""The connected clients: events to all of them, or to one."""
+"""The connected clients, and events to all or some of them."""
 
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
@@ -65,7 +65,7 @@ class Hub:
         return tuple(client for client in clients if name in self._only.get(client, (name,)))
 
     def subscribers(self, name: str) -> tuple[Connection, ...]:
-        """Give the clients that are sent an additional event."""
+        """Return the clients that are sent an additional event."""
         least = EVENTS[name].role
         hearing = self._hearing(name, self._subscribers.get(name, set()) & self.clients)
         return tuple(client for client in hearing if client.role >= least)

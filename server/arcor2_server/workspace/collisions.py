@@ -1,22 +1,14 @@
-"""The world of collision models: what was put in over REST, what stands in the scene in operation; lines through it."""
+"""Collision models that clients add over REST, and line checks against simple bodies."""
 
-import functools
 import math
-from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Final
-
-import msgspec
+from collections.abc import Callable, Iterable
+from typing import Final
 
 from arcor2_hw.collision.description import Attachment
-from arcor2_hw.data.base import Data, Unset
-from arcor2_hw.data.events import PackageInfoData
+from arcor2_hw.data.base import Data
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, Sphere
 from arcor2_hw.exceptions import NotFound
-from arcor2_hw.runtime.messages import HeldPart
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
 
 INFLATION: Final = 0.01
 """By how much sizes are larger than stated where safety of a line is asked, m (protocol, section 14)."""
@@ -33,7 +25,7 @@ class Placed(Data, frozen=True):
 
     @property
     def simple(self) -> bool:
-        """Tell whether lines are checked against it here: it stands by itself, and is no mesh."""
+        """Return whether lines are checked against it here: it stands by itself, and is no mesh."""
         return self.attachment is None and not isinstance(self.model, Mesh)
 
 
@@ -53,24 +45,24 @@ class CollisionWorld:
 
     @property
     def put_in(self) -> dict[str, Placed]:
-        """Give what was put in, by id."""
+        """Return what was put in, by id."""
         return dict(self._put)
 
     def put(self, placed: Placed) -> None:
         """Put a model in, in place of one of its id."""
         self._put[placed.model.id] = placed
-        for tell in self.on_put:
-            tell(placed)
+        for notify in self.on_put:
+            notify(placed)
         self._changed()
 
     def given(self, key: str) -> Placed:
-        """Give a model that was put in; NotFound."""
+        """Return a model that was put in. Raise NotFound if there is none."""
         if (placed := self._put.get(key)) is None:
             raise NotFound(f"There is no collision model {key!r}.")
         return placed
 
     def remove(self, key: str) -> None:
-        """Take a model out; NotFound."""
+        """Take a model out. Raise NotFound if there is none."""
         if self._put.pop(key, None) is None:
             raise NotFound(f"There is no collision model {key!r}.")
         self._removed([key])
@@ -83,65 +75,13 @@ class CollisionWorld:
         self._removed(gone)
 
     def _removed(self, keys: list[str]) -> None:
-        for tell in self.on_remove:
-            tell(keys)
+        for notify in self.on_remove:
+            notify(keys)
         self._changed()
 
     def _changed(self) -> None:
-        for tell in self.on_change:
-            tell()
-
-    def everything(self, services: "Services") -> dict[str, Placed]:
-        """Give all models by id: those put in, and those of the objects of the scene in operation."""
-        return dict(_standing(services)) | self._put
-
-
-def _standing(services: "Services") -> Iterator[tuple[str, Placed]]:
-    """Return the collision models of the scene that is online, or of the running program, by id.
-
-    A part that a robot holds is in the frame of the link that holds it.
-    """
-    scene = services.session.scene
-    if scene is not None and services.cell.online:
-        board = services.cell.board
-        placed = [
-            (obj.id, obj.name, Placed(model.model(), obj.pose))
-            for obj in scene.objects
-            if not isinstance(model := services.types.meta(obj.type).object_model, Unset)
-            and not isinstance(obj.pose, Unset)
-        ]
-    elif (encoded := services.execution.state_and_info()[1]) is not None:
-        board, placed = services.execution.board, list(_of_program(encoded))
-    else:
-        return
-    disabled, held = board.not_in_the_way(), board.held_parts()
-    for key, name, one in placed:
-        if key not in disabled:
-            yield key, _held(one, *held[name]) if name in held else one
-    for name, (robot, part) in held.items():
-        if part.model is not None:
-            yield name, _held(Placed(part.model.model(), part.pose), robot, part)
-
-
-def _held(placed: Placed, robot: str, part: HeldPart) -> Placed:
-    return Placed(placed.model, part.pose, placed.scale, Attachment(robot, part.link))
-
-
-@functools.lru_cache(maxsize=1)
-def _of_program(encoded: bytes) -> tuple[tuple[str, str, Placed], ...]:
-    info = msgspec.json.decode(encoded, type=_InfoEvent).data
-    kinds = info.collision_models
-    every: list[Models] = [*kinds.boxes, *kinds.spheres, *kinds.cylinders, *kinds.meshes]
-    models = {one.id: one for one in every}
-    return tuple(
-        (placed.id, placed.name, Placed(models[placed.type], placed.pose))
-        for placed in info.scene.objects
-        if placed.type in models and not isinstance(placed.pose, Unset)
-    )
-
-
-class _InfoEvent(msgspec.Struct):
-    data: PackageInfoData
+        for notify in self.on_change:
+            notify()
 
 
 # ------------------------------------------------------------------------------------------------ lines
@@ -153,7 +93,7 @@ class Hit(Data, frozen=True):
 
 
 def first_hit(start: Position, end: Position, placed: Iterable[tuple[str, Placed]], inflation: float) -> Hit | None:
-    """Give what a straight line from `start` to `end` meets first, None when it is free.
+    """Return what a straight line from `start` to `end` meets first, None when it is free.
 
     Boxes, spheres and cylinders (along their z) with sizes increased by `inflation`, m: edges of a box, radius and
     height. Meshes, and what is held, are not looked at: that is no business of this process.
@@ -172,7 +112,7 @@ def first_hit(start: Position, end: Position, placed: Iterable[tuple[str, Placed
 
 
 def _near(placed: Placed, a: Position, d: Position, within: float) -> bool:
-    """Tell whether the ball around a body comes within so much of a line: most of many do not."""
+    """Return whether the ball around a body comes within so much of a line: most of many do not."""
     model, at = placed.model, placed.pose.position
     match model:
         case Box():
@@ -192,7 +132,7 @@ def _near(placed: Placed, a: Position, d: Position, within: float) -> bool:
 
 
 def _entry(a: Position, d: Position, model: Models, inflation: float) -> float | None:
-    """Give at which share of the way from `a` along `d` a model around the origin is entered, None if it is not."""
+    """Return at which share of the way from `a` along `d` a model around the origin is entered, None if it is not."""
     match model:
         case Box():
             sizes = (model.size_x, model.size_y, model.size_z)
@@ -213,7 +153,7 @@ def _entry(a: Position, d: Position, model: Models, inflation: float) -> float |
 
 
 def _slab(a: float, d: float, half: float) -> tuple[float, float] | None:
-    """Give between which shares of the way the line is within +-half of one axis."""
+    """Return between which shares of the way the line is within +-half of one axis."""
     if abs(d) < _TINY:
         return (-math.inf, math.inf) if abs(a) <= half else None
     one, other = (-half - a) / d, (half - a) / d
@@ -221,7 +161,7 @@ def _slab(a: float, d: float, half: float) -> tuple[float, float] | None:
 
 
 def _round(a: tuple[float, ...], d: tuple[float, ...], radius: float) -> tuple[float, float] | None:
-    """Give between which shares of the way the line is within `radius` of the origin (of a plane, or of space)."""
+    """Return between which shares of the way the line is within `radius` of the origin (of a plane, or of space)."""
     square = math.fsum(x * x for x in d)
     constant = math.fsum(x * x for x in a) - radius * radius
     if square < _TINY * _TINY:

@@ -1,18 +1,17 @@
-"""Meshes and robots as clients show them: made by the compute worker when somebody first asks, and kept on disk.
+"""Meshes and robot models converted for display, by the compute worker on first use, and stored on disk.
 
-What is kept is named by the hash of the asset's content and the version of its maker, so it never has to be asked
-whether it is still right. It may be deleted at any time.
+A file is named by the hash of the asset and the version of the converter, so that it never becomes outdated. It may be
+deleted at any time.
 """
 
 import asyncio
 import contextlib
 import gzip
 import os
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import structlog
 
@@ -21,11 +20,11 @@ from arcor2_hw.compute.mesh_tasks import CONVERSION, PrepareAsset, PreparedAsset
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
-from arcor2_server.collaboration.tasks import Task
+from arcor2_server.collaboration.tasks import Task, Tasks
+from arcor2_server.compute.workers import Compute
+from arcor2_server.files import replace_file
+from arcor2_server.storage import AssetStore
 from arcor2_server.storage.assets import Asset
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
 
 log = structlog.get_logger(__name__)
 
@@ -48,57 +47,61 @@ class Shown:
     packed: Path | None
 
 
-class PreparedAssets:
+class DisplayModels:
     """For use on one event loop. `directory` is made when it is needed."""
 
-    def __init__(self, services: "Services", directory: Path) -> None:
-        self._services = services
+    def __init__(self, assets: AssetStore, compute: Compute, tasks: Tasks, directory: Path) -> None:
+        self._assets = assets
+        self._compute = compute
+        self._tasks = tasks
         self._directory = directory
         self._making: dict[str, asyncio.Task[Shown]] = {}
         self._refusals: dict[tuple[str, str], Arcor2Error] = {}
 
     async def get(self, key: str) -> Shown:
-        """Give an asset as clients show it; it is made once, however many ask.
+        """Return an asset as clients show it; it is made once, however many ask.
 
         NotFound; InvalidData and its kinds for what is no mesh or robot; ComputeStopped, ComputeTimeout, ComputeBusy,
-        NotInstalled; StorageError.
+        NotInstalled or StorageError.
         """
-        asset = self._services.assets.info(key)
+        asset = self._assets.info(key)
         name = _named(asset)
         # The ending of the name may say what it is.
-        kept = f"{asset.digest}.{CONVERSION}{Path(name).suffix.lower() if Path(name).suffix[1:].isalnum() else ''}"
-        if (found := await asyncio.to_thread(self._find, kept)) is not None:
+        name_on_disk = (
+            f"{asset.digest}.{CONVERSION}{Path(name).suffix.lower() if Path(name).suffix[1:].isalnum() else ''}"
+        )
+        if (found := await asyncio.to_thread(self._find, name_on_disk)) is not None:
             return found
-        if (refusal := self._refusals.get((kept, name))) is not None:
+        if (refusal := self._refusals.get((name_on_disk, name))) is not None:
             raise refusal.with_traceback(None)
-        making = self._making.get(kept)
+        making = self._making.get(name_on_disk)
         if making is None:
-            making = asyncio.create_task(self._make(kept, key, name), name=f"preparing {key}")
-            self._making[kept] = making
-            making.add_done_callback(lambda done: self._made(kept, done))
+            making = asyncio.create_task(self._make(name_on_disk, key, name), name=f"preparing {key}")
+            self._making[name_on_disk] = making
+            making.add_done_callback(lambda done: self._made(name_on_disk, done))
         return await asyncio.shield(making)
 
     async def close(self) -> None:
-        """Give up what is being made."""
+        """Return up what is being made."""
         making = list(self._making.values())
         for each in making:
             each.cancel()
         await asyncio.gather(*making, return_exceptions=True)
 
     # ------------------------------------------------------------------------------------------------ inside
-    def _made(self, kept: str, done: asyncio.Task[Shown]) -> None:
-        self._making.pop(kept, None)
+    def _made(self, name_on_disk: str, done: asyncio.Task[Shown]) -> None:
+        self._making.pop(name_on_disk, None)
         if not done.cancelled():
             done.exception()  # who asked may have gone
 
-    async def _make(self, kept: str, key: str, name: str) -> Shown:
-        task = PrepareAsset(StoredFile(str(self._services.assets.file(key)), name))
+    async def _make(self, name_on_disk: str, key: str, name: str) -> Shown:
+        task = PrepareAsset(StoredFile(str(self._assets.file(key)), name))
         try:
-            with _told(self._services, name) as told:
-                made = await self._services.compute.run(task, told=told)
+            with _ShownTask(self._tasks, name) as on_progress:
+                made = await self._compute.run(task, on_progress=on_progress)
         except InvalidData as error:
             if await asyncio.to_thread(Path(task.file.path).is_file):  # else it is the asset that went meanwhile
-                self._refusals[kept, name] = error
+                self._refusals[name_on_disk, name] = error
             while len(self._refusals) > MOST_REFUSALS:
                 del self._refusals[next(iter(self._refusals))]
             raise
@@ -107,27 +110,28 @@ class PreparedAssets:
             problems=made.problems,
         )  # fmt: skip
         try:
-            return await asyncio.to_thread(self._keep, kept, made)
+            return await asyncio.to_thread(self._store, name_on_disk, made)
         except OSError as error:
             text = f"cannot keep what was prepared in {self._directory}: {error.strerror}"
             raise StorageError(text, detail=str(error)) from error
 
-    def _find(self, kept: str) -> Shown | None:
-        plain, packed = self._directory / f"{kept}.glb", self._directory / f"{kept}.glb.gz"
+    def _find(self, name_on_disk: str) -> Shown | None:
+        plain, packed = self._directory / f"{name_on_disk}.glb", self._directory / f"{name_on_disk}.glb.gz"
         try:
             os.utime(plain)  # asked for now
         except OSError:
             return None
-        return Shown(f'"{kept}"', plain, packed if packed.is_file() else None)
+        return Shown(f'"{name_on_disk}"', plain, packed if packed.is_file() else None)
 
-    def _keep(self, kept: str, made: PreparedAsset) -> Shown:
+    def _store(self, name_on_disk: str, made: PreparedAsset) -> Shown:
         self._directory.mkdir(parents=True, exist_ok=True)
         self._make_room(len(made.content))
+        half = self._directory / f"half.{CONVERSION}"  # an incomplete file is never used, and a lost one is made again
         packed = gzip.compress(made.content, _GZIP_LEVEL, mtime=0)
         if len(packed) < _WORTH * len(made.content):
-            _write(self._directory / f"{kept}.glb.gz", packed)
-        _write(self._directory / f"{kept}.glb", made.content)
-        found = self._find(kept)
+            replace_file(self._directory / f"{name_on_disk}.glb.gz", packed, durable=False, temporary=half)
+        replace_file(self._directory / f"{name_on_disk}.glb", made.content, durable=False, temporary=half)
+        found = self._find(name_on_disk)
         if found is None:
             raise FileNotFoundError(2, "it is gone at once")
         return found
@@ -150,31 +154,19 @@ class PreparedAssets:
 
 
 def _named(asset: Asset) -> str:
-    """Give an asset's name as a person knows it."""
+    """Return an asset's name as a person knows it."""
     return asset.id if isinstance(asset.file_name, Unset) or not asset.file_name else asset.file_name
 
 
-def _write(place: Path, content: bytes) -> None:
-    """Put a file in its place in one step. It is not flushed: half a file is never named, and a lost one made anew."""
-    descriptor, name = tempfile.mkstemp(dir=place.parent, prefix=f"half.{CONVERSION}.")
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(content)
-        Path(name).replace(place)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
-class _told(contextlib.AbstractContextManager[Callable[[float, str], None]]):  # noqa: N801 - reads as a function
+class _ShownTask(contextlib.AbstractContextManager[Callable[[float, str], None]]):
     """Tells of work as a task once it takes longer than a moment."""
 
-    def __init__(self, services: "Services", name: str) -> None:
-        self._tasks = services.tasks
+    def __init__(self, tasks: Tasks, name: str) -> None:
+        self._tasks = tasks
         self._name = name
         self._task: Task | None = None
         self._last: tuple[float, str] = (0.0, "")
-        self._later = asyncio.get_running_loop().call_later(TOLD_AFTER, self._begin)
+        self._timer = asyncio.get_running_loop().call_later(TOLD_AFTER, self._begin)
 
     def _begin(self) -> None:
         self._task = self._tasks.begin(TaskKind.COMPUTATION, f"Preparing {self._name} for the editor")
@@ -189,7 +181,7 @@ class _told(contextlib.AbstractContextManager[Callable[[float, str], None]]):  #
         return self._at
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
-        self._later.cancel()
+        self._timer.cancel()
         if self._task is None:
             return
         if error is None:

@@ -1,4 +1,4 @@
-"""Which markers stand where in this workplace: from a file that the server was given, or as it was told over REST."""
+"""Marker configuration of the workplace: from a configured file, or set over REST."""
 
 import asyncio
 from pathlib import Path
@@ -20,18 +20,18 @@ class Markers:
     def __init__(self, path: Path, given: CalibrationConfiguration | None = None) -> None:
         self._path = path
         self._given = given
-        self._kept = CalibrationConfiguration()
+        self._stored = CalibrationConfiguration()
         self._changing = asyncio.Lock()
 
     @property
     def configuration(self) -> CalibrationConfiguration:
-        """Give what is in force."""
-        return self._kept if self._given is None else self._given
+        """Return what is in force."""
+        return self._stored if self._given is None else self._given
 
     def load(self, damage: DataDamage) -> None:
         """Read what is stored; a damaged file is set aside and reported. StorageError when it cannot be read."""
         try:
-            self._kept = msgspec.json.decode(self._path.read_bytes(), type=CalibrationConfiguration)
+            self._stored = msgspec.json.decode(self._path.read_bytes(), type=CalibrationConfiguration)
         except FileNotFoundError:
             return
         except msgspec.DecodeError as error:
@@ -40,7 +40,10 @@ class Markers:
             raise StorageError(f"The markers in {self._path} cannot be read: {error}") from error
 
     async def set(self, configuration: CalibrationConfiguration) -> None:
-        """Keep another configuration. Conflict when the server was given a file; StorageError."""
+        """Keep another configuration. Conflict when the server was given a file.
+
+        Raise StorageError if that is impossible.
+        """
         if self._given is not None:
             raise Conflict("The server was started with a file of markers: change them there.")
         async with self._changing:
@@ -50,5 +53,5 @@ class Markers:
                 )
             except OSError as error:
                 raise StorageError(f"The markers cannot be kept in {self._path}: {error.strerror}") from error
-            self._kept = configuration
+            self._stored = configuration
         log.info("markers set", markers=len(configuration.markers), boards=len(configuration.boards))

@@ -1,4 +1,4 @@
-"""Who points a robot at the focus points of an object, and which of them are done (protocol, 7.3)."""
+"""Object aiming: which user touches the focus points of an object with a robot (protocol, 7.3)."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(slots=True)
-class Aim:
+class ObjectAiming:
     """One user's aiming. points: in the frame of the object's mesh. poses: of the end effector, by index of point."""
 
     object_id: str
@@ -22,30 +22,30 @@ class Aim:
     poses: dict[int, Pose] = field(default_factory=dict)
 
 
-class Aiming:
+class ObjectAimings:
     """The aimings by user. One ends with the scene that it began in."""
 
     def __init__(self) -> None:
-        self._aims: dict[str, Aim] = {}
+        self._aimings: dict[str, ObjectAiming] = {}
 
-    def of(self, user: str, document: "Document") -> Aim | None:
-        """Give the aiming of a user in the open scene, None when he is not aiming."""
-        aim = self._aims.get(user)
-        if aim is not None and aim.document is not document:
-            del self._aims[user]
+    def of(self, user: str, document: "Document") -> ObjectAiming | None:
+        """Return the aiming of a user in the open scene, None when he is not aiming."""
+        aiming = self._aimings.get(user)
+        if aiming is not None and aiming.document is not document:
+            del self._aimings[user]
             return None
-        return aim
+        return aiming
 
-    def require(self, user: str, document: "Document") -> Aim:
-        """Give the aiming of a user in the open scene; RequestRefused."""
-        if (aim := self.of(user, document)) is None:
+    def require(self, user: str, document: "Document") -> ObjectAiming:
+        """Return the aiming of a user in the open scene. Raise RequestRefused if that is impossible."""
+        if (aiming := self.of(user, document)) is None:
             raise RequestRefused("You are not aiming: send ObjectAimingStart first.")
-        return aim
+        return aiming
 
-    def begin(self, user: str, aim: Aim) -> None:
+    def begin(self, user: str, aiming: ObjectAiming) -> None:
         """Let a user aim."""
-        self._aims[user] = aim
+        self._aimings[user] = aiming
 
     def end(self, user: str) -> None:
         """Forget a user's aiming."""
-        self._aims.pop(user, None)
+        self._aimings.pop(user, None)

@@ -1,4 +1,4 @@
-"""Where an object stands, from points on it and where a robot touched them (rigid motion by least squares)."""
+"""Computes the pose of an object from points on it and their touched positions (least squares)."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -37,7 +37,7 @@ def check_points(points: Sequence[Position], what: str) -> None:
 
 
 def fit(on_object: Sequence[Position], touched: Sequence[Position]) -> Fit:
-    """Give the pose of an object in the world: that which moves its own points nearest to where they were touched.
+    """Return the pose of an object in the world: that which moves its own points nearest to where they were touched.
 
     Least squares over the points (W. Kabsch, Acta Crystallographica A32 (1976) 922, with the sign of the smallest
     singular value that keeps a rotation from becoming a reflection). Raises InvalidData for lists of different length

@@ -1,4 +1,4 @@
-"""Which orientations and joints of the open project each robot reaches: worked out beside, told by events."""
+"""Reachability of the orientations and joints of the open project, computed in the background."""
 
 import asyncio
 from collections.abc import Mapping
@@ -18,14 +18,20 @@ from arcor2_hw.data.project_index import global_pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, NotFound
-from arcor2_server.events import make_event
-from arcor2_server.workspace.robot_models import model_of
-from arcor2_server.workspace.scene_collisions import in_names, robot_model, robots, things
-from arcor2_server.workspace.stopped_robots import PERIOD, StandingArms
+from arcor2_server.compute.workers import Compute
+from arcor2_server.documents import Session
+from arcor2_server.events import EventHub, make_event
+from arcor2_server.hosts.session import HostSession
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.workspace.collisions import CollisionWorld
+from arcor2_server.workspace.robot_calibrations import RobotCalibrations
+from arcor2_server.workspace.robot_models import RobotModels
+from arcor2_server.workspace.robots import SceneRobots
+from arcor2_server.workspace.scene_collisions import SceneCollisions
+from arcor2_server.workspace.stopped_robots import PERIOD, StoppedRobots
 
 if TYPE_CHECKING:
     from arcor2_hw.data.rpc.editor import ReachabilityArgs
-    from arcor2_server.services import Services
 
 log = structlog.get_logger(__name__)
 
@@ -59,8 +65,26 @@ class _Row:
 class ReachabilityBoard:
     """Works only while somebody subscribed to the event, or asked since the project was opened."""
 
-    def __init__(self, services: "Services") -> None:
-        self._services = services
+    def __init__(
+        self,
+        hub: EventHub,
+        types: ObjectTypes,
+        session: Session,
+        host: HostSession,
+        compute: Compute,
+        collisions: CollisionWorld,
+        robot_calibrations: RobotCalibrations,
+        robots: SceneRobots,
+        robot_models: RobotModels,
+        scene_collisions: SceneCollisions,
+    ) -> None:
+        self._hub = hub
+        self._types = types
+        self._session = session
+        self._compute = compute
+        self._robots = robots
+        self._robot_models = robot_models
+        self._scene_collisions = scene_collisions
         self._rows: dict[tuple[str, str], _Row] = {}
         self._effectors: dict[bytes, list[str]] = {}
         self._asked = False
@@ -70,25 +94,24 @@ class ReachabilityBoard:
         self._described = asyncio.Event()
         """The rows are there."""
         self._working: asyncio.Task[None] | None = None
-        self._arms = StandingArms(services)
-        services.session.on_change.append(lambda edit: self.look() if edit is not None else self._begin_anew())
-        services.collisions.on_change.append(self.look)
-        services.cell.board.on_obstacles_changed.append(self.look)
-        services.arm_calibrations.on_change.append(lambda _: self.look())
+        self._stopped = StoppedRobots(host, robots)
+        session.on_change.append(lambda edit: self.schedule() if edit is not None else self._begin_anew())
+        collisions.on_change.append(self.schedule)
+        host.board.on_obstacles_changed.append(self.schedule)
+        robot_calibrations.on_change.append(lambda _: self.schedule())
 
     # -------------------------------------------------------------------------------- asked
     async def ask(self, args: "ReachabilityArgs") -> list[ReachabilityData]:
-        """Give what is known, having waited a moment for it. RequestRefused, NotFound for what cannot be asked of."""
-        services = self._services
-        services.session.require_project_open()
-        project = services.session.require_project()
+        """Return what is known, having waited a moment for it. RequestRefused, NotFound for what cannot be asked of."""
+        self._session.require_project_open()
+        project = self._session.require_project()
         chosen = self._chosen(args)
         known = {key for point in project.action_points for key in _items(point)}
         wanted = known if isinstance(args.ids, Unset) else args.ids
         if strange := sorted(wanted - known):
             raise NotFound(f"The project has no orientation or joints {strange[0]!r}.")
         self._asked = True
-        self.look()
+        self.schedule()
         for event, within in ((self._described, DESCRIBED_WITHIN), (self._idle, ANSWER_WITHIN)):
             try:
                 async with asyncio.timeout(within):
@@ -96,34 +119,33 @@ class ReachabilityBoard:
             except TimeoutError:
                 log.debug("reachability is being worked out still")
         rows = [row for row in self._rows.values() if row.robot in chosen and _is_asked(row, args)]
-        return [self._told(row, self._of_interest(row, wanted)) for row in rows]
+        return [self._data(row, self._of_interest(row, wanted)) for row in rows]
 
     def _chosen(self, args: "ReachabilityArgs") -> set[str]:
-        services = self._services
         if isinstance(args.robot_id, Unset):
-            return {robot.id for robot in robots(services)}
-        robot = services.cell.robot(args.robot_id)
-        model_of(services, robot, "by which its reach could be told")
+            return {robot.id for robot in self._robots.with_models()}
+        robot = self._robots.robot(args.robot_id)
+        self._robot_models.require(robot, "by which its reach could be told")
         return {robot.id}
 
     def _of_interest(self, row: _Row, wanted: set[str]) -> list[ReachOfItem]:
-        """Give items in the order of their ids; joints of other robots are none of this row's."""
-        project = self._services.session.require_project()
+        """Return items in the order of their ids; joints of other robots are none of this row's."""
+        project = self._session.require_project()
         own = {orientation.id for point in project.action_points for orientation in point.orientations}
         own |= {each.id for point in project.action_points for each in point.robot_joints if _is_of(each, row)}
         return [row.judged.get(key, ReachOfItem(key, Reach.UNKNOWN)) for key in sorted(wanted & own)]
 
-    def _told(self, row: _Row, items: list[ReachOfItem]) -> ReachabilityData:
-        return ReachabilityData(row.robot, row.end_effector, self._services.session.revision, items, row.arm)
+    def _data(self, row: _Row, items: list[ReachOfItem]) -> ReachabilityData:
+        return ReachabilityData(row.robot, row.end_effector, self._session.revision, items, row.arm)
 
     # -------------------------------------------------------------------------------- when
     @property
     def _wanted(self) -> bool:
-        return self._asked or bool(self._services.hub.subscribers(NAME))
+        return self._asked or bool(self._hub.subscribers(NAME))
 
-    def look(self) -> None:
+    def schedule(self) -> None:
         """Look, a moment later, whether something changed."""
-        if not self._wanted or self._services.session.project is None:
+        if not self._wanted or self._session.project is None:
             return
         self._idle.clear()
         self._wake.set()
@@ -134,7 +156,7 @@ class ReachabilityBoard:
         """Forget all: another document is open, or none."""
         self._asked = False
         self._stop()
-        self.look()
+        self.schedule()
 
     def _stop(self) -> None:
         if self._working is not None:
@@ -142,14 +164,14 @@ class ReachabilityBoard:
             self._working = None
         self._rows.clear()
         self._effectors.clear()
-        self._arms.forget()
+        self._stopped.forget()
         self._wake.clear()
         self._described.set()  # who waits is told that there is nothing to wait for
         self._described = asyncio.Event()
         self._idle.set()
 
     async def close(self) -> None:
-        """End with the server."""
+        """Stop when the server ends."""
         working = self._working
         self._stop()
         if working is not None:
@@ -179,25 +201,24 @@ class ReachabilityBoard:
                     await self._wake.wait()
             except TimeoutError:
                 if self._wanted and await self._moved():
-                    self.look()
+                    self.schedule()
 
     async def _moved(self) -> bool:
         try:
-            return await self._arms.look(self._neighbours())
+            return await self._stopped.update(self._neighbours())
         except Exception:
             log.exception("where robots stand could not be asked")
             return False
 
     def _neighbours(self) -> list[SceneObject]:
-        """Give the robots that have a model, where there are several."""
-        found = robots(self._services)
+        """Return the robots that have a model, where there are several."""
+        found = self._robots.with_models()
         return found if len(found) > 1 else []
 
     # -------------------------------------------------------------------------------- one round
     async def _round(self) -> None:
-        services = self._services
-        standing = robots(services)
-        await self._arms.look(self._neighbours())
+        standing = self._robots.with_models()
+        await self._stopped.update(self._neighbours())
         names = {robot.id for robot in standing}
         for key in [key for key in self._rows if key[0] not in names]:
             del self._rows[key]
@@ -208,7 +229,7 @@ class ReachabilityBoard:
             problem = problems[robot.id]
             # One whose model cannot be used is in nobody's way, nor is one of which nobody knows where it stands.
             others = [
-                one for one in standing if one is not robot and not problems[one.id] and one.id in self._arms.joints
+                one for one in standing if one is not robot and not problems[one.id] and one.id in self._stopped.joints
             ]
             for row in [row for row in self._rows.values() if row.robot == robot.id]:
                 await self._judge(row, [robot, *others], poses | self._joints(row), problem)
@@ -216,8 +237,8 @@ class ReachabilityBoard:
                 return  # something changed meanwhile: what is known of the old state is of no use
 
     async def _described_robot(self, robot: SceneObject) -> str:
-        """Bring the rows of a robot up to date; gives why its model cannot be used, empty when it can."""
-        model = robot_model(self._services, robot)
+        """Bring the rows of a robot up to date; return why its model cannot be used, empty when it can."""
+        model = self._robot_models.find(robot)
         if model is None:
             return ""
         try:
@@ -230,12 +251,11 @@ class ReachabilityBoard:
 
     async def _rows_of(self, robot: SceneObject, model: RobotSource) -> None:
         """Bring the rows of a robot up to date with the end effectors of its model."""
-        services = self._services
         key = repr((model.urdf, sorted(model.settings.items(), key=str))).encode()
         if key not in self._effectors:
-            found = await services.compute.run(DescribeRobot(model), background=True)
+            found = await self._compute.run(DescribeRobot(model), background=True)
             self._effectors[key] = found.end_effectors
-        several = services.types.robot_meta(robot.type).multi_arm
+        several = self._types.robot_meta(robot.type).multi_arm
         wanted: dict[tuple[str, str], _Row] = {}
         for link in self._effectors[key]:
             arm, _, name = link.partition("_") if several else ("", "", link)
@@ -245,8 +265,8 @@ class ReachabilityBoard:
         self._rows = {**wanted, **self._rows}
 
     async def _poses(self) -> dict[str, Target]:
-        """Give the orientations of the project as poses in the world; others get their turn between many."""
-        session = self._services.session
+        """Return the orientations of the project as poses in the world; others get their turn between many."""
+        session = self._session
         project = session.project
         found: dict[str, Target] = {}
         for point in project.action_points if project is not None else ():
@@ -261,18 +281,19 @@ class ReachabilityBoard:
         return found
 
     def _joints(self, row: _Row) -> dict[str, Target]:
-        """Give the joints of the project that are meant for an end effector."""
-        project = self._services.session.project
+        """Return the joints of the project that are meant for an end effector."""
+        project = self._session.project
         points = project.action_points if project is not None else ()
         return {each.id: each.joints for point in points for each in point.robot_joints if _is_of(each, row)}
 
     async def _judge(self, row: _Row, standing: list[SceneObject], targets: dict[str, Target], problem: str) -> None:
         """Judge what is new, or may have changed. standing: its robot, and those that are in the way of that."""
-        services = self._services
         for gone in row.judged.keys() - targets.keys():
             del row.judged[gone]
             row.targets.pop(gone, None)
-        world = things(services, standing, {key: at for key, at in self._arms.joints.items() if key != row.robot})
+        world = self._scene_collisions.things(
+            standing, {key: at for key, at in self._stopped.joints.items() if key != row.robot}
+        )
         if world != row.world:
             row.targets.clear()
             row.world = world
@@ -296,7 +317,7 @@ class ReachabilityBoard:
         effector = row.end_effector if isinstance(row.arm, Unset) else f"{row.arm}_{row.end_effector}"
         joints = isinstance(targets[0], list)
         task = JudgeJoints(row.robot, targets) if joints else JudgePoses(row.robot, effector, targets)
-        run, place = self._services.compute.run, f"reach of {row.robot}"
+        run, place = self._compute.run, f"reach of {row.robot}"
         try:
             return await run(task, world=row.world, place=place, background=True)
         except ComputeStopped:
@@ -307,13 +328,13 @@ class ReachabilityBoard:
         """Keep what was judged, and tell what is another than before."""
         changed = []
         for key, one in judged.items():
-            item = ReachOfItem(key, one.reach, in_names(self._services, one.reason) or UNSET)
+            item = ReachOfItem(key, one.reach, self._scene_collisions.in_names(one.reason) or UNSET)
             row.targets[key] = targets[key]
             if row.judged.get(key) != item:
                 row.judged[key] = item
                 changed.append(item)
         if changed:
-            self._services.hub.broadcast(make_event(NAME, self._told(row, changed)))
+            self._hub.broadcast(make_event(NAME, self._data(row, changed)))
 
 
 def _items(point: Any) -> set[str]:
@@ -321,7 +342,7 @@ def _items(point: Any) -> set[str]:
 
 
 def _is_of(joints: ProjectRobotJoints, row: _Row) -> bool:
-    """Tell whether joints are meant for an end effector: of its robot, and of its arm where that is said."""
+    """Return whether joints are meant for an end effector: of its robot, and of its arm where that is said."""
     if joints.robot_id != row.robot:
         return False
     return isinstance(joints.arm_id, Unset) or isinstance(row.arm, Unset) or joints.arm_id == row.arm

@@ -1,15 +1,14 @@
-"""What controllers tell of their very arms, kept: kinematics computed here are then those of the arm, also offline.
+"""Kinematic calibrations read from robot controllers, used for computations also offline.
 
-Read whenever a robot that can tell it gets connected in a scene that is online. Kept for the object of the scene and
-for where its device is: another address may be that of another arm, of which nothing is known until it is read.
+A calibration is read whenever a robot that provides one connects in an online scene. It is stored for the object and
+for the address of its device, since another address may be another robot.
 """
 
 import asyncio
 import enum
 import hashlib
 from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import msgspec
 import structlog
@@ -22,12 +21,15 @@ from arcor2_hw.data.events import NotificationData, NotificationLevel
 from arcor2_hw.data.robot import KinematicCalibration
 from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
-from arcor2_server.events import make_event
+from arcor2_server.compute.workers import Compute
+from arcor2_server.documents import Session
+from arcor2_server.events import EventHub, make_event
 from arcor2_server.files import write_private
-from arcor2_server.workspace.robot_models import model_of_type, settings_of
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
+from arcor2_server.hosts.session import HostSession
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage.damage_notices import DataDamage
+from arcor2_server.workspace.robots import SceneRobots
 
 log = structlog.get_logger(__name__)
 
@@ -36,7 +38,7 @@ MOST: Final = 1000
 _THERE: Final = (Connection.ONLINE, Connection.BACK)
 
 
-class ArmCalibration(Data, frozen=True):
+class RobotCalibration(Data, frozen=True):
     """What a controller told of the arm of an object: when, and why it is not used, empty where it is.
 
     device: stands for where the device is, by the object's settings.
@@ -61,13 +63,30 @@ class InForce(enum.StrEnum):
     """As its controller told of the very arm."""
 
 
-class ArmCalibrations:
+class RobotCalibrations:
     """For use on one event loop."""
 
-    def __init__(self, services: "Services", path: Path) -> None:
-        self._services = services
-        self._path = path
-        self._kept: dict[str, ArmCalibration] = {}
+    def __init__(
+        self,
+        settings: ServerSettings,
+        hub: EventHub,
+        types: ObjectTypes,
+        session: Session,
+        host: HostSession,
+        compute: Compute,
+        damage: DataDamage,
+        robots: SceneRobots,
+    ) -> None:
+        self._settings = settings
+        self._hub = hub
+        self._types = types
+        self._session = session
+        self._host = host
+        self._compute = compute
+        self._damage = damage
+        self._robots = robots
+        self._path = settings.arm_calibrations_file
+        self._stored: dict[str, RobotCalibration] = {}
         """By the object's id."""
         self._asked: set[str] = set()
         """Robots that were asked since they were connected."""
@@ -78,48 +97,47 @@ class ArmCalibrations:
 
     @property
     def any(self) -> bool:
-        """Tell whether any are kept."""
-        return bool(self._kept)
+        """Return whether any are kept."""
+        return bool(self._stored)
 
     def load(self) -> None:
         """Read what is stored; a damaged file is set aside and reported. StorageError when it cannot be read."""
         try:
-            kept = msgspec.json.decode(self._path.read_bytes(), type=list[ArmCalibration])
+            stored = msgspec.json.decode(self._path.read_bytes(), type=list[RobotCalibration])
         except FileNotFoundError:
             return
         except msgspec.DecodeError as error:
             what = "Kinematics are nominal until each robot is connected again."
-            self._services.damage.set_aside(self._path, what, error)
+            self._damage.set_aside(self._path, what, error)
             return
         except OSError as error:
             raise StorageError(f"The calibrations in {self._path} cannot be read: {error}") from error
-        self._kept = {each.object_id: each for each in kept}
+        self._stored = {each.object_id: each for each in stored}
 
-    def kept(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> ArmCalibration | None:
-        """Give what was told of a robot's arm, used or not; None when nothing was.
+    def stored(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> RobotCalibration | None:
+        """Return what was told of a robot's arm, used or not; None when nothing was.
 
         overrides: of the project that the robot is used in, else those of the open one.
         """
-        found = self._kept.get(robot.id)
+        found = self._stored.get(robot.id)
         return found if found is not None and found.device == self._device(robot, overrides) else None
 
     def in_force(
         self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None
     ) -> KinematicCalibration | None:
-        """Give the calibration with which kinematics of a robot are computed; None: they are nominal. As `kept`."""
-        found = self.kept(robot, overrides)
+        """Return the calibration with which kinematics of a robot are computed; None: they are nominal. As `kept`."""
+        found = self.stored(robot, overrides)
         return None if found is None or found.refused else found.calibration
 
-    def look(self) -> None:
+    def read_connected(self) -> None:
         """Ask the robots that got connected since; called when a connection, or the state of the scene, changed."""
-        services = self._services
-        if not services.cell.online:
+        if not self._host.online:
             self._asked.clear()
             return
-        there = {state.object_id for state in services.cell.board.states() if state.state in _THERE}
+        there = {state.object_id for state in self._host.board.states() if state.state in _THERE}
         self._asked &= there
-        for robot in services.session.require_scene().objects:
-            if robot.id in there - self._asked and self._can_tell(robot):
+        for robot in self._session.require_scene().objects:
+            if robot.id in there - self._asked and self._is_readable(robot):
                 self._asked.add(robot.id)
                 task = asyncio.create_task(self._read(robot), name=f"kinematics of {robot.name}")
                 self._reading.add(task)
@@ -131,84 +149,81 @@ class ArmCalibrations:
             await asyncio.wait(self._reading)
 
     async def close(self) -> None:
-        """End with the server."""
+        """Stop when the server ends."""
         reading = list(self._reading)
         for task in reading:
             task.cancel()
         await asyncio.gather(*reading, return_exceptions=True)
 
     # ------------------------------------------------------------------------------------------------ inside
-    def _can_tell(self, robot: SceneObject) -> bool:
-        types = self._services.types
-        if not types.derives_from(robot.type, "Robot") or model_of_type(self._services, robot.type) is None:
+    def _is_readable(self, robot: SceneObject) -> bool:
+        types = self._types
+        if not types.derives_from(robot.type, "Robot") or self._robots.model_of_type(robot.type) is None:
             return False
         meta = types.robot_meta(robot.type)
         return meta.features.kinematic_calibration is True and not meta.multi_arm
 
     def _device(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> str:
-        """Give what stands for where a robot's device is: its settings that are texts or whole numbers."""
-        settings = settings_of(self._services, robot, overrides)
-        cell = self._services.settings.cell
+        """Return what stands for where a robot's device is: its settings that are texts or whole numbers."""
+        settings = self._robots.settings_of(robot, overrides)
+        cell = self._settings.cell
         here = None if cell is None else cell.device(robot.name)
         if here is not None and here.type == robot.type:
             settings |= here.settings
         where = {key: value for key, value in settings.items() if type(value) in (str, int)}
-        told = msgspec.json.encode((robot.type, where), order="sorted")
-        return hashlib.sha256(told).hexdigest()[:32]
+        encoded = msgspec.json.encode((robot.type, where), order="sorted")
+        return hashlib.sha256(encoded).hexdigest()[:32]
 
     async def _read(self, robot: SceneObject) -> None:
-        services = self._services
         try:
-            calibration = await services.cell.ask(KinematicCalibration, robot.id, "kinematic_calibration")
+            calibration = await self._host.ask(KinematicCalibration, robot.id, "kinematic_calibration")
         except Arcor2Error as error:
-            if services.cell.online:
+            if self._host.online:
                 log.warning("kinematics not told", robot=robot.name, reason=str(error))
                 used = "those that it told before" if self.in_force(robot) else "nominal ones"
-                self._tell(robot, f"its controller does not tell its calibration, kinematics are {used}. {error}")
+                self._publish(robot, f"its controller does not tell its calibration, kinematics are {used}. {error}")
             return
-        before = self.kept(robot)
+        before = self.stored(robot)
         refused = await self._refused(robot, calibration)
-        found = ArmCalibration(robot.id, robot.name, self._device(robot), now(), calibration, refused)
+        found = RobotCalibration(robot.id, robot.name, self._device(robot), now(), calibration, refused)
         same = before is not None and (before.calibration, before.refused) == (calibration, refused)
-        self._kept.pop(robot.id, None)
-        self._kept[robot.id] = found
-        while len(self._kept) > MOST:
-            del self._kept[next(iter(self._kept))]
+        self._stored.pop(robot.id, None)
+        self._stored[robot.id] = found
+        while len(self._stored) > MOST:
+            del self._stored[next(iter(self._stored))]
         log.info("kinematics read", robot=robot.name, checksum=calibration.checksum, refused=refused, same=same)
         await self._save()
         if same:
             return
-        for tell in self.on_change:
-            tell(robot)
+        for notify in self.on_change:
+            notify(robot)
         if refused:
-            self._tell(robot, f"the calibration in its controller is not used, kinematics are nominal. {refused}")
+            self._publish(robot, f"the calibration in its controller is not used, kinematics are nominal. {refused}")
         else:
-            self._tell(robot, "kinematics are from now on those of the calibration in its controller.", bad=False)
+            self._publish(robot, "kinematics are from now on those of the calibration in its controller.", bad=False)
 
     async def _refused(self, robot: SceneObject, calibration: KinematicCalibration) -> str:
         """Tell why a calibration cannot be used, empty when it can."""
-        file = model_of_type(self._services, robot.type)
+        file = self._robots.model_of_type(robot.type)
         if file is None:
             return f"{robot.name} has no model (URDF)."
-        settings = settings_of(self._services, robot)
+        settings = self._robots.settings_of(robot)
         try:
-            await self._services.compute.run(
-                DescribeRobot(RobotSource(file, settings=settings, calibration=calibration))
-            )
+            await self._compute.run(DescribeRobot(RobotSource(file, settings=settings, calibration=calibration)))
         except InvalidData as error:
             return str(error)
         except Arcor2Error as error:  # whoever computes with it will be told
             log.warning("calibration not looked at", robot=robot.name, reason=str(error))
         return ""
 
-    def _tell(self, robot: SceneObject, what: str, *, bad: bool = True) -> None:
-        """Tell everybody which kinematics of a robot are in force, and why."""
+    def _publish(self, robot: SceneObject, what: str, *, bad: bool = True) -> None:
+        """Notify all clients which kinematics of a robot are in force, and why."""
         level = NotificationLevel.WARN if bad else NotificationLevel.INFO
-        self._services.hub.broadcast(make_event("Notification", NotificationData(f"{robot.name}: {what}", level)))
+        self._hub.broadcast(make_event("Notification", NotificationData(f"{robot.name}: {what}", level)))
 
     async def _save(self) -> None:
         async with self._writing:
-            content = msgspec.json.format(msgspec.json.encode(list(self._kept.values())))
+            content = msgspec.json.format(msgspec.json.encode(list(self._stored.values())))
             try:
                 await asyncio.to_thread(write_private, self._path, content)
             except OSError as error:

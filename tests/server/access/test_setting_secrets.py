@@ -28,10 +28,10 @@ from arcor2_hw.data.project import Flow, Project
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import HIDDEN, ObjectSecrets, is_reference
 from arcor2_hw.exceptions import AddressChanged, InvalidData
-from arcor2_server.app import running_services
-from arcor2_server.documents.setting_secrets import SettingSecrets
+from arcor2_server.app import running_server
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage.secret_store import Secret
+from arcor2_server.storage.setting_secrets import SettingSecrets
 from tests.server.core.serving import ServerProcess, running
 
 CODE, OTHER, UNSAVED = "swordfish-4711", "halibut-0815", "haddock-42"
@@ -240,7 +240,7 @@ async def test_data_with_secrets_in_clear_is_migrated(tmp_path: Path) -> None:
     assert leaks(tmp_path, *CLEAR)
     references = []
     for _ in range(2):
-        async with running_services(ServerSettings(data_dir=tmp_path)) as services:
+        async with running_server(ServerSettings(data_dir=tmp_path)) as services:
             store = services.secrets.store
             scene = services.session.require_scene()
             (opened,) = [each for obj in scene.objects for each in obj.parameters if each.name == "password"]
@@ -270,7 +270,7 @@ async def test_data_with_secrets_in_clear_is_migrated(tmp_path: Path) -> None:
 
 
 async def test_what_a_reference_may_stand_for(tmp_path: Path) -> None:
-    async with running_services(ServerSettings(data_dir=tmp_path)) as services:
+    async with running_server(ServerSettings(data_dir=tmp_path)) as services:
         secrets = services.secrets
         (first,) = secrets.hide("YuMi", [setting("password", CODE)])
         (second,) = secrets.hide("YuMi", [setting("password", CODE)])
@@ -359,7 +359,7 @@ async def test_a_secret_is_not_sent_to_another_host(tmp_path: Path) -> None:
 
 async def test_which_secrets_the_cell_host_gets(tmp_path: Path) -> None:
     settings = ServerSettings(data_dir=tmp_path)
-    async with running_services(settings) as services:
+    async with running_server(settings) as services:
         secrets = services.secrets
         host = setting("host", "yumi1")
         (_, password) = secrets.hide("YuMi", [host, setting("password", CODE)])
@@ -397,7 +397,7 @@ async def test_which_secrets_the_cell_host_gets(tmp_path: Path) -> None:
 
 
 async def test_a_default_that_is_secret_is_not_sent(tmp_path: Path) -> None:
-    async with running_services(ServerSettings(data_dir=tmp_path)) as services:
+    async with running_server(ServerSettings(data_dir=tmp_path)) as services:
         (password,) = [each for each in services.types.meta("YuMi").settings if each.name == "password"]
         assert isinstance(password, ParameterMeta)
         assert not isinstance(password.default_value, Unset)

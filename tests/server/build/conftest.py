@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import arcor2_hw.objects
-from arcor2_server.object_types.registry import PackageType
+from arcor2_server.object_types.catalog import PackageType
 from tests.server.build import workplace
 
 STOCK = Path(arcor2_hw.objects.__file__).parent / "stock"

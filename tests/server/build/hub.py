@@ -11,9 +11,11 @@ from msgspec import UNSET
 
 from arcor2_hw.analysis import InstalledType, SourceFile
 from arcor2_hw.data.object_type import ObjectModel, ObjectTypeSource
+from arcor2_server.build.importing import PackageImport
 from arcor2_server.build.service import BuildService
-from arcor2_server.object_types.notifications import TypeNews
-from arcor2_server.object_types.registry import ObjectTypes, PackageType
+from arcor2_server.object_types.catalog import PackageType
+from arcor2_server.object_types.notifications import TypeNotifications
+from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
 
@@ -55,11 +57,14 @@ async def opened(
             session=types.SimpleNamespace(scene=None, project=None),
             hub=types.SimpleNamespace(broadcast=told.append, told=told),
         )
-        services.build = BuildService(services)
-        services.type_news = TypeNews()
+        services.build = BuildService(settings, storage, object_types)
+        services.type_notifications = TypeNotifications(object_types, services.hub)
+        services.package_import = PackageImport(
+            storage, assets, object_types, services.session, services.type_notifications
+        )
         try:
             yield services
         finally:
-            await services.type_news.close()
+            await services.type_notifications.close()
     finally:
         await storage.close()

@@ -20,9 +20,9 @@ from arcor2_hw.data.project import END, START, ActionPoint, Project
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFound, StorageError
 from arcor2_server.build import package
-from arcor2_server.build.importing import ImportOptions, import_package
+from arcor2_server.build.importing import ImportOptions
 from arcor2_server.build.reading import NotUnderstood
-from arcor2_server.object_types.registry import PackageType
+from arcor2_server.object_types.catalog import PackageType
 from tests.server.build import hub, workplace
 from tests.server.build.conftest import make_code
 
@@ -90,7 +90,7 @@ def untimed(document: Any) -> Any:
 
 # ------------------------------------------------------------------------------------------------ what comes back
 async def test_all_of_a_package_comes_back(here: Any, packed: bytes) -> None:
-    ids = await import_package(here, packed, NOTHING)
+    ids = await here.package_import.import_package(packed, NOTHING)
     assert (ids.scene_id, ids.project_id) == ("scn_1", "pro_1")
     assert msgspec.to_builtins(ids) == {"sceneId": "scn_1", "projectId": "pro_1"}
     assert untimed(await here.storage.scene("scn_1")) == workplace.scene()
@@ -112,7 +112,7 @@ async def test_a_helper_module_without_a_class_comes_back(here: Any, packed: byt
     arm = f"from .sort_tools import FASTEST\n{workplace.ARM}"
     helper = b"import math\n\nFASTEST = math.inf\n"
     given = changed(packed, object_types__arm_py=arm.encode(), object_types__sort_tools_py=helper)
-    await import_package(here, given, NOTHING)
+    await here.package_import.import_package(given, NOTHING)
     assert (await here.storage.object_type("sort_tools")).source == helper.decode()
     await here.types.refresh()
     assert not here.types.known("sort_tools")  # no type that could be placed
@@ -124,22 +124,22 @@ async def test_a_helper_module_without_a_class_comes_back(here: Any, packed: byt
     await here.storage.delete_object_type("sort_tools")
     await here.storage.put_object_type(ObjectTypeSource("SortTools", helper.decode()))
     revision = here.storage.revision
-    await import_package(here, given, NOTHING)
+    await here.package_import.import_package(given, NOTHING)
     assert here.storage.revision == revision
 
 
 async def test_from_a_file(here: Any, packed: bytes, tmp_path: Path) -> None:
     path = tmp_path / "package.zip"
     path.write_bytes(packed)
-    assert (await import_package(here, path, NOTHING)).project_id == "pro_1"
+    assert (await here.package_import.import_package(path, NOTHING)).project_id == "pro_1"
     with pytest.raises(StorageError, match="cannot be read"):
-        await import_package(here, tmp_path / "none.zip", NOTHING)
+        await here.package_import.import_package(tmp_path / "none.zip", NOTHING)
 
 
 async def test_twice_changes_nothing(here: Any, packed: bytes) -> None:
-    await import_package(here, packed, NOTHING)
+    await here.package_import.import_package(packed, NOTHING)
     revision, before = here.storage.revision, await here.storage.project("pro_1")
-    await import_package(here, packed, NOTHING)
+    await here.package_import.import_package(packed, NOTHING)
     assert here.storage.revision == revision
     assert await here.storage.project("pro_1") == before
 
@@ -151,13 +151,13 @@ async def test_what_fails_on_the_way_leaves_nothing(here: Any, packed: bytes, mo
 
     monkeypatch.setattr(here.storage, "put_project", full)
     with pytest.raises(StorageError, match="disk is full"):
-        await import_package(here, packed, NOTHING)
+        await here.package_import.import_package(packed, NOTHING)
     storage = here.storage
     assert [await storage.scenes(), await storage.projects(), await storage.object_types(), await storage.models()] == [
         [] for _ in range(4)
     ]
     monkeypatch.undo()
-    assert (await import_package(here, packed, NOTHING)).project_id == "pro_1"
+    assert (await here.package_import.import_package(packed, NOTHING)).project_id == "pro_1"
     assert len(await storage.object_types()) > 0
     assert [one.id for one in await storage.projects()] == ["pro_1"]
 
@@ -168,22 +168,22 @@ async def test_camel_case_documents_are_read(here: Any, packed: bytes) -> None:
     renamed["actionPoints"] = renamed.pop("action_points")
     for point in renamed["actionPoints"]:
         point["robotJoints"] = point.pop("robot_joints", [])
-    await import_package(here, changed(packed, data__project_json=json.dumps(renamed).encode()), NOTHING)
+    await here.package_import.import_package(changed(packed, data__project_json=json.dumps(renamed).encode()), NOTHING)
     assert untimed(await here.storage.project("pro_1")) == the_project()
 
 
 async def test_a_script_by_hand_comes_back(here: Any, packed: bytes) -> None:
     project = replace(the_project(), has_logic=False, logic=[])
     by_hand = changed(packed, data__project_json=msgspec.json.encode(project), script_py=b"print('by hand')\n")
-    await import_package(here, by_hand, NOTHING)
+    await here.package_import.import_package(by_hand, NOTHING)
     assert await here.storage.project_source("pro_1") == "print('by hand')\n"
     other = changed(by_hand, script_py=b"print('other')\n")
     with pytest.raises(Conflict, match="overwriteProjectSources"):
-        await import_package(here, other, ImportOptions(overwrite_project=True))
-    await import_package(here, other, ImportOptions(overwrite_project_sources=True))
+        await here.package_import.import_package(other, ImportOptions(overwrite_project=True))
+    await here.package_import.import_package(other, ImportOptions(overwrite_project_sources=True))
     assert await here.storage.project_source("pro_1") == "print('other')\n"
     with pytest.raises(InvalidProject, match="line 2"):
-        await import_package(here, changed(by_hand, script_py=b"a = 1\nb = (\n"), ALL)
+        await here.package_import.import_package(changed(by_hand, script_py=b"a = 1\nb = (\n"), ALL)
 
 
 # ------------------------------------------------------------------------------------------------ from the script
@@ -191,12 +191,12 @@ FROM_SCRIPT = replace(ALL, update_project_from_script=True)
 
 
 async def test_an_edited_script_becomes_the_project(here: Any, packed: bytes) -> None:
-    await import_package(here, packed, NOTHING)
+    await here.package_import.import_package(packed, NOTHING)
     source = files_in(packed)["script.py"].decode()
     line = '        robot.pick(aps.feeder.poses.default, grip=Grip.FIRM, an="pick")\n'
     assert line in source
     new = line + '        robot.drop(aps.good.position, 0.25, an="lay down")\n'
-    await import_package(here, changed(packed, script_py=source.replace(line, new).encode()), FROM_SCRIPT)
+    await here.package_import.import_package(changed(packed, script_py=source.replace(line, new).encode()), FROM_SCRIPT)
     project = await here.storage.project("pro_1")
     actions = {action.name: action for point in project.action_points for action in point.actions}
     assert {name for name in actions if name not in workplace_actions()} == {"lay down"}
@@ -219,14 +219,14 @@ def workplace_actions() -> dict[str, str]:
 async def test_an_edited_script_that_is_not_understood_changes_nothing(here: Any, packed: bytes) -> None:
     source = files_in(packed)["script.py"].replace(b"    while True:\n", b"    while True:\n        print(1)\n")
     with pytest.raises(NotUnderstood, match=r"line \d+: print"):
-        await import_package(here, changed(packed, script_py=source), FROM_SCRIPT)
+        await here.package_import.import_package(changed(packed, script_py=source), FROM_SCRIPT)
     assert here.storage.revision == 0
 
 
 async def test_a_script_by_hand_has_no_logic_to_go_back_to(here: Any, packed: bytes) -> None:
     project = msgspec.json.encode(replace(the_project(), has_logic=False, logic=[]))
     with pytest.raises(InvalidProject, match="has no logic"):
-        await import_package(here, changed(packed, data__project_json=project), FROM_SCRIPT)
+        await here.package_import.import_package(changed(packed, data__project_json=project), FROM_SCRIPT)
 
 
 # ------------------------------------------------------------------------------------------------ conflicts
@@ -259,14 +259,14 @@ def _other_model(services: Any) -> Any:
 async def test_what_differs_is_named_and_kept(
     here: Any, packed: bytes, change: Callable[[Any], Any], option: str, named: str
 ) -> None:
-    await import_package(here, packed, NOTHING)
+    await here.package_import.import_package(packed, NOTHING)
     await change(here)
     revision = here.storage.revision
     others = replace(ALL, **{option: False})
     with pytest.raises(Conflict, match=named):
-        await import_package(here, packed, others)
+        await here.package_import.import_package(packed, others)
     assert here.storage.revision == revision
-    await import_package(here, packed, ImportOptions(**{option: True}))
+    await here.package_import.import_package(packed, ImportOptions(**{option: True}))
     assert here.storage.revision > revision
     assert untimed(await here.storage.scene("scn_1")) == workplace.scene()
     assert untimed(await here.storage.project("pro_1")) == the_project()
@@ -277,11 +277,11 @@ async def test_what_differs_is_named_and_kept(
 
 
 async def test_all_conflicts_are_named_at_once(here: Any, packed: bytes) -> None:
-    await import_package(here, packed, NOTHING)
+    await here.package_import.import_package(packed, NOTHING)
     for change in (_other_scene, _other_project, _other_type, _other_model):
         await change(here)
     with pytest.raises(Conflict) as caught:
-        await import_package(here, packed, NOTHING)
+        await here.package_import.import_package(packed, NOTHING)
     for what in ("scene workplace", "project Sort boards", "type Arm", "model of table"):
         assert what in str(caught.value)
 
@@ -289,26 +289,26 @@ async def test_all_conflicts_are_named_at_once(here: Any, packed: bytes) -> None
 async def test_a_name_that_is_taken_is_a_conflict(here: Any, packed: bytes) -> None:
     await here.storage.put_scene(replace(workplace.scene(), id="scn_other"))
     with pytest.raises(Conflict, match="Another scene is named workplace"):
-        await import_package(here, packed, ALL)
+        await here.package_import.import_package(packed, ALL)
 
 
 @pytest.mark.parametrize("what", ["scene", "project"])
 async def test_what_is_open_is_not_replaced(here: Any, packed: bytes, what: str) -> None:
-    await import_package(here, packed, NOTHING)
+    await here.package_import.import_package(packed, NOTHING)
     here.session.scene = workplace.scene()
     here.session.project = the_project() if what == "project" else None
-    await import_package(here, packed, NOTHING)  # nothing differs
+    await here.package_import.import_package(packed, NOTHING)  # nothing differs
     await (_other_scene(here) if what == "scene" else _other_project(here))
     with pytest.raises(Conflict, match=f"The {what} .* is open"):
-        await import_package(here, packed, ALL)
+        await here.package_import.import_package(packed, ALL)
 
 
 async def test_a_type_of_the_package_shadows_an_installed_one(here: Any, packed: bytes) -> None:
-    await import_package(here, packed, NOTHING)
+    await here.package_import.import_package(packed, NOTHING)
     before = files_in(await here.build.publish("pro_1"))
     module = here.types.type_code("AcmeReader").entry_point.partition(":")[0]
     source = f"from {module} import AcmeReader as Installed\n\n\nclass AcmeReader(Installed):\n    pass\n"
-    await import_package(here, changed(packed, object_types__acme_reader_py=source.encode()), NOTHING)
+    await here.package_import.import_package(changed(packed, object_types__acme_reader_py=source.encode()), NOTHING)
     await here.types.refresh()
     meta = here.types.meta("AcmeReader")
     assert (meta.built_in, meta.disabled) == (False, False)
@@ -320,7 +320,7 @@ async def test_a_type_of_the_package_shadows_an_installed_one(here: Any, packed:
     # Base classes stay what they are.
     generic = b"from arcor2_hw.objects import Robot\n\n\nclass Generic(Robot):\n    pass\n"
     with pytest.raises(InvalidPackage, match="Generic is built in"):
-        await import_package(here, changed(packed, object_types__generic_py=generic), ALL)
+        await here.package_import.import_package(changed(packed, object_types__generic_py=generic), ALL)
 
 
 # ------------------------------------------------------------------------------------------------ refusals
@@ -329,13 +329,13 @@ async def test_a_driver_that_is_not_installed_is_named(
 ) -> None:
     async with hub.opened(tmp_path / "bare", [], monkeypatch) as bare:
         with pytest.raises(NotFound, match="AcmeReader"):
-            await import_package(bare, packed, ALL)
+            await bare.package_import.import_package(packed, ALL)
         assert bare.storage.revision == 0
 
 
 async def test_a_type_whose_file_lacks_its_class_is_named(here: Any, packed: bytes) -> None:
     with pytest.raises(NotFound, match="The object type Arm is neither in the package nor here"):
-        await import_package(here, changed(packed, object_types__arm_py=b"class Leg:\n    pass\n"), ALL)
+        await here.package_import.import_package(changed(packed, object_types__arm_py=b"class Leg:\n    pass\n"), ALL)
     assert here.storage.revision == 0
 
 
@@ -343,13 +343,13 @@ async def test_a_mesh_needs_its_asset(here: Any, packed: bytes) -> None:
     mesh = ObjectModel(Model3dType.MESH, mesh=Mesh("table", "table.stl"))
     other = changed(packed, data__models__table_json=msgspec.json.encode(mesh))
     with pytest.raises(NotFound, match=r"table\.stl"):
-        await import_package(here, other, ALL)
+        await here.package_import.import_package(other, ALL)
 
     async def content() -> AsyncIterator[bytes]:
         yield b"solid"
 
     await here.assets.put(content(), "table.stl")
-    await import_package(here, other, ALL)
+    await here.package_import.import_package(other, ALL)
 
 
 def _project(**fields: Any) -> bytes:
@@ -395,7 +395,7 @@ async def test_an_unsound_package_is_refused_whole(
     here: Any, packed: bytes, contents: dict[str, bytes | None], text: str
 ) -> None:
     with pytest.raises(InvalidPackage) as caught:
-        await import_package(here, changed(packed, **contents), ALL)
+        await here.package_import.import_package(changed(packed, **contents), ALL)
     assert text in str(caught.value)
     assert here.storage.revision == 0
     assert here.hub.told == []
@@ -432,7 +432,7 @@ FILE, LINK = stat.S_IFREG | 0o644, stat.S_IFLNK | 0o777
 )
 async def test_a_foul_zip_is_refused(here: Any, foul: bytes) -> None:
     with pytest.raises(InvalidPackage):
-        await import_package(here, foul, ALL)
+        await here.package_import.import_package(foul, ALL)
     assert here.storage.revision == 0
 
 
@@ -440,25 +440,25 @@ async def test_a_zip_bomb_is_refused_while_it_is_read(here: Any) -> None:
     bomb = _zip(("script.py", bytes(package.MAX_READ + 1), FILE))
     assert len(bomb) < 100_000
     with pytest.raises(InvalidPackage, match="larger than"):
-        await import_package(here, bomb, ALL)
+        await here.package_import.import_package(bomb, ALL)
     # The size that the zip tells of itself is a lie: what counts is what comes out.
     at = bomb.index(b"PK\x01\x02")
     liar = bomb[: at + 24] + struct.pack("<I", 10) + bomb[at + 28 :]
     with pytest.raises(InvalidPackage):
-        await import_package(here, liar, ALL)
+        await here.package_import.import_package(liar, ALL)
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 async def test_one_file_twice_is_refused(here: Any) -> None:
     with pytest.raises(InvalidPackage, match="twice"):
-        await import_package(here, _zip(("script.py", b"", FILE), ("./script.py", b"", FILE)), ALL)
+        await here.package_import.import_package(_zip(("script.py", b"", FILE), ("./script.py", b"", FILE)), ALL)
 
 
 async def test_a_damaged_zip_is_refused(here: Any, packed: bytes) -> None:
     for cut in range(100, len(packed), len(packed) // 40):
         torn = packed[:cut] + bytes(16) + packed[cut + 16 :]
         try:
-            await import_package(here, torn, ALL)
+            await here.package_import.import_package(torn, ALL)
         except (InvalidPackage, InvalidProject, NotFound):
             continue
 
@@ -537,7 +537,7 @@ async def test_bases_mixins_and_further_modules_go_along_and_come_back(
     }
     assert json.loads(files["package.json"])["name"] == "Tools"
     async with hub.opened(tmp_path / "b", [], monkeypatch) as other:
-        await import_package(other, published, NOTHING)
+        await other.package_import.import_package(published, NOTHING)
         assert {one.id: one.source for one in await other.storage.object_types()} == sources
         assert files_in(await other.build.publish("pro_t", "Tools"))["script.py"] == files["script.py"]
         # An extra module that is nowhere is named.
@@ -570,5 +570,5 @@ async def test_the_facts_of_a_stored_type_say_which_parameters_have_a_name_only(
         published = await there.build.publish("pro_t")
     assert 'tool.use(1, force=0.25, an="use")' in files_in(published)["script.py"].decode()
     async with hub.opened(tmp_path / "b", [], monkeypatch) as other:
-        await import_package(other, published, FROM_SCRIPT)
+        await other.package_import.import_package(published, FROM_SCRIPT)
         assert untimed(await other.storage.project("pro_t")) == project

@@ -6,7 +6,7 @@ import pytest
 
 from arcor2_hw.analysis import InstalledType, installed_types, module_name
 from arcor2_server.build.snapshot import files_of
-from arcor2_server.object_types.registry import PackageType
+from arcor2_server.object_types.catalog import PackageType
 
 
 @pytest.mark.parametrize("found", installed_types(), ids=lambda found: found.name)

@@ -27,8 +27,8 @@ from arcor2_hw.exceptions import InvalidPackage, InvalidProject, NotFound, Stora
 from arcor2_server.build import package
 from arcor2_server.build.service import BuildService, Ingredients, files_of
 from arcor2_server.errors import RequestRefused
-from arcor2_server.object_types.registry import PackageType
-from arcor2_server.rpc.build import build_project
+from arcor2_server.object_types.catalog import PackageType
+from arcor2_server.rpc.build import BuildRequests
 from arcor2_server.rpc.registry import Context
 from arcor2_server.storage import Storage, package_versions
 from tests.server.build import hub, workplace
@@ -368,12 +368,13 @@ async def test_the_request_builds_under_the_lock_of_the_project() -> None:
             yield
             seen.append("finished")
 
-    services: Any = types.SimpleNamespace(locks=Locks(), build=Build(), execution=Execution(), tasks=Tasks())
+    fakes: Any = (Locks(), Execution(), Build(), Tasks())
+    requests = BuildRequests(*fakes)
     client: Any = types.SimpleNamespace(user="ann", name="ann")
     args = BuildProjectArgs("pro_1", "Boards")
-    assert await build_project(Context(services, client), args) == BuildProjectData("pkg_1")
+    assert await requests.build_project(Context(client), args) == BuildProjectData("pkg_1")
     begun = f"{TaskKind.BUILD.value} 'Building the package Boards' of ann"
     assert seen == ["locked ann ('pro_1',)", begun, "build pro_1 Boards", "finished", "unlocked", "added pkg_1"]
     client.user = None
     with pytest.raises(RequestRefused):
-        await build_project(Context(services, client), args)
+        await requests.build_project(Context(client), args)

@@ -17,22 +17,42 @@ from arcor2_hw.data.rpc import RPCS
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.runtime.messages import TypeCode
+from arcor2_server.app.adapters import request_handlers
+from arcor2_server.collaboration.lock_takeover import LockTakeover
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.collaboration.presence import PresenceBoard
+from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.collaboration.users import Users
+from arcor2_server.compute.workers import Compute
 from arcor2_server.documents import Session
+from arcor2_server.execution.breakpoints import SharedBreakpoints
+from arcor2_server.execution.package_runs import PackageRuns
+from arcor2_server.execution.run_message import RunMessages
+from arcor2_server.execution.runs import Runs
 from arcor2_server.execution.service import Execution
-from arcor2_server.hosts.workspace_updates import tell_hosts
-from arcor2_server.online.online_scene import OnlineCell
-from arcor2_server.rpc import execution as _execution  # noqa: F401 - for their handlers
-from arcor2_server.rpc import robot as _robot  # noqa: F401 - for their handlers
-from arcor2_server.rpc import runs as _runs  # noqa: F401 - for their handlers
-from arcor2_server.rpc.registry import HANDLERS, Context
-from arcor2_server.services import Services
+from arcor2_server.execution.stop_all import StopAll
+from arcor2_server.hosts.pool import CellHosts
+from arcor2_server.hosts.session import HostSession
+from arcor2_server.online.motion import RobotMotion
+from arcor2_server.online.online_scene import OnlineScene
+from arcor2_server.online.opening import SceneOpening
+from arcor2_server.rpc.registry import Context
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore
+from arcor2_server.storage.damage_notices import DataDamage
+from arcor2_server.storage.packages import Packages
+from arcor2_server.storage.secret_store import SecretStore
+from arcor2_server.storage.setting_secrets import SettingSecrets
 from arcor2_server.websocket.hub import Hub
+from arcor2_server.workspace.collisions import CollisionWorld
+from arcor2_server.workspace.host_world import HostWorld
+from arcor2_server.workspace.kinematics import Kinematics
+from arcor2_server.workspace.robot_calibrations import RobotCalibrations
+from arcor2_server.workspace.robot_models import RobotModels
+from arcor2_server.workspace.robots import SceneRobots
+from arcor2_server.workspace.scene_collisions import SceneCollisions
 from tests.runtime.conftest import type_code
+from tests.server.parts import Parts
 
 PATIENCE = 15.0
 
@@ -105,8 +125,9 @@ class Types:
 
 
 class Server:
-    def __init__(self, services: Services, types: Types) -> None:
+    def __init__(self, services: Any, types: Types) -> None:
         self.services = services
+        self.handlers = request_handlers(services).by_request
         self.types = types
         self.client = Recorder("alice")
         services.hub.add(self.client)  # type: ignore[arg-type]
@@ -114,10 +135,10 @@ class Server:
     async def ask(self, name: str, args: Any = None, client: Recorder | None = None) -> Any:
         """Send a request as the endpoint does: the response takes its place among the events."""
         client = client or self.client
-        context = Context(self.services, client)  # type: ignore[arg-type]
+        context = Context(client)  # type: ignore[arg-type]
         if isinstance(args, dict):
             args = msgspec.convert(args, RPCS[name].args)
-        data = await HANDLERS[name](context, args)
+        data = await self.handlers[name](context, args)
         for event in context.events_before:
             self.services.hub.broadcast(event)
         client.put(msgspec.json.encode({"event": f"response {name}"}))
@@ -138,26 +159,70 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     data_dir.mkdir(exist_ok=True)
     settings = ServerSettings(data_dir=data_dir, streaming_period=0.05)
     hub, locks, types = Hub(), Locks(2, 0.05), Types()
+    known: Any = types
     none: Any = None
-    given: dict[str, Any] = dict.fromkeys(("access", "storage", "session", "cell", "execution", "build"), none)
-    given["users"] = Users(hub, locks, settings)
-    given["assets"] = await AssetStore.open(settings.assets_dir)
-    services = Services(settings=settings, hub=hub, locks=locks, types=types, **given)  # type: ignore[arg-type]
-    services.session = Session(services)
-    await services.session.open()
-    services.cell = OnlineCell(services)
-    services.execution = Execution(services)
-    tell_hosts(services)
-    services.presence = PresenceBoard(hub, services.users)
-    locks.tree = services.session
-    server = Server(services, types)
-    await services.users.register(server.client, server.client.name)  # type: ignore[arg-type]
+    users = Users(hub, locks, settings)
+    assets = await AssetStore.open(settings.assets_dir)
+    damage = DataDamage(data_dir, hub)
+    secrets = SettingSecrets(known, SecretStore(settings.secrets_file))
+    session = Session(settings, none, known, damage, secrets)
+    await session.open()
+    locks.tree = session
+    compute, tasks, hosts = Compute(settings.compute_idle), Tasks(hub), CellHosts(settings.device_files_dirs)
+    scene_host, program_host = HostSession(hub, hosts, "scene"), HostSession(hub, hosts, "program", everybody=True)
+    robots = SceneRobots(assets, known, session, scene_host)
+    calibrations = RobotCalibrations(settings, hub, known, session, scene_host, compute, damage, robots)
+    models, collisions = RobotModels(robots, calibrations), CollisionWorld(settings.scene_inflation)
+    scene_collisions = SceneCollisions(
+        assets, known, session, compute, collisions, robots, models, scene_host, program_host
+    )
+    world = HostWorld(collisions, calibrations, assets, scene_host, program_host)
+    opening = SceneOpening(settings, known, session, secrets, world)
+    online = OnlineScene(scene_host, opening, hub, locks, session, robots, tasks, calibrations)
+    runs = Runs(hub)
+    breakpoints = SharedBreakpoints(hub, none, session, none)
+    packages = Packages(settings.packages_dir, secrets.hide_in_package)
+    messages = RunMessages(settings, secrets, breakpoints, world)
+    execution = Execution(packages, program_host, online, settings, hub, known, runs, breakpoints, secrets, messages)
+    presence = PresenceBoard(hub, users)
+    takeover = LockTakeover(locks, users, session.name_of)
+    kinematics = Kinematics(known, scene_host, compute, robots, models, scene_collisions)
+    parts: Any = Parts(
+        settings=settings,
+        hub=hub,
+        users=users,
+        locks=locks,
+        assets=assets,
+        types=types,
+        session=session,
+        compute=compute,
+        hosts=hosts,
+        tasks=tasks,
+        robots=robots,
+        robot_calibrations=calibrations,
+        robot_models=models,
+        collisions=collisions,
+        scene_collisions=scene_collisions,
+        kinematics=kinematics,
+        online=online,
+        motion=RobotMotion(hub, known, session, online, robots, kinematics),
+        execution=execution,
+        runs=runs,
+        breakpoints=breakpoints,
+        presence=presence,
+        lock_takeover=takeover,
+        package_runs=PackageRuns(hub, users, locks, session, online, execution, presence, takeover),
+        stop_all=StopAll(session, online, execution),
+    )
+    server = Server(parts, types)
+    await users.register(server.client, server.client.name)  # type: ignore[arg-type]
     try:
         yield server
     finally:
-        services.presence.close()
-        await services.cell.close()
-        await services.session.close()
+        presence.close()
+        await execution.close()
+        await online.close()
+        await session.close()
 
 
 Test = Callable[[Server], Awaitable[None]]

@@ -132,7 +132,7 @@ async def test_a_host_killed_in_a_run(server: Server) -> None:
     write(server, 'lamp.wait(an="a")')
     await server.ask("RunPackage", {"id": "pkg_1"})
     await server.client.event("ActionStateBefore")
-    host = server.services.execution._host
+    host = server.services.execution._host.host
     assert host is not None
     began = time.monotonic()
     os.kill(host.pid, signal.SIGKILL)

@@ -107,7 +107,7 @@ async def test_how_runs_end(server: Server) -> None:
 
     await server.ask("RunPackage", {"id": "pkg_wait"})
     await server.client.event("ActionStateBefore", lambda data: data["action_id"] == "act_b")
-    host = server.services.execution._host
+    host = server.services.execution._host.host
     assert host is not None
     host.kill()
     await server.client.state("stopped", "PackageState")
@@ -184,8 +184,8 @@ async def test_the_newest_runs_and_actions_are_kept(tmp_path: Any, monkeypatch: 
         for _ in range(8):
             number = kept.begin("pkg", by="", temporary=False, start_paused=False)
             for action in range(1, 6):
-                kept.told(m.ProgramEvent("ActionStateBefore", BEFORE, action, "a", time.time()))
-                kept.told(m.ProgramEvent("ActionStateAfter", AFTER, action, time=0.1))
+                kept.announced(m.ProgramEvent("ActionStateBefore", BEFORE, action, "a", time.time()))
+                kept.announced(m.ProgramEvent("ActionStateAfter", AFTER, action, time=0.1))
             if number != 8:
                 kept.end(number, RunEnd.FINISHED)
         assert [run.number for run in kept.newest(100)] == [8, 7, 6, 5, 4]

@@ -126,11 +126,11 @@ class Hand:
 
 
 async def report(server: Server) -> tuple[Any, ...]:
-    return tuple(json.loads(await server.services.cell.call(OBJ, "report")))
+    return tuple(json.loads(await server.services.online.call(OBJ, "report")))
 
 
 async def do(server: Server, method: str, **args: Any) -> None:
-    await server.services.cell.call(OBJ, method, args)
+    await server.services.online.call(OBJ, method, args)
 
 
 async def join(server: Server, user: str, role: Role = Role.PROGRAMMER) -> Recorder:
@@ -215,8 +215,8 @@ async def test_whose_connection_ends_lets_go(arm: Server) -> None:
     told = await bob.event("RobotHold", lambda data: not data["held"])
     assert "alice is not connected" in told["reason"]
     assert (await report(arm))[1] == 1
-    assert arm.services.cell.held.holder(OBJ) is None
-    assert arm.services.cell.moving == set()
+    assert arm.services.online.held.holder(OBJ) is None
+    assert arm.services.online.moving == set()
 
 
 @serving(with_arm)
@@ -235,7 +235,7 @@ async def test_late_requests_are_thrown_away(arm: Server) -> None:
     began = time.monotonic()
     hand.number -= 1
     await hand.jog(sent_ms=theirs(0.2))  # 0.1 s are left of it
-    while arm.services.cell.held.holder(OBJ):
+    while arm.services.online.held.holder(OBJ):
         assert time.monotonic() - began < 0.28, "what was lost on the way was not taken off"
         await asyncio.sleep(0.005)
     assert len((await report(arm))[0]) == 2
@@ -306,7 +306,7 @@ async def test_wrong_arguments(arm: Server) -> None:
         args = {key: value for key, value in args.items() if value is not None}
         with pytest.raises(Arcor2Error, match=text):
             await arm.ask("JogRobot", args | {"sent_ms": time.monotonic() * 1e3})
-        assert arm.services.cell.moving == set(), text
+        assert arm.services.online.moving == set(), text
     assert (await report(arm))[0] == []
 
 
@@ -318,7 +318,7 @@ async def test_hand_teaching_while_held(arm: Server) -> None:
     told = await arm.client.event("HandTeachingMode")
     assert told == {"robot_id": OBJ, "enabled": True}
     await hand.teach()
-    assert arm.services.cell.held.states()[0].kind == "hand_teaching"
+    assert arm.services.online.held.states()[0].kind == "hand_teaching"
     await hand.teach(0)
     assert await arm.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": False}
     assert (await report(arm))[2] == [True, False]
@@ -372,7 +372,7 @@ async def test_stop_by_anybody_and_a_scene_that_goes_offline(arm: Server) -> Non
     await arm.ask("StopScene")
     told = await operator.event("RobotHold", lambda data: not data["held"])
     assert told["reason"]
-    assert arm.services.cell.held.states() == []
+    assert arm.services.online.held.states() == []
 
 
 @serving(with_arm)

@@ -8,14 +8,14 @@ import pytest
 
 from arcor2_hw.runtime import messages as m
 from arcor2_server.hosts import process as host_module
-from arcor2_server.hosts.process import CellHost, _Wire
+from arcor2_server.hosts.process import CellHost, _Connection
 
 
 class Listener:
     def __init__(self) -> None:
         self.heard: list[str] = []
 
-    def host_said(self, host: CellHost, message: Any) -> None:
+    def host_message(self, host: CellHost, message: Any) -> None:
         self.heard.append(message.text)
 
     def host_silent(self, host: CellHost, silent: bool) -> None:
@@ -32,8 +32,8 @@ async def test_all_is_heard_before_the_end_is_told(monkeypatch: pytest.MonkeyPat
     async def wait() -> int:
         return 0
 
-    process: Any = SimpleNamespace(pid=1, returncode=0, wait=wait)
-    wire, listener = _Wire(), Listener()
+    process: Any = SimpleNamespace(pid=1, returncode=0, wait=wait, kill=lambda: None)
+    wire, listener = _Connection(), Listener()
     wire.host = host = CellHost(process, wire)
     host.user = listener
     watching = asyncio.create_task(host._watch_end())

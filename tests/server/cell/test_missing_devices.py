@@ -92,7 +92,7 @@ async def test_the_scene_comes_up_without_it_and_a_retry_brings_it_in(server: Se
     await server.ask("ExecuteAction", {"action_id": "act_here"})
     assert (await client.event("ActionResult"))["results"] == ["true"]
     async with asyncio.timeout(PATIENCE):  # what is told of one that is there comes with the next look at it
-        while [one.state for one in server.services.cell.board.states()] != ["online", "failed"]:
+        while [one.state for one in server.services.online.board.states()] != ["online", "failed"]:
             await asyncio.sleep(0.01)
 
     with pytest.raises(Arcor2Error, match=r"192\.0\.2\.7:502"):
@@ -135,11 +135,11 @@ async def test_health_and_alarms_are_told(server: Server) -> None:
     await boxes.open()
     boxes.away.touch()
     await server.start()
-    await server.services.cell.call("obj_here", "heat")
+    await server.services.online.call("obj_here", "heat")
     hot = await client.event("ObjectHealth", lambda data: data["health"] == "off_spec" and data["alarms"])
     assert hot["object_id"] == "obj_here"
     assert [alarm["remedy"] for alarm in hot["alarms"]] == ["let it cool"]
-    assert [one.health for one in server.services.cell.board.healths()] == ["off_spec", "normal"]
+    assert [one.health for one in server.services.online.board.healths()] == ["off_spec", "normal"]
 
 
 ARM = """

@@ -167,7 +167,7 @@ async def test_a_setting_names_no_file_outside_the_device_files(server: Server) 
 
 @serving(with_arm)
 async def test_up_and_down(arm: Server) -> None:
-    cell, client = arm.services.cell, arm.client
+    cell, client = arm.services.online, arm.client
     with pytest.raises(RequestRefused):
         await arm.ask("StopScene")
     await arm.ask("StartScene")
@@ -223,12 +223,12 @@ async def test_a_failed_start_says_why_and_a_later_one_works(server: Server) -> 
 @serving(with_arm)
 async def test_a_crash_takes_the_scene_offline_within_a_second(arm: Server) -> None:
     await arm.start()
-    cell = arm.services.cell
-    assert cell._host is not None
+    cell = arm.services.online
+    assert cell._host.host is not None
     call = asyncio.create_task(cell.call(OBJ, "pick", {"where": Pose(), "offset": 9.0}))
     await asyncio.sleep(0.05)
     began = time.monotonic()
-    os.kill(cell._host.pid, signal.SIGKILL)
+    os.kill(cell._host.host.pid, signal.SIGKILL)
     stopped = await arm.client.state("stopped")
     assert time.monotonic() - began < 1.0
     assert "SIGKILL" in stopped["message"]
@@ -241,7 +241,7 @@ async def test_a_crash_takes_the_scene_offline_within_a_second(arm: Server) -> N
 async def test_a_driver_that_ends_the_process(arm: Server) -> None:
     await arm.start()
     with pytest.raises(ConnectionLost):
-        await arm.services.cell.call(OBJ, "vanish")
+        await arm.services.online.call(OBJ, "vanish")
     assert "status 9" in (await arm.client.state("stopped"))["message"]
 
 
@@ -262,7 +262,7 @@ async def test_a_driver_that_ends_the_process_while_it_connects(server: Server) 
 @serving(with_arm)
 async def test_silence_is_reported_and_forgiven(arm: Server) -> None:
     await arm.start()
-    cell = arm.services.cell
+    cell = arm.services.online
     arm.services.hub.subscribe(arm.client, {"ObjectState"}, True)  # type: ignore[arg-type]
     began = time.monotonic()
     call = asyncio.create_task(cell.call(OBJ, "freeze"))
@@ -425,7 +425,7 @@ async def test_cancel(arm: Server) -> None:
     await arm.ask("CancelAction")
     await arm.client.event("ActionCancelled")
     async with asyncio.timeout(2):
-        while arm.services.cell.running_action is not None:
+        while arm.services.online.running_action is not None:
             await asyncio.sleep(0.01)
     assert all(event["event"] != "ActionResult" for event in arm.client.got)
     await _execute(arm, "act_literal")
@@ -435,16 +435,16 @@ async def test_cancel(arm: Server) -> None:
 async def test_an_action_cut_off_by_a_crash_ends_with_an_error(arm: Server) -> None:
     await arm.start()
     await arm.ask("ExecuteAction", {"action_id": "act_long"})
-    assert arm.services.cell._host is not None
-    arm.services.cell._host.kill()
+    assert arm.services.online._host.host is not None
+    arm.services.online._host.host.kill()
     assert "SIGKILL" in (await arm.client.event("ActionResult"))["error"]
-    assert arm.services.cell.running_action is None
-    assert arm.services.cell.results == {}
+    assert arm.services.online.running_action is None
+    assert arm.services.online.results == {}
 
 
 @serving(with_arm)
 async def test_a_moved_object_moves_live(arm: Server) -> None:
     await arm.start()
-    await arm.services.cell.object_pose_changed(OBJ, Pose(Position(5, 0, 0)))
-    raw = await arm.services.cell.call(OBJ, "pose")
+    await arm.services.online.object_pose_changed(OBJ, Pose(Position(5, 0, 0)))
+    raw = await arm.services.online.call(OBJ, "pose")
     assert json.loads(raw)["position"]["x"] == 5

@@ -63,7 +63,7 @@ async def move(server: Server, values: tuple[float, ...], safe: bool = True) -> 
 @serving(with_uploads)
 async def test_around_a_mesh_or_refused(server: Server) -> None:
     assert (await move(server, ACROSS))["move_event_type"] == "end"
-    assert int(await server.services.cell.call("obj_arm", "waypoints")) > 2
+    assert int(await server.services.online.call("obj_arm", "waypoints")) > 2
     inside = (1.57, *READY[1:])
     failed = await move(server, inside)
     assert failed["move_event_type"] == "failed"
@@ -108,7 +108,7 @@ async def line(server: Server, to: Position) -> str:
 
 
 async def height(server: Server) -> float:
-    return (await server.services.cell.end_effector_pose(OBJ, "tcp")).position.z
+    return (await server.services.online.end_effector_pose(OBJ, "tcp")).position.z
 
 
 @serving(with_arm_alone)
@@ -179,7 +179,7 @@ def write(server: Server) -> None:
 
 @serving(with_arm_alone)
 async def test_the_arm_is_led_as_its_controller_told_also_in_programs(server: Server) -> None:
-    kept = server.services.arm_calibrations
+    kept = server.services.robot_calibrations
     try:
         await server.start()
         await kept.settled()

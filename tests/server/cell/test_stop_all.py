@@ -142,7 +142,7 @@ def missed(data: StopAllData) -> dict[str, Any]:
 
 async def ended(server: Server, within: float = 1.0) -> None:
     async with asyncio.timeout(within):
-        while server.services.cell.running_action is not None:
+        while server.services.online.running_action is not None:
             await asyncio.sleep(0.01)
 
 
@@ -174,7 +174,7 @@ async def test_what_cannot_be_stopped_is_named_at_once_and_does_not_keep_the_sce
     assert {outcome.name for outcome in data.outcomes if outcome.stopped} == {"screwdriver"}
     assert "press: run cannot be stopped" in missed(data)["press_1"]
     assert all(word in missed(data)["press_1"] for word in ("Press", "stop()", "CANCEL_MAPPING"))
-    assert server.services.cell.running_action is not None
+    assert server.services.online.running_action is not None
     assert all(event["event"] != "ActionCancelled" for event in server.client.got)
     began = time.monotonic()
     await server.ask("StopScene")
@@ -221,7 +221,7 @@ async def test_what_was_requested_before_does_not_start_after(server: Server) ->
 async def test_a_frozen_host_is_named(server: Server) -> None:
     await server.start()
     await trying(server, "screwdriver")
-    host = server.services.cell._host
+    host = server.services.online._host.host
     assert host is not None
     os.kill(host.pid, signal.SIGSTOP)
     try:

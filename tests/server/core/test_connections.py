@@ -17,11 +17,11 @@ import uvloop
 from websockets.asyncio.client import connect
 
 from arcor2_server.access import certificate
+from arcor2_server.access.connection_limits import OWN_FILES, Connection, ConnectionLimits
 from arcor2_server.settings import ServerSettings
 from arcor2_server.web import http_server
-from arcor2_server.web.connection_limits import OWN_FILES, Connection, ConnectionLimits
 from arcor2_server.web.http_server import Server, configuration
-from arcor2_server.websocket.transport import EXTENSION, LONGEST_UNADMITTED
+from arcor2_server.web.websocket_transport import EXTENSION, LONGEST_UNADMITTED
 from tests.server.core.serving import Talker, running, talking, until
 
 TIMEOUT = 0.3

@@ -7,18 +7,18 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 import structlog
 from litestar.datastructures import Address
 
 from arcor2_hw.exceptions import DeviceTimeout
-from arcor2_server.app import running_services
+from arcor2_server.app import Server, running_server
+from arcor2_server.app.application import endpoints
 from arcor2_server.errors import RequestRefused
-from arcor2_server.rpc.registry import AT_ONCE, HANDLERS, Context, Handler
-from arcor2_server.services import Services
 from arcor2_server.settings import ServerSettings
-from arcor2_server.websocket.endpoint import Endpoint
-from arcor2_server.websocket.transport import EXTENSION
+from arcor2_server.web.websocket_transport import EXTENSION
+from arcor2_server.websocket.request import Context, Handler
 
 
 class Protocol:
@@ -73,39 +73,40 @@ class Socket:
 
 
 @pytest.fixture
-async def services(tmp_path: Path) -> AsyncIterator[Services]:
-    async with running_services(ServerSettings(data_dir=tmp_path, requests_in_flight=2)) as running:
+async def services(tmp_path: Path) -> AsyncIterator[Server]:
+    async with running_server(ServerSettings(data_dir=tmp_path, requests_in_flight=2)) as running:
         yield running
 
 
 @asynccontextmanager
-async def connecting(services: Services) -> AsyncIterator[Callable[[], Socket]]:
-    """Connect to an endpoint that knows the handlers of this moment."""
+async def connecting(services: Server) -> AsyncIterator[Callable[[], Socket]]:
+    """Connect to an endpoint whose routes a test may change by `handle`."""
     tasks: list[asyncio.Task[None]] = []
     sockets: list[Socket] = []
-    endpoint: list[Endpoint] = []
+    endpoint = endpoints(services)[0]
 
     def make() -> Socket:
-        if not endpoint:
-            endpoint.append(Endpoint(services))
         socket: Any = Socket()
         sockets.append(socket)
-        tasks.append(asyncio.create_task(endpoint[0].serve(socket)))
+        tasks.append(asyncio.create_task(endpoint.serve(socket)))
         return socket  # type: ignore[no-any-return]
 
+    make.routes = endpoint.service.routes  # type: ignore[attr-defined]
     yield make
     for socket in sockets:
         socket.hang_up()
     await asyncio.gather(*tasks)
-    for each in endpoint:
-        await each.close()
+    await endpoint.close()
 
 
-def handle(monkeypatch: pytest.MonkeyPatch, name: str, handler: Handler) -> None:
-    monkeypatch.setitem(HANDLERS, name, handler)
+def handle(connect: Any, name: str, handler: Handler | None = None, **fields: Any) -> None:
+    """Replace the handler of a request, or other fields of its route."""
+    if handler is not None:
+        fields["handler"] = handler
+    connect.routes[name] = msgspec.structs.replace(connect.routes[name], **fields)
 
 
-async def test_events_before_answer_events_after(services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_events_before_answer_events_after(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     async with connecting(services) as connect:
 
         async def handler(context: Context, args: None) -> set[str]:
@@ -113,7 +114,7 @@ async def test_events_before_answer_events_after(services: Services, monkeypatch
             context.emit_first("ProjectSaved")
             return {"x"}
 
-        handle(monkeypatch, "SaveScene", handler)
+        handle(connect, "SaveScene", handler)
         ann, bob = connect(), connect()
         await bob.heard(1)
         ann.say(id=1, request="SaveScene")
@@ -123,7 +124,7 @@ async def test_events_before_answer_events_after(services: Services, monkeypatch
         assert [one["event"] for one in (await bob.heard(3))[1:]] == ["ProjectSaved", "SceneSaved"]
 
 
-async def test_refusal_drops_events_unless_a_part_was_done(services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_refusal_drops_events_unless_a_part_was_done(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     async with connecting(services) as connect:
 
         async def refused(context: Context, args: None) -> None:
@@ -134,8 +135,8 @@ async def test_refusal_drops_events_unless_a_part_was_done(services: Services, m
             context.emit_first("ProjectSaved")
             raise RequestRefused("not all", ["a"])
 
-        handle(monkeypatch, "SaveScene", refused)
-        handle(monkeypatch, "SaveProject", partly)
+        handle(connect, "SaveScene", refused)
+        handle(connect, "SaveProject", partly)
         ann = connect()
         ann.say(id=1, request="SaveScene")
         await ann.heard(2)
@@ -147,20 +148,20 @@ async def test_refusal_drops_events_unless_a_part_was_done(services: Services, m
         ]
 
 
-async def test_error_of_ours_is_the_message(services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_error_of_ours_is_the_message(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     async with connecting(services) as connect:
 
         async def handler(context: Context, args: None) -> None:
             raise DeviceTimeout("robot at 10.0.0.1 did not answer", detail="register 7")
 
-        handle(monkeypatch, "SaveScene", handler)
+        handle(connect, "SaveScene", handler)
         ann = connect()
         ann.say(id=1, request="SaveScene")
         assert (await ann.heard(2))[1]["messages"] == ["robot at 10.0.0.1 did not answer"]
 
 
 async def test_what_nobody_foresaw_is_answered_with_a_reference_to_the_log(
-    services: Services, monkeypatch: pytest.MonkeyPatch
+    services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async with connecting(services) as connect:
 
@@ -170,12 +171,12 @@ async def test_what_nobody_foresaw_is_answered_with_a_reference_to_the_log(
         async def not_encodable(context: Context, args: None) -> Any:
             return object()
 
-        def no_kept_answer(services: Services) -> Any:
+        def no_cached_answer() -> Any:
             raise ZeroDivisionError
 
-        handle(monkeypatch, "SaveScene", handler)
-        handle(monkeypatch, "SaveProject", not_encodable)
-        monkeypatch.setitem(AT_ONCE, "SystemInfo", no_kept_answer)
+        handle(connect, "SaveScene", handler)
+        handle(connect, "SaveProject", not_encodable)
+        handle(connect, "SystemInfo", cached=no_cached_answer)
         ann = connect()
         with structlog.testing.capture_logs() as logged:
             monkeypatch.setattr("arcor2_server.websocket.endpoint.log", structlog.get_logger())
@@ -190,7 +191,7 @@ async def test_what_nobody_foresaw_is_answered_with_a_reference_to_the_log(
         assert answers[3]["result"] is True
 
 
-async def test_bounded_number_in_flight(services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_bounded_number_in_flight(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     async with connecting(services) as connect:
         started: list[int] = []
         go_on = asyncio.Event()
@@ -199,7 +200,7 @@ async def test_bounded_number_in_flight(services: Services, monkeypatch: pytest.
             started.append(1)
             await go_on.wait()
 
-        handle(monkeypatch, "SaveScene", handler)
+        handle(connect, "SaveScene", handler)
         ann = connect()
         for number in range(10):
             ann.say(id=number, request="SaveScene")
@@ -215,7 +216,7 @@ async def test_bounded_number_in_flight(services: Services, monkeypatch: pytest.
         assert len(started) == 10
 
 
-async def test_request_of_one_who_leaves_is_finished(services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_request_of_one_who_leaves_is_finished(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     async with connecting(services) as connect:
         entered, go_on, done = asyncio.Event(), asyncio.Event(), asyncio.Event()
 
@@ -224,7 +225,7 @@ async def test_request_of_one_who_leaves_is_finished(services: Services, monkeyp
             await go_on.wait()
             done.set()
 
-        handle(monkeypatch, "SaveScene", handler)
+        handle(connect, "SaveScene", handler)
         ann = connect()
         ann.say(id=1, request="SaveScene")
         await entered.wait()
@@ -234,7 +235,7 @@ async def test_request_of_one_who_leaves_is_finished(services: Services, monkeyp
             await done.wait()
 
 
-async def test_a_name_of_megabytes_is_refused_and_nobody_is_told(services: Services) -> None:
+async def test_a_name_of_megabytes_is_refused_and_nobody_is_told(services: Server) -> None:
     async with connecting(services) as connect:
         ann, bob = connect(), connect()
         await bob.heard(1)

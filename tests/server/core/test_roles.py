@@ -9,11 +9,11 @@ from litestar import Litestar
 from arcor2_hw.data.events import EVENTS
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
-from arcor2_server.app import create_app, running_services
+from arcor2_server.access.route_options import ROLE
+from arcor2_server.app import create_app, running_server
 from arcor2_server.cli.role_table import page
 from arcor2_server.events import make_event
-from arcor2_server.rest.responses import ROLE
-from arcor2_server.rpc.registry import HANDLERS
+from arcor2_server.rpc.registry import DECLARED
 from arcor2_server.settings import ServerSettings
 from arcor2_server.websocket.client import Client, Wire
 from arcor2_server.websocket.hub import Hub
@@ -22,7 +22,7 @@ from tests.server.core.test_every_message_answered import meaningless
 
 
 async def test_every_route_declares_its_least_role(tmp_path: Path) -> None:
-    async with running_services(ServerSettings(data_dir=tmp_path)) as services:
+    async with running_server(ServerSettings(data_dir=tmp_path)) as services:
         app: Litestar = create_app(services)
     handlers: dict[str, Any] = {}
     for route in app.routes:
@@ -39,8 +39,8 @@ async def test_every_route_declares_its_least_role(tmp_path: Path) -> None:
 
 
 def test_every_handler_is_of_a_declared_request() -> None:
-    assert set(HANDLERS) <= set(RPCS)
-    assert all(isinstance(RPCS[name].role, Role) for name in HANDLERS)
+    assert set(DECLARED) <= set(RPCS)
+    assert all(isinstance(RPCS[name].role, Role) for name in DECLARED)
     assert all(isinstance(event.role, Role) for event in EVENTS.values())
 
 
@@ -82,7 +82,7 @@ async def test_event_needs_its_role(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 
 
 async def test_the_page_of_roles_is_what_is_declared(tmp_path: Path) -> None:
-    async with running_services(ServerSettings(data_dir=tmp_path)) as services:
+    async with running_server(ServerSettings(data_dir=tmp_path)) as services:
         made = page(create_app(services))
     text = (Path(__file__).resolve().parents[3] / "docs/reference/roles.md").read_text()
     assert text == made, "run: python -m arcor2_server.cli.role_table > docs/reference/roles.md"

@@ -11,7 +11,7 @@ import pytest
 
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene, SceneObject
-from arcor2_server.app import running_services
+from arcor2_server.app import running_server
 from arcor2_server.settings import ServerSettings
 
 MODULES = 1150
@@ -32,10 +32,10 @@ START = """
 import asyncio, json, sys
 from pathlib import Path
 import arcor2_server.cli.main, arcor2_server.cli.serve
-from arcor2_server.app import create_app, running_services
+from arcor2_server.app import create_app, running_server
 from arcor2_server.settings import ServerSettings
 async def start():
-    async with running_services(ServerSettings(data_dir=Path(sys.argv[1]))) as services:
+    async with running_server(ServerSettings(data_dir=Path(sys.argv[1]))) as services:
         create_app(services)
         print(json.dumps(sorted(sys.modules)))
 asyncio.run(start())
@@ -43,7 +43,7 @@ asyncio.run(start())
 
 
 async def test_a_start_imports_only_what_it_needs(tmp_path: Path) -> None:
-    async with running_services(ServerSettings(data_dir=tmp_path)):
+    async with running_server(ServerSettings(data_dir=tmp_path)):
         pass  # creates the database, which takes more imports than opening it
     started = subprocess.run(
         [sys.executable, "-c", START, str(tmp_path)], stdout=subprocess.PIPE, check=True, timeout=60
@@ -55,28 +55,28 @@ async def test_a_start_imports_only_what_it_needs(tmp_path: Path) -> None:
 
 async def test_a_second_start_parses_no_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = ServerSettings(data_dir=tmp_path)
-    async with running_services(settings) as first:
+    async with running_server(settings) as first:
         known = first.types.metas()
     monkeypatch.setattr(ast, "parse", None)
-    async with running_services(settings) as second:
+    async with running_server(settings) as second:
         assert second.types.metas() == known
         assert second.types.actions("TimeActions")
 
 
 async def test_a_damaged_analysis_is_made_again(tmp_path: Path) -> None:
     settings = ServerSettings(data_dir=tmp_path)
-    async with running_services(settings) as first:
+    async with running_server(settings) as first:
         known = first.types.metas()
     intact = settings.analysis_file.read_bytes()
     settings.analysis_file.write_bytes(intact[: len(intact) // 3])
-    async with running_services(settings) as second:
+    async with running_server(settings) as second:
         assert second.types.metas() == known
     assert settings.analysis_file.read_bytes() == intact
 
 
 async def test_a_second_start_checks_no_saved_document_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = ServerSettings(data_dir=tmp_path)
-    async with running_services(settings) as first:
+    async with running_server(settings) as first:
         await first.storage.put_scene(Scene("good", id="scn_good"))
         lamp = SceneObject("lamp", "NoSuchType", id="obj_lamp")
         await first.storage.put_scene(Scene("bad", id="scn_bad", objects=[lamp]))
@@ -87,7 +87,7 @@ async def test_a_second_start_checks_no_saved_document_again(tmp_path: Path, mon
         assert of_scenes["scn_good"] == []
         assert "NoSuchType" in of_scenes["scn_bad"][0]
         assert "NoSuchType" in of_projects["pro_bad"][0]
-    async with running_services(settings) as second:
+    async with running_server(settings) as second:
         read: list[str] = []
         original = second.storage.scenes_with_ids
 
@@ -105,5 +105,5 @@ async def test_a_second_start_checks_no_saved_document_again(tmp_path: Path, mon
         assert (await second.saved_problems.of_projects(projects, scenes))["pro_bad"] == []
         assert read == ["scn_bad", "scn_bad"]
     settings.problems_file.write_bytes(b"damaged")
-    async with running_services(settings) as third:
+    async with running_server(settings) as third:
         assert (await third.saved_problems.of_scenes(scenes))["scn_bad"] == []

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tests.server.machine.picture import Picture
+from tests.server.document_picture import Picture
 from tests.server.session.desk import Desk, Person
 
 Flat = dict[tuple[str, str], Any]

@@ -19,9 +19,9 @@ from arcor2_hw.data.rpc import RPCS
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks import action_meta, project_problems
 from arcor2_server.documents.logic import check_logic_item
+from tests.server.crash_copy import copy_at_one_moment
+from tests.server.document_picture import Picture
 from tests.server.machine.client import Client, Flat, flat
-from tests.server.machine.crash_copy import copy_at_one_moment
-from tests.server.machine.picture import Picture
 from tests.server.machine.requests import EDITS, SCENE_EDITS, Draw, Request
 from tests.server.session.desk import Refused, open_desk
 from tests.server.session.work import Work

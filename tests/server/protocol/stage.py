@@ -13,10 +13,9 @@ from arcor2_hw.data.events import EVENTS
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Mesh, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.rpc import RPCS
-from arcor2_server.app import running_services
-from arcor2_server.services import Services
+from arcor2_server.app import Server, running_server
+from arcor2_server.app.application import endpoints
 from arcor2_server.settings import ServerSettings
-from arcor2_server.websocket.endpoint import Endpoint
 from tests.server.protocol import devices
 from tests.server.session.desk import Person, Refused
 
@@ -105,9 +104,9 @@ class Actor(Person):
 class Stage:
     """What a test speaks to."""
 
-    def __init__(self, services: Services) -> None:
+    def __init__(self, services: Server) -> None:
         self.services = services
-        self.endpoint = Endpoint(services)
+        self.endpoint = endpoints(services)[0]
         self.ids: dict[str, str] = {}
         self.faults: list[str] = []
         """What is wrong with messages that were sent."""
@@ -130,7 +129,7 @@ class Stage:
 
     async def spare_host(self) -> None:
         """Return when the host that stands by is up."""
-        hosts = self.services.cell.hosts
+        hosts = self.services.hosts
         hosts.prepare()
         spare = hosts._spare
         assert spare is not None
@@ -204,7 +203,7 @@ async def _nothing_much() -> AsyncIterator[bytes]:
 async def open_stage(directory: Path, *types: str, **settings: Any) -> AsyncIterator[Stage]:
     """Bring up a server with the named types uploaded."""
     given: dict[str, Any] = {"lock_retries": 2, "lock_retry_wait": 0.02, "streaming_period": 0.05} | settings
-    async with running_services(ServerSettings(data_dir=directory, **given)) as services:
+    async with running_server(ServerSettings(data_dir=directory, **given)) as services:
         for asset in ("part.stl", "arm.zip") if types else ():
             await services.assets.put(_nothing_much(), asset)
         for name in types:

@@ -80,7 +80,7 @@ async def put_tip(stage: Stage, actor: Actor, position: Position) -> None:
     """Move the arm there; the lock for that is not the one that the user holds."""
     pose = msgspec.to_builtins(Pose(position, Orientation(1, 0, 0, 0)))
     raw: dict[str, Any] = {"end_effector_id": "tip", "target_pose": pose, "speed": 1.0}
-    await stage.services.cell.call(stage.ids["arm"], "move_to_pose", raw)
+    await stage.services.online.call(stage.ids["arm"], "move_to_pose", raw)
     actor.take()
 
 
@@ -121,7 +121,7 @@ async def test_aiming(tmp_path: Path) -> None:
         assert "aiming already" in await refused(alice, "ObjectAimingStart", **start)
         assert "not aiming" in await refused(bob, "ObjectAimingAddPoint", point_idx=0)
         for wrong in (-1, 4):
-            assert "no focus point" in await refused(alice, "ObjectAimingAddPoint", point_idx=wrong)
+            assert "does not exist" in await refused(alice, "ObjectAimingAddPoint", point_idx=wrong)
         assert "missing: 0, 1, 2, 3" in await refused(alice, "ObjectAimingDone")
 
         done: list[int] = []
@@ -145,7 +145,7 @@ async def test_aiming(tmp_path: Path) -> None:
         changed = await happens(bob, "SceneObjectChanged")
         assert changed["id"] == part
         assert near(msgspec.convert(changed["pose"], Pose), TRUE_POSE)
-        live = await stage.services.cell.ask(Pose, part, "pose")
+        live = await stage.services.online.ask(Pose, part, "pose")
         assert near(live, TRUE_POSE)
         assert "not aiming" in await refused(alice, "ObjectAimingDone")
         # The locks stay with the user.

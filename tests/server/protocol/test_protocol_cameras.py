@@ -20,8 +20,8 @@ from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.camera import CameraParameters, Corner, MarkerCorners
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import Arcor2Error, NotFound
-from arcor2_server.compute.calibration import RobotView
-from arcor2_server.compute.process import Told
+from arcor2_server.compute.process import ProgressCallback
+from arcor2_server.workspace.calibration import RobotView
 from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused
 
 PARAMETERS = {"fx": 600, "fy": 610, "cx": 320, "cy": 240, "dist_coefs": [0, 0, 0, 0]}
@@ -49,7 +49,7 @@ class Service:
         pictures: list[bytes],
         *,
         expected: Pose | None = None,
-        told: Told | None = None,
+        on_progress: ProgressCallback | None = None,
     ) -> CameraPose:
         await self._take(parameters, pictures, expected)
         return CameraPose(
@@ -72,10 +72,10 @@ class Service:
         return [MarkerCorners(10, [Corner(1, 2), Corner(3, 2), Corner(3, 4), Corner(1, 4)])]
 
     async def robot(
-        self, model: RobotSource, view: RobotView, depth: list[bytes], *, told: Told | None = None
+        self, model: RobotSource, view: RobotView, depth: list[bytes], *, on_progress: ProgressCallback | None = None
     ) -> RobotPose:
-        if told is not None:
-            told(0.5, "looking for the robot")
+        if on_progress is not None:
+            on_progress(0.5, "looking for the robot")
         await self._take(view, depth, model)
         return RobotPose(
             pose=FOUND,
@@ -97,11 +97,19 @@ class Service:
         )
 
 
+def replaced_calibration(stage: Stage) -> Service:
+    """Let a service answer in place of the stage's own."""
+    service = Service()
+    for method in ("camera", "markers", "robot"):
+        setattr(stage.services.calibration, method, getattr(service, method))
+    return service
+
+
 async def ready(stage: Stage, **objects: str) -> tuple[Actor, Service]:
     alice = await stage.person("alice")
     await stage.place(alice, **objects)
     await stage.start(alice)
-    service = stage.services.calibration = Service()
+    service = replaced_calibration(stage)
     return alice, service
 
 
@@ -151,7 +159,7 @@ async def test_pictures_of_clients_go_to_the_calibration_service(tmp_path: Path,
         # A picture that is none; without markers that are configured it is not even looked at.
         words = "No markers are configured" if request_name == "GetCameraPose" else "picture"
         assert words in await refused(stranger, request_name, **args)
-        service = stage.services.calibration = Service()
+        service = replaced_calibration(stage)
         if request_name == "GetCameraPose":
             answer = await stranger.ask(request_name, **args, inverse=True)
             assert answer["quality"] == 0.75
@@ -207,7 +215,7 @@ async def test_a_camera_is_put_where_its_picture_says(tmp_path: Path) -> None:
         assert expected == Pose(), "where it was placed"
         placed = stage.services.session.scene_object(eye)
         assert placed.pose == FOUND
-        raw = await stage.services.cell.ask(Pose, eye, "pose")
+        raw = await stage.services.online.ask(Pose, eye, "pose")
         assert raw == FOUND, "the live camera has moved too"
         (record,) = await stage.services.calibration_records.find(object_id=eye)
         assert (record.kind, record.person, record.object_name) == (CalibrationKind.CAMERA_POSE, "alice", "eye")

@@ -73,7 +73,7 @@ async def forward(alice: Actor, robot: str, joints: Any) -> Pose:
 
 async def test_offline_joints_come_from_the_model(stage: Stage, alice: Actor) -> None:
     robot = stage.ids["ur"]
-    assert not stage.services.cell.online
+    assert not stage.services.online.online
     joints = await solve(alice, robot)
     there = await forward(alice, robot, joints)
     assert there.position.distance_to(TARGET.position) < 1e-6
@@ -143,7 +143,7 @@ async def test_a_robot_that_computes_none_itself_is_computed_for(stage: Stage, a
         await alice.ask("RemoveFromScene", id=stage.ids[name])
     await stage.start(alice)
     try:
-        assert stage.services.cell.online
+        assert stage.services.online.online
         found = await solve(alice, robot, start_joints=joints)
         assert [joint["value"] for joint in found] == pytest.approx([joint["value"] for joint in joints], abs=1e-4)
         there = await forward(alice, robot, found)

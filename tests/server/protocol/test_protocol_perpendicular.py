@@ -53,7 +53,7 @@ async def test_a_tool_is_turned_down_by_the_least_change(tmp_path: Path) -> None
 
         async def put(pose: Pose) -> None:
             raw = {"end_effector_id": "tip", "target_pose": msgspec.to_builtins(pose), "speed": 1.0}
-            await stage.services.cell.call(arm, "move_to_pose", raw)
+            await stage.services.online.call(arm, "move_to_pose", raw)
 
         await put(Pose(Position(0.3, 0.2, 0.1), tilted))
         bob.take()
@@ -72,7 +72,7 @@ async def test_a_tool_is_turned_down_by_the_least_change(tmp_path: Path) -> None
         for degree in range(360):
             other = Orientation.from_rotation_vector(0, 0, math.radians(degree)) * DOWN
             assert _distance(here, other) > change - 0.02
-        assert not stage.services.cell.moving
+        assert not stage.services.online.moving
 
         # It holds the caller's lock, before and after.
         assert "lock" in await refused(bob, "SetEefPerpendicularToWorld", **args)

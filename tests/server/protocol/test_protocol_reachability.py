@@ -17,7 +17,6 @@ from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Joint
 from arcor2_server.documents.changes import Kind
 from arcor2_server.workspace.collisions import Placed
-from arcor2_server.workspace.robot_models import model_of
 from tests.server.protocol.devices import PART
 from tests.server.protocol.stage import PATIENCE, Actor, Stage, open_stage, refused, until
 
@@ -126,7 +125,7 @@ async def test_reachability_is_told_and_follows_edits(tmp_path: Path) -> None:
 
 
 async def _joints(stage: Stage) -> list[Any]:
-    model = model_of(stage.services, stage.services.session.scene_object(stage.ids["ur"]), "")
+    model = stage.services.robot_models.require(stage.services.session.scene_object(stage.ids["ur"]), "")
     return (await stage.services.compute.run(DescribeRobot(model))).joints
 
 
@@ -248,7 +247,7 @@ async def test_a_gripped_part_counts_online(tmp_path: Path) -> None:
         await stage.start(alice)
 
         async def claw(method: str, **args: float) -> None:
-            await stage.services.cell.call(stage.ids["claw"], method, args)
+            await stage.services.online.call(stage.ids["claw"], method, args)
 
         await claw("activate")
         bob.take()
@@ -256,7 +255,7 @@ async def test_a_gripped_part_counts_online(tmp_path: Path) -> None:
         await until(lambda: told(bob) == {above: "in_collision"})
         (row,) = await alice.ask("Reachability", robot_id=robot, ids=[above])
         assert "part of claw and crate" in row["items"][0]["reason"]
-        assert "part of claw" in stage.services.collisions.everything(stage.services)
+        assert "part of claw" in stage.services.scene_collisions.in_operation()
         bob.take()
         await claw("release")
         await until(lambda: told(bob) == {above: "reachable"})

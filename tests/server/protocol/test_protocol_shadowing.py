@@ -24,7 +24,7 @@ class LogicActions(Generic):
 async def upload(stage: Stage, name: str, source: str) -> None:
     """Upload an object type as the REST service does."""
     await stage.services.storage.put_object_type(ObjectTypeSource(name, source))
-    await stage.services.type_news.taken(stage.services)
+    await stage.services.type_notifications.uploaded()
 
 
 async def project(stage: Stage, alice: Actor) -> str:
@@ -104,7 +104,7 @@ async def test_what_uses_a_type_that_becomes_shadowed(tmp_path: Path) -> None:
         # Deleting restores the installed type. The program that runs goes on as it is.
         assert "is used in the scenes" in (await deleted(alice, "LogicActions"))[0]["error"]
         await stage.services.storage.delete_object_type("LogicActions")
-        await stage.services.type_news.taken(stage.services)
+        await stage.services.type_notifications.uploaded()
         assert await problems(alice, project_id) == []
         events = [event for event in alice.events() if event["event"] == "ChangedObjectTypes"]
         assert [(event["change_type"], event["data"][0]["built_in"]) for event in events] == [("update", True)]

@@ -10,19 +10,18 @@ from arcor2_hw.collision.description import StoredFile
 from arcor2_hw.compute.calibration_tasks import FrameByPoints
 from arcor2_hw.compute.kinematics_tasks import ReadMesh
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.app import create_app
-from arcor2_server.services import Services
+from arcor2_server.app import Server, create_app
 
 
 @contextlib.asynccontextmanager
-async def asking(services: Services) -> AsyncIterator[httpx.AsyncClient]:
+async def asking(services: Server) -> AsyncIterator[httpx.AsyncClient]:
     """Give what asks the parts of a server over REST, without a network between."""
     transport = httpx.ASGITransport(create_app(services))  # type: ignore[arg-type]
     async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1:6789") as client:
         yield client
 
 
-async def start_workers(services: Services) -> None:
+async def start_workers(services: Server) -> None:
     """Let the compute workers come up before the tests, not within the one that happens to need them first."""
     with contextlib.suppress(InvalidData):
         await services.compute.run(FrameByPoints([], []))

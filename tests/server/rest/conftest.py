@@ -10,29 +10,28 @@ import psutil
 import pytest
 import pytest_asyncio
 
-from arcor2_server.app import running_services
-from arcor2_server.services import Services
+from arcor2_server.app import Server, running_server
 from arcor2_server.settings import ServerSettings
 from tests.server.core.serving import ServerProcess, until
 from tests.server.rest.asking import asking, start_workers
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def services(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Services]:
+async def services(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Server]:
     """All parts, for the tests of a module."""
     directory: Path = tmp_path_factory.mktemp("rest")
     # What comes up later belongs to all tests of the module, not to the one that happens to run then.
     with ThreadPoolExecutor(1) as executor:
         asyncio.get_running_loop().set_default_executor(executor)
-        async with running_services(ServerSettings(data_dir=directory)) as parts:
-            parts.cell.hosts.prepare()
+        async with running_server(ServerSettings(data_dir=directory)) as parts:
+            parts.hosts.prepare()
             await until(lambda: psutil.Process().children())
             await start_workers(parts)
             yield parts
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def http(services: Services) -> AsyncIterator[httpx.AsyncClient]:
+async def http(services: Server) -> AsyncIterator[httpx.AsyncClient]:
     """What asks them."""
     async with asking(services) as client:
         yield client

@@ -18,7 +18,7 @@ from arcor2_hw.calibration.records import CalibrationKind, CalibrationRecord
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import Conflict, StorageError
-from arcor2_server.services import Services
+from arcor2_server.app import Server
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.damage_notices import DataDamage
 from arcor2_server.websocket.hub import Hub
@@ -56,7 +56,7 @@ def pictures() -> list[bytes]:
 
 
 @pytest_asyncio.fixture(loop_scope="module", autouse=True)
-async def no_markers(services: Services) -> AsyncIterator[None]:
+async def no_markers(services: Server) -> AsyncIterator[None]:
     yield
     await services.markers.set(CalibrationConfiguration())
 
@@ -196,7 +196,7 @@ async def test_records_are_listed_and_checked(http: httpx.AsyncClient) -> None:
     refused(await http.put("/api/calibrations/none/check", json={"pose": {}}), 404, "NotFound")
 
 
-async def test_the_oldest_records_go_but_the_last_of_an_object_stays(services: Services) -> None:
+async def test_the_oldest_records_go_but_the_last_of_an_object_stays(services: Server) -> None:
     records = Calibrations(services.storage, kept=5)
 
     def record(name: str, number: int) -> CalibrationRecord:
@@ -213,7 +213,7 @@ async def test_the_oldest_records_go_but_the_last_of_an_object_stays(services: S
 
 
 # ------------------------------------------------------------------------------------------------ markers
-async def test_markers_are_kept(http: httpx.AsyncClient, services: Services, tmp_path: Path) -> None:
+async def test_markers_are_kept(http: httpx.AsyncClient, services: Server, tmp_path: Path) -> None:
     assert granted(await http.get("/api/calibration/markers"))["markers"] == []
     granted(await http.put("/api/calibration/markers", json=MARKERS | {"marker_size": 0.08}))
     again = Markers(services.settings.markers_file)

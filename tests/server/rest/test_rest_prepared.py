@@ -17,8 +17,8 @@ from arcor2_hw.compute.mesh_tasks import CONVERSION, PrepareAsset
 from arcor2_hw.compute.task import ComputeStopped
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import InvalidData
+from arcor2_server.app import Server
 from arcor2_server.collaboration.tasks import Task
-from arcor2_server.services import Services
 from arcor2_server.workspace import display_models as prepared_module
 from tests.server.rest.asking import granted, refused
 
@@ -30,14 +30,14 @@ SHOWN = "/api/assets/{}/shown"
 
 
 @pytest_asyncio.fixture(autouse=True, scope="module", loop_scope="module")
-async def worker(services: Services) -> None:
+async def worker(services: Server) -> None:
     """The worker for meshes is up before the tests."""
     with contextlib.suppress(InvalidData):
         await services.compute.run(PrepareAsset(StoredFile("/nonexistent", "none.stl")))
 
 
 @pytest.fixture
-def runs(services: Services, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def runs(services: Server, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of what the worker is asked to prepare."""
     asked: list[str] = []
     run = services.compute.run
@@ -62,7 +62,7 @@ def no_digest(content: bytes, mark: bytes) -> bytes:
 
 
 async def test_five_who_ask_at_once_are_given_one_and_it_is_kept(
-    http: httpx.AsyncClient, services: Services, runs: list[str]
+    http: httpx.AsyncClient, services: Server, runs: list[str]
 ) -> None:
     await put(http, "ball.stl", BALL)
     answers = await asyncio.gather(*(http.get(SHOWN.format("ball.stl")) for _ in range(5)))
@@ -77,7 +77,9 @@ async def test_five_who_ask_at_once_are_given_one_and_it_is_kept(
     # The same under another name is not made again; nor by a server that starts anew.
     await put(http, "same.stl", BALL)
     assert (await http.get(SHOWN.format("same.stl"))).content == content
-    anew = prepared_module.PreparedAssets(services, services.settings.prepared_dir)
+    anew = prepared_module.DisplayModels(
+        services.assets, services.compute, services.tasks, services.settings.prepared_dir
+    )
     assert (await anew.get("ball.stl")).plain.read_bytes() == content
     assert runs == ["ball.stl"]
 
@@ -110,7 +112,7 @@ async def test_a_broken_mesh_is_refused_by_name_and_looked_at_once(http: httpx.A
 
 
 async def test_what_takes_long_is_told_as_a_task(
-    http: httpx.AsyncClient, services: Services, monkeypatch: pytest.MonkeyPatch
+    http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     began: list[str] = []
     begin = services.tasks.begin
@@ -132,7 +134,7 @@ async def test_what_takes_long_is_told_as_a_task(
 
 
 async def test_a_worker_that_dies_costs_one_answer_and_is_no_fault_of_the_mesh(
-    http: httpx.AsyncClient, services: Services, monkeypatch: pytest.MonkeyPatch
+    http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await put(http, "unlucky.stl", no_digest(BALL, b"unlucky"))
     with monkeypatch.context() as patched:
@@ -146,11 +148,11 @@ async def test_a_worker_that_dies_costs_one_answer_and_is_no_fault_of_the_mesh(
 
 
 async def test_who_leaves_does_not_spoil_it_for_others(
-    http: httpx.AsyncClient, services: Services, runs: list[str]
+    http: httpx.AsyncClient, services: Server, runs: list[str]
 ) -> None:
     await put(http, "shared.stl", no_digest(BALL, b"shared"))
-    leaver = asyncio.create_task(services.prepared.get("shared.stl"))
-    stayer = asyncio.create_task(services.prepared.get("shared.stl"))
+    leaver = asyncio.create_task(services.display_models.get("shared.stl"))
+    stayer = asyncio.create_task(services.display_models.get("shared.stl"))
     while not runs:
         await asyncio.sleep(0.001)
     leaver.cancel()
@@ -159,11 +161,11 @@ async def test_who_leaves_does_not_spoil_it_for_others(
 
 
 async def test_what_older_makers_made_and_what_nobody_asks_for_goes(
-    http: httpx.AsyncClient, services: Services, monkeypatch: pytest.MonkeyPatch
+    http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder: Path = services.settings.prepared_dir
     await put(http, "first.stl", no_digest(BALL, b"first"))
-    first = await services.prepared.get("first.stl")
+    first = await services.display_models.get("first.stl")
     old = folder / f"{'0' * 64}.{CONVERSION - 1}.stl.glb"
     old.write_bytes(b"glTF")
     os.utime(first.plain, (1, 1))
@@ -171,16 +173,16 @@ async def test_what_older_makers_made_and_what_nobody_asks_for_goes(
     room = sum(file.stat().st_size for file in (*kept, first.plain))
     monkeypatch.setattr(prepared_module, "MOST_KEPT", room + 1000)
     await put(http, "second.stl", no_digest(BALL, b"second"))
-    second = await services.prepared.get("second.stl")
+    second = await services.display_models.get("second.stl")
     assert set(folder.glob("*.glb")) == kept | {second.plain}
     assert first.packed is not None
     assert not first.packed.exists()
     # It comes back when it is asked for.
-    assert (await services.prepared.get("first.stl")).plain.is_file()
+    assert (await services.display_models.get("first.stl")).plain.is_file()
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def robots(services: Services) -> AsyncIterator[list[str]]:
+async def robots(services: Server) -> AsyncIterator[list[str]]:
     yield sorted(
         {str(robot.urdf_package_filename) for robot in services.types.robot_metas() if robot.urdf_package_filename}
     )

@@ -10,7 +10,7 @@ import trimesh
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.scene import Scene, SceneObject
-from arcor2_server.app import running_services
+from arcor2_server.app import running_server
 from arcor2_server.settings import ServerSettings
 from tests.server.core.serving import until
 from tests.server.rest.asking import asking, granted, refused
@@ -127,22 +127,22 @@ class Crate(CollisionObject):
 
 
 async def test_what_stands_in_the_scene_that_is_online_is_in_the_way(http: httpx.AsyncClient, tmp_path: Path) -> None:
-    async with running_services(ServerSettings(data_dir=tmp_path)) as services, asking(services) as own:
+    async with running_server(ServerSettings(data_dir=tmp_path)) as services, asking(services) as own:
         await services.types.add(ObjectTypeSource("Crate", CRATE, model=ObjectModel.of(Box("Crate", 1, 1, 1))))
         placed = SceneObject("crate", "Crate", Pose(Position(3.0)), id="obj_crate")
         await services.session.show(Scene("scene", objects=[placed], id="scn_1"))
         assert granted(await own.get("/collisions")) == []
         assert granted(await own.get("/system/running")) is False
-        await services.cell.begin_start()
-        await until(lambda: services.cell.online)
+        await services.online.begin_start()
+        await until(lambda: services.online.online)
         assert granted(await own.get("/collisions")) == ["obj_crate"]
         assert granted(await own.get("/system/running")) is True
         answer = granted(await own.put("/utils/line-safe", json=line((0, 0, 0), (10, 0, 0))))
         assert answer == {"safe": False, "object_id": "obj_crate"}
         granted(await own.put("/system/stop"))
         assert granted(await own.get("/collisions")) == ["obj_crate"], "it is still there"
-        await services.cell.begin_stop()
-        await until(lambda: services.cell.state.value == "stopped")
+        await services.online.begin_stop()
+        await until(lambda: services.online.state.value == "stopped")
         assert granted(await own.get("/collisions")) == []
 
 

@@ -21,7 +21,7 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from arcor2_server.app import create_app, running_services
+from arcor2_server.app import create_app, running_server
 from arcor2_server.rest import OPERATIONS
 from arcor2_server.rest.operations import Operation
 from arcor2_server.settings import ServerSettings
@@ -51,8 +51,8 @@ class Loop:
         self._loop.set_default_executor(ThreadPoolExecutor(1))
         # schemathesis calls an application in this process "testserver".
         settings = ServerSettings(data_dir=self._directory, allowed_hosts=frozenset({"testserver"}))
-        async with running_services(settings) as services:
-            services.cell.hosts.prepare()
+        async with running_server(settings) as services:
+            services.hosts.prepare()
             await until(lambda: psutil.Process().children())
             await start_workers(services)
             self.app = create_app(services)

@@ -9,9 +9,9 @@ import pytest
 
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
+from arcor2_server.app import Server
 from arcor2_server.object_types import notifications
 from arcor2_server.rest.field_names import camelized, snaked
-from arcor2_server.services import Services
 from tests.server.build import workplace
 from tests.server.rest.asking import granted, refused
 
@@ -217,7 +217,7 @@ def lamp(name: str, **more: Any) -> dict[str, Any]:
     return {"id": name, "name": name, "source": LAMP.format(name=name)} | more
 
 
-async def test_an_object_type_comes_and_goes(http: httpx.AsyncClient, services: Services) -> None:
+async def test_an_object_type_comes_and_goes(http: httpx.AsyncClient, services: Server) -> None:
     with_model = lamp("Lamp", description="text", model={"id": "Lamp", "type": "Sphere"})
     refused(await http.put("/object-types", json=with_model), 404, "NotFound", "Lamp")
     granted(await http.put("/models/sphere", json={"id": "Lamp", "radius": 0.2}))
@@ -235,7 +235,7 @@ async def test_an_object_type_comes_and_goes(http: httpx.AsyncClient, services: 
     refused(await http.delete("/object-types/Lamp"), 404, "NotFound")
 
 
-async def test_a_module_that_is_no_type_is_taken(http: httpx.AsyncClient, services: Services) -> None:
+async def test_a_module_that_is_no_type_is_taken(http: httpx.AsyncClient, services: Server) -> None:
     mixin = {"id": "Colours", "name": "Colours", "source": "class Colours:\n    RED = 1\n"}
     granted(await http.put("/object-types", json=mixin))
     assert granted(await http.get("/object-types/Colours"))["source"] == mixin["source"]
@@ -243,7 +243,7 @@ async def test_a_module_that_is_no_type_is_taken(http: httpx.AsyncClient, servic
     granted(await http.delete("/object-types/Colours"))
 
 
-async def test_an_installed_type_may_be_shadowed_but_not_deleted(http: httpx.AsyncClient, services: Services) -> None:
+async def test_an_installed_type_may_be_shadowed_but_not_deleted(http: httpx.AsyncClient, services: Server) -> None:
     granted(await http.put("/object-types", json=lamp("FlowActions")))
     assert services.types.is_uploaded("FlowActions")
     granted(await http.delete("/object-types/FlowActions"))
@@ -264,7 +264,7 @@ async def test_an_installed_type_is_not_deleted_and_a_source_has_an_end(http: ht
 
 
 async def test_a_series_of_uploads_is_told_once(
-    http: httpx.AsyncClient, services: Services, monkeypatch: pytest.MonkeyPatch
+    http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[tuple[str, list[str]]] = []
 
@@ -282,7 +282,7 @@ async def test_a_series_of_uploads_is_told_once(
         granted(await http.put("/object-types", json=bodies[-1]))
         await asyncio.sleep(0.5)
 
-    await services.type_news.close()
+    await services.type_notifications.close()
     await services.types.refresh()
     monkeypatch.setattr(services.hub, "broadcast", note)
     # One that comes twice is not two pieces of news.

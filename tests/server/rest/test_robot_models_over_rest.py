@@ -8,14 +8,14 @@ import httpx
 import pytest
 from msgspec import UNSET
 
+from arcor2_server.app import Server
 from arcor2_server.object_types.robot_packages import robot_packages
-from arcor2_server.services import Services
 from tests.server.rest.asking import granted, refused
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 
-async def test_every_robot_that_names_a_model_has_it_served(http: httpx.AsyncClient, services: Services) -> None:
+async def test_every_robot_that_names_a_model_has_it_served(http: httpx.AsyncClient, services: Server) -> None:
     named = {robot.type: robot.urdf_package_filename for robot in services.types.robot_metas()}
     assert {"UR3e", "UR5e", "UR10e", "DobotMagician", "TwoAxisRobot"} <= {k for k, v in named.items() if v is not UNSET}
     for name in filter(None, named.values()):

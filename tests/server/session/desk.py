@@ -6,6 +6,7 @@ their own, and the same requests are sent to a real server process elsewhere.
 
 import asyncio
 import contextlib
+import functools
 import json
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -20,36 +21,35 @@ from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeS
 from arcor2_hw.data.robot import Joint, RobotMeta, RobotType
 from arcor2_hw.exceptions import NotFound
 from arcor2_server.access.admission import Access
+from arcor2_server.app import Server
+from arcor2_server.app.application import endpoints
+from arcor2_server.app.parts import connect_edits
+from arcor2_server.collaboration.lock_takeover import LockTakeover
 from arcor2_server.collaboration.locks import Locks
+from arcor2_server.collaboration.presence import PresenceBoard
+from arcor2_server.collaboration.previews import Previews
+from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.collaboration.users import Users
+from arcor2_server.collaboration.view_states import ViewStates
 from arcor2_server.documents import Session
+from arcor2_server.documents.dependents import Dependents
+from arcor2_server.documents.edit_notifications import EditNotifications
+from arcor2_server.documents.saved_problems import SavedProblems
 from arcor2_server.errors import RequestRefused
+from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.object_types.changes import Changes
-from arcor2_server.rpc import (  # noqa: F401
-    action_points,
-    actions,
-    copying,
-    editor,
-    general,
-    history,
-    joints,
-    lists,
-    locking,
-    logic,
-    object_types,
-    orientations,
-    parameters,
-    project,
-    scene,
-    scene_objects,
-)
-from arcor2_server.services import Services
+from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
-from arcor2_server.websocket.endpoint import Endpoint
+from arcor2_server.storage.damage_notices import DataDamage
+from arcor2_server.storage.secret_store import SecretStore
+from arcor2_server.storage.setting_secrets import SettingSecrets
+from arcor2_server.storage.shared_data import SharedData
+from arcor2_server.web.websocket_transport import EXTENSION
 from arcor2_server.websocket.hub import Hub
-from arcor2_server.websocket.transport import EXTENSION
+from arcor2_server.workspace.object_aiming import ObjectAimings
 from tests.protocol import session
+from tests.server.parts import Parts
 
 
 class RecordedTypes:
@@ -134,7 +134,7 @@ class FakeCell:
         self.pose = Pose(Position(0.4, 0.1, 0.3), Orientation(1, 0, 0, 0))
         self.joints = [Joint("j1", 0.1), Joint("j2", -0.2)]
         self.moved: list[tuple[str, Pose]] = []
-        self.board = SimpleNamespace(on_obstacles_changed=[])
+        self.board = SimpleNamespace(states=list, healths=list)
 
     @property
     def online(self) -> bool:
@@ -260,11 +260,11 @@ class Person:
 class Desk:
     """The parts of a server that the session works with."""
 
-    def __init__(self, services: Services, types: RecordedTypes, cell: FakeCell) -> None:
+    def __init__(self, services: Server, types: RecordedTypes, cell: FakeCell) -> None:
         self.services = services
         self.types = types
         self.cell = cell
-        self.endpoint = Endpoint(services)
+        self.endpoint = endpoints(services)[0]
         self._people: list[Person] = []
 
     @property
@@ -293,39 +293,60 @@ async def open_desk(directory: Path, **settings: Any) -> AsyncIterator[Desk]:
     storage = await Storage.open(chosen)
     locks = Locks(chosen.lock_retries, chosen.lock_retry_wait)
     users = Users(hub, locks, chosen)
-    execution: Any = SimpleNamespace(busy=False, greeting=list)
-    services = Services(
-        settings=chosen,
-        access=Access(chosen),
-        hub=hub,
-        users=users,
-        locks=locks,
-        storage=storage,
-        assets=None,  # type: ignore[arg-type]
-        types=types,  # type: ignore[arg-type]
-        session=None,  # type: ignore[arg-type]
-        cell=cell,  # type: ignore[arg-type]
-        execution=execution,
-        build=None,  # type: ignore[arg-type]
-    )
-    services.session = Session(services)
+    damage = DataDamage(directory, hub)
+    damage.load()
+    known: Any = types
+    secrets = SettingSecrets(known, SecretStore(chosen.secrets_file))
+    session = Session(chosen, storage, known, damage, secrets)
+    shared = SharedData(storage)
 
     async def stored(item: str) -> bool:
         return types.known(item) or await storage.identify(item) is not None
 
-    locks.tree, locks.stored = services.session, stored
+    locks.tree, locks.stored = session, stored
     try:
-        await services.session.open()
+        await session.open()
         try:
-            await services.share()
+            parts: Any = Parts(
+                settings=chosen,
+                access=Access(chosen),
+                hub=hub,
+                users=users,
+                locks=locks,
+                storage=storage,
+                damage=damage,
+                secrets=secrets,
+                types=types,
+                session=session,
+                online=cell,
+                execution=SimpleNamespace(
+                    busy=False, greeting=list, state_and_info=None, board=SimpleNamespace(states=list, healths=list)
+                ),
+                type_notifications=TypeNotifications(known, hub),
+                dependents=Dependents(storage, known, session),
+                saved_problems=SavedProblems(storage, known, chosen.problems_file),
+                edit_notifications=EditNotifications(hub, session),
+                lock_takeover=LockTakeover(locks, users, session.name_of),
+                tasks=Tasks(hub),
+                previews=Previews(hub, locks),
+                view_states=ViewStates(hub, shared),
+                presence=PresenceBoard(hub, users),
+                breakpoints=SharedBreakpoints(hub, storage, session, shared),
+                object_aiming=ObjectAimings(),
+            )
+            parts.greeting = functools.partial(Server.greeting, parts)
+            connect_edits(parts.edit_notifications, parts.previews, parts.breakpoints)
+            storage.on_deleted += [parts.view_states.forget, parts.breakpoints.forget, session.forget_history]
             try:
-                desk = Desk(services, types, cell)
+                desk = Desk(parts, types, cell)
                 yield desk
                 await desk.close()
             finally:
-                await services.close_shared()
+                await parts.saved_problems.close()
+                for part in (parts.edit_notifications, parts.presence, parts.previews, parts.tasks):
+                    part.close()
         finally:
-            await services.session.close()
+            await session.close()
     finally:
         users.close()
         await storage.close()

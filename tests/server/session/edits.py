@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from arcor2_hw.data.events import SceneStateEnum
-from tests.server.machine.picture import Picture
+from tests.server.document_picture import Picture
 from tests.server.session.desk import Desk, Person, Refused
 from tests.server.session.work import ORIGIN, URL, Work
 

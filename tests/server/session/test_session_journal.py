@@ -101,14 +101,14 @@ async def test_a_restart_goes_on_where_it_was(tmp_path: Path) -> None:
         assert list(desk.session.history) == history
         assert desk.session.has_changes
         assert desk.services.locks.announced() == {}
-        names = [event.event for event in desk.session.greeting()]
+        names = [event.event for event in desk.session.greeting(desk.cell.state)]
         assert names == ["OpenProject", "SceneState"]
         saved = await desk.services.storage.project(desk.session.require_project().id)
         assert [point.name for point in saved.action_points] == ["p0"]
         alice = await desk.person("alice")
         await alice.ask("CloseProject", force=True)
     async with open_desk(tmp_path) as desk:
-        assert desk.session.greeting() == []
+        assert desk.session.greeting(desk.cell.state) == []
         assert desk.session.scene is None
 
 
@@ -198,7 +198,7 @@ async def test_a_damaged_journal_is_set_aside(tmp_path: Path, damage: str, capsy
         assert notice == desk.services.greeting()[-1].data.message
         alice = await desk.person("alice")
         if not left:
-            assert desk.session.greeting() == []
+            assert desk.session.greeting(desk.cell.state) == []
             await alice.ask("OpenProject", id=key)
         assert point_names(desk)[30:] == left
         await add_point(alice, "again")

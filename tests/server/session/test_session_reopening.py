@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.geometry import Position
 from arcor2_server.documents import Session, closed_history
-from tests.server.machine.crash_copy import copy_at_one_moment
+from tests.server.crash_copy import copy_at_one_moment
 from tests.server.session.desk import Desk, Person, open_desk
 from tests.server.session.edits import refused, shown
 from tests.server.session.work import ORIGIN, POSE, Work

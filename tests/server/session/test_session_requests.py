@@ -28,7 +28,7 @@ async def test_order_of_events_when_documents_open_and_close(desk: Desk, alice: 
     alice.take()
     await alice.ask("NewProject", scene_id=scene.id, name="project")
     assert alice.names() == ["SceneSaved", "OpenProject", "SceneState"]
-    assert [e.event for e in desk.session.greeting()] == ["OpenProject", "SceneState"]
+    assert [e.event for e in desk.session.greeting(desk.cell.state)] == ["OpenProject", "SceneState"]
     await alice.ask("SaveProject")
     assert alice.names() == ["ProjectSaved"]
     with pytest.raises(Refused, match="no changes"):
@@ -59,7 +59,7 @@ async def test_logic_items_always_tell_of_unlocking(work: Work, alice: Person, b
     events = alice.take()
     assert [e.get("event") for e in events] == [None, "LogicItemChanged", "ObjectsUnlocked"]
     assert events[2]["data"]["object_ids"] == [one]
-    assert work.session._services.locks.announced() == {}
+    assert work.services.locks.announced() == {}
     item = events[1]["data"]["id"]
     with pytest.raises(Refused, match="part of the logic"):
         await alice.ask("RemoveAction", id=two)
@@ -182,7 +182,7 @@ async def test_two_users_and_one_tree(work: Work, alice: Person, bob: Person) ->
     with pytest.raises(Refused, match="locked"):
         await alice.ask("RemoveActionPoint", id=p)
     await bob.ask("RemoveActionPoint", id=p)
-    assert work.session._services.locks.announced() == {}
+    assert work.services.locks.announced() == {}
 
 
 async def test_edits_of_many_users_at_once_keep_their_order(

@@ -18,7 +18,7 @@ from arcor2_server.rpc import (
     scene,
     scene_objects,
 )
-from arcor2_server.rpc.registry import HANDLERS
+from arcor2_server.rpc.registry import DECLARED
 from tests.protocol import STATES
 from tests.server.session.desk import Desk, Person
 
@@ -37,7 +37,7 @@ MODULES = {
         scene_objects,
     )
 }
-OURS = sorted(name for name, handler in HANDLERS.items() if handler.__module__ in MODULES)
+OURS = sorted(name for name, module in DECLARED.items() if module in MODULES)
 REASONS = {
     "needs a registered user": "not logged in",
     "needs an open scene": "is open: open one first",

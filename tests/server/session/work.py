@@ -17,6 +17,7 @@ class Work:
 
     def __init__(self, person: Person) -> None:
         self.person = person
+        self.services = person.desk.services
         self.session = person.desk.session
 
     def object(self, name: str) -> str:

@@ -54,7 +54,7 @@ async def test_a_scene_that_does_not_come_up(tmp_path: Path) -> None:
         async def broken(*_: Any) -> str:
             return "The camera is not there."
 
-        stage.services.cell._bring_up = broken  # type: ignore[method-assign, assignment]
+        stage.services.online._bring_up = broken  # type: ignore[method-assign, assignment]
         await alice.ask("StartScene")
         failed = await happens(alice, "TaskState", kind="scene_start", state="failed")
         assert failed["message"] == "The camera is not there."
@@ -123,14 +123,14 @@ async def test_a_disabled_object_is_not_in_the_way(tmp_path: Path) -> None:
         alice = await stage.person("alice")
         await stage.place(alice, part="Part", plain="Plain")
         await stage.start(alice)
-        world, services, part = stage.services.collisions, stage.services, stage.ids["part"]
-        assert set(world.everything(services)) == {part}  # the other one has no model
-        await services.cell.call(part, "set_enabled", {"state": False})
-        await until(lambda: world.everything(services) == {})
-        await services.cell.call(part, "set_enabled", {"state": True})
-        await until(lambda: set(world.everything(services)) == {part})
-        await services.cell.call(part, "set_enabled", {"state": False})
+        services, part = stage.services, stage.ids["part"]
+        assert set(services.scene_collisions.in_operation()) == {part}  # the other one has no model
+        await services.online.call(part, "set_enabled", {"state": False})
+        await until(lambda: services.scene_collisions.in_operation() == {})
+        await services.online.call(part, "set_enabled", {"state": True})
+        await until(lambda: set(services.scene_collisions.in_operation()) == {part})
+        await services.online.call(part, "set_enabled", {"state": False})
         await stage.stop(alice)
         await stage.start(alice)  # a new instance counts
-        assert set(world.everything(services)) == {part}
+        assert set(services.scene_collisions.in_operation()) == {part}
         await stage.stop(alice)

@@ -1,4 +1,4 @@
-"""Script to project: a generated script, edited by hand within its conventions, goes back to actions and logic."""
+"""Turns a script that keeps the conventions back into actions and logic."""
 
 from arcor2_server.build.reading.errors import NotUnderstood
 from arcor2_server.build.reading.project import from_script

@@ -1,4 +1,4 @@
-"""What is told of a script that does not keep the conventions."""
+"""Errors in scripts that do not keep the conventions."""
 
 import ast
 
@@ -16,7 +16,7 @@ class NotUnderstood(InvalidProject):
 
 
 def shown(node: ast.AST) -> str:
-    """Give the text of a piece of a script, shortened, to be quoted."""
+    """Return the text of a piece of a script, shortened, to be quoted."""
     try:
         text = " ".join(ast.unparse(node).split())
     except RecursionError:

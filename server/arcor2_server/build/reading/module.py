@@ -1,4 +1,4 @@
-"""What stands around the loop of a script: imports, the names of objects and project parameters, the entry."""
+"""The frame of a script around its loop: imports, names of objects and project parameters, entry point."""
 
 import ast
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Calls and ways of a script as a project: what was there before keeps its ids and its place."""
+"""Turns the calls and paths of a script into a project. Existing items keep their ids and positions."""
 
 import json
 from collections.abc import Mapping
@@ -38,7 +38,7 @@ _Asked = tuple[str, object] | None
 
 
 def from_script(source: str, scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> Project:
-    """Give the project with the actions, logic and project parameters that the script has.
+    """Return the project with the actions, logic and project parameters that the script has.
 
     project: what the script was made from. An action of the same name (`an`) keeps its id, action point and what the
     script does not say; one that the script left out is removed, one that could not be in it stays. A new action lies
@@ -105,7 +105,7 @@ class _Reading:
 
     # ------------------------------------------------------------------------------------------------ actions
     def project(self) -> Project:
-        """Give the project as the script has it."""
+        """Return the project as the script has it."""
         reached = _reached(self._old)
         number_of = {call.name: number for number, call in enumerate(self._calls)}
         named: dict[str, str] = {}
@@ -269,7 +269,7 @@ def _variables(frame: Frame, project: Project) -> dict[str, list[str]]:
 
 
 def _reached(project: Project) -> set[str]:
-    """Give the actions that START leads to: those that a script of the project has."""
+    """Return the actions that START leads to: those that a script of the project has."""
     following: dict[str, list[str]] = {}
     for item in project.logic:
         following.setdefault(item.start.partition("/")[0], []).append(item.end.partition("/")[0])

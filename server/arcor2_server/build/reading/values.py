@@ -1,4 +1,4 @@
-"""What stands in a call: literals, members of enumerations, action points, project parameters, results."""
+"""Arguments of a call: literals, members of enumerations, action points, project parameters, results."""
 
 import ast
 from collections.abc import Mapping
@@ -22,12 +22,12 @@ PLAIN: Final[dict[type, str]] = {bool: "boolean", int: "integer", float: "double
 
 
 def json_of(value: Any) -> str:
-    """Give a plain value as JSON."""
+    """Return a plain value as JSON."""
     return msgspec.json.encode(value).decode()
 
 
 def plain(node: ast.expr) -> Any:
-    """Give the value of a literal: truth value, number or text; NotUnderstood for anything else."""
+    """Return the value of a literal: truth value, number or text; NotUnderstood for anything else."""
     match node:
         case ast.Constant(bool() | int() | float() | str() as value):
             return value
@@ -37,14 +37,14 @@ def plain(node: ast.expr) -> Any:
 
 
 def of_type(value: Any, kind: str) -> Any:
-    """Give a plain value as what `kind` takes: a whole number may stand for a double."""
+    """Return a plain value as what `kind` takes: a whole number may stand for a double."""
     if kind == "double" and type(value) is int:
         return float(value)
     return value
 
 
 def kept(kind: str, value: Any, old: Parameter | None) -> str:
-    """Give a plain value as JSON: as it was written before if it is still the same."""
+    """Return a plain value as JSON: as it was written before if it is still the same."""
     if old is not None and old.type == kind:
         try:
             before = msgspec.json.decode(old.value)
@@ -78,7 +78,7 @@ class Values:
 
     # ------------------------------------------------------------------------------------------------ calls
     def arguments(self, call: ast.Call, declared: ObjectAction, type_name: str) -> dict[str, ast.expr]:
-        """Give what is written for each parameter but `an`; NotUnderstood where it does not fit."""
+        """Return what is written for each parameter but `an`; NotUnderstood where it does not fit."""
         given: dict[str, ast.expr] = {}
         names = [meta.name for meta in declared.parameters]
         by_name = self._frame.types[type_name].keyword_only
@@ -109,7 +109,7 @@ class Values:
         return given
 
     def points_in(self, node: ast.expr) -> list[str]:
-        """Give the ids of the action points that an argument refers to."""
+        """Return the ids of the action points that an argument refers to."""
         path = self._path(node)
         return [self._points[path[0]]] if path and path[0] in self._points else []
 
@@ -146,7 +146,7 @@ class Values:
 
     # ------------------------------------------------------------------------------------------------ references
     def _path(self, node: ast.expr) -> tuple[str, ...] | None:
-        """Give the parts behind the name of the action points, None when something else is meant."""
+        """Return the parts behind the name of the action points, None when something else is meant."""
         parts: list[str] = []
         while isinstance(node, ast.Attribute):
             parts.append(node.attr)
@@ -173,7 +173,7 @@ class Values:
 
     # ------------------------------------------------------------------------------------------------ enumerations
     def _named_member(self, node: ast.expr) -> tuple[str, str] | None:
-        """Give the enumeration, as it is called where it is defined, and the member that an expression names."""
+        """Return the enumeration, as it is called where it is defined, and the member that an expression names."""
         match node:
             case ast.Attribute(ast.Name(name), member) if name in self._script.imports:
                 return self._script.imports[name], member
@@ -194,7 +194,7 @@ class Values:
         raise NotUnderstood(node.lineno, f"{kind.name} has no member {named[1]}")
 
     def compared(self, node: ast.expr) -> bool | int | str:
-        """Give the value that a condition compares a result with: a literal, or a member of an enumeration."""
+        """Return the value that a condition compares a result with: a literal, or a member of an enumeration."""
         named = self._named_member(node)
         if named is not None:
             if named not in self._members:

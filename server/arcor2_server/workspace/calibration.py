@@ -1,6 +1,6 @@
-"""What computes poses from pictures: the interface, the service over the compute worker, and what is running of it."""
+"""Calibration of cameras and robots from pictures, computed by the worker."""
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from msgspec.structs import replace
 
@@ -13,11 +13,10 @@ from arcor2_hw.data.base import Data
 from arcor2_hw.data.camera import CameraParameters, MarkerCorners
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
-from arcor2_server.compute.process import Told
+from arcor2_server.compute.process import ProgressCallback
+from arcor2_server.compute.workers import Compute
 from arcor2_server.errors import RequestRefused
-
-if TYPE_CHECKING:
-    from arcor2_server.services import Services
+from arcor2_server.workspace.markers import Markers
 
 EXPECTED_WITHIN = (0.3, 0.5)
 """m and rad, standard deviations of the pose that a camera has in the scene: enough to choose between two answers."""
@@ -45,27 +44,28 @@ class Calibration(Protocol):
         pictures: list[bytes],
         *,
         expected: Pose | None = None,
-        told: Told | None = None,
+        on_progress: ProgressCallback | None = None,
     ) -> CameraPose:
-        """Give where a camera stands that sees the configured markers.
+        """Return where a camera stands that sees the configured markers.
 
         expected: where it is roughly known to be, which is asked only where the markers alone leave two answers.
         """
 
     async def markers(self, parameters: CameraParameters, picture: bytes) -> list[MarkerCorners]:
-        """Give the corners of every marker in the picture."""
+        """Return the corners of every marker in the picture."""
 
     async def robot(
-        self, model: RobotSource, view: RobotView, depth: list[bytes], *, told: Told | None = None
+        self, model: RobotSource, view: RobotView, depth: list[bytes], *, on_progress: ProgressCallback | None = None
     ) -> RobotPose:
-        """Give where a robot stands in the world, from depth pictures (16 bit, mm)."""
+        """Return where a robot stands in the world, from depth pictures (16 bit, mm)."""
 
 
 class CalibrationService:
     """Asks the compute worker, with the markers that are configured."""
 
-    def __init__(self, services: "Services") -> None:
-        self._services = services
+    def __init__(self, compute: Compute, markers: Markers) -> None:
+        self._compute = compute
+        self._markers = markers
 
     async def camera(
         self,
@@ -73,39 +73,39 @@ class CalibrationService:
         pictures: list[bytes],
         *,
         expected: Pose | None = None,
-        told: Told | None = None,
+        on_progress: ProgressCallback | None = None,
     ) -> CameraPose:
-        """Give where a camera stands."""
-        configuration = self._services.markers.configuration
+        """Return where a camera stands."""
+        configuration = self._markers.configuration
         if not configuration.markers and not configuration.boards:
             raise CalibrationRefused(
                 "No markers are configured: say which stand where (serve --markers, or PUT /api/calibration/markers).",
                 reason=Reason.NO_MARKER,
             )
         task = FindCameraPose(pictures, parameters, configuration.layout, configuration.options)
-        run = self._services.compute.run
+        run = self._compute.run
         try:
-            return await run(task, told=told)
+            return await run(task, on_progress=on_progress)
         except CalibrationRefused as error:
             if expected is None or error.reason != Reason.AMBIGUOUS:
                 raise
         distance, angle = EXPECTED_WITHIN
         hinted = replace(task.options, expected=expected, expected_position=distance, expected_orientation=angle)
-        found = await run(replace(task, options=hinted), told=told)
+        found = await run(replace(task, options=hinted), on_progress=on_progress)
         return replace(found, verdict=f"{found.verdict} Of two answers, the one near its present pose was taken.")
 
     async def markers(self, parameters: CameraParameters, picture: bytes) -> list[MarkerCorners]:
-        """Give the corners of every marker in the picture."""
-        dictionary = self._services.markers.configuration.dictionary
-        return await self._services.compute.run(FindMarkers(picture, parameters, dictionary))
+        """Return the corners of every marker in the picture."""
+        dictionary = self._markers.configuration.dictionary
+        return await self._compute.run(FindMarkers(picture, parameters, dictionary))
 
     async def robot(
-        self, model: RobotSource, view: RobotView, depth: list[bytes], *, told: Told | None = None
+        self, model: RobotSource, view: RobotView, depth: list[bytes], *, on_progress: ProgressCallback | None = None
     ) -> RobotPose:
-        """Give where a robot stands in the world."""
+        """Return where a robot stands in the world."""
         placed = replace(model, base=view.robot_pose)
         task = FindRobotPose(placed, view.robot_joints, depth, view.camera_parameters, view.camera_pose)
-        return await self._services.compute.run(task, told=told)
+        return await self._compute.run(task, on_progress=on_progress)
 
 
 class RunningCalibrations:
@@ -115,7 +115,7 @@ class RunningCalibrations:
         self._objects: set[str] = set()
 
     def begin(self, object_id: str, name: str) -> None:
-        """Count an object as being calibrated; RequestRefused while it is already."""
+        """Count an object as being calibrated; raise RequestRefused while it is already."""
         if object_id in self._objects:
             raise RequestRefused(f"{name} is being calibrated already.")
         self._objects.add(object_id)

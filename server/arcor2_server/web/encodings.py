@@ -1,4 +1,4 @@
-"""Which encodings a client takes (RFC 9110, 12.5.3)."""
+"""The content encodings that a client accepts (RFC 9110, 12.5.3)."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from litestar import Request
 
 
 def accepted_encodings(request: Request[Any, Any, Any]) -> set[str]:
-    """Give the encodings that a client takes."""
+    """Return the encodings that a client takes."""
     taken = set()
     for part in request.headers.get("accept-encoding", "").lower().split(","):
         name, _, quality = part.strip().partition(";")

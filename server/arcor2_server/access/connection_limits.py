@@ -1,4 +1,4 @@
-"""How many connections the server holds, so that nobody who is not admitted can use up its file descriptors."""
+"""Limits on connections, so that clients without a token cannot exhaust the file descriptors."""
 
 import ipaddress
 import resource

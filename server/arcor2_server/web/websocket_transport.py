@@ -1,4 +1,4 @@
-"""The websocket of a client, on uvicorn's protocol: text frames of bytes, pings that can be waited for, abort."""
+"""The websocket transport on uvicorn: text frames from bytes, awaitable pings, abort."""
 
 import asyncio
 import secrets
@@ -9,7 +9,7 @@ from websockets.exceptions import InvalidState
 from websockets.frames import Frame
 from websockets.http11 import Request
 
-from arcor2_server.web.connection_limits import Connection
+from arcor2_server.access.connection_limits import Connection
 
 CLOSE_WITHIN: Final = 1.0
 """Seconds that a client without a pong has to take the close frame."""
@@ -68,7 +68,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         self._pongs.clear()
 
     def send_text_now(self, message: bytes) -> bool:
-        """Send an encoded text message unless the connection is full, or closed; tells whether it was sent."""
+        """Send an encoded text message unless the connection is full, or closed; return whether it was sent."""
         if self.disconnected or self.close_sent or not self.writable.is_set():
             return False
         try:

@@ -7,7 +7,7 @@ changes the host in the settings of a device cannot have the password sent to an
 
 import contextlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -24,21 +24,19 @@ from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import HIDDEN, ObjectSecrets, is_reference, is_secret_name
 from arcor2_hw.exceptions import AddressChanged, InvalidData, InvalidPackage, NotFound
 from arcor2_hw.runtime.documents import read_document
-from arcor2_server.documents.changes import Change, Kind
-from arcor2_server.documents.journal_records import Recovered
+from arcor2_server.files import replace_file
 from arcor2_server.storage.secret_store import Secret, SecretStore
 
 PACKAGED: Final = ("scene.json", "project.json")
 """Documents in the folder `data` of a package that may hold settings."""
 _UNKNOWN: Final = SceneObject("", "")
-_WITH_SETTINGS: Final = frozenset({Kind.OBJECT, Kind.OVERRIDE})
 
 
 class Types(Protocol):
     """What is needed of the registry of object types."""
 
     def meta(self, name: str) -> ObjectTypeMeta:
-        """Return what is known of a type; NotFound."""
+        """Return what is known of a type. Raise NotFound if there is none."""
 
     def names(self) -> Iterable[str]:
         """Return the names of all types."""
@@ -72,7 +70,7 @@ class SettingSecrets:
         }
 
     def is_secret(self, type_name: str, setting: str) -> bool:
-        """Tell whether a setting is secret; of an unknown type, or an unknown setting, its name decides."""
+        """Return whether a setting is secret; of an unknown type, or an unknown setting, its name decides."""
         found = next((each for each in self._settings(type_name) if each.name == setting), None)
         return is_secret_name(setting) if found is None else found.secret is True
 
@@ -188,42 +186,28 @@ class SettingSecrets:
         return found
 
     async def take_from_scene(self, scene: Scene, before: Scene | None) -> Scene:
-        """Return a scene without secrets, which are on disk then; `before` is how it is stored. StorageError."""
+        """Return a scene without secrets, which are on disk then; `before` is how it is stored.
+
+        Raise StorageError if that is impossible.
+        """
         hidden = self.hide_in_scene(scene, before)
         await self.store.flush()
         return hidden
 
     async def take_from_project(self, project: Project, scene: Scene, before: Project | None) -> Project:
-        """Return a project on a scene without secrets, which are on disk then. StorageError."""
+        """Return a project on a scene without secrets, which are on disk then.
+
+        Raise StorageError if that is impossible.
+        """
         stored = [] if before is None else before.object_overrides
         hidden = self.hide_in_overrides(project.object_overrides, objects_of(scene), stored)
         await self.store.flush()
         return replace(project, object_overrides=hidden)
 
-    def hide_in_journal(self, found: Recovered) -> Recovered:
-        """Return what the journal holds without secrets; the same when it has none. StorageError."""
-        values = [(item.kind, item.value) for item in found.items if item.kind in _WITH_SETTINGS]
-        for edit in found.edits:
-            for change in edit.changes:
-                if change.kind in _WITH_SETTINGS:
-                    values += [(change.kind, change.before), (change.kind, change.after)]
-        objects = {value.id: value for kind, value in values if kind is Kind.OBJECT and value is not None}
-
-        def hidden(kind: Kind, value: Any) -> Any:
-            if value is None or kind not in _WITH_SETTINGS:
-                return value
-            return self.hide_in_object(value) if kind is Kind.OBJECT else self.hide_in_overrides([value], objects)[0]
-
-        with self.migrating():
-            if all(hidden(kind, value) == value for kind, value in values):
-                return found
-            items = [replace(item, value=hidden(item.kind, item.value)) for item in found.items]
-            edits = [replace(edit, changes=[_hidden(each, hidden) for each in edit.changes]) for edit in found.edits]
-        self.store.save()
-        return replace(found, items=items, edits=edits)
-
     def hide_in_package(self, directory: Path) -> bool:
-        """Replace secrets in the documents of a package on disk; tells whether there were any. Raises OSError.
+        """Replace secrets in the documents of a package on disk; return whether there were any.
+
+        Raise OSError if that is impossible.
 
         What cannot be read is left: the package does not run then.
         """
@@ -245,9 +229,7 @@ class SettingSecrets:
         for name, content in documents.items():
             if content is not None:
                 path = directory / "data" / name
-                fresh = path.with_name(f".{name}.new")
-                fresh.write_bytes(msgspec.json.format(msgspec.json.encode(content)))
-                fresh.replace(path)
+                replace_file(path, msgspec.json.format(msgspec.json.encode(content)), mode=0o666)
         return True
 
     def _hide_plain(self, entry: dict[str, Any], obj: dict[str, Any], below: list[Parameter]) -> bool:
@@ -303,10 +285,6 @@ def _enter_again(name: str, secret: Secret, address: str) -> str:
         f"Enter the {secret.setting} of {name!r} again: its host changed from {secret.address or 'none'} "
         f"to {address or 'none'}."
     )
-
-
-def _hidden(change: Change, hidden: Callable[[Kind, Any], Any]) -> Change:
-    return replace(change, before=hidden(change.kind, change.before), after=hidden(change.kind, change.after))
 
 
 def objects_of(scene: Scene) -> dict[str, SceneObject]:

@@ -1,0 +1,6 @@
+"""The composition root: the parts of the server, its adapters, and the ASGI application."""
+
+from arcor2_server.app.application import create_app
+from arcor2_server.app.parts import Server, running_server
+
+__all__ = ["Server", "create_app", "running_server"]

@@ -1,0 +1,151 @@
+"""Composition of the adapters: the handlers of requests and REST operations."""
+
+from arcor2_server.app.parts import Server
+from arcor2_server.rest.api_page import ApiPageOperations
+from arcor2_server.rest.assets import AssetOperations
+from arcor2_server.rest.build import BuildOperations
+from arcor2_server.rest.calibration import CalibrationOperations
+from arcor2_server.rest.calibration_records import CalibrationRecordOperations
+from arcor2_server.rest.calibrations import MeasurementCalibrationOperations
+from arcor2_server.rest.diagnosis import DiagnosisOperations
+from arcor2_server.rest.diagnosis_bundle import Diagnosis
+from arcor2_server.rest.display_models import DisplayModelOperations
+from arcor2_server.rest.documents import ApiDocumentOperations
+from arcor2_server.rest.execution import ExecutionOperations
+from arcor2_server.rest.general import GeneralOperations
+from arcor2_server.rest.kinematics import KinematicsOperations
+from arcor2_server.rest.models import ModelOperations
+from arcor2_server.rest.object_types import ObjectTypeOperations
+from arcor2_server.rest.projects import ProjectOperations
+from arcor2_server.rest.runs import RunOperations
+from arcor2_server.rest.scene import SceneServiceOperations
+from arcor2_server.rest.scenes import SceneOperations
+from arcor2_server.rpc.action_points import ActionPointRequests
+from arcor2_server.rpc.actions import ActionRequests
+from arcor2_server.rpc.answer_cache import AnswerCache
+from arcor2_server.rpc.build import BuildRequests
+from arcor2_server.rpc.calibration import CalibrationRequests
+from arcor2_server.rpc.calibration_records import CalibrationRecordRequests
+from arcor2_server.rpc.cameras import CameraRequests
+from arcor2_server.rpc.change_events import ChangeEvents
+from arcor2_server.rpc.copying import CopyRequests
+from arcor2_server.rpc.editing import Editing
+from arcor2_server.rpc.editor import SharedStateRequests
+from arcor2_server.rpc.execution import ExecutionRequests
+from arcor2_server.rpc.general import GeneralRequests
+from arcor2_server.rpc.history import HistoryRequests
+from arcor2_server.rpc.joints import JointsRequests
+from arcor2_server.rpc.lists import ListRequests
+from arcor2_server.rpc.locking import LockRequests
+from arcor2_server.rpc.logic import LogicRequests
+from arcor2_server.rpc.object_aiming import ObjectAimingRequests
+from arcor2_server.rpc.object_types import ObjectTypeRequests
+from arcor2_server.rpc.operation import OperationRequests
+from arcor2_server.rpc.orientations import OrientationRequests
+from arcor2_server.rpc.parameters import ParameterRequests
+from arcor2_server.rpc.perpendicular import PerpendicularRequests
+from arcor2_server.rpc.project import ProjectRequests
+from arcor2_server.rpc.reachability import ReachabilityRequests
+from arcor2_server.rpc.registry import Handlers
+from arcor2_server.rpc.robot import RobotRequests
+from arcor2_server.rpc.robot_motion import RobotMotionRequests
+from arcor2_server.rpc.runs import RunRequests
+from arcor2_server.rpc.scene import SceneRequests
+from arcor2_server.rpc.scene_objects import SceneObjectRequests
+
+
+def request_handlers(s: Server) -> Handlers:
+    """Return the handlers of the protocol's requests."""
+    answers = AnswerCache()
+    editing = Editing(s.locks, s.storage, s.session, s.online, s.execution, s.secrets)
+    motion_requests = RobotMotionRequests(s.locks, s.types, s.session, s.online, s.robots, s.motion)
+    scenes = SceneRequests(s.locks, s.storage, s.session, s.online, s.type_notifications, s.dependents, editing)
+    objects = SceneObjectRequests(s.locks, s.storage, s.assets, s.types, s.session, s.online, s.dependents, editing)
+    return Handlers(
+        ActionPointRequests(s.locks, s.session, s.online, editing),
+        ActionRequests(s.locks, s.types, s.session, editing),
+        BuildRequests(s.locks, s.execution, s.build, s.tasks),
+        CalibrationRequests(
+            s.hub,
+            s.locks,
+            s.types,
+            s.session,
+            s.online,
+            s.calibration,
+            s.calibration_records,
+            s.markers,
+            s.running_calibrations,
+            s.tasks,
+            s.robots,
+            s.robot_models,
+            s.motion,
+            editing,
+            s.cameras,
+        ),
+        CalibrationRecordRequests(s.session, s.calibration_records),
+        CameraRequests(s.session, s.online, editing, s.cameras),
+        CopyRequests(s.locks, s.session, editing),
+        SharedStateRequests(s.locks, s.session, s.previews, s.view_states, s.breakpoints, s.presence),
+        ExecutionRequests(
+            s.locks, s.types, s.session, s.online, s.execution, s.tasks, s.package_runs, s.temporary_runs
+        ),
+        GeneralRequests(
+            s.access,
+            s.hub,
+            s.users,
+            s.locks,
+            s.session,
+            s.online,
+            s.execution,
+            s.object_aiming,
+            s.tasks,
+            s.presence,
+            s.edit_notifications,
+            s.reachability,
+        ),
+        HistoryRequests(
+            s.locks, s.storage, s.types, s.session, s.online, s.dependents, editing, ChangeEvents(s.session)
+        ),
+        JointsRequests(s.locks, s.session, s.online, editing),
+        ListRequests(s.storage, s.types, s.type_notifications, answers, s.saved_problems),
+        LockRequests(s.users, s.locks, s.lock_takeover),
+        LogicRequests(s.locks, s.types, s.session, editing),
+        ObjectAimingRequests(s.types, s.session, s.online, s.object_aiming, editing, objects),
+        ObjectTypeRequests(s.locks, s.storage, s.assets, s.types, s.session, s.online, answers),
+        OperationRequests(s.types, s.session, s.online, s.execution, s.motion, s.stop_all),
+        OrientationRequests(s.locks, s.session, s.online, editing),
+        ParameterRequests(s.locks, s.types, s.session, editing),
+        PerpendicularRequests(s.locks, s.online, s.motion, motion_requests),
+        ProjectRequests(s.locks, s.storage, s.types, s.session, s.online, s.type_notifications, editing, scenes),
+        ReachabilityRequests(s.reachability),
+        RobotRequests(s.locks, s.types, s.session, s.online, s.robots, s.kinematics, s.motion),
+        motion_requests,
+        RunRequests(s.runs),
+        scenes,
+        objects,
+    )
+
+
+def rest_groups(s: Server) -> list[object]:
+    """Return the objects that handle the REST operations."""
+    diagnosis = Diagnosis(s.settings, s.hub, s.types, s.session, s.online, s.execution, s.runs)
+    return [
+        ApiPageOperations(),
+        AssetOperations(s.assets, s.type_notifications),
+        BuildOperations(s.storage, s.build, s.package_import),
+        CalibrationOperations(s.calibration, s.robots),
+        CalibrationRecordOperations(s.calibration_records),
+        MeasurementCalibrationOperations(s.calibration_records, s.compute, s.markers, s.robots),
+        DiagnosisOperations(s.secrets, diagnosis),
+        DisplayModelOperations(s.display_models),
+        ApiDocumentOperations(s.settings),
+        ExecutionOperations(s.hub, s.storage, s.execution, s.package_runs),
+        GeneralOperations(s.settings, s.online, s.execution),
+        KinematicsOperations(s.online, s.robot_calibrations, s.robots),
+        ModelOperations(s.storage, s.type_notifications),
+        ObjectTypeOperations(s.storage, s.types, s.type_notifications),
+        ProjectOperations(s.storage),
+        RunOperations(s.runs),
+        SceneServiceOperations(s.assets, s.online, s.compute, s.collisions, s.scene_collisions),
+        SceneOperations(s.storage, s.types),
+    ]

@@ -1,0 +1,83 @@
+"""The ASGI application: websocket, REST routes and editor around the running parts."""
+
+from typing import Any
+
+from litestar import Litestar, Request, Response, WebSocket, websocket
+from litestar.exceptions import HTTPException, MethodNotAllowedException, NotFoundException
+from litestar.plugins import PluginProtocol
+from litestar.plugins.core import MsgspecDIPlugin
+
+from arcor2_hw.data.role import Role
+from arcor2_server.access.admission import role_needed
+from arcor2_server.access.origin import HostNames, own_pages_only
+from arcor2_server.access.route_options import ROLE
+from arcor2_server.app.adapters import request_handlers, rest_groups
+from arcor2_server.app.parts import Server
+from arcor2_server.rest import routes as rest_routes
+from arcor2_server.rest.responses import http_refusal
+from arcor2_server.web.editor import editor_routes
+from arcor2_server.web.response_headers import add_headers
+from arcor2_server.websocket.classic_ports import SOCKET
+from arcor2_server.websocket.endpoint import Endpoint, Service, routes
+from arcor2_server.websocket.execution_endpoint import execution_service
+
+
+@websocket(["/", "/{path:path}"], opt={ROLE: Role.OPERATOR})
+async def sockets(socket: WebSocket[Any, Any, Any]) -> None:
+    """Speak the ARCOR2 protocol: at /execution or at its classic port as the Execution service, else as ARServer.
+
+    Each request declares its own least role.
+    """
+    state = socket.app.state
+    port = (socket.scope.get("server") or ("", None))[1]
+    own_port = state.settings.classic_ports.get(SOCKET)
+    endpoint = state.execution if socket.url.path == "/execution" or port == own_port else state.endpoint
+    await endpoint.serve(socket)
+
+
+def no_such_route(request: Request[Any, Any, Any], error: MethodNotAllowedException) -> Response[Any]:
+    """Answer 404 where only the websocket is: Litestar takes that for a route without the method."""
+    allowed = {name.lower(): value for name, value in (error.headers or {}).items()}.get("allow")
+    if allowed in (None, "websocket"):
+        return http_refusal(request, NotFoundException("There is no such route."))
+    return http_refusal(request, error)
+
+
+class Application(Litestar):
+    """Litestar without its plugins for pydantic and attrs, which serve nothing here and cost a tenth of a second."""
+
+    @staticmethod
+    def _get_default_plugins(plugins: list[PluginProtocol]) -> list[PluginProtocol]:
+        return [*plugins, MsgspecDIPlugin()]
+
+
+def endpoints(server: Server) -> tuple[Endpoint, Endpoint]:
+    """Return the websocket endpoints of ARServer and of the Execution service."""
+    handlers = request_handlers(server)
+    table = routes(handlers.by_request, handlers.cached)
+
+    def endpoint(service: Service) -> Endpoint:
+        return Endpoint(service, server.settings, server.access, server.hub, server.users, server.damage)
+
+    execution = execution_service(table, server.execution.state_and_info)
+    return endpoint(Service(table, server.greeting)), endpoint(execution)
+
+
+def create_app(server: Server) -> Litestar:
+    """Return the application around parts that are running."""
+    endpoint, execution_endpoint = endpoints(server)
+    app = Application(
+        route_handlers=[sockets, *rest_routes(rest_groups(server), server.tasks), *editor_routes()],
+        guards=[own_pages_only, role_needed],
+        before_send=[add_headers],
+        openapi_config=None,
+        exception_handlers={MethodNotAllowedException: no_such_route, HTTPException: http_refusal},
+        on_shutdown=[endpoint.close, execution_endpoint.close],
+        logging_config=None,
+    )
+    app.state.access = server.access
+    app.state.endpoint = endpoint
+    app.state.execution = execution_endpoint
+    app.state.host_names = HostNames.of(server.settings)
+    app.state.settings = server.settings
+    return app

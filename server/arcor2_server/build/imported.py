@@ -1,0 +1,160 @@
+"""Reads the files of a package that is imported."""
+
+import ast
+from collections.abc import Iterable, Mapping
+from pathlib import Path, PurePosixPath
+from typing import Final, Literal, TypeVar
+
+import humps
+import msgspec
+from msgspec import UNSET, field
+
+from arcor2_hw.analysis import module_name
+from arcor2_hw.data.base import Data, Unset, is_valid_name
+from arcor2_hw.data.object_type import Model3dType, ObjectModel, ObjectTypeSource
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.data.texts import check_texts
+from arcor2_hw.exceptions import InvalidPackage, TextTooLong
+from arcor2_server.build import package, snapshot
+
+T = TypeVar("T")
+
+MAX_ID: Final = 255
+_Kind = Literal["type", "installed", "helper"]
+
+
+class Imported(Data, frozen=True):
+    """The content of a package as documents, checked as far as a package can be by itself.
+
+    types: uploaded types and helpers, by name. installed: types whose driver the package carries a copy of.
+    helpers: those of `types` that have no class of their name.
+    """
+
+    scene: Scene
+    project: Project
+    script: str
+    types: dict[str, ObjectTypeSource] = field(default_factory=dict)
+    installed: list[str] = field(default_factory=list)
+    helpers: list[str] = field(default_factory=list)
+
+    @property
+    def needs_source(self) -> bool:
+        """Return whether the script is the program itself, not made from the logic."""
+        return not self.project.has_logic
+
+
+def _wanted(path: PurePosixPath) -> bool:
+    match path.parts:
+        case ("script.py",) | ("data", "scene.json" | "project.json"):
+            return True
+        case (snapshot.FOLDER, name):
+            return name.endswith(".py") and name != "__init__.py"
+        case ("data", "models", name):
+            return name.endswith(".json")
+    return False
+
+
+def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
+    """Read a JSON document in snake_case or camelCase."""
+    try:
+        raw = files[path]
+    except KeyError:
+        raise InvalidPackage(f"The package has no {path}.") from None
+    try:
+        found = msgspec.json.decode(raw, type=kind)
+    except (msgspec.MsgspecError, RecursionError) as error:
+        try:
+            found = msgspec.convert(humps.decamelize(msgspec.json.decode(raw)), kind)
+        except (msgspec.MsgspecError, ValueError, RecursionError):
+            raise InvalidPackage(f"{path} of the package is damaged: {error}") from error
+    try:
+        check_texts(found)
+    except TextTooLong as error:
+        raise InvalidPackage(f"{path} of the package: {error}") from error
+    return found
+
+
+def _text(files: Mapping[str, bytes], path: str) -> str:
+    try:
+        return files[path].decode("utf-8-sig")  # some editors put a mark in front
+    except KeyError:
+        raise InvalidPackage(f"The package has no {path}.") from None
+    except UnicodeDecodeError as error:
+        raise InvalidPackage(f"{path} of the package is no text: {error}") from error
+
+
+def _class_in(path: str, source: str) -> tuple[str, _Kind]:
+    """Return the name of the type in a module; "installed" if the module only imports it from a copied driver.
+
+    A module that has no class of its name is a helper of others.
+    """
+    stem = PurePosixPath(path).stem
+    try:
+        tree = ast.parse(source)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise InvalidPackage(f"{path} of the package is no Python: {error}") from error
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef) and module_name(node.name) == stem:
+            return node.name, "type"
+    for node in tree.body:
+        if isinstance(node, ast.ImportFrom) and node.level:
+            for alias in node.names:
+                if module_name(alias.asname or alias.name) == stem:
+                    return alias.asname or alias.name, "installed"
+    if is_valid_name(stem) and module_name(stem) == stem:
+        return stem, "helper"
+    raise InvalidPackage(f"{path} of the package has no class that the file is named after.")
+
+
+def read(data: Path | bytes) -> Imported:
+    """Read a package. Raise InvalidPackage or StorageError if that is impossible."""
+    files = package.from_zip(data, _wanted)
+    scene = _document(files, "data/scene.json", Scene)
+    project = _document(files, "data/project.json", Project)
+    for what, key in (("scene", scene.id), ("project", project.id)):
+        if not key or len(key) > MAX_ID or not key.isprintable():
+            raise InvalidPackage(f"The {what} of the package has no usable id: {key[:80]!r}.")
+    source = _text(files, "script.py")
+    types: dict[str, ObjectTypeSource] = {}
+    installed: list[str] = []
+    helpers: list[str] = []
+    for path in sorted(files):
+        if not path.startswith(f"{snapshot.FOLDER}/"):
+            continue
+        text = _text(files, path)
+        name, kind = _class_in(path, text)
+        if kind == "installed":
+            installed.append(name)
+        else:
+            if kind == "helper":
+                helpers.append(name)
+            types[name] = ObjectTypeSource(name, text, model=_model(files, name))
+    modules = {module_name(name) for name in (*types, *installed)}
+    for path in files:
+        if path.startswith("data/models/") and PurePosixPath(path).stem not in modules:
+            raise InvalidPackage(f"{path} of the package belongs to none of its object types.")
+    given = Imported(scene, project, source, types, installed, helpers)
+    extra = project.project_objects_ids
+    return given if isinstance(extra, Unset) else with_helpers_named(given, extra)
+
+
+def _model(files: Mapping[str, bytes], name: str) -> ObjectModel | Unset:
+    path = f"data/models/{module_name(name)}.json"
+    if path not in files:
+        return UNSET
+    model = _document(files, path, ObjectModel)
+    if model.type is Model3dType.NONE:
+        return UNSET
+    if model.model().id != name:
+        raise InvalidPackage(f"{path} of the package is the model of {model.model().id}, not of {name}.")
+    return model
+
+
+def with_helpers_named(given: Imported, known: Iterable[str]) -> Imported:
+    """Return the package with helpers under the names by which they are known: a file tells only that of a module."""
+    modules = {module_name(name): name for name in known}
+    names = {name: modules.get(name, name) for name in given.helpers}
+    types = {names.get(name, name): one for name, one in given.types.items()}
+    types = {name: msgspec.structs.replace(one, id=name) for name, one in types.items()}
+    return msgspec.structs.replace(given, types=types, helpers=list(names.values()))

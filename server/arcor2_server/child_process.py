@@ -1,0 +1,116 @@
+"""A Python process of the server: connected by a socket, its output read line by line, killed if it does not end."""
+
+import asyncio
+import contextlib
+import os
+import signal
+import socket
+import sys
+from collections.abc import AsyncIterator, Mapping, Sequence
+from typing import Final
+
+LONGEST_LINE: Final = 64 * 1024
+"""Maximum length of a line of output, bytes; the rest of a longer line is dropped."""
+_CHUNK: Final = 65536
+
+
+class ChildProcess:
+    """A running process.
+
+    Args:
+        process: the process; its standard output and error are one pipe.
+    """
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self._process = process
+
+    @classmethod
+    async def start(
+        cls, command: Sequence[str], connection: socket.socket, environment: Mapping[str, str] = os.environ
+    ) -> "ChildProcess":
+        """Start `python COMMAND --fd N`, where N is the file descriptor of the process's end of a socket.
+
+        Args:
+            command: the arguments of Python, such as `-m` and a module.
+            connection: the end of the socket for the process. It is closed in this process.
+            environment: the environment of the process.
+
+        Raises:
+            OSError: the process cannot be started.
+        """
+        try:
+            process = await asyncio.create_subprocess_exec(
+                sys.executable, *command, "--fd", str(connection.fileno()),
+                pass_fds=[connection.fileno()],
+                stdin=asyncio.subprocess.DEVNULL,
+                stdout=asyncio.subprocess.PIPE,
+                stderr=asyncio.subprocess.STDOUT,
+                # The processes have their own threads; a thread pool of the linear algebra only costs memory.
+                env={"OPENBLAS_NUM_THREADS": "1", **environment},
+                start_new_session=True,  # Ctrl-C goes to the server, which ends its processes in order
+            )  # fmt: skip
+        finally:
+            connection.close()
+        return cls(process)
+
+    @property
+    def pid(self) -> int:
+        """The process id."""
+        return self._process.pid
+
+    @property
+    def returncode(self) -> int | None:
+        """The exit status, negative for a signal; None while the process runs."""
+        return self._process.returncode
+
+    def kill(self) -> None:
+        """Kill the process if it runs."""
+        if self._process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                self._process.kill()
+
+    async def wait(self) -> int:
+        """Wait for the end of the process and return its exit status."""
+        return await self._process.wait()
+
+    async def ended(self, within: float) -> int:
+        """Wait for the end of the process, kill it after `within` seconds, and return its exit status.
+
+        The process is killed at once if the caller is cancelled.
+        """
+        try:
+            async with asyncio.timeout(within):
+                return await self._process.wait()
+        except TimeoutError:
+            self.kill()
+            return await self._process.wait()
+        except BaseException:
+            self.kill()
+            await self._process.wait()
+            raise
+
+    async def output(self, longest: int = LONGEST_LINE) -> AsyncIterator[str]:
+        """Yield the lines that the process prints, each cut at `longest` bytes, until it closes its output."""
+        stream = self._process.stdout
+        assert stream is not None
+        line = bytearray()
+        while chunk := await stream.read(_CHUNK):
+            *whole, rest = chunk.split(b"\n")
+            for part in whole:
+                line += part[: longest - len(line)]
+                yield line.decode(errors="backslashreplace")
+                line.clear()
+            line += rest[: longest - len(line)]
+        if line:
+            yield line.decode(errors="backslashreplace")
+
+
+def describe_exit(status: int) -> str:
+    """Describe an exit status: "was killed by SIGKILL", "ended with status 3" or "ended"."""
+    if status < 0:
+        try:
+            name = signal.Signals(-status).name
+        except ValueError:
+            name = f"signal {-status}"
+        return f"was killed by {name}"
+    return f"ended with status {status}" if status else "ended"

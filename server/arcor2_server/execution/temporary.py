@@ -1,0 +1,215 @@
+"""Runs the open project as a package of its own and opens it again afterwards (protocol, 12.6)."""
+
+import asyncio
+import contextlib
+import time
+
+import structlog
+
+from arcor2_hw.data.base import new_id
+from arcor2_hw.data.editor import TaskKind
+from arcor2_hw.data.events import ChangeType, Event, MainScreen, OpenProjectData, SceneStateEnum, ShowMainScreenData
+from arcor2_hw.data.project import Project
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.build.service import BuildService
+from arcor2_server.collaboration.locks import Locks
+from arcor2_server.collaboration.tasks import Tasks
+from arcor2_server.documents import Session
+from arcor2_server.documents.checks import project_problems
+from arcor2_server.documents.renamed_actions import with_present_names
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import EventHub, make_event
+from arcor2_server.execution.runs import How
+from arcor2_server.execution.service import Execution
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.online.online_scene import OnlineScene
+from arcor2_server.storage import Storage
+
+log = structlog.get_logger(__name__)
+
+
+def _settle(built: "asyncio.Future[None]", error: Exception | None = None) -> None:
+    """Let the request be answered, unless nobody waits any more."""
+    if built.done():
+        return
+    if error is None:
+        built.set_result(None)
+    else:
+        built.set_exception(error)
+
+
+class _Run:
+    """One run, from the check whether it is allowed to the project being open again."""
+
+    def __init__(self, runs: "TemporaryRuns", how: How) -> None:
+        self._runs = runs
+        self._hub = runs.hub
+        self._locks = runs.locks
+        self._session = runs.session
+        self._scene = runs.online
+        self._execution = runs.execution
+        self._tasks = runs.tasks
+        self._how = how
+        self._package = ""
+        self._requested_at = time.monotonic()
+        self._online = False
+
+    async def whole(self, built: "asyncio.Future[None]") -> None:
+        """Do it all; `built` gets the moment in which the request can be answered, or why it is refused.
+
+        One task from the checks to the closed project, so that it keeps everybody else out without a gap.
+        """
+        try:
+            async with self._locks.exclusive():
+                project = await self._build()
+                self._scene.last_stop.require_none_since(self._requested_at)
+                self._execution.reserved = True
+                _settle(built)
+                await asyncio.sleep(0)  # the answer goes out first
+                await self._close()
+        except Exception as error:
+            self._execution.reserved = False
+            await self._discard_package()
+            if not built.done():
+                _settle(built, error)
+                return
+            log.exception("project not run")
+            return
+        except BaseException:
+            built.cancel()
+            await self._discard_package()
+            raise
+        try:
+            await self._run()
+            await self._delete()
+            await self._open_again(project)
+        except BaseException:  # the server ends: at its next start the project is open, as it was
+            await self._discard_package()
+            await self._open_again(project)
+            raise
+        finally:
+            self._execution.reserved = False
+        if self._online and self._session.project is not None:
+            try:
+                await self._scene.begin_start()
+            except Arcor2Error as error:
+                log.warning("scene not started again", reason=str(error))
+
+    async def _discard_package(self) -> None:
+        """Delete the package without a word: nobody was told of it, or nobody is there any more."""
+        if self._package:
+            with contextlib.suppress(Arcor2Error):
+                await asyncio.to_thread(self._execution.packages.forget_temporary, self._package)
+
+    def _publish(self, event: Event) -> None:
+        self._hub.broadcast(event)
+
+    async def _build(self) -> Project:
+        project = self._session.require_project()
+        if self._session.has_changes:
+            raise RequestRefused(f"{project.name} has changes that are not saved: save it first.")
+        if self._execution.busy:
+            raise RequestRefused("A program is running: stop it first.")
+        if self._scene.running_action is not None:
+            raise RequestRefused("An action is running: wait for it, or stop it.")
+        if self._scene.state not in (SceneStateEnum.STOPPED, SceneStateEnum.STARTED):
+            raise RequestRefused(f"The scene is {self._scene.state.value}: wait until that is over.")
+        name = f"Temporary package for project '{project.name}'."
+        self._package = new_id("pkg")
+        await asyncio.to_thread(self._execution.packages.note_temporary, self._package, project.id)
+        with self._tasks.running(TaskKind.BUILD, f"Building {project.name} to run it", self._how.by):
+            await self._runs.builder.build(project.id, name, self._package)
+        return project
+
+    async def _close(self) -> None:
+        self._online = self._scene.online
+        if self._online:
+            await self._scene.begin_stop()
+            await self._scene.settled()
+        ids = [item.id for item in self._session.document.items()]
+        await self._session.discard()
+        self._locks.drop(ids)
+        self._publish(make_event("ProjectClosed"))
+        summary = await asyncio.to_thread(self._execution.packages.summary, self._package)
+        self._publish(make_event("PackageChanged", summary, ChangeType.ADD))
+
+    async def _run(self) -> None:
+        try:
+            self._scene.last_stop.require_none_since(self._requested_at)
+            await self._execution.run_through(self._package, self._how)
+        except Arcor2Error as error:
+            log.warning("temporary package not run", package=self._package, reason=str(error))
+
+    async def _delete(self) -> None:
+        try:
+            summary = await self._execution.delete(self._package)
+        except Arcor2Error as error:
+            log.warning("temporary package not deleted", package=self._package, reason=str(error))
+        else:
+            self._publish(make_event("PackageChanged", summary, ChangeType.REMOVE))
+
+    async def _open_again(self, project: Project) -> None:
+        """Open the project as it is saved now; without it, clients get the list of projects."""
+        try:
+            opened = await self._runs.open(project.id)
+        except Arcor2Error as error:
+            log.warning("project not opened again", project=project.name, reason=str(error))
+            self._publish(make_event("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id)))
+            return
+        self._publish(make_event("OpenProject", opened))
+
+
+class TemporaryRuns:
+    """Runs the open project as a temporary package, and opens the project again afterwards."""
+
+    def __init__(
+        self,
+        hub: EventHub,
+        locks: Locks,
+        storage: Storage,
+        types: ObjectTypes,
+        session: Session,
+        online: OnlineScene,
+        execution: Execution,
+        build: BuildService,
+        tasks: Tasks,
+    ) -> None:
+        self.hub = hub
+        self.locks = locks
+        self.session = session
+        self.online = online
+        self.execution = execution
+        self.builder = build
+        self.tasks = tasks
+        self._storage = storage
+        self._types = types
+
+    async def run(self, how: How) -> None:
+        """Run the open project, which is closed meanwhile; return once the package is built.
+
+        Raises:
+            RequestRefused: the project has unsaved changes, or something is running.
+            InvalidProject: the project cannot be built.
+        """
+        built: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self.online.spawn(_Run(self, how).whole(built), "temporary package")
+        await built
+
+    async def open(self, project_id: str) -> OpenProjectData:
+        """Open a project as it is saved. Raise RequestRefused, NotFound or StorageError if that is impossible."""
+        project = await self._storage.project(project_id)
+        scene = await self._storage.scene(project.scene_id)
+        if problems := project_problems(scene, project, self._types):
+            raise RequestRefused(" ".join(problems))
+        project = with_present_names(scene, project, self._types)
+        await self.session.show(scene, project)
+        return OpenProjectData(scene, project)
+
+    async def recover(self) -> None:
+        """After a crash: delete the package of a project that was being run, and open the project again."""
+        try:
+            projects = await asyncio.to_thread(self.execution.packages.sweep)
+            if self.session.scene is None and len(projects) == 1:
+                await self.open(projects[0])
+        except Arcor2Error as error:
+            log.warning("a run that a crash ended is not cleared up", reason=str(error))

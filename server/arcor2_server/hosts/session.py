@@ -1,0 +1,162 @@
+"""The use of one cell host: its process, the state of its devices, calls to them and their streams."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import msgspec
+import structlog
+
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.runtime import messages as m
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import EventHub
+from arcor2_server.hosts.devices import DeviceBoard
+from arcor2_server.hosts.pool import CellHosts
+from arcor2_server.hosts.process import CellHost, json_of
+from arcor2_server.hosts.streams import RobotStreams
+
+log = structlog.get_logger(__name__)
+
+OBSERVE_WITHIN: Final = 5.0
+"""Time limit for reading a value, s; a device on a local network answers within one."""
+CANCEL_WITHIN: Final = 5.0
+"""Time limit for cancelling an action, s."""
+
+
+class HostSession:
+    """The scene that is online, or the program that runs: at most one cell host at a time.
+
+    Args:
+        hub: publishes the states and streams of the devices.
+        pool: provides the hosts.
+        what: names the session in the log, "scene" or "program".
+        everybody: send the streams at the streaming period to all clients, as the protocol does for a program.
+    """
+
+    def __init__(self, hub: EventHub, pool: CellHosts, what: str, *, everybody: bool = False) -> None:
+        self.host: CellHost | None = None
+        self.online = False
+        """Whether the devices are in operation. Set by the owner of the session."""
+        self.package_info: bytes | None = None
+        """The encoded PackageInfo while a program runs. Set by the owner of the session."""
+        self.board = DeviceBoard(hub)
+        self.streams = RobotStreams(hub, self.send, everybody=everybody)
+        self.on_message: Callable[[CellHost, m.ServerBound], None] = lambda _host, _message: None
+        """Receives the messages that the session does not handle by itself."""
+        self.on_end: Callable[[str], None] = lambda _reason: None
+        """Called when the host has ended by itself, with the reason."""
+        self._pool = pool
+        self._what = what
+        hub.on_leave.append(self.streams.forget)
+
+    # -------------------------------------------------------------------------------- the process
+    async def take(self) -> CellHost:
+        """Take a host from the pool. Its messages arrive from now on; it becomes `host` by assignment.
+
+        Raises:
+            ConnectionLost: the process ended while it started.
+        """
+        return await self._pool.take(self)
+
+    def prepare(self) -> None:
+        """Start a spare host if there is none."""
+        self._pool.prepare()
+
+    def send(self, message: m.ToHost) -> None:
+        """Send a message to the host, if there is one."""
+        if self.host is not None:
+            self.host.send(message)
+
+    def host_message(self, host: CellHost, message: m.ServerBound) -> None:
+        """Handle a message of the host."""
+        match message:
+            case m.StreamEvent():
+                if host is self.host:
+                    self.streams.publish(message)
+            case m.DeviceChanged():
+                self.board.changed(message)
+                log.info(
+                    "device",
+                    id=message.object_id,
+                    connection=message.connection.value,
+                    reason=message.reason,
+                    health=message.health.value,
+                    alarms=[alarm.text for alarm in message.alarms],
+                    control=message.control_owner,
+                )
+            case m.LogLine():
+                log.info(self._what, level=message.level, text=message.text, object=message.object_id)
+            case _:
+                self.on_message(host, message)
+
+    def host_silent(self, host: CellHost, silent: bool) -> None:
+        """Note whether the host answers."""
+        if host is self.host:
+            self.board.set_answering(not silent)
+            log.warning(f"{self._what} does not answer" if silent else f"{self._what} answers again", pid=host.pid)
+
+    def host_ended(self, host: CellHost, reason: str) -> None:
+        """Report that the host has ended."""
+        if host is self.host:
+            self.on_end(reason)
+
+    async def close(self) -> None:
+        """Close all hosts of the pool, in reaction to the end of the server."""
+        self.host = None
+        await self._pool.close()
+
+    # -------------------------------------------------------------------------------- calls
+    def require_online(self) -> CellHost:
+        """Return the host. Raise RequestRefused unless the devices are in operation."""
+        if not self.online or self.host is None:
+            raise RequestRefused("The scene is offline: start it first.")
+        return self.host
+
+    async def call(
+        self,
+        object_id: str,
+        method: str,
+        args: Mapping[str, Any] | None = None,
+        *,
+        control: bool = False,
+        deadline: float | None = None,
+    ) -> bytes:
+        """Call a method of a device.
+
+        Args:
+            object_id: the device.
+            method: the name of the method.
+            args: its arguments.
+            control: take control of the device before.
+            deadline: time limit, s; None: as the host has it.
+
+        Returns:
+            The result as JSON, empty for None.
+
+        Raises:
+            CellError: the device refused, or failed.
+            ConnectionLost: the host ended.
+            DeviceTimeout: the device or the host did not answer in time.
+        """
+        encoded = {name: json_of(value) for name, value in (args or {}).items()}
+        return await self.require_online().call(object_id, method, encoded, control=control, deadline=deadline)
+
+    async def ask(self, kind: type[Any], object_id: str, method: str, args: Mapping[str, Any] | None = None) -> Any:
+        """Call a method that only observes, and decode its result as `kind`. Raises what `call` raises."""
+        raw = await self.call(object_id, method, args, deadline=OBSERVE_WITHIN)
+        try:
+            return msgspec.json.decode(raw, type=kind)
+        except msgspec.MsgspecError as error:
+            raise Arcor2Error(f"{method} gave something else than it should.", str(error)) from error
+
+    async def cancel(self, object_id: str, action: str) -> None:
+        """Cancel an action of a device while it runs."""
+        await self.require_online().call(object_id, action, cancel=True, deadline=CANCEL_WITHIN)
+
+    async def retry(self, object_id: str) -> None:
+        """Create and connect a failed device again."""
+        await self.require_online().retry(object_id)
+
+    async def stop_motion(self, object_id: str) -> None:
+        """Stop a device, whatever it does."""
+        await self.require_online().stop_motion(object_id)

@@ -1,0 +1,182 @@
+"""Look-ups in the analysed object types, and how a cell host or a package gets their code."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from msgspec import Struct
+
+from arcor2_hw.analysis import (
+    Enumeration,
+    InstalledType,
+    Library,
+    SourceFile,
+    TypeAnalysis,
+    module_name,
+)
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource, find_action
+from arcor2_hw.data.robot import RobotMeta
+from arcor2_hw.exceptions import NotFound
+from arcor2_hw.runtime.messages import TypeCode
+
+
+class PackageType(Data, frozen=True):
+    """What Build puts into a package for one object type.
+
+    An uploaded type has `module` and `source`; an installed one `entry_point` ("module:Class") and the `folder` of
+    its own code, and is copied from there.
+    """
+
+    name: str
+    module: str
+    source: str = ""
+    entry_point: str = ""
+    folder: Path | None = None
+    distribution: str = ""
+    version: str = ""
+
+
+class Known(Struct, frozen=True):
+    """Everything that follows from the sources, made anew and put in place as a whole."""
+
+    analyses: dict[str, TypeAnalysis] = {}
+    metas: dict[str, ObjectTypeMeta] = {}
+    robots: dict[str, RobotMeta] = {}
+    digest: str = ""
+
+
+class TypeCatalog:
+    """The known object types. Look-ups raise NotFound for an unknown type or action."""
+
+    def __init__(self) -> None:
+        self._library = Library()
+        self._installed: dict[str, InstalledType] = {}
+        self._uploaded: dict[str, ObjectTypeSource] = {}
+        self._known = Known()
+
+    # ------------------------------------------------------------------------------------------------ look-ups
+    @property
+    def digest(self) -> str:
+        """Return a digest of all types, robots and actions; it is the same in the next process if they are."""
+        return self._known.digest
+
+    def names(self) -> list[str]:
+        """Return the names of all types."""
+        return list(self._known.metas)
+
+    def known(self, name: str) -> bool:
+        """Return whether there is such a type."""
+        return name in self._known.metas
+
+    def metas(self) -> list[ObjectTypeMeta]:
+        """Return all types, by name, built-in and disabled ones too."""
+        return list(self._known.metas.values())
+
+    def meta(self, name: str) -> ObjectTypeMeta:
+        """Return one type."""
+        try:
+            return self._known.metas[name]
+        except KeyError:
+            raise NotFound(f"There is no object type {name!r}.") from None
+
+    def _analysis(self, name: str) -> TypeAnalysis:
+        self.meta(name)
+        return self._known.analyses[name]
+
+    def bases(self, name: str) -> list[str]:
+        """Return the names of all ancestors of a type, the nearest first, without the type itself."""
+        return list(self._analysis(name).bases)
+
+    def derives_from(self, name: str, base: str) -> bool:
+        """Return whether a type is, or derives from, `base`."""
+        return name == base or base in self._analysis(name).bases
+
+    def actions(self, name: str) -> list[ObjectAction]:
+        """Return the actions of a type: inherited and disabled ones too, hidden ones not."""
+        return [action for action in self._analysis(name).actions if not action.meta.hidden]
+
+    def action(self, type_name: str, name: str) -> ObjectAction:
+        """Return one action, by its name or a former one."""
+        if (action := find_action(self._analysis(type_name).actions, name)) is not None:
+            return action
+        raise NotFound(f"The object type {type_name} has no action {name!r}.")
+
+    def enumerations(self, name: str) -> dict[tuple[str, str], Enumeration]:
+        """Return the enumerations that the actions of a type take, by action and parameter."""
+        return self._analysis(name).enumerations
+
+    def keyword_only(self, name: str) -> frozenset[tuple[str, str]]:
+        """Return the parameters of a type's actions that are given by name only, by action and parameter."""
+        return self._analysis(name).keyword_only
+
+    def robot_metas(self) -> list[RobotMeta]:
+        """Return the features of all non-abstract robot types."""
+        return list(self._known.robots.values())
+
+    def robot_meta(self, name: str) -> RobotMeta:
+        """Return the features of one robot type; raise NotFound when it is no robot."""
+        self.meta(name)
+        if (robot := self._known.robots.get(name)) is None:
+            raise NotFound(f"The object type {name} is no robot.")
+        return robot
+
+    def implements(self, name: str, method: str) -> bool:
+        """Return whether a type really has an optional method, by itself or by an ancestor."""
+        return method in self._analysis(name).implemented
+
+    def files(self) -> list[SourceFile]:
+        """Return the sources of installed and then of uploaded types, to be put into another library in this order."""
+        installed = (each.file for each in self._installed.values() if each.file is not None)
+        return [*installed, *map(self._library.file, self._uploaded)]
+
+    def is_uploaded(self, name: str) -> bool:
+        """Return whether a type was uploaded, and so can be changed and deleted."""
+        return name in self._uploaded
+
+    # ------------------------------------------------------------------------------------------------ code
+    def type_code(self, name: str) -> TypeCode:
+        """Return how the cell host gets at one type."""
+        self.meta(name)
+        return self._code(name)
+
+    def _code(self, name: str) -> TypeCode:
+        if (one := self._uploaded.get(name)) is not None:
+            return TypeCode(name, module=module_name(name), source=one.source)
+        if (installed := self._installed.get(name)) is not None:
+            return TypeCode(name, entry_point=installed.entry_point)
+        return TypeCode(name, entry_point=f"arcor2_hw.objects:{name}")
+
+    def _with_needed(self, names: Iterable[str]) -> list[str]:
+        """Return types and the uploaded modules that they need, each after those that it needs itself."""
+        found: dict[str, None] = {}
+        for name in names:
+            # A helper or mixin is no type of its own, but its module may be wanted.
+            known = self._known.analyses[name] if name in self._uploaded else self._analysis(name)
+            for file in known.modules:
+                if file.name in self._uploaded:
+                    found[file.name] = None
+            found[name] = None
+        return list(found)
+
+    def type_codes(self, names: Iterable[str]) -> list[TypeCode]:
+        """Return how the cell host gets at types and at the uploaded modules they need, bases and mixins first."""
+        return [self._code(name) for name in self._with_needed(names)]
+
+    def sources_for(self, names: Iterable[str]) -> list[PackageType]:
+        """Give what a package needs of types, with their uploaded bases and mixins first; nothing for built-in ones."""
+        found = []
+        for name in self._with_needed(names):
+            if (one := self._uploaded.get(name)) is not None:
+                found.append(PackageType(name, module_name(name), source=one.source))
+            elif (installed := self._installed.get(name)) is not None:
+                found.append(
+                    PackageType(
+                        name,
+                        module_name(name),
+                        entry_point=installed.entry_point,
+                        folder=Path(installed.folder) if installed.folder else None,
+                        distribution=installed.distribution,
+                        version=installed.version,
+                    )
+                )
+        return found

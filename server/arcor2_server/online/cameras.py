@@ -1,0 +1,38 @@
+"""Access to the cameras of the online scene."""
+
+import msgspec
+
+from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.documents import Session
+from arcor2_server.errors import RequestRefused
+from arcor2_server.hosts.session import OBSERVE_WITHIN
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.online.online_scene import OnlineScene
+
+
+class Cameras:
+    """Access to the cameras of the online scene."""
+
+    def __init__(self, types: ObjectTypes, session: Session, online: OnlineScene) -> None:
+        self._types = types
+        self._session = session
+        self._online = online
+
+    def require_camera(self, object_id: str) -> SceneObject:
+        """Return a camera of the open scene; NotFound, RequestRefused when it is none."""
+        found = self._session.scene_object(object_id)
+        if not self._types.derives_from(found.type, "Camera"):
+            raise RequestRefused(f"{found.name} is not a camera.")
+        return found
+
+    async def camera_parameters(self, camera: SceneObject) -> CameraParameters:
+        """Return the intrinsics that a live camera has; raise RequestRefused when it has none."""
+        raw = await self._online.call(camera.id, "color_camera_params", deadline=OBSERVE_WITHIN)
+        if not raw:
+            raise RequestRefused(f"{camera.name} does not know its parameters.")
+        try:
+            return msgspec.json.decode(raw, type=CameraParameters)
+        except msgspec.MsgspecError as error:
+            raise Arcor2Error(f"{camera.name} gave no parameters of a camera.", str(error)) from error

@@ -1,0 +1,68 @@
+"""The message with which a cell host opens a scene."""
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.object_type import ObjectModel
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.runtime import messages as m
+from arcor2_server.documents import Session
+from arcor2_server.hosts.devices import overlay_for
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage.setting_secrets import SettingSecrets
+from arcor2_server.workspace.host_world import HostWorld
+
+
+class SceneOpening:
+    """Prepares the opening of a scene."""
+
+    def __init__(
+        self,
+        settings: ServerSettings,
+        types: ObjectTypes,
+        session: Session,
+        secrets: SettingSecrets,
+        host_world: HostWorld,
+    ) -> None:
+        self._settings = settings
+        self._types = types
+        self._session = session
+        self._secrets = secrets
+        self._host_world = host_world
+
+    async def prepare(self, scene: Scene, keep_going: bool) -> tuple[m.OpenScene, dict[str, list[str]]]:
+        """Return the message, and by object the names of the settings that the cell file of the server overrides.
+
+        Args:
+            scene: the scene.
+            keep_going: leave out objects that cannot be created or connected.
+
+        Raises:
+            NotFound: a type or a secret is missing.
+            InvalidData: an object has another type in the cell file.
+            StorageError: secrets cannot be stored.
+        """
+        here, overlaid = overlay_for(self._settings.cell, self._secrets.is_secret, scene)
+        names = {obj.type for obj in scene.objects}
+        models: dict[str, ObjectModel] = {}
+        for name in names:
+            model = self._types.meta(name).object_model
+            if not isinstance(model, Unset):
+                models[name] = model
+        project = self._session.project
+        overrides = [*([] if project is None else project.object_overrides), *here]
+        message = m.OpenScene(
+            scene,
+            self._types.type_codes(names),
+            models,
+            overrides,
+            self._settings.streaming_period,
+            keep_going=keep_going,
+            assets=self._host_world.shape_files(),
+            secrets=self._secrets.values_for(scene, overrides),
+        )
+        await self._secrets.store.flush()
+        return message, overlaid
+
+    def with_workspace(self, message: m.OpenScene, scene: Scene) -> m.OpenScene:
+        """Add the collision models and calibrations in force now. Send the message at once."""
+        return self._host_world.with_world(message, self._host_world.calibrations(scene.objects))

@@ -1,0 +1,145 @@
+"""The database of saved documents: connections, transactions and errors."""
+
+import asyncio
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from contextvars import ContextVar
+from typing import Any, Final, Self
+
+import msgspec
+from sqlalchemy import event, select
+from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.ext.asyncio import AsyncEngine, AsyncSession, async_sessionmaker, create_async_engine
+
+from arcor2_hw.exceptions import NotFound, StorageError
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage.schema import bring_up_to_date
+from arcor2_server.storage.sqlite import check_opens, prepare, purge
+
+_together: ContextVar[AsyncSession | None] = ContextVar("together", default=None)
+"""The session of the transaction that the present task is in."""
+_PER_QUERY: Final = 100
+"""Documents read by one query; each may have some hundred kilobytes."""
+
+
+class Database:
+    """The database with its transactions. All methods may raise StorageError, which names the database.
+
+    `revision` grows with every write; `types_revision` with every write to object types and models.
+    """
+
+    def __init__(self, engine: AsyncEngine, place: str) -> None:
+        self.revision = 0
+        self.types_revision = 0
+        self._engine = engine
+        self._place = place
+        self._sessions = async_sessionmaker(engine, expire_on_commit=False)
+
+    @classmethod
+    async def open(cls, settings: ServerSettings) -> Self:
+        """Open, or create, the database. StorageError when it is damaged, not writable or of a newer version."""
+        place = settings.database_url.rpartition("@")[2] or str(settings.documents_database)
+        if settings.database_url:
+            engine = create_async_engine(settings.database_url)
+        else:
+            check_opens(settings.documents_database)
+            # One connection: SQLite writes one at a time anyway, and each connection costs a thread.
+            engine = create_async_engine(
+                f"sqlite+aiosqlite:///{settings.documents_database}", pool_size=1, max_overflow=0
+            )
+            event.listen(engine.sync_engine, "connect", prepare)
+        try:
+            await bring_up_to_date(engine, place)
+        except BaseException:
+            await engine.dispose()
+            raise
+        return cls(engine, place)
+
+    async def purge(self) -> None:
+        """Overwrite what was replaced or deleted, in the file of SQLite. Raise StorageError if that is impossible."""
+        try:
+            await purge(self._engine)
+        except SQLAlchemyError as error:
+            raise self._failed("write", error) from error
+
+    async def close(self) -> None:
+        """Close the database."""
+        await self._engine.dispose()
+
+    # ------------------------------------------------------------------------------------------------ inside
+    @asynccontextmanager
+    async def together(self) -> AsyncIterator[None]:
+        """Make one transaction of all that is written inside by the present task: all of it is kept, or nothing.
+
+        StorageError for what the database says of it as a whole.
+        """
+        before = self.types_revision
+        async with self.writing() as session:
+            token = _together.set(session)
+            try:
+                yield
+            finally:
+                _together.reset(token)
+        if self.types_revision != before:
+            self.types_revision += 1  # only now they are there for others
+
+    @asynccontextmanager
+    async def reading(self) -> AsyncIterator[AsyncSession]:
+        """Return a session to read with; raise StorageError for whatever the database says."""
+        try:
+            if (session := _together.get()) is not None:
+                yield session
+                return
+            async with self._sessions() as session:
+                yield session
+        except SQLAlchemyError as error:
+            raise self._failed("read", error) from error
+
+    @asynccontextmanager
+    async def writing(self, *, documents: bool = True) -> AsyncIterator[AsyncSession]:
+        """Return a session in a transaction, which is on disk when it is left; StorageError as above.
+
+        `documents`: `revision` grows, since answers that are made from documents may be others now.
+        """
+        try:
+            if (session := _together.get()) is not None:
+                yield session
+                await session.flush()
+                return
+            async with self._sessions() as session, session.begin():
+                yield session
+        except SQLAlchemyError as error:
+            raise self._failed("write", error) from error
+        if documents:
+            self.revision += 1
+
+    def _failed(self, what: str, error: SQLAlchemyError) -> StorageError:
+        cause = getattr(error, "orig", None) or error
+        return StorageError(f"cannot {what} the database {self._place}: {cause}", detail=str(error))
+
+    @staticmethod
+    async def one(session: AsyncSession, table: type[Any], key: str, what: str) -> Any:
+        """Return the row of that key; NotFound says `what` there is not."""
+        if (row := await session.get(table, key)) is None:
+            raise NotFound(f"There is no {what} {key!r}.")
+        return row
+
+    async def with_ids(self, table: type[Any], keys: Sequence[str], decode: Any) -> list[Any]:
+        """Return the decoded documents with these ids, decoded off the event loop, some at a time."""
+        found: list[Any] = []
+        for begin in range(0, len(keys), _PER_QUERY):
+            wanted = select(table.id, table.document).where(table.id.in_(keys[begin : begin + _PER_QUERY]))
+            async with self.reading() as session:
+                rows = list(await session.execute(wanted))
+            found += await asyncio.to_thread(self._decode_all, decode, rows)
+        return found
+
+    def _decode_all(self, decode: Any, rows: Sequence[Any]) -> list[Any]:
+        return [self.decoded(decode, row) for row in rows]
+
+    def decoded(self, decode: Any, row: Any) -> Any:
+        """Return the document of a row. Raise StorageError that names the row if the document is damaged."""
+        try:
+            return decode(row.document)
+        except msgspec.DecodeError as error:
+            raise StorageError(f"the document {row.id!r} in the database {self._place} is damaged: {error}") from error

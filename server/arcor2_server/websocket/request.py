@@ -1,0 +1,65 @@
+"""One request of the protocol while it is served: its client and the events that it sends."""
+
+import time
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from msgspec import Raw
+
+from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.events import ChangeType, Event
+from arcor2_server.errors import NotRegistered
+from arcor2_server.events import make_event
+from arcor2_server.websocket.client import Client
+
+
+class Context:
+    """What a handler receives next to its arguments.
+
+    Events: `emit` sends to all clients after the response, `emit_first` before it (protocol, section 2). They are
+    sent when the request is granted, or refused with data. Any other error drops them.
+    """
+
+    __slots__ = (
+        "client",
+        "dry_run",
+        "events_after",
+        "events_before",
+        "events_to_caller",
+        "received_at",
+        "request",
+    )
+
+    def __init__(self, client: Client, dry_run: bool = False, request: str = "") -> None:
+        self.client = client
+        self.dry_run = dry_run
+        self.request = request
+        self.received_at = time.monotonic()
+        """Time of receipt, s of the monotonic clock."""
+        self.events_before: list[Event] = []
+        self.events_after: list[Event] = []
+        self.events_to_caller: list[Event] = []
+        """Sent to the caller alone, after the response."""
+
+    @property
+    def user(self) -> str:
+        """The registered name of the caller. Raises NotRegistered if there is none."""
+        if self.client.user is None:
+            raise NotRegistered("You are not logged in: send RegisterUser first.")
+        return self.client.user
+
+    def emit(self, name: str, data: Any = UNSET, change: ChangeType | None = None, parent: str | None = None) -> None:
+        """Send an event to all clients after the response."""
+        self.events_after.append(make_event(name, data, change, parent))
+
+    def emit_first(
+        self, name: str, data: Any = UNSET, change: ChangeType | None = None, parent: str | None = None
+    ) -> None:
+        """Send an event to all clients before the response."""
+        self.events_before.append(make_event(name, data, change, parent))
+
+
+Handler = Callable[[Context, Any], Awaitable[Any]]
+"""Takes the context and the decoded arguments (None if the request has none); returns the data of the answer."""
+CachedAnswer = Callable[[], Raw | None]
+"""Returns the encoded data of an answer if it is cached, else None."""
