@@ -4,7 +4,6 @@ import asyncio
 import tempfile
 import time
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, Final
 
 import msgspec
@@ -97,8 +96,7 @@ async def build(report: Report) -> None:
             types = ObjectTypes(storage, await AssetStore.open(settings.assets_dir))
             await types.load()
             await storage.put_scene(_SCENE)
-            services: Any = SimpleNamespace(settings=settings, storage=storage, types=types)
-            service = BuildService(services)
+            service = BuildService(settings, storage, types)
             times: dict[int, list[float]] = {size: [] for size in SIZES}
             for size in SIZES:
                 await storage.put_project(project(size))

@@ -1,10 +1,8 @@
 """What the compute workers cost the server: their start, a question, and worlds of many bodies."""
 
 import time
-from pathlib import Path
 from typing import Final
 
-import arcor2_drivers
 from arcor2_hw.collision.description import RobotSource, StoredFile, WorldBody, WorldItem, WorldRobot
 from arcor2_hw.compute import kinematics_tasks as t
 from arcor2_hw.data.geometry import Orientation, Pose, Position
@@ -14,8 +12,8 @@ from arcor2_hw.kinematics import primitives
 from arcor2_server.compute.workers import Compute
 from arcor2_server.workspace.collisions import Placed, first_hit
 from benchmarks.metrics import Metric, Report, median, percentile
+from benchmarks.models import UR5E
 
-UR5E: Final = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e"
 BODIES: Final = 1000
 ROUNDS: Final = 100
 

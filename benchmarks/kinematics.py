@@ -7,12 +7,10 @@ little as can be; processor time is in the notes.
 import os
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-import arcor2_drivers
 from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.kinematics.errors import OutOfReach
@@ -22,8 +20,8 @@ from arcor2_hw.kinematics.shapes import Array, Box
 from arcor2_hw.planning.reachability import Reach, Reachability
 from benchmarks import planning, safe_moves
 from benchmarks.metrics import Metric, Report, median, percentile
+from benchmarks.models import UR5E
 
-UR5E: Final = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e"
 SEED: Final = 20
 POSES: Final = 5000
 ORIENTATIONS: Final = (

@@ -13,7 +13,7 @@ import trimesh
 
 from arcor2_hw.collision.description import StoredFile
 from arcor2_hw.compute.mesh_tasks import PrepareAsset
-from arcor2_server.app import running_services
+from arcor2_server.app import running_server
 from arcor2_server.compute.workers import Compute
 from arcor2_server.settings import ServerSettings
 from benchmarks.metrics import Metric, Report, median
@@ -85,16 +85,16 @@ async def again(folder: Path) -> Metric:
     """Time what is asked for the second time, from the disk."""
     taken = []
     (folder / "data").mkdir()
-    async with running_services(ServerSettings(data_dir=folder / "data")) as services:
+    async with running_server(ServerSettings(data_dir=folder / "data")) as services:
 
         async def pieces() -> AsyncIterator[bytes]:
             yield (folder / "arm.zip").read_bytes()
 
         await services.assets.put(pieces(), "arm.zip")
-        await services.prepared.get("arm.zip")
+        await services.display_models.get("arm.zip")
         for _ in range(AGAIN):
             began = time.perf_counter()
-            shown = await services.prepared.get("arm.zip")
+            shown = await services.display_models.get("arm.zip")
             (shown.packed or shown.plain).read_bytes()
             taken.append(1e3 * (time.perf_counter() - began))
     return Metric("meshes_again_ms", median(taken), len(taken), "the compressed file, read")

@@ -161,6 +161,6 @@ def plan_with_ompl(model: RobotModel) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    from benchmarks.kinematics import UR5E
+    from benchmarks.models import UR5E
 
     print(json.dumps(plan_with_ompl(RobotModel.load(UR5E))), flush=True)

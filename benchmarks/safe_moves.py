@@ -5,7 +5,6 @@ import time
 from pathlib import Path
 from typing import Final
 
-import arcor2_drivers
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box
 from arcor2_hw.data.robot import Joint
@@ -14,8 +13,9 @@ from arcor2_hw.objects.safe_moves import Way
 from arcor2_hw.objects.surroundings import Nothing, Obstacle
 from arcor2_hw.objects.urdf_robot import UrdfRobot
 from benchmarks.metrics import Metric, median, percentile
+from benchmarks.models import UR5E
 
-UR5E: Final = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e" / "ur5e.urdf"
+UR5E_URDF: Final = UR5E / "ur5e.urdf"
 MOVES: Final = 100
 STOPS: Final = 40
 NAMES: Final = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
@@ -37,7 +37,7 @@ class Around(Nothing):
 
     def asset(self, asset_id: str) -> Path | None:  # noqa: ARG002
         """Return the model of the arm."""
-        return UR5E
+        return UR5E_URDF
 
 
 class InstantArm(UrdfRobot):
