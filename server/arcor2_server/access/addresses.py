@@ -11,9 +11,11 @@ _DOCUMENTATION = "192.0.2.1"
 
 
 class Joining(Data, frozen=True):
-    """addresses: of the editor, the best first; empty when only this machine reaches the server.
+    """The addresses for inviting users.
 
-    fingerprint: SHA-256 of the certificate, as browsers show it; empty without TLS. name: of this machine.
+    addresses: URLs of the editor, the best one first; empty if only this machine reaches the server.
+    fingerprint: SHA-256 of the certificate, as browsers show it; empty without TLS.
+    name: the name of this machine.
     """
 
     addresses: list[str]

@@ -44,7 +44,7 @@ class TooManyAttempts(AccessRefused):
 
 
 class Admission(Data, frozen=True):
-    """In which role somebody is let in; `role` is None for one who still has to show a token."""
+    """The role of an admitted client; None if the client has to send a token first."""
 
     role: Role | None
     token: Token | None = None
@@ -66,7 +66,7 @@ def is_local(settings: ServerSettings) -> bool:
 
 
 class Access:
-    """Decides for each connection."""
+    """Decides which clients are admitted."""
 
     def __init__(self, settings: ServerSettings) -> None:
         self._settings = settings

@@ -24,7 +24,7 @@ RESERVE: Final = 4
 
 
 class Connection:
-    """One accepted connection. It waits until its client is admitted; a connection that waits may be dropped."""
+    """One accepted connection. Until its client is admitted, it may be dropped in favour of a new one."""
 
     __slots__ = ("_limits", "address", "admitted", "drop")
 
@@ -49,10 +49,11 @@ class Connection:
 
 
 class ConnectionLimits:
-    """Counts connections. Where there are too many, the one that has waited longest makes room for a new one.
+    """Counts connections. If there are too many, the unadmitted connection that has waited longest is dropped.
 
-    total: connections at most; a quarter of them is for admitted clients. per_address: connections at most that wait
-    from one address. proxies: addresses and networks without a limit of their own, since many clients are behind each.
+    total: maximum number of connections; a quarter of them is reserved for admitted clients.
+    per_address: maximum number of unadmitted connections from one address.
+    proxies: addresses and networks without this limit, since many clients are behind each.
     """
 
     def __init__(self, total: int, per_address: int, proxies: Iterable[str] = ()) -> None:

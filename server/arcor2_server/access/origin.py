@@ -18,10 +18,10 @@ RESOLVER: Final = Path("/etc/resolv.conf")
 
 
 class HostNames:
-    """The names under which this server is reached: any IP address, localhost, the machine's names, `configured` ones.
+    """The valid names of this server: any IP address, localhost, the names of the machine, and configured names.
 
-    Every other name may belong to somebody who points it at this machine (DNS rebinding): to a browser, that person's
-    page then has the same origin as this server. An address belongs to nobody else's page.
+    Any other name could be pointed at this machine by an attacker (DNS rebinding), whose page would then have the
+    origin of this server. An IP address cannot be misused in this way.
     """
 
     def __init__(self, configured: Iterable[str] = ()) -> None:

@@ -23,8 +23,9 @@ LONGEST_NAME: Final = 100
 
 
 class Token(Data, frozen=True):
-    """One token: for whom, in which role, until when; `digest` is the SHA-256 of its secret, which has 256 random bits
-    and so needs no slow hash.
+    """One token: its name, role and expiry; `digest` is the SHA-256 of its secret.
+
+    The secret has 256 random bits, so that no slow hash is needed.
     """
 
     id: str
@@ -46,8 +47,8 @@ _decode = msgspec.json.Decoder(list[Token]).decode
 class TokenFile:
     """The tokens of one data directory. Methods raise StorageError naming the file.
 
-    Other processes may change the file at any time: it is read again when it is another one. Each change is written to
-    a copy first, which is used when the file is damaged.
+    Other processes may change the file at any time; a changed file is read again. Each change is written to a backup
+    first, which is used if the file is damaged.
     """
 
     def __init__(self, data_dir: Path) -> None:

@@ -19,13 +19,13 @@ OWN_ROOTS: Final = frozenset({SCENE, PROJECT, ACTION, ADDING_OBJECT, "START", "E
 
 
 class Locked(RequestRefused):
-    """Somebody else holds a lock on what was named."""
+    """Another user holds a lock on the item."""
 
     code = "locked"
 
 
 class LockTree(Protocol):
-    """How ids hang together; the open document knows it."""
+    """Returns the trees of items. The open document implements it."""
 
     def root_of(self, item: str) -> str:
         """Return the root of the tree that an id belongs to; raise NotFound for an id it does not know."""
@@ -62,10 +62,10 @@ class _Root:
 
 
 class LockTable:
-    """Who holds what. Nothing here waits, so that each change is made as a whole.
+    """The locks of all users. Its methods do not wait, so that each change is atomic.
 
-    `tree` and `stored` are set when the server is put together: the open document, and whether an id is that of a
-    stored scene or project or the name of an object type.
+    `tree` and `stored` are set by the composition root: the open document, and a function that tells whether an id
+    names a stored scene or project, or an object type.
     """
 
     def __init__(self) -> None:

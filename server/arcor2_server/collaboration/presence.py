@@ -18,7 +18,7 @@ PERIOD: Final = 1 / 15
 
 
 class PresenceBoard:
-    """What users said last; of one who leaves it is forgotten."""
+    """The presence of each connected user, as last reported by the client."""
 
     def __init__(self, hub: EventHub, users: Users) -> None:
         self._hub = hub

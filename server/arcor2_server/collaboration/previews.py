@@ -29,7 +29,7 @@ class _Dragged:
 
 
 class Previews:
-    """What is dragged just now, by item."""
+    """The items that are being dragged."""
 
     def __init__(self, hub: EventHub, locks: Locks) -> None:
         self._hub = hub

@@ -21,7 +21,7 @@ NAME: Final = "TaskState"
 
 
 class Task:
-    """One piece of work. What is said after its end is dropped."""
+    """One task. Updates after its end are ignored."""
 
     def __init__(self, tasks: "Tasks", state: TaskStateData) -> None:
         self._tasks = tasks
@@ -50,7 +50,7 @@ class Task:
 
 
 class Tasks:
-    """What is under way. Clients that subscribed to TaskState are told."""
+    """The running tasks. Changes are published to the subscribers of TaskState."""
 
     def __init__(self, hub: EventHub) -> None:
         self._hub = hub

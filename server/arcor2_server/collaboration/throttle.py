@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 
 class Throttle:
-    """Passes messages on by `send(key, message)`, of each key at most one in `period` seconds: the newest one."""
+    """Passes on messages by `send(key, message)`: of each key at most the newest one per `period` seconds."""
 
     def __init__(self, period: float, send: Callable[[str, bytes], None]) -> None:
         self._period = period

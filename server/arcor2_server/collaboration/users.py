@@ -26,7 +26,7 @@ USERS_WITH_NOTICES: Final = 200
 
 
 class Users:
-    """Names of people, each at one connection."""
+    """The registered users, each with one connection."""
 
     def __init__(self, hub: EventHub, locks: Locks, settings: ServerSettings) -> None:
         self._hub = hub

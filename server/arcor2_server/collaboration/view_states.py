@@ -26,7 +26,7 @@ IN_MEMORY: Final = 64
 
 
 class ViewStates:
-    """The values by whose they are (nobody: shared) and document; on disk, the ones in use in memory too."""
+    """The view values by user (empty: shared) and document. They are stored in the database; some are cached."""
 
     def __init__(self, hub: EventHub, data: SharedData) -> None:
         self._hub = hub

@@ -42,7 +42,7 @@ LINES: Final = 30
 
 
 class ComputeProcess:
-    """Made by `start`. Not for two questions at once."""
+    """A running worker, created by `start`. It computes one task at a time."""
 
     def __init__(self, process: ChildProcess, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.process = process

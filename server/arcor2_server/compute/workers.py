@@ -118,7 +118,7 @@ def _settle(question: _Question, error: Exception) -> None:
 
 
 class Compute:
-    """Asks the workers. A crash costs the one computation that it happened in."""
+    """Runs tasks in the workers. A crash of a worker fails only the task that it computes."""
 
     def __init__(self, idle: float) -> None:
         self._workers = {kind: _Worker(kind, idle) for kind in WorkerKind}

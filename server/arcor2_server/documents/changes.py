@@ -52,9 +52,10 @@ OF_SCENE: Final = frozenset({Kind.SCENE, Kind.OBJECT})
 
 
 class Item(Struct, frozen=True, array_like=True):
-    """One item. `parent` is the action point that an orientation, joints or action belongs to, else empty.
+    """One item. `parent`: the action point of an orientation, joints or action, else empty.
 
-    `rank` orders items of one kind: what is put back takes its old place. Values are never changed in place.
+    `rank` orders the items of one kind: a restored item returns to its old position. Values are never modified in
+    place.
     """
 
     kind: Kind
@@ -65,7 +66,7 @@ class Item(Struct, frozen=True, array_like=True):
 
 
 class Change(Struct, frozen=True, array_like=True):
-    """An item appears (`before` is None), gets another value, or goes (`after` is None)."""
+    """An item is added (`before` is None), replaced, or removed (`after` is None)."""
 
     kind: Kind
     id: str
@@ -80,7 +81,7 @@ class Change(Struct, frozen=True, array_like=True):
 
 
 class How(enum.StrEnum):
-    """Why an edit was made."""
+    """The kind of an edit."""
 
     EDIT = "edit"
     UNDO = "undo"
@@ -91,10 +92,10 @@ class How(enum.StrEnum):
 
 
 class Edit(Struct, frozen=True):
-    """The changes of one request, which are made, undone and kept together. `number` grows by one with each edit.
+    """The changes of one request, which are applied, undone and stored together. `number` grows by one per edit.
 
-    `request` is what asked for it; of an undo or redo, what had asked for the edit that is taken back. `of` is the
-    number of that edit, or the revision that was restored.
+    `request`: the request that made the edit; for an undo or redo, the request of the edit that it reverts.
+    `of`: the number of that edit, or the restored revision.
     """
 
     number: int

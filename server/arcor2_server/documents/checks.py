@@ -34,7 +34,7 @@ from arcor2_server.documents.reparenting import check_parent
 
 
 class Types(Protocol):
-    """What the checks need to know of object types (arcor2_server.object_types.registry.ObjectTypes)."""
+    """The object types, as far as the checks need them (arcor2_server.object_types.registry.ObjectTypes)."""
 
     def meta(self, name: str) -> ObjectTypeMeta:
         """Return one type. Raise NotFound if there is none."""
@@ -132,7 +132,7 @@ def _twice(names: Iterable[str], what: str) -> list[str]:
 
 # ---------------------------------------------------------------------------------------------- actions
 class _Unparented:
-    """A lookup that shows action points without parents: whether a reference exists does not hang on them."""
+    """A lookup without the parents of action points, which do not matter for the existence of references."""
 
     def __init__(self, lookup: ProjectLookup) -> None:
         self._lookup = lookup

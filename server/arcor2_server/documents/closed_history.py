@@ -28,7 +28,7 @@ CLOSED_LIMIT: Final = 100
 
 
 class ClosedHistory(msgspec.Struct, frozen=True):
-    """Edits of a closed document, and its content after the last of them."""
+    """The edits of a closed document, and its content after the last one."""
 
     document: str
     items: list[Item]
@@ -52,7 +52,7 @@ class _Stored(msgspec.Struct, frozen=True):
 
 
 class ClosedHistories:
-    """One file per closed document."""
+    """The histories of closed documents, one file each."""
 
     def __init__(self, directory: Path, damage: DataDamage) -> None:
         self._directory = directory

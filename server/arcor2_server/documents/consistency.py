@@ -17,7 +17,7 @@ _NAMED = (Kind.OBJECT, Kind.POINT, Kind.ACTION, Kind.PARAMETER, *_NAMED_IN_POINT
 
 
 class Unsound(InvalidData):
-    """The document would not hold together; `ids` are what stands against it."""
+    """The document would become inconsistent; `ids` are the conflicting items."""
 
     code = "unsound"
 

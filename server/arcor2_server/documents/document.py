@@ -57,9 +57,9 @@ def reference(kind: str, value: str) -> str | None:
 
 
 class Document:
-    """Items by kind and id. `apply` is the only way to change it; an item's value is replaced, never altered.
+    """Items by kind and id. `apply` is the only way to change it; the value of an item is replaced, never modified.
 
-    Gives what `arcor2_hw.data.project_index.ProjectLookup` asks for; a lookup of an unknown id raises NotFound.
+    It implements `arcor2_hw.data.project_index.ProjectLookup`; the lookup of an unknown id raises NotFound.
     """
 
     def __init__(self, items: Iterable[Item] = ()) -> None:

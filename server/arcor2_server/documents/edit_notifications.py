@@ -20,7 +20,7 @@ NAME: Final = "HistoryChanged"
 
 
 class EditNotifications:
-    """Collects changes; tells each subscriber of HistoryChanged what he, as his user, could undo and redo."""
+    """Collects changes, and publishes to each subscriber of HistoryChanged what the user can undo and redo."""
 
     def __init__(self, hub: EventHub, session: Session) -> None:
         self.on_edit: list[Callable[[Sequence[Change]], None]] = []

@@ -7,9 +7,9 @@ from arcor2_server.documents.changes import Edit, How
 
 
 class History:
-    """Edits, oldest first, with numbers that follow each other; the oldest goes when there are more than `limit`.
+    """Edits with consecutive numbers, oldest first. The oldest is dropped if there are more than `limit`.
 
-    An undo is an edit that takes back another one, a redo is an edit that takes back an undo.
+    An undo is an edit that reverts another one; a redo is an edit that reverts an undo.
     """
 
     def __init__(self, limit: int) -> None:

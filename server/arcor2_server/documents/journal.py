@@ -22,11 +22,11 @@ _Job = tuple[Edit | Base | None, int, "asyncio.Future[None]"]
 
 
 class Journal:
-    """One thread with one file. Jobs that wait together go to the disk in one commit, in order.
+    """The journal: one thread with one file. Waiting jobs are written in one commit, in order.
 
-    After a failure all jobs of the same epoch fail, those that come later too: what they build on is not kept.
-    `on_failure` is called in the event loop before the waiting callers get their StorageError; it has to take the
-    edits back and to begin a new epoch (`next_epoch`). `convert` changes what is recovered; it is called by the thread.
+    After a failure all jobs of the same epoch fail, also later ones, since the edits that they build on are lost.
+    `on_failure` is called in the event loop before the callers get their StorageError; it has to revert the edits and
+    to start a new epoch (`next_epoch`). `convert` changes what is restored; it is called by the thread.
     """
 
     def __init__(

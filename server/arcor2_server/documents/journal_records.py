@@ -31,7 +31,7 @@ COLUMNS: Final = "number, time, user, changes, request, how, target"
 
 
 class Times(msgspec.Struct, frozen=True):
-    """When a document was created, saved, and changed after it was saved; empty where it was not."""
+    """Times at which a document was created, saved, and changed after it was saved; empty if it was not."""
 
     created: str = ""
     modified: str = ""
@@ -66,7 +66,7 @@ class Times(msgspec.Struct, frozen=True):
 
 
 class Recovered(msgspec.Struct, frozen=True):
-    """What the journal held: the document as `items` after edit `number`, and all edits that are stored."""
+    """The content of the journal: the document as `items` after edit `number`, and all stored edits."""
 
     items: list[Item]
     number: int
@@ -81,9 +81,9 @@ class Recovered(msgspec.Struct, frozen=True):
 
 
 class Base(msgspec.Struct, frozen=True):
-    """A whole document to begin with: its items after edit `number`.
+    """A complete document: its items after edit `number`.
 
-    Stored edits up to `forget` are dropped, then `edits`, which lead to the document, are stored.
+    Stored edits up to `forget` are dropped. Then `edits`, which lead to the document, are stored.
     """
 
     items: list[Item]
@@ -95,9 +95,9 @@ class Base(msgspec.Struct, frozen=True):
 
 
 class Position(msgspec.Struct, frozen=True):
-    """The last acknowledged change: which opening of which document, its number, who made it and when.
+    """The last acknowledged change: the opening of which document, its number, author and time.
 
-    `serial` grows by one whenever something is opened or closed. `document` is empty when nothing is open.
+    `serial` grows by one whenever a document is opened or closed. `document` is empty if none is open.
     """
 
     serial: int = 0
@@ -125,9 +125,9 @@ class Position(msgspec.Struct, frozen=True):
 
 
 class Loss(msgspec.Struct, frozen=True):
-    """What a damaged journal could not return; sentences for people.
+    """What a damaged journal lost, as sentences for users.
 
-    `incomplete`: what was reopened is not the document as it was last acknowledged.
+    `incomplete`: the reopened document differs from the last acknowledged state.
     """
 
     reason: str
@@ -145,7 +145,7 @@ class Damaged(Exception):
 
 
 class Reading(msgspec.Struct):
-    """What a file holds: `recovered` is all that is intact, `lost` says what is not, `damage` how it was noticed."""
+    """The content of a file: `recovered` is intact, `lost` describes the rest, `damage` how it was detected."""
 
     serial: int = 0
     recovered: Recovered | None = None

@@ -26,7 +26,7 @@ class Condition(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """One way on: to action number `target` (or END_NODE), under a condition, or always, or when no condition holds."""
+    """A connection to action number `target` (or END_NODE): conditional, unconditional, or the default."""
 
     target: int
     condition: Condition | None
@@ -34,10 +34,10 @@ class Edge(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """The actions that a cycle can reach, numbered so that every edge leads to a higher number; 0 is the first.
+    """The reachable actions of a cycle, numbered so that every edge leads to a higher number; 0 is the first.
 
-    `edges[n]`: one edge without a condition, or several of which exactly one holds if they are tried in order: the last
-    one holds when no other does, whether it has a condition or not.
+    `edges[n]`: one unconditional edge, or several of which exactly one applies if they are tried in order: the last one
+    applies if no other does.
     """
 
     actions: list[Action]

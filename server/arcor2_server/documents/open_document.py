@@ -22,7 +22,7 @@ from arcor2_server.events import make_event
 
 
 class OpenDocument:
-    """The open scene, or project on its scene."""
+    """Read access to the open scene, or the open project on its scene."""
 
     def __init__(self) -> None:
         self.document = Document()

@@ -11,7 +11,7 @@ from arcor2_hw.exceptions import NotFound
 
 
 class Types(Protocol):
-    """What is needed of the object types."""
+    """The object types, as far as renamed actions need them."""
 
     def action(self, type_name: str, name: str) -> ObjectAction:
         """Return the action that has a name or had it formerly. Raise NotFound if there is none."""

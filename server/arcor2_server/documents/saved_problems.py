@@ -36,7 +36,7 @@ class Checked(Data, frozen=True, array_like=True):
 
 
 class Stored(Data, frozen=True):
-    """The file that a process leaves to the next: all problems by document id, and a digest of the code's sources."""
+    """The file for the next process: all problems by document id, and a digest of the sources of the checks."""
 
     code: str
     scenes: dict[str, Checked]
@@ -44,9 +44,9 @@ class Stored(Data, frozen=True):
 
 
 class SavedProblems:
-    """Checks saved documents, and checks one again only after it, its scene or an object type has changed.
+    """Checks saved documents. A result is reused until the document, its scene or an object type changes.
 
-    The results are stored in a file, so that this holds across restarts.
+    The results are stored in a file for the next start.
     """
 
     def __init__(self, storage: Storage, types: ObjectTypes, file: Path) -> None:

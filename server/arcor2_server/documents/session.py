@@ -38,7 +38,7 @@ log = structlog.get_logger(__name__)
 
 
 class _Pending(NamedTuple):
-    """An edit that is made but not yet on the disk, with the times that held before it."""
+    """An applied edit that is not on disk yet, with the times that were valid before it."""
 
     edit: Edit
     scene: Times
@@ -46,7 +46,7 @@ class _Pending(NamedTuple):
 
 
 class Session(OpenDocument):
-    """What is open. Between two awaits of a handler nobody else changes it."""
+    """The open document. Between two awaits of a handler no other handler changes it."""
 
     def __init__(
         self,

@@ -9,7 +9,7 @@ _Values = dict[tuple[Kind, str], Any]
 
 
 class Unsaved:
-    """Each item that differs, with its saved value (None: it is not saved). Scene and project are saved apart."""
+    """The items that differ from the saved version, with their saved values (None: not saved)."""
 
     def __init__(self) -> None:
         self._of_scene: _Values = {}

@@ -20,7 +20,7 @@ _KINDS: Final = frozenset({Kind.POINT, Kind.ACTION})
 
 
 class SharedBreakpoints:
-    """By project: what was set, of which that counts which the project has."""
+    """The breakpoints of each project. Only breakpoints on existing items are active."""
 
     def __init__(self, hub: EventHub, storage: Storage, session: Session, data: SharedData) -> None:
         self._hub = hub

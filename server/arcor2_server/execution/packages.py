@@ -11,7 +11,7 @@ from arcor2_server.storage.packages import Packages
 
 
 class PackageLibrary(abc.ABC):
-    """What may be done with packages on disk; with that which runs, nothing but to give it another name."""
+    """Operations on stored packages. The running package may only be renamed."""
 
     def __init__(self, hub: EventHub, packages: Packages) -> None:
         self.packages = packages

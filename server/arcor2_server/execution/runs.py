@@ -39,7 +39,7 @@ class _After(Struct):
 
 
 class _Call:
-    """One call of an action, as it was told; it is read only when somebody asks."""
+    """One call of an action as published; it is decoded only on request."""
 
     __slots__ = ("before", "end")
 
@@ -69,9 +69,11 @@ class _Call:
 
 
 class How(Struct, frozen=True):
-    """How a package is run. by: a user's name. breakpoints: ids of its action points and actions.
+    """Options of a run.
 
-    shared_breakpoints: pause at those that users share on its project, too.
+    by: name of the user.
+    breakpoints: ids of action points and actions.
+    shared_breakpoints: pause also at the breakpoints that users share on the project.
     """
 
     start_paused: bool = False
@@ -81,7 +83,7 @@ class How(Struct, frozen=True):
 
 
 class Runs:
-    """All runs by number, which grows; on disk too once `open` has read them."""
+    """All runs by number. They are also stored in the database once `open` has read it."""
 
     def __init__(self, hub: EventHub) -> None:
         self._hub = hub

@@ -51,7 +51,7 @@ _IDLE: Final = frozenset({S.UNDEFINED, S.STOPPED})
 
 
 class Execution(PackageLibrary):
-    """Runs one package at a time, in a cell host of its own. Requests that a state forbids raise RequestRefused."""
+    """Runs one package at a time in its own cell host. Raises RequestRefused if the state forbids a request."""
 
     def __init__(
         self,

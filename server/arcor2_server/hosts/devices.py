@@ -21,9 +21,10 @@ log = structlog.get_logger(__name__)
 
 
 class DeviceStatus(Data, frozen=True):
-    """One object of the scene in operation; `answering` is false while its cell host is silent.
+    """The state of one object of the scene; `answering` is false while its cell host does not answer.
 
-    reason: why the connection is lost. overlaid: the settings that come from the server's cell file.
+    reason: why the connection is lost.
+    overlaid: names of the settings that the cell file of the server overrides.
     """
 
     id: str
@@ -65,7 +66,7 @@ def overlay_for(
 
 
 class DeviceBoard:
-    """Keeps the newest word of each device, and tells clients each change of a connection or of health, once."""
+    """Stores the last report of each device, and publishes each change of connection or health once."""
 
     def __init__(self, hub: EventHub) -> None:
         self.on_connection: list[Callable[[], None]] = []

@@ -22,7 +22,7 @@ READY_WITHIN: Final = 20.0
 
 
 class CellHosts:
-    """Gives hosts away. Who took one calls `prepare` again once it is up, and the processors are free for a start.
+    """Hands out cell hosts. Call `prepare` when the taken host has started its devices and the processors are idle.
 
     device_files: the directories in which the settings of devices may name files.
     """

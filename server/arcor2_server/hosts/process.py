@@ -33,7 +33,7 @@ ANSWERS_WITHIN: Final = 5.0
 
 
 class CellError(Arcor2Error):
-    """What went wrong in the cell host, with the code and the name that the error has there."""
+    """An error in the cell host, with the code and type that it has there."""
 
     def __init__(self, data: m.ErrorData) -> None:
         super().__init__(data.message, data.detail)
@@ -43,7 +43,7 @@ class CellError(Arcor2Error):
 
 
 class HostUser(Protocol):
-    """Who uses a host: told of everything that answers no question."""
+    """The user of a host. It receives all messages that answer no call."""
 
     def host_message(self, host: "CellHost", message: m.ServerBound) -> None:
         """Take a message."""
@@ -56,7 +56,7 @@ class HostUser(Protocol):
 
 
 class _Connection(asyncio.Protocol):
-    """Cuts the stream into messages."""
+    """Splits the stream into messages."""
 
     def __init__(self) -> None:
         self.host: CellHost | None = None
@@ -94,7 +94,7 @@ class _Connection(asyncio.Protocol):
 
 
 class CellHost:
-    """A running host. `user` is set by who takes it."""
+    """A running cell host."""
 
     def __init__(self, process: ChildProcess, connection: _Connection) -> None:
         self.process = process

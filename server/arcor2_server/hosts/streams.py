@@ -12,9 +12,9 @@ _KINDS: Final = {"RobotJoints": RobotEventKind.JOINTS, "RobotEef": RobotEventKin
 
 
 class RobotStreams:
-    """The subscriptions; `say` tells the host, where there is one.
+    """The subscriptions to the streams of robots; `send_message` sends a message to the host, if there is one.
 
-    everybody: what comes at the streaming period goes to all, as in the protocol while a program runs.
+    everybody: streams at the streaming period go to all clients, as the protocol requires while a program runs.
     """
 
     def __init__(self, hub: EventHub, send_message: Callable[[m.ToHost], None], *, everybody: bool = False) -> None:

@@ -21,10 +21,10 @@ from arcor2_hw.runtime.messages import TypeCode
 
 
 class PackageType(Data, frozen=True):
-    """What Build puts into a package for one object type.
+    """The code of one object type in a package.
 
-    An uploaded type has `module` and `source`; an installed one `entry_point` ("module:Class") and the `folder` of
-    its own code, and is copied from there.
+    An uploaded type has `module` and `source`. An installed type has `entry_point` ("module:Class") and the `folder`
+    of its code, which is copied.
     """
 
     name: str
@@ -37,7 +37,7 @@ class PackageType(Data, frozen=True):
 
 
 class Known(Struct, frozen=True):
-    """Everything that follows from the sources, made anew and put in place as a whole."""
+    """All results of the analysis, replaced as a whole."""
 
     analyses: dict[str, TypeAnalysis] = {}
     metas: dict[str, ObjectTypeMeta] = {}

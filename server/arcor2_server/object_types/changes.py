@@ -19,7 +19,7 @@ class Changes(Struct, frozen=True):
 
 
 class PendingChanges:
-    """Compare what is known of object types with what clients were notified of."""
+    """The differences between the known object types and those of which clients were notified."""
 
     def __init__(self) -> None:
         self.changes = Changes()

@@ -65,10 +65,10 @@ class ModelStore(Protocol):
 
 
 class ObjectTypes(TypeCatalog):
-    """The registry. Look-ups raise NotFound for a type or action that is not known.
+    """The registry of object types.
 
-    `revision` grows with every change of what is known. A type whose collision model, or the mesh of it, is not there
-    is disabled, as is one whose source cannot be read; a robot's description is named only when it is there.
+    `revision` grows with every change. A type is disabled if its source cannot be read, or its collision model or mesh
+    is missing. A robot's description is listed only if it exists.
     """
 
     def __init__(self, storage: SourceStore, assets: ModelStore, stored_analysis: Path | None = None) -> None:

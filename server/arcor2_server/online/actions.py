@@ -20,7 +20,7 @@ log = structlog.get_logger(__name__)
 
 
 class LastStop:
-    """When everything was last stopped: what was requested before that does not start any more."""
+    """The time at which everything was last stopped. Motion requested before does not start."""
 
     def __init__(self) -> None:
         self._at = -math.inf
@@ -49,7 +49,7 @@ class RunningAction:
 
 
 class PreparedAction(Data, frozen=True):
-    """All that a call needs."""
+    """The resolved call of an action."""
 
     action_id: str
     object_id: str

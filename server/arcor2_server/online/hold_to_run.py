@@ -36,9 +36,9 @@ Held = JogRobotArgs | HoldHandTeachingArgs
 
 
 class Delay:
-    """How much later the messages of one client come than its quickest, by its own clock and ours.
+    """Measures the delay of a client's messages relative to its fastest message, by the clocks of both sides.
 
-    The clocks need not agree, and may drift: only the last minute counts.
+    The clocks may differ and drift: only the last minute counts.
     """
 
     def __init__(self) -> None:
@@ -57,7 +57,7 @@ class Delay:
 
 
 class _Press:
-    """One press of the button: a user holds a robot."""
+    """One press of the hold-to-run button."""
 
     def __init__(self, client: Connection, user: str, kind: HoldKind, args: Held, number: int) -> None:
         loop = asyncio.get_running_loop()
@@ -85,7 +85,7 @@ class _Scale(Data, frozen=True):
 
 
 class HoldToRun:
-    """At most one press of each robot. `host` gives the cell host, RequestRefused when the scene is offline."""
+    """The active holds, at most one per robot."""
 
     def __init__(
         self,

@@ -40,9 +40,9 @@ STOP_WITHIN: Final = 5.0
 
 
 class OnlineScene:
-    """One scene, offline or online. Made inside the event loop.
+    """The scene, offline or online. Create it inside the event loop.
 
-    What is asked of devices raises CellError, ConnectionLost, DeviceTimeout.
+    Calls to devices raise CellError, ConnectionLost or DeviceTimeout.
     """
 
     def __init__(

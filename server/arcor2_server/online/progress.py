@@ -9,7 +9,7 @@ _UP = frozenset({Connection.ONLINE, Connection.BACK})
 
 
 class SceneTask:
-    """Follows the states of the scene, and the connections of its objects while it comes up."""
+    """Follows the states of the scene, and the connections of its objects during the start."""
 
     def __init__(self, tasks: Tasks) -> None:
         self._tasks = tasks

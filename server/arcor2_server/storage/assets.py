@@ -31,13 +31,13 @@ CHUNK: Final = 256 * 1024
 
 
 class TooLarge(InvalidData):
-    """What was sent is larger than is taken."""
+    """The uploaded file is larger than allowed."""
 
     code = "too_large"
 
 
 class Asset(Data, frozen=True):
-    """What is known of one asset. `size` in bytes, `digest` the SHA-256 of its content in hexadecimal."""
+    """The record of one asset. `size` in bytes; `digest`: SHA-256 of the content in hexadecimal."""
 
     id: str
     created: Timestamp

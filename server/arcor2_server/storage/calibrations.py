@@ -19,7 +19,7 @@ _decode = msgspec.json.Decoder(CalibrationRecord).decode
 
 
 class Calibrations:
-    """All methods may raise StorageError."""
+    """The calibration records. All methods may raise StorageError."""
 
     def __init__(self, storage: Storage, kept: int = KEPT) -> None:
         self._storage = storage

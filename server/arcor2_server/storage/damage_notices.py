@@ -21,7 +21,7 @@ FILE: Final = "damage.json"
 
 
 class DataDamage:
-    """Notices about damaged files. They reach every client of this run, and of later runs until one has got them."""
+    """Notices about damaged files. All clients receive them until one has received them after a restart."""
 
     def __init__(self, data_dir: Path, hub: "EventHub") -> None:
         self._path = data_dir / FILE

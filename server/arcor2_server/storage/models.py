@@ -22,7 +22,7 @@ class SceneRow(Base):
 
 
 class ProjectRow(Base):
-    """A saved project. Its scene may be deleted under it by other means than ours, hence no foreign key."""
+    """A saved project. No foreign key: other programs may delete its scene."""
 
     __tablename__ = "project"
 
@@ -69,7 +69,7 @@ class ModelRow(Base):
 
 
 class ProjectTablesRow(Base):
-    """What REST keeps beside a project's document: lists of parameters and of overrides, as JSON."""
+    """Parameters and overrides that REST stores next to a project, as JSON."""
 
     __tablename__ = "project_beside"
 
@@ -79,7 +79,7 @@ class ProjectTablesRow(Base):
 
 
 class ExecutionTokenRow(Base):
-    """A token of the Execution service's table, which lets nobody in (docs/protocol.md)."""
+    """A token of the Execution service's table, which grants no access (docs/protocol.md)."""
 
     __tablename__ = "execution_token"
 
@@ -98,7 +98,7 @@ class BreakpointsRow(Base):
 
 
 class ViewValueRow(Base):
-    """One value of the view state, as JSON. `user` is empty for what all users share, `document` for that of none."""
+    """One view value as JSON. `user` is empty for shared values, `document` for values without a document."""
 
     __tablename__ = "view_value"
 

@@ -39,7 +39,7 @@ _NEVER_BUILT: Final = PackageMeta("N/A", "1970-01-01T00:00:00+00:00")
 
 
 class Packages:
-    """The directory of packages. Everything here reads or writes files: call it in a thread."""
+    """The directory of packages. All methods read or write files: call them in a thread."""
 
     def __init__(self, root: Path, hide_secrets: Callable[[Path], bool] = lambda _: False) -> None:
         self._root = root

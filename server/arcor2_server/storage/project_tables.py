@@ -23,7 +23,7 @@ class ExecutionToken(Data, frozen=True):
 
 
 class ProjectTables:
-    """All methods may raise StorageError, and NotFound for a project or token that is not there."""
+    """The tables. All methods may raise StorageError, and NotFound for an unknown project or token."""
 
     def __init__(self, storage: Storage) -> None:
         self._storage = storage

@@ -14,9 +14,9 @@ from arcor2_server.storage.damage_notices import DataDamage
 
 
 class Secret(Data, frozen=True):
-    """One value, and the setting of which object type it is for.
+    """One secret value with its object type and setting.
 
-    address: hosts that the value may be sent to; None in files of older versions, until the value is used.
+    address: hosts that the value may be sent to; None in files of older versions until the value is used.
     """
 
     type: str
@@ -32,7 +32,7 @@ class _Content(msgspec.Struct):
 
 
 class SecretStore:
-    """A file that only its owner can read. Any thread may use it; what was added is on disk after `flush`."""
+    """The file of secrets, readable only by its owner. Thread-safe; added values are on disk after `flush`."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

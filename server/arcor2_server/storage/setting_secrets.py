@@ -33,7 +33,7 @@ _UNKNOWN: Final = SceneObject("", "")
 
 
 class Types(Protocol):
-    """What is needed of the registry of object types."""
+    """The object types, as far as secrets need them."""
 
     def meta(self, name: str) -> ObjectTypeMeta:
         """Return what is known of a type. Raise NotFound if there is none."""
@@ -43,7 +43,7 @@ class Types(Protocol):
 
 
 class SettingSecrets:
-    """Replaces values by references, and finds values by reference."""
+    """Replaces secret values by references, and resolves references."""
 
     def __init__(self, types: Types, store: SecretStore, cell: Cell | None = None) -> None:
         self._types = types

@@ -12,7 +12,7 @@ from arcor2_server.storage.store import Storage
 
 
 class SharedData:
-    """All methods may raise StorageError. None of it is a document: lists and answers made from those stay valid."""
+    """Data shared by clients. All methods may raise StorageError. Cached lists of documents stay valid."""
 
     def __init__(self, storage: Storage) -> None:
         self._storage = storage

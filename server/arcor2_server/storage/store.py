@@ -24,7 +24,7 @@ _MODEL_DECODERS: Final = {kind.__name__: msgspec.json.Decoder(kind).decode for k
 
 
 class DocumentId(Data, frozen=True):
-    """What a stored id names: `kind` is scene, project or object_type."""
+    """The kind of a stored id: scene, project or object_type."""
 
     id: str
     kind: str

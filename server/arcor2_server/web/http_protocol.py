@@ -14,12 +14,12 @@ SLOWEST: Final = 500
 
 
 class HttpProtocol(HttpToolsProtocol):
-    """uvicorn's protocol, which itself waits for ever.
+    """The HTTP protocol of uvicorn, with time limits.
 
-    The connection waits (and may be dropped for a new one) but while a request of an admitted client is served.
+    The connection may be dropped for a new one, except while a request of an admitted client is served.
 
-    request_timeout: seconds for the head of a request, for the first 500 bytes per second of its body, and between two
-    checks that the other side takes what is sent.
+    request_timeout: time limit, s, for the head of a request, for each 500 bytes of its body, and between two checks
+    that the client receives what is sent.
     """
 
     def __init__(self, *args: Any, connection: Connection, request_timeout: float, **kwargs: Any) -> None:

@@ -50,9 +50,10 @@ def configuration(
 
 
 class Listener:
-    """Accepts the connections of one socket, as long as there is room for them. Takes the place of an asyncio.Server.
+    """Accepts the connections of one socket within the limits. It replaces an asyncio.Server.
 
-    connected: makes the protocol of a connection. handshake_timeout: seconds for the TLS handshake.
+    connected: creates the protocol of a connection.
+    handshake_timeout: time limit of the TLS handshake, s.
     """
 
     def __init__(
@@ -144,7 +145,7 @@ class Listener:
 
 
 class Server(uvicorn.Server):
-    """uvicorn's server, which says when it is ready, limits connections, and leaves signals to us."""
+    """The server of uvicorn, which reports when it is ready, limits connections, and leaves signals to the caller."""
 
     def __init__(
         self,

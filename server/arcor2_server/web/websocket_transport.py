@@ -20,7 +20,7 @@ EXTENSION: Final = "arcor2_hw.wire"
 
 
 class WireProtocol(WebSocketsSansIOProtocol):
-    """uvicorn's protocol, which ASGI alone does not let send a ping, drop a connection or write encoded text."""
+    """The websocket protocol of uvicorn, with ping, abort and encoded text, which ASGI does not offer."""
 
     def __init__(self, *args: Any, connection: Connection, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

@@ -20,7 +20,7 @@ _numbers = itertools.count(1)
 
 
 class CloseCode(enum.IntEnum):
-    """Why the server closes a connection (RFC 6455 section 7.4; 4000 and above are ours)."""
+    """Close codes of the server (RFC 6455 section 7.4; 4000 and above are private)."""
 
     GOING_AWAY = 1012
     """The server ends."""
@@ -33,7 +33,7 @@ class CloseCode(enum.IntEnum):
 
 
 class Wire(Protocol):
-    """What a client needs of its connection."""
+    """The transport of a client."""
 
     def send_now(self, message: bytes) -> bool:
         """Send one text message if the connection takes it at once; return whether it did."""
@@ -59,7 +59,7 @@ ABORT_AFTER: Final = 1.0
 
 
 class Client:
-    """A connection. Messages leave in the order in which they were put; of a stream only the newest waits."""
+    """A connected client. Messages are sent in order; of a stream only the newest message is queued."""
 
     def __init__(self, wire: Wire, settings: ServerSettings) -> None:
         self.number = next(_numbers)

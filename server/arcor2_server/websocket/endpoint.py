@@ -50,7 +50,7 @@ _decode_anything = msgspec.json.Decoder().decode
 
 
 class _Head(Struct):
-    """What is read of a message that is not served."""
+    """The readable part of a message that is not served."""
 
     id: int = 0
     request: str = UNREADABLE
@@ -99,7 +99,7 @@ class Service(Struct, frozen=True):
 
 
 class _SocketWire:
-    """A client's connection: the ASGI socket for closing, the protocol below it for the rest."""
+    """The transport of a client: the ASGI socket for closing, the protocol below it for everything else."""
 
     def __init__(self, socket: WebSocket[Any, Any, Any], protocol: WireProtocol) -> None:
         self._socket = socket
@@ -118,7 +118,7 @@ class _SocketWire:
 
 
 class Endpoint:
-    """Serves all connections of one server."""
+    """Serves all connections of one websocket service."""
 
     def __init__(
         self,

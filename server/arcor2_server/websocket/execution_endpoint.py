@@ -41,7 +41,7 @@ EVENTS: Final = frozenset(
 
 
 class VersionData(Data, frozen=True):
-    """What the request Version is answered."""
+    """The answer to the request Version."""
 
     version: str = ""
 

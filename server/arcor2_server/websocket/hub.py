@@ -9,7 +9,7 @@ from arcor2_server.websocket.client import Client
 
 
 class Hub:
-    """Knows every connection. An event is encoded once, and only queued here: no client can delay another."""
+    """All connections. An event is encoded once and only queued here, so that no client delays another."""
 
     def __init__(self) -> None:
         self.clients: set[Client] = set()

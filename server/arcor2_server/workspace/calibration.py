@@ -23,7 +23,7 @@ EXPECTED_WITHIN = (0.3, 0.5)
 
 
 class RobotView(Data, frozen=True):
-    """A robot as a camera of known pose sees it. robot_pose: where it is taken to stand."""
+    """A robot seen by a camera with a known pose. robot_pose: the assumed pose of the robot."""
 
     robot_joints: list[Joint]
     robot_pose: Pose
@@ -32,10 +32,10 @@ class RobotView(Data, frozen=True):
 
 
 class Calibration(Protocol):
-    """Computes poses from pictures' files.
+    """Computes poses from picture files.
 
-    told: called with the progress. Raises InvalidData for what is no picture, CalibrationRefused for one that
-    determines nothing, NotInstalled, ComputeStopped, ComputeTimeout.
+    on_progress: called with the progress. Methods raise InvalidData for a file that is not a picture,
+    CalibrationRefused if the pictures determine no pose, NotInstalled, ComputeStopped and ComputeTimeout.
     """
 
     async def camera(
@@ -61,7 +61,7 @@ class Calibration(Protocol):
 
 
 class CalibrationService:
-    """Asks the compute worker, with the markers that are configured."""
+    """Computes poses in the compute worker, with the configured markers."""
 
     def __init__(self, compute: Compute, markers: Markers) -> None:
         self._compute = compute

@@ -16,7 +16,7 @@ _TINY: Final = 1e-12
 
 
 class Placed(Data, frozen=True):
-    """A collision model, and its pose in the world, or in the frame of the link that holds it. scale: of a mesh."""
+    """A collision model with its pose in the world, or in the frame of the link that holds it. scale: of a mesh."""
 
     model: Models
     pose: Pose
@@ -30,7 +30,7 @@ class Placed(Data, frozen=True):
 
 
 class CollisionWorld:
-    """What is in the way. What REST puts in stays until it is deleted or the scene is stopped over REST."""
+    """The collision models added over REST. They stay until they are deleted or the scene is stopped over REST."""
 
     def __init__(self, inflation: float = INFLATION) -> None:
         self.started = False
@@ -86,7 +86,7 @@ class CollisionWorld:
 
 # ------------------------------------------------------------------------------------------------ lines
 class Hit(Data, frozen=True):
-    """What a line meets first, and at which share of it."""
+    """The first body that a line hits, and the fraction of the line at which it does."""
 
     id: str
     share: float

@@ -40,7 +40,7 @@ _WORTH: Final = 0.9
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What is there of an asset for clients: the file, and a compressed copy where one pays. etag: of its content."""
+    """A converted asset: the file, and a compressed copy if it is smaller. etag: identifies the content."""
 
     etag: str
     plain: Path
@@ -48,7 +48,7 @@ class Shown:
 
 
 class DisplayModels:
-    """For use on one event loop. `directory` is made when it is needed."""
+    """The converted assets, for use on one event loop. `directory` is created when it is needed."""
 
     def __init__(self, assets: AssetStore, compute: Compute, tasks: Tasks, directory: Path) -> None:
         self._assets = assets
@@ -159,7 +159,7 @@ def _named(asset: Asset) -> str:
 
 
 class _ShownTask(contextlib.AbstractContextManager[Callable[[float, str], None]]):
-    """Tells of work as a task once it takes longer than a moment."""
+    """Shows work as a task once it takes longer than a moment."""
 
     def __init__(self, tasks: Tasks, name: str) -> None:
         self._tasks = tasks

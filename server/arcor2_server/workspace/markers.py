@@ -15,7 +15,7 @@ log = structlog.get_logger(__name__)
 
 
 class Markers:
-    """The configuration in force. What is set is kept in the data directory, at once."""
+    """The configuration in use. A new configuration is stored in the data directory at once."""
 
     def __init__(self, path: Path, given: CalibrationConfiguration | None = None) -> None:
         self._path = path

@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class ObjectAiming:
-    """One user's aiming. points: in the frame of the object's mesh. poses: of the end effector, by index of point."""
+    """The aiming of one user.
+
+    points: focus points in the frame of the object's mesh.
+    poses: touched poses of the end effector, by index of the point.
+    """
 
     object_id: str
     robot: RobotArg
@@ -23,7 +27,7 @@ class ObjectAiming:
 
 
 class ObjectAimings:
-    """The aimings by user. One ends with the scene that it began in."""
+    """The aimings by user. An aiming ends when its scene is closed."""
 
     def __init__(self) -> None:
         self._aimings: dict[str, ObjectAiming] = {}

@@ -16,7 +16,7 @@ NEAREST: Final = 1e-4
 
 
 class Fit(Data, frozen=True):
-    """The pose, and how far the worst point lies from where it should be then, m."""
+    """The fitted pose, and the largest distance of a point from its fitted position, m."""
 
     pose: Pose
     worst: float

@@ -52,7 +52,7 @@ Target = Pose | list[Joint]
 
 @dataclass(slots=True)
 class _Row:
-    """What is known of one end effector. targets: for which `judged` holds, in `world`."""
+    """The results for one end effector. targets: the poses and joints for which `judged` is valid in `world`."""
 
     robot: str
     end_effector: str
@@ -63,7 +63,7 @@ class _Row:
 
 
 class ReachabilityBoard:
-    """Works only while somebody subscribed to the event, or asked since the project was opened."""
+    """The reachability of the open project. It is computed only for subscribers, or after a request for it."""
 
     def __init__(
         self,

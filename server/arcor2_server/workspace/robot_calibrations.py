@@ -39,9 +39,9 @@ _THERE: Final = (Connection.ONLINE, Connection.BACK)
 
 
 class RobotCalibration(Data, frozen=True):
-    """What a controller told of the arm of an object: when, and why it is not used, empty where it is.
+    """A calibration read from the controller of an object; `refused` says why it is not used, empty if it is.
 
-    device: stands for where the device is, by the object's settings.
+    device: identifies the device by the settings of the object.
     """
 
     object_id: str
@@ -53,7 +53,7 @@ class RobotCalibration(Data, frozen=True):
 
 
 class InForce(enum.StrEnum):
-    """With which kinematics a robot's are computed here."""
+    """The origin of the kinematics of a robot."""
 
     NONE = "none"
     """It has no model."""
@@ -64,7 +64,7 @@ class InForce(enum.StrEnum):
 
 
 class RobotCalibrations:
-    """For use on one event loop."""
+    """The stored calibrations, for use on one event loop."""
 
     def __init__(
         self,

@@ -10,7 +10,7 @@ from arcor2_server.workspace.robots import SceneRobots
 
 
 class RobotModels:
-    """Models as the compute worker takes them."""
+    """Robot models for the compute worker."""
 
     def __init__(self, robots: SceneRobots, robot_calibrations: RobotCalibrations) -> None:
         self._robots = robots

@@ -18,7 +18,7 @@ STANDSTILL: Final = 0.01
 
 
 class StoppedRobots:
-    """`joints` by robot; what moves counts where it stood last until it stands again, one that is lost likewise."""
+    """`joints` by robot: those of the last standstill while a robot moves or is disconnected."""
 
     def __init__(self, host: HostSession, robots: SceneRobots) -> None:
         self._host = host
