@@ -42,7 +42,7 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     host: str = "127.0.0.1"
     port: int = 6789
     insecure: bool = False
-    """Ask nobody for a token, wherever the server listens."""
+    """Require no token, on any network."""
     fingerprint: str = ""
     """SHA-256 of the certificate that the server shows; empty without TLS."""
     classic_ports: dict[str, int] = {}
@@ -61,19 +61,19 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     lock_retry_wait: float = 0.15
     streaming_period: float = 0.1
     scene_inflation: float = 0.01
-    """By how much sizes are larger than stated where the safety of a line is asked, m."""
+    """Inflation of body sizes for safe line checks, m."""
     compute_idle: float = 120.0
-    """Seconds after which a compute worker that is asked nothing ends, and gives its memory back."""
+    """Time after which an idle compute worker ends to free its memory, s."""
     markers: CalibrationConfiguration | None = None
-    """Which markers stand where; else as it was said over REST."""
+    """Poses of the markers; None: as set over REST."""
     history_limit: int = 1000
-    """Steps of undo that the journal keeps."""
+    """Number of undo steps in the journal."""
     allowed_hosts: frozenset[str] = frozenset()
     """Names under which the server is reached, besides addresses, localhost and this machine's own names."""
     trusted_proxies: tuple[str, ...] = ()
     """Addresses and networks of reverse proxies, whose X-Forwarded-For and X-Forwarded-Proto are believed."""
     default_role: Role = Role.PROGRAMMER
-    """Role of whoever connects where no token is asked for."""
+    """Role of clients if no token is required."""
     served_size: int = 16 * MIB
     drained_size: int = 32 * MIB
     requests_in_flight: int = 256

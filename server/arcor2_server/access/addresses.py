@@ -7,7 +7,7 @@ from arcor2_hw.data.base import Data
 from arcor2_server.settings import ServerSettings
 
 _DOCUMENTATION = "192.0.2.1"
-"""An address that belongs to nobody (RFC 5737): the way there is the way out of this machine. Nothing is sent."""
+"""A documentation address (RFC 5737) for finding the outgoing interface. Nothing is sent to it."""
 
 
 class Joining(Data, frozen=True):

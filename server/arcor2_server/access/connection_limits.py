@@ -16,7 +16,7 @@ CONNECTION: Final = "arcor2_hw.connection"
 OWN_FILES: Final = 256
 """File descriptors left for all that is no client's connection: databases, cell hosts, packages, uploads."""
 MOST: Final = 4000
-"""Connections at most, where the system allows more files."""
+"""Maximum number of connections, if the system allows more files."""
 FEWEST: Final = 64
 """Connections at least, however few files the system allows."""
 RESERVE: Final = 4

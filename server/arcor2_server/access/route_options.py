@@ -3,10 +3,10 @@
 from typing import Final
 
 ROLE: Final = "role"
-"""The key of a route's `opt` under which it declares the least role that may use it."""
+"""Key of a route's `opt`: the lowest role that may use the route."""
 OPEN: Final = "open"
-"""The key of a route's `opt` that says that it asks nobody for a token: it tells nothing."""
+"""Key of a route's `opt`: the route needs no token, since it reveals nothing."""
 PERSON: Final = "person"
-"""The key of a request's state under which the name on its token is, where it has one."""
+"""Key of a request's state: the name on its token, if it has one."""
 AS_ROLE: Final = "as_role"
-"""The key of a request's state under which the role of the sender is."""
+"""Key of a request's state: the role of the sender."""

@@ -59,7 +59,7 @@ class TokenFile:
         self.damage = ""
         """What is wrong with the file and what to do, as sentences; empty when it is intact."""
         self.unusable = False
-        """Whether neither the file nor its copy can be read, so that nobody can be admitted by a token."""
+        """Whether neither the file nor its backup can be read, so that no token is valid."""
 
     def all(self) -> list[Token]:
         """Return all tokens, the expired too; empty when there never was one, or they are lost to damage."""

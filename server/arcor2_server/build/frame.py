@@ -21,7 +21,7 @@ from arcor2_server.build.points import PointNames, names_of
 from arcor2_server.build.style import Writer
 
 NOTE: Final = "next_action"
-"""The variable that notes where a program goes on behind joins that it passes by."""
+"""Variable that stores where a program continues after a join that it skips."""
 REFERENCES: Final = frozenset({"pose", "position", "joints"})
 """Parameter types whose value is an id of something in the project."""
 _FIXED: Final = ("ActionPoints", "Resources", "aps", "error", "main", "print_exception", "res", NOTE)

@@ -37,7 +37,7 @@ class Ingredients(Data, frozen=True):
     enumerations: dict[str, list[Enumeration]] = field(default_factory=dict)
     """By object type, for those whose code is copied from an installed driver, as the driver defines them."""
     source: str | None = None
-    """The script of a project without logic, where one is stored."""
+    """The script of a project without logic, if one is stored."""
 
 
 def _facts(types: ObjectTypes, scene: Scene, project: Project, code: Iterable[PackageType]) -> dict[str, TypeFacts]:

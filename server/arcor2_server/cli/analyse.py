@@ -14,7 +14,7 @@ from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
 from arcor2_server.cli.exit_status import ExitStatus
 
 PIPE_WIDTH = 160
-"""Characters of a line where the output is no terminal."""
+"""Maximum line length if the output is not a terminal."""
 
 
 def analyse(file: Path, *, type_name: str | None = None) -> int:

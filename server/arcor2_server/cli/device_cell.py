@@ -19,7 +19,7 @@ from arcor2_server.cli.tables import console
 
 VIRTUAL: Final = "VirtualCollisionObject"
 CHECKED_WITHIN: Final = 60.0
-"""Seconds for all devices, which are looked at at once; the slowest may take some twenty to connect."""
+"""Time limit for checking all devices concurrently, s; the slowest needs about twenty to connect."""
 
 
 # ------------------------------------------------------------------------------------------------ export

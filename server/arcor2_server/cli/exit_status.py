@@ -28,11 +28,11 @@ class ExitStatus(enum.IntEnum):
     ANALYSIS_PROBLEMS = 10
     """An object type has problems."""
     CELL_UNUSABLE = 11
-    """A cell file is damaged, or says what cannot be."""
+    """A cell file is damaged or contradictory."""
     DEVICE_UNREACHABLE = 12
     """A device did not connect, or is not fit for work."""
     NO_TOKENS = 13
-    """Other machines would reach a server that asks nobody for a token."""
+    """Other machines could reach a server that requires no token."""
     CERTIFICATE_UNUSABLE = 14
     """The certificate or its key cannot be read, or do not belong together."""
     DIFFERENT = 15

@@ -14,7 +14,7 @@ from arcor2_server.events import Connection, EventHub, encode, make_event
 PERIOD: Final = 1 / 30
 """Seconds between two events of one item."""
 CHECK_PERIOD: Final = 0.1
-"""Seconds between two looks at whether those who drag something still hold it."""
+"""Period of checking that users who drag an item still hold its lock, s."""
 NAME: Final = "MovePreview"
 
 

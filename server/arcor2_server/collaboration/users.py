@@ -16,10 +16,10 @@ from arcor2_server.settings import ServerSettings
 log = structlog.get_logger(__name__)
 
 PONG_WITHIN: Final = 1.0
-"""Seconds in which the other connection of a name has to answer to keep it (protocol, section 3)."""
+"""Time limit for the present connection of a name to answer a ping and keep the name, s (protocol, section 3)."""
 
 NOTICES_OF_USER: Final = 20
-"""Number of notices, the newest, that a user gets on returning."""
+"""Maximum number of notices for a returning user; older ones are dropped."""
 
 USERS_WITH_NOTICES: Final = 200
 """Number of users who left for whom notices are stored."""
@@ -38,7 +38,7 @@ class Users:
         self._notices: dict[str, list[str]] = {}
         self.on_enter: list[Callable[[str], None]] = []
         self.on_leave: list[Callable[[str], None]] = []
-        """Called with the name of who logged in, or is logged out."""
+        """Called with the name of a user who registers or leaves."""
 
     def client_of(self, user: str) -> Connection | None:
         """Return the connection of a user."""

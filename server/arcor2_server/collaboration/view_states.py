@@ -19,9 +19,9 @@ LARGEST_VIEW: Final = 1024 * 1024
 """Bytes of all values of one document and scope."""
 MOST_KEYS: Final = 1000
 MOST_DOCUMENTS: Final = 200
-"""Documents of one user whose views are kept."""
+"""Maximum number of documents per user with stored views."""
 MOST_SHARED: Final = 10_000
-"""Documents whose shared views are kept."""
+"""Maximum number of documents with stored shared views."""
 IN_MEMORY: Final = 64
 
 

@@ -35,10 +35,10 @@ COMMAND: Final = ("-P", "-m", "arcor2_hw.compute")
 PIECE: Final = 256 * 1024
 """Bytes that are handed to the socket at once."""
 WORLDS: Final = 16
-"""Worlds that a process keeps."""
+"""Maximum number of worlds cached by a process."""
 LONGEST_LINE: Final = 4096
 LINES: Final = 30
-"""Lines of output that tell why a process ended."""
+"""Number of output lines reported when a process ends unexpectedly."""
 
 
 class ComputeProcess:
@@ -49,7 +49,7 @@ class ComputeProcess:
         self._reader = reader
         self._writer = writer
         self._sent_worlds: dict[str, dict[str, WorldItem]] = {}
-        """The worlds as this process knows them, the one that was asked of last at the end."""
+        """The worlds cached by the process, the last used one at the end."""
         self._lines: deque[str] = deque(maxlen=LINES)
         self._output = asyncio.create_task(self._read_output(), name=f"output of compute worker {process.pid}")
 

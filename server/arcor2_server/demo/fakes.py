@@ -13,7 +13,7 @@ from arcor2_server.demo.processes import ChildFailed, python_module
 from arcor2_server.demo.workplace import Scalar
 
 Ready = Mapping[str, Any]
-"""What a fake's ready line says."""
+"""The content of a fake's ready line."""
 
 _UR_PORTS: Final = (30004, 30003, 29999)
 _HURRY: Final = ("--time-scale", "3")

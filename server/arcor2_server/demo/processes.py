@@ -12,7 +12,7 @@ import msgspec
 from arcor2_hw.exceptions import Arcor2Error
 
 READY_TIMEOUT: Final = 20.0
-"""Seconds for a child to say that it is ready: interpreters start slowly on a busy machine."""
+"""Time limit for a child to report that it is ready, s; interpreters start slowly on a busy machine."""
 END_TIMEOUT: Final = 5.0
 
 

@@ -29,7 +29,7 @@ OWNED: Final = (Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
 """Kinds that belong to an action point."""
 
 ROOTS: Final = (Kind.OBJECT, Kind.PARAMETER, Kind.SCENE, Kind.PROJECT)
-"""Kinds that are roots of lock trees, beside action points without a parent."""
+"""Kinds of items that are roots of lock trees, in addition to action points without a parent."""
 
 REFERRING: Final = frozenset({"pose", "position", "joints", *ActionParameterType})
 """Types of action parameter whose value is the id of something in the project."""

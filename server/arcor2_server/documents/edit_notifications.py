@@ -13,9 +13,9 @@ from arcor2_server.documents.history import History
 from arcor2_server.events import Connection, EventHub, encode, make_event
 
 DELAY: Final = 0.005
-"""Seconds after an edit: its answer and its own events go out first, and edits in a row are told once."""
+"""Delay after an edit, s: its answer and own events are sent first, and successive edits are notified once."""
 AT_LATEST: Final = 0.1
-"""Seconds after which it is told although edits still come."""
+"""Maximum delay while further edits arrive, s."""
 NAME: Final = "HistoryChanged"
 
 

@@ -64,7 +64,7 @@ alter table edit add column request text not null default '';
 alter table edit add column how text not null default 'edit';
 alter table edit add column target integer not null default 0;
 """
-"""Format 1 does not say why an edit was made."""
+"""Format 1 does not store the kind of an edit."""
 _FROM_2: Final = """
 alter table base add column sum integer not null default 0;
 alter table edit add column sum integer not null default 0;

@@ -61,10 +61,10 @@ class Session(OpenDocument):
         self._types = types
         self._damage = damage
         self.removed_types: set[str] = set()
-        """Object types of objects that were removed: those made for one object are deleted when the scene is saved."""
+        """Object types of removed objects. Types generated for one object are deleted when the scene is saved."""
         self.history = History(settings.history_limit)
         self.on_change: list[Callable[[Edit | None], None]] = []
-        """Called with each edit once it is on the disk, and with None when another document is open."""
+        """Called with each edit when it is on disk, and with None when another document is opened."""
         self._limit = settings.history_limit
         self._journal = Journal(settings.journal_database, self._take_back, functools.partial(hide_in_journal, secrets))
         self._closed = ClosedHistories(settings.history_dir, damage)

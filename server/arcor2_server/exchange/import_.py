@@ -29,7 +29,7 @@ Verb = Literal["new", "replaced", "same"]
 SHADOWS: Final = "takes the place of the installed type until it is removed"
 _UNTIMED: Final[dict[str, Any]] = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
 FIRST_WORD: Final = 5.0
-"""Seconds in which the server's greeting, which says what is open, has to come."""
+"""Time limit for the greeting of the server, which tells what is open, s."""
 
 
 class Step(Data, frozen=True):

@@ -24,10 +24,10 @@ from arcor2_server.storage.shared_data import SharedData
 log = structlog.get_logger(__name__)
 
 KEPT: Final = 1000
-"""Runs that are kept."""
+"""Maximum number of stored runs."""
 TRACE: Final = "ExecutionTrace"
 KEPT_ACTIONS: Final = 1000
-"""Actions of the last run that are kept."""
+"""Maximum number of stored actions of the last run."""
 
 
 class _Before(Struct):

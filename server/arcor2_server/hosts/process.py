@@ -21,15 +21,15 @@ T = TypeVar("T", bound=m.ToServer)
 
 COMMAND: Final = ("-P", "-m", "arcor2_hw.runtime.host")
 GOES_WITHIN: Final = 3.0
-"""Seconds a host has to end by itself once it should; then it is killed."""
+"""Time limit for a host to end by itself before it is killed, s."""
 LAST_WORDS: Final = 0.2
-"""Seconds that the second sign of the end (socket or process) may come after the first."""
+"""Time between the two signs of the end, closed socket and ended process, s."""
 HELD_WITHIN: Final = 15.0
-"""Seconds for a hold to begin, in which control may have to be taken, or for a robot to come to rest."""
+"""Time limit for the start of a hold, including taking control, or for a robot to stop, s."""
 STOPPED_WITHIN: Final = 3.0
-"""Seconds for a stop of all devices; the host gives the devices two."""
+"""Time limit for stopping all devices, s; the host allows the devices two."""
 ANSWERS_WITHIN: Final = 5.0
-"""Seconds beyond a call's own deadline after which the host itself is to blame for the missing answer."""
+"""Time after the deadline of a call at which the host is reported as not answering, s."""
 
 
 class CellError(Arcor2Error):
@@ -102,7 +102,7 @@ class CellHost:
         self.ready: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.reason = ""
-        """Why the host is gone; empty while it is not."""
+        """Why the host has ended; empty while it runs."""
         self._connection = connection
         self._number = itertools.count(1)
         self._calls: dict[int, asyncio.Future[bytes]] = {}

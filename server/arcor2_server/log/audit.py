@@ -28,7 +28,7 @@ READING: Final = frozenset(
         "Version",
     }
 )
-"""Requests that change nothing, besides those whose names begin with Get and List."""
+"""Requests that change nothing, in addition to those whose names begin with Get and List."""
 OF_THE_SCREEN: Final = frozenset(
     {
         "PreviewMove",
@@ -61,7 +61,7 @@ _TARGETS: Final = (
         "type",
     ),
 )
-"""Fields of arguments that say what a request is about, the most telling first. Their values are no secrets."""
+"""Argument fields that identify the target of a request, most specific first. Their values are not secret."""
 LONGEST_TARGET: Final = 100
 
 

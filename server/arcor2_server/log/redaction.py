@@ -7,7 +7,7 @@ from typing import Any, Final
 from arcor2_hw.data.secret import HIDDEN, is_secret_name
 
 SHORTEST: Final = 4
-"""Characters of a secret that is looked for in other texts: a shorter one stands in too many words."""
+"""Minimum length of a secret that is searched in other texts; shorter ones occur in too many words."""
 
 _VALUES: Final = ("value", "default_value")
 _IN_TEXT: Final = (

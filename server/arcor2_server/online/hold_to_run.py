@@ -28,9 +28,9 @@ from arcor2_server.workspace.robots import SceneRobots
 log = structlog.get_logger(__name__)
 
 QUICKEST_OF: Final = 30.0
-"""Seconds; the quickest message of the last one or two of these spans is what others are compared with."""
+"""Time span for measuring the fastest message, s; the last one or two spans count."""
 STOPS_WITHIN: Final = 5.0
-"""Seconds for a robot that is let go to come to rest; a stop that is obeyed takes a tenth of that."""
+"""Time limit for a released robot to stop, s; a normal stop takes a tenth of it."""
 
 Held = JogRobotArgs | HoldHandTeachingArgs
 
@@ -105,7 +105,7 @@ class HoldToRun:
         self._numbers = itertools.count(1)
         self._held: dict[str, _Press] = {}
         self._spent: dict[Connection, int] = {}
-        """By client, the newest press that has ended: it and those before never begin again."""
+        """The newest ended press by client. It and earlier ones never start again."""
         self._delays: dict[Connection, Delay] = {}
 
     def holder(self, robot_id: str) -> str | None:

@@ -34,7 +34,7 @@ FEATURES = {
 }
 
 MoveEventData = Callable[[MoveEventType, str | Unset], Any]
-"""Makes the data of the event that tells a phase of the motion."""
+"""Creates the data of the event for a phase of the motion."""
 
 
 def require_speed(speed: float) -> None:

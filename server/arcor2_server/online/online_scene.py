@@ -32,11 +32,11 @@ from arcor2_server.workspace.robots import SceneRobots
 log = structlog.get_logger(__name__)
 
 SPARE_AFTER: Final = 0.5
-"""Seconds from the start of the server to that of the first spare host, which must not delay it."""
+"""Time from the start of the server to the start of the first spare host, s."""
 START_WITHIN: Final = 60.0
-"""Seconds for importing object types (which may hang) and connecting; the host gives each device less."""
+"""Time limit for importing object types, which may hang, and connecting, s; the host allows each device less."""
 STOP_WITHIN: Final = 5.0
-"""Seconds in which the host says that it has closed the devices; it allows itself two."""
+"""Time limit for the host to close the devices, s; its own limit is two."""
 
 
 class OnlineScene:
@@ -59,7 +59,7 @@ class OnlineScene:
         self.state = SceneStateEnum.STOPPED
         self.running_action: RunningAction | None = None
         self.results: dict[str, list[str]] = {}
-        """Results of executed actions by action id, as JSON; forgotten when the scene goes offline."""
+        """Results of executed actions by action id, as JSON; deleted when the scene goes offline."""
         self.last_stop = LastStop()
         self.moving: set[str] = set()
         """Robots that move on request."""

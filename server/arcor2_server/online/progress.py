@@ -16,7 +16,7 @@ class SceneTask:
         self._task: Task | None = None
         self._starting = False
         self.asked_by = ""
-        """Who asked last for the scene to be started or stopped."""
+        """The user who last started or stopped the scene."""
 
     def entered(self, state: SceneStateEnum, scene: str, message: str) -> None:
         """The scene of that name is in another state, `message` says why."""

@@ -25,9 +25,9 @@ from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.settings import API_VERSION, VERSION, ServerSettings
 
 LARGEST_PART: Final = 4 * 1024 * 1024
-"""Bytes of one file in it, unpacked; a larger one is left out, and said to be."""
+"""Maximum size of one unpacked file, bytes; a larger one is replaced by a note."""
 LARGEST_NOTES: Final = 256 * 1024
-"""Bytes of what a client brings along."""
+"""Maximum size of the notes from a client, bytes."""
 RUNS: Final = 20
 
 _README: Final = """A bundle for diagnosis of ARCOR2-HW.

@@ -35,11 +35,11 @@ F = TypeVar("F", bound=Callable[..., Awaitable[Any]])
 
 MIB: Final = 1024 * 1024
 LARGEST_BODY: Final = 16 * MIB
-"""Bytes of a JSON body, as of a message of the websocket."""
+"""Maximum size of a JSON body, as of a websocket message, bytes."""
 MOST_FILES: Final = 200
-"""Files of one body."""
+"""Maximum number of files in one body."""
 BESIDE: Final = 256 * 1024
-"""Bytes of JSON beyond which it is read, or written, beside the event loop."""
+"""Size of JSON above which it is decoded or encoded in a thread, bytes."""
 
 
 class Binary(msgspec.Struct, frozen=True):
@@ -96,12 +96,12 @@ class Operation:
     parts: tuple[str, ...] = ()
     """The names of further parts that have to be there."""
     title: str = ""
-    """What is told of the file while it comes and is kept (TaskState); `{name}` stands for a part of the path."""
+    """Title of the task that shows the upload (TaskState); `{name}` is replaced by a part of the path."""
     shown_from: int = 0
-    """Bytes of a body below which nothing is told."""
+    """Size of a body below which no task is shown, bytes."""
     limit: int = LARGEST_BODY
     plain: bool = False
-    """The answer keeps snake_case: so do those of the original that came late."""
+    """Whether the answer has snake_case names, as later operations of the protocol do."""
     open: bool = False
     media_type: str = "application/json"
     """Of the answer."""

@@ -55,14 +55,14 @@ _STATUS: Final[dict[type[Arcor2Error], tuple[int, str]]] = {
     Conflict: (409, "Conflict"),
     InvalidProject: (409, "InvalidProject"),
 }
-"""Status and `type` of the answer by kind of error, the first that fits: existing clients tell them by the type."""
+"""Status and `type` of the answer by error class, first match. Existing clients distinguish errors by the type."""
 _ABSENT: Final = frozenset({"not_installed", "compute_stopped", "compute_timeout", "compute_busy"})
-"""Codes that say that the part of the system that would answer is not there, or did not."""
+"""Codes of errors of an unavailable part of the system."""
 _BY_CODE: Final = {"calibration_refused": (409, "Invalid")}
 _BY_REASON: Final = {"no_marker": (404, "NotFound")}
 """As the original's Calibration service has them (protocol, section 15)."""
 _STATES: Final = {"Execution": "PackageRunState"}
-"""The type of an error of state, where a service has one of its own."""
+"""The type of a state error, for services that define one."""
 
 
 def answer(content: Any, status: int = 200) -> Response[bytes]:

@@ -14,7 +14,7 @@ from arcor2_server.access.route_options import PERSON
 from arcor2_server.collaboration.tasks import Task, Tasks
 
 RECEIVED: Final = 0.9
-"""How far the task is when all has come: what came is checked and kept then."""
+"""Progress of the task when all data has been received; then it is checked and stored."""
 
 
 @contextmanager

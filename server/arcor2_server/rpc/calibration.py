@@ -47,7 +47,7 @@ PICTURES: Final = 3
 STILL: Final = 0.002
 """rad or m: a joint that changed by more while the picture was taken has moved."""
 DEPTH_FRAMES: Final = 10
-"""Frames of which a camera gives the mean as one depth picture."""
+"""Number of frames that a camera averages into one depth picture."""
 
 
 # ------------------------------------------------------------------------------------------------ given pictures

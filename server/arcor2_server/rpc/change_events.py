@@ -24,7 +24,7 @@ _EVENTS: Final = {
     Kind.LOGIC: "LogicItemChanged",
 }
 _BASE_UPDATED: Final = (Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
-"""Kinds of which a new name is told as update_base."""
+"""Kinds of items whose renaming is published as update_base."""
 _ORDER: Final = (
     *(Kind.SCENE, Kind.PROJECT, Kind.OBJECT, Kind.OVERRIDE, Kind.PARAMETER),
     *(Kind.POINT, Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION, Kind.LOGIC),

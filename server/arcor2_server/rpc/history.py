@@ -39,7 +39,7 @@ from arcor2_server.storage import Storage
 LONGEST_LIST: Final = 20
 """Things that History names of one edit."""
 ATTEMPTS: Final = 5
-"""How often what others edited meanwhile is taken into account before RestoreRevision gives up."""
+"""Number of attempts of RestoreRevision while other users edit."""
 
 
 def _moves(change: Change) -> bool:

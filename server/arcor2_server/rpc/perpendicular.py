@@ -26,11 +26,11 @@ log = structlog.get_logger(__name__)
 DOWN: Final = Orientation(1, 0, 0, 0)
 """A tool whose z axis points down."""
 YAWS: Final = 360
-"""Angles about the vertical that are looked at."""
+"""Number of checked angles about the vertical."""
 SEARCH_WITHIN: Final = 10.0
-"""Seconds after which the best of what was looked at is taken; a slow controller answers fifty questions in one."""
+"""Time limit of the search, s; a slow controller answers fifty requests per second."""
 _GONE: Final = frozenset({"connection_lost", "device_timeout", "not_connected", "not_implemented"})
-"""Codes of errors that say nothing of the pose: asking again is of no use."""
+"""Codes of errors that do not depend on the pose; they end the search."""
 
 
 def yaw_of(tool: Orientation) -> float:

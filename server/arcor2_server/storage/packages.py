@@ -32,7 +32,7 @@ MAX_UPLOAD: Final = 128 * 1024 * 1024
 _CHUNK: Final = 1 << 20
 _ID: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,127}")
 _TEMPORARY: Final = ".temporary-"
-"""Begins the name of the file that says that a package is there for one run; its content is the project's id."""
+"""Prefix of the file that marks a temporary package; its content is the id of the project."""
 _UNFINISHED: Final = (".new-", ".old-", ".pkg_")
 """Begin the names of directories that are being written or deleted."""
 _NEVER_BUILT: Final = PackageMeta("N/A", "1970-01-01T00:00:00+00:00")

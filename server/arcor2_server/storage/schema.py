@@ -14,7 +14,7 @@ from arcor2_server.storage.models import Base
 REVISION: Final = "0004"
 """The newest revision in `migrations/versions`."""
 KNOWN: Final = frozenset({"0001", "0002", "0003", REVISION})
-"""All revisions from which a database can be brought up to date."""
+"""All revisions from which a database can be migrated."""
 MIGRATIONS: Final = Path(__file__).parent / "migrations"
 CHECKED_SIZE: Final = 64 * 1024 * 1024
 """Bytes up to which a database in a file is read through at start to find damage."""

@@ -17,9 +17,9 @@ from arcor2_server.access.route_options import OPEN, ROLE
 from arcor2_server.web.encodings import accepted_encodings
 
 FILES: Final = Path(__file__).parents[1] / "editor_files"
-"""Where the build puts the editor; absent in a checkout where it was not built."""
+"""Folder of the built editor; missing in a checkout without a build."""
 NONCE: Final = b"__NONCE__"
-"""What stands in the page where each answer puts a nonce of its own, for the styles that components insert."""
+"""Placeholder in the page for the nonce of the styles that components insert; each response has its own."""
 NOT_BUILT: Final = (
     b"<!doctype html><html lang=en><meta charset=utf-8><title>ARCOR2-HW</title>"
     b"<h1>The editor is not built</h1><p>The server runs. In a checkout, <code>make run</code> builds the editor."

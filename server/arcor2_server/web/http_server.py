@@ -20,9 +20,9 @@ from arcor2_server.web.websocket_transport import WireProtocol
 log = structlog.get_logger(__name__)
 
 GRACE: Final = 2
-"""Seconds that open requests get to end; the contract allows 5 for everything."""
+"""Time limit for open requests at the end of the server, s; the contract allows 5 for everything."""
 ACCEPTED_AT_ONCE: Final = 100
-"""Connections accepted before anything else gets its turn."""
+"""Number of connections accepted before the event loop continues."""
 PAUSE: Final = 0.5
 """Seconds without accepting after the system had no file descriptor for a connection."""
 

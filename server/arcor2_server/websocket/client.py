@@ -55,7 +55,7 @@ class Wire(Protocol):
 
 
 ABORT_AFTER: Final = 1.0
-"""Seconds a close frame may take to get out before the connection is dropped."""
+"""Time limit for sending a close frame before the connection is dropped, s."""
 
 
 class Client:
@@ -67,15 +67,15 @@ class Client:
         self.address = ""
         self.role: Role = Role.OPERATOR
         self.token: Token | None = None
-        """What let it in, where a token did."""
+        """The token of the client, if it sent one."""
         self.greeting: Callable[[], list[Event]] = list
-        """Gives what it is sent when it is let in."""
+        """Returns the events for the client when it is admitted."""
         self.events: frozenset[str] | None = None
-        """The events that it gets, None for all."""
+        """The events for the client, None for all."""
         self.follows: frozenset[str] = frozenset()
-        """Users whose view state it is sent beside that of its own."""
+        """Other users whose view states the client receives."""
         self.admitted = False
-        """Until then it is sent no event, and only Authenticate is served."""
+        """Before it is admitted, the client receives no events, and only Authenticate is served."""
         self._wire = wire
         self._settings = settings
         self._waiting: deque[bytes | str] = deque()  # a str stands for the newest message of that stream

@@ -32,19 +32,19 @@ from arcor2_server.websocket.request import CachedAnswer, Context, Handler
 log = structlog.get_logger(__name__)
 
 AUTHENTICATE: Final = "Authenticate"
-"""The one request that is served before a client is admitted."""
+"""The only request that is served before a client is admitted."""
 AUTHENTICATE_WITHIN: Final = 10.0
-"""Seconds in which a client has to show its token."""
+"""Time limit for a client to send its token, s."""
 LONGEST_AUTHENTICATION: Final = 4096
-"""Characters that are looked at of somebody who is not admitted."""
+"""Maximum length of a message from an unadmitted client, characters."""
 TOKENS_PERIOD: Final = 2.0
-"""Seconds after which a token that was revoked, or has run out, ends its connections."""
+"""Period of checking for revoked and expired tokens, s."""
 UNREADABLE: Final = "Error"
-"""What stands as the answered request when that could not be read."""
+"""Request name in the answer to an unreadable message."""
 LONGEST_NAME: Final = 200
-"""Characters up to which the name of a request that does not exist is repeated."""
+"""Maximum length of an unknown request name in an answer, characters."""
 LONGEST_REASON: Final = 4000
-"""Characters of a refusal: what it quotes may be as long as the request."""
+"""Maximum length of a refusal, characters; its quotations may be as long as the request."""
 _decode_request = msgspec.json.Decoder(Request).decode
 _decode_anything = msgspec.json.Decoder().decode
 
@@ -72,7 +72,7 @@ class Route(Struct, frozen=True):
     cached: CachedAnswer | None
     decode: Any
     default: Any
-    """What the handler gets when the arguments are left out; UNSET when they must not be."""
+    """Default of the arguments; UNSET if they are required."""
 
 
 def routes(handlers: Mapping[str, Handler], cached: Mapping[str, CachedAnswer]) -> dict[str, Route]:
@@ -138,7 +138,7 @@ class Endpoint:
         self._tasks: set[asyncio.Task[None]] = set()
         self._watch: asyncio.Task[None] | None = None
         self._holds: WeakKeyDictionary[Client, tuple[str, str, int, str]] = WeakKeyDictionary()
-        """The hold of each client that was logged last."""
+        """The last logged hold of each client."""
 
     async def serve(self, socket: WebSocket[Any, Any, Any]) -> None:
         """Serve one connection until it ends."""

@@ -17,7 +17,7 @@ class Hub:
         self._subscribers: dict[str, set[Connection]] = {}
         self.on_leave: list[Callable[[Connection], None]] = []
         self.main_screen = make_event("ShowMainScreen", ShowMainScreenData(MainScreen.SCENES_LIST))
-        """What a client sees that connects while nothing is open: the last ShowMainScreen, without `highlight`."""
+        """The greeting while nothing is open: the last ShowMainScreen, without `highlight`."""
 
     def add(self, client: Client, only: frozenset[str] | None = None) -> None:
         """Take in a connection; `only` are the events that it gets, None for all."""

@@ -11,7 +11,7 @@ from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, Sphere
 from arcor2_hw.exceptions import NotFound
 
 INFLATION: Final = 0.01
-"""By how much sizes are larger than stated where safety of a line is asked, m (protocol, section 14)."""
+"""Inflation of body sizes for safe line checks, m (protocol, section 14)."""
 _TINY: Final = 1e-12
 
 
@@ -37,11 +37,11 @@ class CollisionWorld:
         self.inflation = inflation
         self._put: dict[str, Placed] = {}
         self.on_change: list[Callable[[], None]] = []
-        """Called when what was put in changed."""
+        """Called when the models changed."""
         self.on_put: list[Callable[[Placed], None]] = []
-        """Called with what was put in, or moved, or is held by another."""
+        """Called with an added, moved, attached or detached model."""
         self.on_remove: list[Callable[[list[str]], None]] = []
-        """Called with the ids of what was taken out."""
+        """Called with the ids of removed models."""
 
     @property
     def put_in(self) -> dict[str, Placed]:

@@ -29,13 +29,13 @@ from arcor2_server.storage.assets import Asset
 log = structlog.get_logger(__name__)
 
 TOLD_AFTER: Final = 1.0
-"""Seconds after which those who watch tasks are told of one."""
+"""Time after which a conversion is shown as a task, s."""
 MOST_KEPT: Final = 1024 * 1024 * 1024
-"""Bytes on disk; beyond, what was asked for longest ago is dropped."""
+"""Maximum size on disk, bytes; beyond, the least recently used files are deleted."""
 MOST_REFUSALS: Final = 1000
 _GZIP_LEVEL: Final = 6
 _WORTH: Final = 0.9
-"""A copy that is compressed is kept when it has less than this share of the bytes."""
+"""A compressed copy is stored if it is smaller than this fraction of the original."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from arcor2_hw.exceptions import InvalidData
 FEWEST: Final = 3
 """Points that determine a pose, if they are not in one line."""
 THINNEST: Final = 0.02
-"""The least extent of the points across their line, as a fraction of that along it: less says nothing of the roll."""
+"""Minimum extent of the points across their line, as a fraction of its length, to determine the roll."""
 NEAREST: Final = 1e-4
 """The least distance that is taken for one, m."""
 

@@ -37,15 +37,15 @@ log = structlog.get_logger(__name__)
 
 NAME: Final = "ReachabilityChanged"
 DELAY: Final = 0.05
-"""Seconds after an edit: edits in a row are looked at once."""
+"""Delay after an edit, s; successive edits are computed once."""
 AT_LATEST: Final = 0.3
-"""Seconds after which it is looked at although edits still come."""
+"""Maximum delay while further edits arrive, s."""
 ANSWER_WITHIN: Final = 1.0
-"""Seconds that a request waits for what is being worked out."""
+"""Time that a request waits for running computations, s."""
 DESCRIBED_WITHIN: Final = 10.0
-"""Seconds that a request waits for what end effectors there are: a worker may have to come up for that."""
+"""Time limit of a request for the list of end effectors, s; a worker may have to start for it."""
 PIECE: Final = 100
-"""Poses of one question to the worker, between which others get their turn."""
+"""Number of poses in one task; other tasks run between two of them."""
 
 Target = Pose | list[Joint]
 
@@ -92,7 +92,7 @@ class ReachabilityBoard:
         self._idle = asyncio.Event()
         self._idle.set()
         self._described = asyncio.Event()
-        """The rows are there."""
+        """Set when the rows exist."""
         self._working: asyncio.Task[None] | None = None
         self._stopped = StoppedRobots(host, robots)
         session.on_change.append(lambda edit: self.schedule() if edit is not None else self._begin_anew())

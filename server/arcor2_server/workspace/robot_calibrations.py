@@ -34,7 +34,7 @@ from arcor2_server.workspace.robots import SceneRobots
 log = structlog.get_logger(__name__)
 
 MOST: Final = 1000
-"""Calibrations that are kept; beyond, those that were read longest ago go."""
+"""Maximum number of stored calibrations; the oldest are dropped."""
 _THERE: Final = (Connection.ONLINE, Connection.BACK)
 
 
@@ -58,9 +58,9 @@ class InForce(enum.StrEnum):
     NONE = "none"
     """It has no model."""
     NOMINAL = "nominal"
-    """As its type is made: the tip may be off by millimetres."""
+    """Nominal for its type: the tip may be off by millimetres."""
     MEASURED = "measured"
-    """As its controller told of the very arm."""
+    """Calibrated for this robot, read from its controller."""
 
 
 class RobotCalibrations:
@@ -89,11 +89,11 @@ class RobotCalibrations:
         self._stored: dict[str, RobotCalibration] = {}
         """By the object's id."""
         self._asked: set[str] = set()
-        """Robots that were asked since they were connected."""
+        """Robots whose calibration was requested since they connected."""
         self._reading: set[asyncio.Task[None]] = set()
         self._writing = asyncio.Lock()
         self.on_change: list[Callable[[SceneObject], None]] = []
-        """Called with a robot of which another calibration, or none, is in force."""
+        """Called with a robot whose calibration in use changed."""
 
     @property
     def any(self) -> bool:

@@ -10,11 +10,11 @@ from arcor2_server.hosts.session import HostSession
 from arcor2_server.workspace.robots import SceneRobots
 
 PERIOD: Final = 0.5
-"""Seconds between two looks."""
+"""Period of reading the joints, s."""
 ANSWER_WITHIN: Final = 1.0
-"""Seconds that a robot gets to tell its joints."""
+"""Time limit for reading the joints of a robot, s."""
 STANDSTILL: Final = 0.01
-"""rad, or m, by which a joint has to have moved for its robot to stand elsewhere."""
+"""Joint change above which a robot counts as moved, rad or m."""
 
 
 class StoppedRobots:
