@@ -35,7 +35,7 @@ def joining(settings: ServerSettings, port: int) -> Joining:
 
 
 def _hosts(host: str) -> list[str]:
-    """Return the addresses of this machine that stand for one on which it listens."""
+    """Return the addresses of this machine for a listening address."""
     try:
         address = ipaddress.ip_address(host.strip("[]"))
     except ValueError:

@@ -75,13 +75,13 @@ class Access:
 
     @property
     def open_to_all(self) -> bool:
-        """Whether no token is asked for: by a setting, or since only this machine reaches us and there is no token."""
+        """Whether no token is required: by a setting, or for a local-only server without tokens."""
         if self._settings.insecure:
             return True
         return is_local(self._settings) and not self._tokens.all() and not self._tokens.unusable
 
     def by_token(self, secret: str, address: str) -> Admission:
-        """Let in by a token. AccessRefused; TooManyAttempts before the token is even looked at."""
+        """Admit a client by a token. Raise AccessRefused, or TooManyAttempts before the token is checked."""
         attempts = self._attempts(address)
         if len(attempts) >= WRONG_TOKENS:
             raise TooManyAttempts(f"Too many wrong tokens came from {address}: wait a minute.")
@@ -116,7 +116,7 @@ class Access:
         return self._tokens.repair()
 
     def valid(self, token: Token) -> bool:
-        """Return whether a token that let somebody in still would."""
+        """Return whether a token is still valid."""
         return self._tokens.valid(token)
 
     def _by_legacy_listener(self, connection: ASGIConnection[Any, Any, Any, Any]) -> bool:
@@ -146,9 +146,9 @@ def _secret(connection: ASGIConnection[Any, Any, Any, Any]) -> str | None:
 
 
 def role_needed(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler) -> None:
-    """Refuse a REST request whose sender has not the route's role (a guard of Litestar).
+    """Refuse a REST request whose sender lacks the role of the route (a guard of Litestar).
 
-    The websocket's requests have roles of their own, and its client may show the token later.
+    Requests on the websocket have their own roles, and its clients may send the token later.
     """
     if isinstance(handler, WebsocketRouteHandler) or handler.opt.get(OPEN):
         return

@@ -40,7 +40,7 @@ class Connection:
         self._limits.admit(self)
 
     def wait(self) -> None:
-        """Count the connection among those that wait, as the newest of them."""
+        """Count the connection as the newest waiting one."""
         self._limits.wait(self)
 
     def close(self) -> None:
@@ -100,7 +100,7 @@ class ConnectionLimits:
             connection.admitted = True
 
     def wait(self, connection: Connection) -> None:
-        """Count a connection among those that wait, as the newest."""
+        """Count a connection as the newest waiting one."""
         if connection not in self._open:
             return
         if connection.admitted:

@@ -79,7 +79,7 @@ def host_of(header: str | None) -> str | None:
 def may_connect(origin: str | None, host: str | None, names: HostNames) -> bool:
     """Return whether a page of this origin may use the server that it addresses as `host`.
 
-    A client that is no browser sends no Origin. A browser sends the page's, which must be one of our own pages.
+    Only browsers send an Origin. It must be that of a page of this server.
     """
     if origin is None:
         return True

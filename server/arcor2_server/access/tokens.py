@@ -104,7 +104,7 @@ class TokenFile:
         return damage
 
     def find(self, secret: str) -> Token | None:
-        """Return the token with this secret, None if there is none or its time is over."""
+        """Return the token with this secret, None if there is none or it has expired."""
         digest = hashlib.sha256(secret.encode(errors="replace")).hexdigest()
         found = None
         for token in self.all():  # all of them, so that the time taken tells nothing
@@ -117,7 +117,7 @@ class TokenFile:
         return not token.expired and any(each.id == token.id for each in self.all())
 
     def add(self, name: str, role: Role, days: int | None = None) -> tuple[Token, str]:
-        """Create a token; return it with its secret, which is nowhere kept.
+        """Create a token; return it with its secret, which is not stored.
 
         Raise InvalidData or Conflict if that is impossible.
         """
@@ -136,7 +136,7 @@ class TokenFile:
         return token, secret
 
     def revoke(self, which: str) -> list[Token]:
-        """Take out the tokens of this id or name, and give them. Raise NotFound if there is none."""
+        """Delete the tokens with this id or name, and return them. Raise NotFound if there is none."""
         with self._changing() as tokens:
             gone = [token for token in tokens if which in (token.id, token.name)]
             if not gone:

@@ -31,7 +31,7 @@ class LockTree(Protocol):
         """Return the root of the tree that an id belongs to; raise NotFound for an id it does not know."""
 
     def tree_of(self, root: str) -> Iterable[str]:
-        """Return the ids of everything below a root; nothing when it is none."""
+        """Return the ids below a root; empty if it is not a root."""
 
 
 class _Nothing:
@@ -101,17 +101,17 @@ class LockTable:
         return root is not None and user in root.readers.get(item, ())
 
     def locked_roots(self, besides: Iterable[str] = ()) -> list[str]:
-        """Return the roots in whose trees anything is locked, without the ones named."""
+        """Return the roots of trees with locks, except the given ones."""
         skipped = set(besides)
         return [name for name in self._roots if name not in skipped]
 
     def write_locked_roots(self, besides: Iterable[str] = ()) -> list[str]:
-        """Return the roots in whose trees anything is write-locked, without the ones named."""
+        """Return the roots of trees with write locks, except the given ones."""
         skipped = set(besides)
         return [name for name, root in self._roots.items() if root.writers and name not in skipped]
 
     def writer_of(self, item: str) -> str | None:
-        """Return who may write an id: its writer, or the holder of the tree it is in."""
+        """Return the user who may write an item: its writer, or the holder of its tree."""
         root = self._roots.get(self._where.get(item) or self._known_root(item))
         if root is None:
             return None
@@ -120,7 +120,7 @@ class LockTable:
         return root.writers.get(item)
 
     def holders_of(self, item: str) -> set[str]:
-        """Return who may write an id, or keeps others from it by a read lock."""
+        """Return the users who may write an item, or hold a read lock on it."""
         root = self._roots.get(self._where.get(item) or self._known_root(item))
         writer = self.writer_of(item)
         return set(root.readers.get(item, ()) if root else ()) | ({writer} if writer else set())
@@ -157,7 +157,7 @@ class LockTable:
 
     # ------------------------------------------------------------------------------------------------ freed, moved
     def release_announced(self, user: str, ids: Iterable[str]) -> list[str]:
-        """Free the client's locks among `ids`; return what ObjectsUnlocked has to name, empty when he held none."""
+        """Release the user's locks among `ids`; return the ids for ObjectsUnlocked."""
         freed: set[str] = set()
         for item in ids:
             if item in self._announced.get(user, ()):
@@ -165,9 +165,9 @@ class LockTable:
         return sorted(freed)
 
     def drop(self, ids: Iterable[str]) -> dict[str, list[str]]:
-        """Forget all locks on ids that were removed; the event that removes them implies it.
+        """Drop all locks on removed items, which their removal event implies.
 
-        Gives what else became free, by owner: the rest of a tree that was locked by an id which is gone.
+        Return the other ids that became free, by owner: the rest of a tree locked through a removed item.
         """
         ids = list(ids)
         freed: dict[str, set[str]] = {}
@@ -210,7 +210,7 @@ class LockTable:
         self._notify()
 
     def release_all(self, user: str) -> list[str]:
-        """Free all that a client locked, for one who does not come back; return the announced ids."""
+        """Release all locks of a user who does not return; return the announced ids."""
         for item in self._reads.pop(user, []):
             self._since.pop((user, item), None)
             self._free_read(user, item)

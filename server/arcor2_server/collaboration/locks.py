@@ -39,7 +39,7 @@ class Locks(LockTable):
 
     # ------------------------------------------------------------------------------------------------ of clients
     async def write_lock(self, user: str, item: str, tree: bool = False) -> list[str]:
-        """Lock for a client. Gives the ids to announce, none when he holds it already.
+        """Lock an item for a client. Return the ids to announce, empty if the user holds the lock already.
 
         Raise Locked or NotFound if that is impossible.
         """
@@ -55,7 +55,7 @@ class Locks(LockTable):
         return sorted(ids)
 
     async def write_unlock(self, user: str, item: str) -> list[str]:
-        """Unlock for a client. Gives the ids to announce as free. Locked when he does not hold exactly this lock."""
+        """Unlock an item for a client. Return the ids to announce. Raise Locked if the user does not hold this lock."""
         await self._pass()
         if not self._is_writer(user, item):
             raise Locked(f"{user} does not hold a write lock of {item!r}.")
@@ -68,7 +68,7 @@ class Locks(LockTable):
         self._since.setdefault((user, item), now())
 
     async def read_unlock(self, user: str, item: str) -> None:
-        """Unlock for reading, for a client. Locked when he holds none."""
+        """Release a read lock of a client. Raise Locked if there is none."""
         await self._pass()
         if item not in self._reads.get(user, ()):
             raise Locked(f"{user} does not hold a read lock of {item!r}.")
@@ -198,7 +198,7 @@ class Locks(LockTable):
                 return root_ids
 
     async def _pass(self) -> None:
-        """Wait while somebody else works under `exclusive`."""
+        """Wait while another task holds `exclusive`."""
         if self._exclusive is None or self._exclusive is asyncio.current_task():
             return
         deadline = asyncio.get_running_loop().time() + EXCLUSIVE_LIMIT

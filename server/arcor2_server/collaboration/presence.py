@@ -29,7 +29,7 @@ class PresenceBoard:
         users.on_leave.append(self._left)
 
     def everybody(self) -> list[Event]:
-        """Return the events that tell of all who are there."""
+        """Return the events that describe all connected users."""
         return [self._event(name) for name in self._users.names()]
 
     def users_of(self, documents: Iterable[str]) -> list[str]:
@@ -46,7 +46,7 @@ class PresenceBoard:
         return found
 
     def update(self, client: Connection, presence: Presence) -> None:
-        """Take what a user's client says, and tell it. RequestRefused for what cannot be sent on."""
+        """Store and publish the presence of a client. Raise RequestRefused if it cannot be encoded."""
         user = client.user
         assert user is not None
         before = self._presence.get(user)

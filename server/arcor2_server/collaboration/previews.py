@@ -39,7 +39,7 @@ class Previews:
         self._check_timer: asyncio.TimerHandle | None = None
 
     def show(self, client: Connection, user: str, preview: MovePreview, locked: str) -> None:
-        """Tell the others where an item is just now; or that it is over; `locked` is what its mover holds."""
+        """Publish the position of a dragged item, or the end of the preview; `locked`: the locked item."""
         if preview.position is UNSET and preview.orientation is UNSET and preview.joints is UNSET:
             self._end(preview.id)
             return
@@ -76,7 +76,7 @@ class Previews:
             self._check_timer.cancel()
 
     def _check_holders(self) -> None:
-        """End the previews of those who are gone, or do not hold the item any more."""
+        """End the previews of clients that left or do not hold the lock any more."""
         self._check_timer = None
         for item, dragged in list(self._dragged.items()):
             if dragged.client not in self._hub.clients or not self._locks.holds(dragged.user, dragged.locked):

@@ -28,7 +28,7 @@ class Task:
         self.state = state
 
     def at(self, progress: float | None, message: str = "") -> None:
-        """Say how far it is, 0..1 (None: nobody knows), and what is being done."""
+        """Report the progress, 0..1 (None: unknown), and the present step."""
         share = UNSET if progress is None else min(max(progress, 0.0), 1.0)
         self._tasks._update(self, replace(self.state, progress=share, message=message or self.state.message))
 
@@ -58,7 +58,7 @@ class Tasks:
         self._events = Throttle(PERIOD, lambda key, event: hub.stream_to_subscribers(NAME, key, event))
 
     def begin(self, kind: TaskKind, title: str, started_by: str | None = None) -> Task:
-        """Tell that something began; `title` is a sentence for people, without a full stop."""
+        """Start a task; `title` is a sentence without a full stop."""
         state = TaskStateData(new_id("task"), kind, title, TaskProgress.RUNNING, now(), started_by or UNSET)
         task = self._running[state.id] = Task(self, state)
         self._events.put(state.id, encode(make_event(NAME, state)))
@@ -66,7 +66,7 @@ class Tasks:
 
     @contextmanager
     def running(self, kind: TaskKind, title: str, started_by: str | None = None) -> Iterator[Task]:
-        """Tell of what is done inside: it fails with the error that leaves it."""
+        """Show the enclosed work as a task, which fails with the raised error."""
         task = self.begin(kind, title, started_by)
         try:
             yield task
@@ -79,7 +79,7 @@ class Tasks:
         task.finish()
 
     def under_way(self) -> list[Event]:
-        """Return the events that tell of all that is under way."""
+        """Return the events that describe all running tasks."""
         return [make_event(NAME, task.state) for task in self._running.values()]
 
     def close(self) -> None:

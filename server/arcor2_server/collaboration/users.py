@@ -45,7 +45,7 @@ class Users:
         return self._clients.get(user)
 
     def names(self) -> list[str]:
-        """Return who is logged in."""
+        """Return the names of the registered users."""
         return list(self._clients)
 
     def left_at(self, user: str) -> str | None:
@@ -58,7 +58,7 @@ class Users:
             raise RequestRefused(f"{user} is connected. Ask {user} to unlock it.")
 
     def release(self, user: str, notice: str) -> list[str]:
-        """Release all locks of a user who left and return their ids; the user gets the notice on returning."""
+        """Release all locks of a user who left and return their ids. The user receives the notice on returning."""
         waiting = self._notices.pop(user, [])
         self._notices[user] = [*waiting, notice][-NOTICES_OF_USER:]
         while len(self._notices) > USERS_WITH_NOTICES:
@@ -66,9 +66,9 @@ class Users:
         return self._locks.release_all(user)
 
     async def register(self, client: Connection, name: str) -> list[Event]:
-        """Log in; return the events that tell this connection alone who holds which locks.
+        """Register a user; return the events that describe the held locks to this client.
 
-        RequestRefused for an empty name, and for one whose other connection is alive.
+        Raise RequestRefused if the name is empty, or another client with it is connected.
         """
         if not name:
             raise RequestRefused("The user name must not be empty.")
@@ -102,7 +102,7 @@ class Users:
         return events
 
     def disconnected(self, client: Connection) -> None:
-        """Log out the user of a connection that is gone; his locks are released after the time-out."""
+        """Unregister the user of a closed connection. The locks are released after the time-out."""
         if client.user is not None and self._clients.get(client.user) is client:
             self._leave(client.user)
 

@@ -45,7 +45,7 @@ class ViewStates:
     async def change(
         self, scope: ViewScope, user: str, document: str, values: Mapping[str, Any], by: Connection
     ) -> int:
-        """Write values, None: take them away, and tell the others; return the revision.
+        """Write values (None: delete) and publish them to other clients; return the revision.
 
         Raise RequestRefused or StorageError if that is impossible.
         """
@@ -70,7 +70,7 @@ class ViewStates:
         return revision
 
     async def forget(self, document: str) -> None:
-        """Drop all views of a document that is gone. Raise StorageError if that is impossible."""
+        """Delete all views of a deleted document. Raise StorageError if that is impossible."""
         async with self._turn:
             await self._data.forget_document(document)
             for key in [key for key in self._views if key[1] == document]:

@@ -69,9 +69,9 @@ class Dependents:
         self._session = session
 
     async def after_saving(self, save: Callable[[], Awaitable[None]]) -> list[ObjectTypeMeta]:
-        """Save the open scene; then joints taught at objects that moved become invalid in all its projects.
+        """Save the open scene; mark joints at moved objects as invalid in all its projects.
 
-        What a project has of objects that are gone is taken out of it. Gives the object types that were deleted.
+        Items of removed objects are removed from the projects. Return the deleted object types.
         """
         scene = self._session.require_scene()
         try:
@@ -97,7 +97,7 @@ class Dependents:
                 await self._storage.put_project(changed)
 
     async def forget_unused_types(self, candidates: Iterable[str]) -> list[ObjectTypeMeta]:
-        """Delete those of the object types that are virtual collision objects and stand in no scene; return them."""
+        """Delete the candidates that are virtual collision objects and used in no scene; return them."""
         types = self._types
         virtual = {
             name for name in candidates if name != VIRTUAL and types.known(name) and types.derives_from(name, VIRTUAL)

@@ -323,7 +323,7 @@ class Document:
         return found
 
     def named(self, kind: Kind | str, name: str, parent: str = "") -> str | None:
-        """Return the id of what has that name, None when the name is free.
+        """Return the id of the item with a name, None if the name is free.
 
         Names are unique per kind, those of orientations and joints within their action point. Kind "output": the
         action whose result has that name.
@@ -387,7 +387,7 @@ class Document:
         raise NotFound(f"{item!r} is not part of what is open.")
 
     def tree_of(self, root: str) -> list[str]:
-        """Return the ids below a root: the action points and what belongs to them; nothing when it is none."""
+        """Return the ids below a root: its action points with their items; empty if it is not a root."""
         points = [point.id for point in self.descendants(root)]
         below = [i for holder in (root, *points) for kind in OWNED for i in self._owned.get(holder, {}).get(kind, ())]
         return points + below

@@ -37,7 +37,7 @@ class EditNotifications:
         session.on_change.append(self._changed)
 
     def history_of(self, client: Connection) -> Event:
-        """Return the event that tells a client what he could undo and redo now."""
+        """Return the event with what the user of a client can undo and redo."""
         return self._history(client.user)
 
     def close(self) -> None:
@@ -114,7 +114,7 @@ _BY_IMPORTANCE: Final = (
 
 
 def _original(edit: Edit, history: History) -> Edit:
-    """Return the edit that an undo or redo is of, as far as it is kept."""
+    """Return the original edit of an undo or redo, as far as it is stored."""
     while edit.how in (How.UNDO, How.REDO) and (found := history.find(edit.of)) is not None:
         edit = found
     return edit

@@ -36,7 +36,7 @@ class History:
         self._note(edit)
 
     def pop(self) -> Edit:
-        """Return back the newest edit: it could not be kept."""
+        """Remove the newest edit, which could not be stored."""
         edit = self._edits.pop()
         kept = list(self._edits)
         self.clear()
@@ -71,7 +71,7 @@ class History:
 
     # ------------------------------------------------------------------------------------------ what is asked
     def find(self, number: int) -> Edit | None:
-        """Return an edit, None when it is not kept."""
+        """Return an edit, None if it is not stored."""
         index = number - self._edits[0].number if self._edits else -1
         return self._edits[index] if 0 <= index < len(self._edits) else None
 
@@ -85,7 +85,7 @@ class History:
         return self.find(numbers[-1]) if numbers else None
 
     def redoable(self, user: str) -> Edit | None:
-        """Return the latest undo of a user after which he made no other edit."""
+        """Return the latest undo of a user, if the user made no other edit after it."""
         numbers = self._redoable.get(user)
         return self.find(numbers[-1]) if numbers else None
 
@@ -94,7 +94,7 @@ class History:
         return number in self._undoable.get(user, ())
 
     def can_redo(self, user: str, number: int) -> bool:
-        """Return whether an edit is an undo of the user after which he made no other edit."""
+        """Return whether an edit is an undo of the user without a later edit of the user."""
         return number in self._redoable.get(user, ())
 
     def since(self, number: int) -> list[Edit]:

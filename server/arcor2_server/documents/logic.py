@@ -45,7 +45,7 @@ def check_logic_item(
 
 
 def _check_otherwise(document: Document, start: str, items: list[LogicItem]) -> None:
-    """Refuse a step without a condition beside others, but one beside those that ask for no truth value."""
+    """Refuse an unconditional connection next to others, except next to conditions that are not boolean."""
     conditions = [item.condition for item in items if not isinstance(item.condition, Unset)]
     without = len(items) - len(conditions)
     if len(items) == 1 or not without:

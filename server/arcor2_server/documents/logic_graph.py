@@ -142,7 +142,7 @@ def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> li
 
 
 def read(project: Project) -> Flow:
-    """Return the graph of a project's logic; InvalidProject names the action where it is no program."""
+    """Return the graph of a project's logic. Raise InvalidProject naming the action where it is invalid."""
     actions = [action for point in project.action_points for action in point.actions]
     known = {action.id: number for number, action in enumerate(actions)}
     starts: list[int] = []

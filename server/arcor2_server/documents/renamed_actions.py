@@ -27,7 +27,7 @@ def with_present_name(action: Action, meta: ObjectAction) -> Action:
 
 
 def with_present_names(scene: Scene, project: Project, types: Types) -> Project:
-    """Return a project whose actions are called as their object types call them now; unknown ones stay as they are."""
+    """Return a project with the present names of its actions; unknown actions are unchanged."""
     type_of = {placed.id: placed.type for placed in scene.objects}
 
     def renamed(action: Action) -> Action:

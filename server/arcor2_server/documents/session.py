@@ -152,15 +152,15 @@ class Session(OpenDocument):
 
     @property
     def oldest_revision(self) -> int:
-        """The oldest revision to which the edits that are kept lead back."""
+        """The oldest revision that the stored edits lead back to."""
         return self._number - len(self.history)
 
     async def commit(
         self, user: str, changes: Sequence[Change], request: str = "", how: How = How.EDIT, of: int = 0
     ) -> None:
-        """Make changes as one edit; return when they are on the disk. `request`, `how`, `of`: see Edit.
+        """Apply changes as one edit; return when they are on disk. `request`, `how`, `of`: see Edit.
 
-        Others see them at once. Raises StorageError when they cannot be kept: then they are taken back.
+        Other requests see them at once. Raise StorageError if they cannot be stored; they are reverted then.
         """
         edit = Edit(self._number + 1, now(), user, list(changes), request, how, of)
         stored = self._journal.append(edit)

@@ -22,7 +22,7 @@ def changes_back(edits: Iterable[Edit]) -> list[Change]:
 def require_possible(
     document: Document, changes: Sequence[Change], types: Types, history: History, after: int, user: str
 ) -> None:
-    """Refuse when what was made since edit number `after` stands against the changes; names who made it."""
+    """Refuse changes that conflict with edits after number `after`; name their author."""
     for change in changes:
         item = document.find(change.kind, change.id)
         if (None if item is None else item.value) != change.before:

@@ -44,7 +44,7 @@ class SharedBreakpoints:
             return set((await self._known(project_id))[0])
 
     async def change(self, project_id: str, add: set[str], remove: set[str], user: str) -> ProjectBreakpoints:
-        """Set and take away breakpoints, and tell it.
+        """Set and remove breakpoints, and publish them.
 
         Raise NotFound, RequestRefused or StorageError if that is impossible.
         """
@@ -69,7 +69,7 @@ class SharedBreakpoints:
         return data
 
     def changed(self, changes: Sequence[Change]) -> None:
-        """Tell of breakpoints that came or went with what they are on."""
+        """Publish breakpoints whose items were added or removed."""
         project = self._session.document.of_kind(Kind.PROJECT)
         if not project or (known := self._set.get(project[0].id)) is None:
             return
@@ -80,7 +80,7 @@ class SharedBreakpoints:
                 self._publish(data)
 
     async def forget(self, project_id: str) -> None:
-        """Drop those of a project that is gone: what is on disk goes with its views."""
+        """Forget the breakpoints of a deleted project. Those on disk are deleted with its views."""
         self._set.pop(project_id, None)
 
     # -------------------------------------------------------------------------------- inside

@@ -95,7 +95,7 @@ class Runs:
         self._trace_of = 0
 
     async def open(self, data: SharedData) -> None:
-        """Read what was kept; runs that had not ended were lost with the server.
+        """Read the stored runs; mark unfinished ones as lost.
 
         Raise StorageError if that is impossible.
         """
@@ -198,7 +198,7 @@ class Runs:
         return self.newest(args.limit, before, package, project)
 
     def trace(self, limit: int, before: int | None = None) -> tuple[int, list[TraceEntry]]:
-        """Return the run whose actions are kept (0: there was none), and actions of it, newest first."""
+        """Return the number of the last run (0: none) and its actions, newest first."""
         calls = (call for number, call in reversed(self._trace.items()) if before is None or number < before)
         return self._trace_of, [call.entry(self._trace_of) for call in islice(calls, limit)]
 

@@ -127,7 +127,7 @@ class Execution(PackageLibrary):
             raise RequestRefused("A program is running: stop it first.")
 
     def streams_of(self, robot_id: str) -> RobotStreams:
-        """Give who is sent what of a robot of the running program. NotFound; RequestRefused while it comes up."""
+        """Return the subscriptions to a robot of the running program. Raise RequestRefused while it starts."""
         if self._host.package_info is None:
             raise RequestRefused("The devices of the program are not there yet: ask again once PackageInfo has come.")
         found = self.board.object(robot_id)
@@ -146,7 +146,7 @@ class Execution(PackageLibrary):
         return self._state_event(), self._host.package_info
 
     def greeting(self) -> list[Event]:
-        """Give the events that tell a new connection of the running program; none when none runs."""
+        """Return the events that describe the running program to a new client; empty if none runs."""
         if self._host.package_info is None:
             return []
         known = [encoded for encoded in (self._host.package_info, self._before) if encoded is not None]
@@ -166,7 +166,7 @@ class Execution(PackageLibrary):
             raise RequestRefused("This package is running: stop it first.")
 
     async def run(self, package_id: str, how: How | None = None) -> None:
-        """Begin to run a package: `started` is told at once, the rest as it happens."""
+        """Start a package. Its states are published."""
         self._require_not_reserved()
         await self._run(package_id, how or How())
 

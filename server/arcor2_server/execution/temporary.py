@@ -29,7 +29,7 @@ log = structlog.get_logger(__name__)
 
 
 def _settle(built: "asyncio.Future[None]", error: Exception | None = None) -> None:
-    """Let the request be answered, unless nobody waits any more."""
+    """Answer the request, unless the caller has left."""
     if built.done():
         return
     if error is None:
@@ -55,9 +55,9 @@ class _Run:
         self._online = False
 
     async def whole(self, built: "asyncio.Future[None]") -> None:
-        """Do it all; `built` gets the moment in which the request can be answered, or why it is refused.
+        """Build, run and delete the package; `built` is done when the request can be answered, or refused.
 
-        One task from the checks to the closed project, so that it keeps everybody else out without a gap.
+        One task holds the exclusive lock from the checks until the project is closed.
         """
         try:
             async with self._locks.exclusive():
@@ -96,7 +96,7 @@ class _Run:
                 log.warning("scene not started again", reason=str(error))
 
     async def _discard_package(self) -> None:
-        """Delete the package without a word: nobody was told of it, or nobody is there any more."""
+        """Delete the package without an event, since no client knows of it."""
         if self._package:
             with contextlib.suppress(Arcor2Error):
                 await asyncio.to_thread(self._execution.packages.forget_temporary, self._package)

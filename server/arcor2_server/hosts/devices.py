@@ -93,7 +93,7 @@ class DeviceBoard:
             self._publish(state)
 
     def clear(self, reason: str = "") -> None:
-        """Begin anew: what was connected is offline now, for a reason."""
+        """Forget all devices and publish connected ones as offline, with a reason."""
         before, self._reports = self._reports, {}
         for report in before.values():
             if report.connection is not Connection.OFFLINE:
@@ -109,21 +109,21 @@ class DeviceBoard:
             notify()
 
     def show(self, objects: Iterable[SceneObject], overlaid: Mapping[str, list[str]]) -> None:
-        """Take the objects of a scene; those that have said nothing yet are offline.
+        """Set the objects of the scene. Objects without a report are offline.
 
-        overlaid: by id, the settings that come from the server's cell file.
+        overlaid: by id, the settings that the cell file of the server overrides.
         """
         self._objects = {obj.id: obj for obj in objects}
         self._overlaid = overlaid
 
     def object(self, object_id: str) -> SceneObject:
-        """Return an object of the scene that is shown. Raise NotFound if there is none."""
+        """Return an object of the scene. Raise NotFound if there is none."""
         if (found := self._objects.get(object_id)) is None:
             raise NotFound(f"There is no object {object_id!r} in operation.")
         return found
 
     def changed(self, message: DeviceChanged) -> None:
-        """Take what a device says."""
+        """Handle the report of a device."""
         before = self._reports.get(message.object_id)
         self._reports[message.object_id] = message
         if before is None or before.connection is not message.connection:

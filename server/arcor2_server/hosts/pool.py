@@ -40,7 +40,7 @@ class CellHosts:
             self._spare.add_done_callback(_look)
 
     async def take(self, user: HostUser) -> CellHost:
-        """Return a host that is ready, started now if there is no spare. Arcor2Error when none can be started."""
+        """Return a ready host, the spare one or a new one. Raise Arcor2Error if none can be started."""
         while True:
             self.prepare()
             if self._spare is None:

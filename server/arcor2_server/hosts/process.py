@@ -49,10 +49,10 @@ class HostUser(Protocol):
         """Take a message."""
 
     def host_silent(self, host: "CellHost", silent: bool) -> None:
-        """Learn that the host does not answer, or answers again."""
+        """Handle that the host does not answer, or answers again."""
 
     def host_ended(self, host: "CellHost", reason: str) -> None:
-        """Learn that the host is gone; called once, with nothing after it."""
+        """Handle the end of the host; called once, as the last call."""
 
 
 class _Connection(asyncio.Protocol):
@@ -149,7 +149,7 @@ class CellHost:
 
     # -------------------------------------------------------------------------------- saying
     def send(self, message: m.ToHost) -> None:
-        """Say something; dropped when the host is gone, which its user learns anyway."""
+        """Send a message. It is dropped if the host has ended, which is reported to its user."""
         transport = self._connection.transport
         if transport is not None and not transport.is_closing():
             transport.write(m.encode(message))
@@ -173,9 +173,9 @@ class CellHost:
         cancel: bool = False,
         deadline: float | None = None,
     ) -> bytes:
-        """Call a method of a device, or with `cancel` what cancels it; return the result as JSON, empty for None.
+        """Call a method of a device, or cancel it; return the result as JSON, empty for None.
 
-        Raises CellError with what the device said, ConnectionLost when the host ends meanwhile.
+        Raise CellError if the device reports an error, ConnectionLost if the host ends.
         """
         number = next(self._number)
         message = m.Call(number, object_id, method, dict(arguments or {}), control, cancel, deadline)
@@ -200,7 +200,7 @@ class CellHost:
         return msgspec.json.decode(raw, type=list[m.DeviceStop])
 
     async def lease(self, object_id: str, hold: int, kind: HoldKind, until: float, **motion: Any) -> bytes:
-        """Let a robot be moved until a moment of the monotonic clock, 0 to let go; gives the scale as JSON, or empty.
+        """Allow a robot to move until a time of the monotonic clock, 0: release it. Return the scale as JSON, or empty.
 
         motion: the further fields of the message. CellError, ConnectionLost, DeviceTimeout.
         """
@@ -208,7 +208,7 @@ class CellHost:
         return await self._ask(number, m.Lease(number, object_id, hold, kind, until, **motion), HELD_WITHIN)
 
     async def retry(self, object_id: str) -> None:
-        """Make and connect an object anew that has failed. Raise CellError or ConnectionLost if that is impossible."""
+        """Create and connect a failed object again. Raise CellError or ConnectionLost if that is impossible."""
         number = next(self._number)
         await self._ask(number, m.RetryObject(number, object_id), None)
 
@@ -253,7 +253,7 @@ class CellHost:
         self._lost.set()
 
     async def _watch_end(self) -> None:
-        """Tell the end as soon as either the process or its socket is gone."""
+        """Report the end as soon as the process has ended or its socket is closed."""
         waiting = asyncio.create_task(self.process.wait())
         lost = asyncio.create_task(self._lost.wait())
         try:

@@ -45,7 +45,7 @@ class RobotStreams:
         self._update_host_rates(robot_id)
 
     def publish(self, message: m.StreamEvent) -> None:
-        """Pass on what the host has read, encoded once for all who are sent it."""
+        """Publish what the host has read, encoded once for all clients."""
         kind = _KINDS.get(message.event)
         if kind is None:
             return

@@ -59,7 +59,7 @@ class PreparedAction(Data, frozen=True):
 
 
 def argument(parameter: ActionParameter, lookup: ProjectLookup, results: dict[str, list[str]]) -> Any:
-    """Return what a parameter stands for at execution. RequestRefused for a link without a result.
+    """Return the value of a parameter at execution. RequestRefused for a link without a result.
 
     Raise InvalidData if that is impossible.
     """

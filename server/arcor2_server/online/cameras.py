@@ -21,7 +21,7 @@ class Cameras:
         self._online = online
 
     def require_camera(self, object_id: str) -> SceneObject:
-        """Return a camera of the open scene; NotFound, RequestRefused when it is none."""
+        """Return a camera of the open scene. Raise NotFound or RequestRefused if there is none."""
         found = self._session.scene_object(object_id)
         if not self._types.derives_from(found.type, "Camera"):
             raise RequestRefused(f"{found.name} is not a camera.")

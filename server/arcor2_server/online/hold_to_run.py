@@ -109,7 +109,7 @@ class HoldToRun:
         self._delays: dict[Connection, Delay] = {}
 
     def holder(self, robot_id: str) -> str | None:
-        """Name who holds a robot, None when nobody does."""
+        """Return the user who holds a robot, None if no user does."""
         press = self._held.get(robot_id)
         return None if press is None else press.user
 
@@ -127,10 +127,10 @@ class HoldToRun:
         motion: Mapping[str, Any],
         allow: Callable[[], Awaitable[None]],
     ) -> float:
-        """Begin, renew or end a hold; return the scale of the motion, 0 when it was let go.
+        """Start, renew or end a hold; return the scale of the motion, 0 after a release.
 
-        motion: what the host's lease has beside. allow: raises what speaks against a new hold.
-        RequestRefused. Raise CellError if that is impossible.
+        motion: further fields of the lease. allow: raises an error if a new hold must not start.
+        Raise RequestRefused or CellError if that is impossible.
         """
         arrived = asyncio.get_running_loop().time()
         if not 0 <= args.valid_ms <= LONGEST_LEASE_MS:
@@ -231,7 +231,7 @@ class HoldToRun:
         await self._release(press)
 
     def _end(self, press: _Press, reason: str) -> None:
-        """Begin to bring the robot to rest, for a reason that is told."""
+        """Start to stop the robot, with a reason for its user."""
         if not press.over:
             press.over, press.reason = True, press.reason or reason
             self._spawn(self._release(press, quietly=True), f"end of a hold of {press.robot_id}")
@@ -285,7 +285,7 @@ class HoldToRun:
         hub.broadcast(make_event("Notification", NotificationData(message.error.message, NotificationLevel.WARN)))
 
     def forget(self, client: Connection) -> None:
-        """Let go of what a client held that is gone."""
+        """Release the robots of a client that disconnected."""
         self._delays.pop(client, None)
         self._spent.pop(client, None)
         for press in [press for press in self._held.values() if press.client is client]:

@@ -69,9 +69,9 @@ class RobotMotion:
             raise RequestRefused(f"{robot.name} cannot {FEATURES[feature]}.")
 
     def require_not_moving(self, robot_id: str, *, held: bool = False) -> None:
-        """RequestRefused while the robot moves by a request, is held, or executes the running action; or is not there.
+        """Raise RequestRefused if the robot moves, is held, executes an action, or has failed.
 
-        held: whether the caller is the one who holds it.
+        held: whether the caller holds it.
         """
         cell = self._online
         name = cell.robot(robot_id).name
@@ -126,7 +126,7 @@ class RobotMotion:
         self._hub.broadcast(make_event(event, event_data(phase, problem or UNSET)))
 
     def require_robot_online(self, robot_id: str) -> OnlineScene:
-        """Return the cell when it is online and the object is a robot; else RequestRefused.
+        """Return the online scene if the object is a robot in it; else raise RequestRefused.
 
         Raise NotFound if there is none.
         """

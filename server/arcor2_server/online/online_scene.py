@@ -109,7 +109,7 @@ class OnlineScene:
             raise RequestRefused("The scene is online: stop it first.")
 
     async def settled(self) -> SceneStateEnum:
-        """Wait until the scene neither comes up nor goes down; return its state then."""
+        """Wait until the scene neither starts nor stops; return its state."""
         while self._task is not None:
             await asyncio.wait([self._task])
         return self.state
@@ -130,9 +130,9 @@ class OnlineScene:
 
     # -------------------------------------------------------------------------------- going online
     async def begin_start(self, *, dry_run: bool = False, keep_going: bool = False) -> None:
-        """Begin to bring the scene up: returns when that is allowed, the rest is told by SceneState.
+        """Start the scene: return when that is allowed; SceneState reports the rest.
 
-        keep_going: objects that cannot be made or connected are left out. RequestRefused, Locked.
+        keep_going: leave out objects that cannot be created or connected. Raise RequestRefused or Locked.
         """
         self._session.require_scene_open()
         self.require_offline()
@@ -174,7 +174,7 @@ class OnlineScene:
         self._gone_offline(problem)
 
     async def _bring_up(self, scene: Scene, keep_going: bool) -> str | None:
-        """Return why the scene did not come up, None when it did."""
+        """Return why the scene did not start, None if it did."""
         self.board.show(scene.objects, {})
         message, overlaid = await self._opening.prepare(scene, keep_going)
         self.board.show(scene.objects, overlaid)
@@ -211,7 +211,7 @@ class OnlineScene:
 
     # -------------------------------------------------------------------------------- going offline
     async def begin_stop(self, *, dry_run: bool = False) -> None:
-        """Begin to take the scene down: returns when that is allowed, the rest is told by SceneState."""
+        """Stop the scene: return when that is allowed; SceneState reports the rest."""
         self._session.require_scene_open()
         if not self.online:
             raise RequestRefused("The scene is not online.")
@@ -247,7 +247,7 @@ class OnlineScene:
         self._gone_offline(problem)
 
     async def close(self) -> None:
-        """End with the server, and the program with it: the hosts stop motion and disconnect by themselves."""
+        """Stop when the server ends. The hosts stop motion and disconnect by themselves."""
         self._preparing.cancel()
         await self._host.close()
         tasks = [task for task in (self._task, *self._background) if task is not None]
@@ -353,7 +353,7 @@ class OnlineScene:
         task.add_done_callback(self._background.discard)
 
     def action_ended(self, action: RunningAction, results: list[str] | None, error: str | None) -> None:
-        """Forget the running action, keep its results, and tell everybody unless it was cancelled."""
+        """Store the results of the running action, and publish its end unless it was cancelled."""
         self.running_action = None
         if results is not None and self.online:
             self.results[action.action_id] = results

@@ -167,7 +167,7 @@ class ExecutionOperations:
     # ------------------------------------------------------------------------------------------------ the program
     @operation("PUT", "/packages/{id}/start", EXECUTION, Role.OPERATOR)
     async def start_package(self, id: str, person: str) -> None:  # noqa: A002
-        """Run a package; a scene or project that nobody uses any more does not prevent it."""
+        """Run a package. An open document that no connected user works on does not prevent it."""
         await self._package_runs.run_package(id, How(by=person))
 
     @operation("PUT", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)

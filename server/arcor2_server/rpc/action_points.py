@@ -58,7 +58,7 @@ class ActionPointRequests:
         self._editing = editing
 
     def check_point_name(self, context: Context, name: str) -> None:
-        """Refuse a name for an action point that is no name, or not free."""
+        """Refuse an invalid or used name of an action point."""
         check_name(name, "action point")
         self._editing.require_free(context, Kind.POINT, name, "an action point")
 

@@ -26,7 +26,7 @@ from arcor2_server.rpc.registry import Context, rpc
 
 
 def _check_results_unneeded(document: Document, before: Action, after: Action) -> None:
-    """Refuse that results are no longer kept which a link or a condition uses."""
+    """Refuse to remove results that a link or a condition uses."""
     if before.outputs() and not after.outputs() and (users := document.users_of(before.id)):
         user = users[0]
         who = f"The action {user.name}" if isinstance(user, Action) else "A condition of the logic"

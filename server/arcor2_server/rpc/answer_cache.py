@@ -10,7 +10,7 @@ class AnswerCache:
         self._answers: dict[str, tuple[tuple[int, ...], Raw]] = {}
 
     def get(self, name: str, revisions: tuple[int, ...]) -> Raw | None:
-        """Return a kept answer, None when it was made from something older."""
+        """Return a cached answer, None if it is outdated."""
         answer = self._answers.get(name)
         return answer[1] if answer is not None and answer[0] == revisions else None
 

@@ -20,7 +20,7 @@ class BuildRequests:
 
     @rpc("BuildProject")
     async def build_project(self, context: Context, args: BuildProjectArgs) -> BuildProjectData:
-        """Build a saved project; PackageChanged tells everybody of the new package."""
+        """Build a saved project; PackageChanged announces the new package."""
         async with self._locks.auto(context.user, args.project_id):
             title = f"Building the package {args.package_name}"
             with self._tasks.running(TaskKind.BUILD, title, context.client.name):

@@ -52,7 +52,7 @@ DEPTH_FRAMES: Final = 10
 
 # ------------------------------------------------------------------------------------------------ given pictures
 def _file(image: str) -> bytes:
-    """Return the picture's file, whose bytes came as one character each."""
+    """Return the file of a picture whose bytes were sent as one character each."""
     try:
         data = image.encode("latin-1")
     except UnicodeEncodeError:
@@ -136,7 +136,7 @@ class CalibrationRequests:
 
     @rpc("GetCameraPose")
     async def get_camera_pose(self, context: Context, args: GetCameraPoseArgs) -> EstimatedPose:
-        """Return where a camera stands by the markers in its picture."""
+        """Return the pose of a camera from the markers in its picture."""
         found = await self._calibration.camera(args.camera_parameters, [_file(args.image)])
         return found.estimated(inverse=args.inverse)
 
@@ -147,7 +147,7 @@ class CalibrationRequests:
 
     @rpc("CalibrateCamera")
     async def calibrate_camera(self, context: Context, args: CalibrateCameraArgs) -> None:
-        """Put a camera where its picture says that it stands; ProcessState tells how it goes."""
+        """Move a camera to the pose computed from its picture; ProcessState reports the progress."""
         self._session.require_scene_open()
         self._online.require_online()
         camera = self._cameras.require_camera(args.id)
@@ -271,7 +271,7 @@ class CalibrationRequests:
     def _begin(
         self, context: Context, obj: SceneObject, process: str, find: Find, end: Callable[[], None] = lambda: None
     ) -> None:
-        """Answer, tell the start, find the pose, keep a record, and tell how it ended."""
+        """Answer, publish the start, compute the pose, store a record, and publish the end."""
         user = context.user
 
         def emit_changes(state: ProcessStateEnum, message: str = "") -> None:
@@ -303,7 +303,7 @@ class CalibrationRequests:
         self._online.spawn(whole(), f"calibration of {obj.name}")
 
     async def _place(self, user: str, object_id: str, pose: Pose) -> None:
-        """Give an object another pose, and the live one too, and tell everybody."""
+        """Set the pose of an object and of its live instance, and publish the change."""
         session = self._session
         await self._online.object_pose_changed(object_id, pose)
         obj = replace(session.scene_object(object_id), pose=pose)

@@ -28,7 +28,7 @@ class CalibrationRecordRequests:
 
     @rpc("CheckCalibration")
     async def check_calibration(self, context: Context, args: CheckCalibrationArgs) -> CalibrationCheck:
-        """Compare a pose measured now, or the one in the open scene, with that of a record."""
+        """Compare a measured pose, or the pose in the open scene, with a record."""
         record = await self._calibration_records.get(args.id)
         pose = self._present(record) if isinstance(args.pose, Unset) else args.pose
         return check_against(record, pose, distance_limit=args.distance_limit, angle_limit=args.angle_limit)

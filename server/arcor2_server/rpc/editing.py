@@ -86,12 +86,12 @@ class Editing:
         return hidden
 
     def unlock(self, context: Context, *ids: str) -> None:
-        """Free the caller's locks among `ids` and tell everybody."""
+        """Release the caller's locks among `ids` and publish it."""
         if freed := self._locks.release_announced(context.user, ids):
             context.emit("ObjectsUnlocked", LockData(freed, context.user))
 
     def drop_locks(self, context: Context, *ids: str) -> None:
-        """Forget the locks of what was removed; what else was locked with it is told to be free."""
+        """Drop the locks of removed items and publish the other items that became free."""
         for owner, freed in self._locks.drop(ids).items():
             context.emit("ObjectsUnlocked", LockData(freed, owner))
 
@@ -101,7 +101,7 @@ class Editing:
 
     @asynccontextmanager
     async def opening_allowed(self, context: Context) -> AsyncIterator[None]:
-        """Keep everybody else out while something is opened; refused while a program runs."""
+        """Exclude all other requests while a document is opened; refuse while a program runs."""
         async with self._locks.exclusive():
             self.require_no_program(context)
             yield

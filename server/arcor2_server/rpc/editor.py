@@ -76,7 +76,7 @@ class SharedStateRequests:
 
     @rpc("SetBreakpoints")
     async def set_breakpoints(self, context: Context, args: SetBreakpointsArgs) -> ProjectBreakpoints:
-        """Set and take away shared breakpoints of a project; BreakpointsChanged tells everybody."""
+        """Set and remove shared breakpoints of a project; BreakpointsChanged announces them."""
         if both := args.add & args.remove:
             raise RequestRefused(f"{min(both)} is to be set and taken away at once.")
         project = self._project(context, args.project_id)

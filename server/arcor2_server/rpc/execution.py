@@ -58,19 +58,19 @@ class ExecutionRequests:
     # ------------------------------------------------------------------------------------------------ scene
     @rpc("StartScene")
     async def start_scene(self, context: Context, args: None) -> None:
-        """Bring the scene online; SceneState tells how it goes."""
+        """Bring the scene online; SceneState reports the progress."""
         self._online.task.asked_by = context.client.name
         await self._online.begin_start(dry_run=context.dry_run)
 
     @rpc("StartSceneKeepGoing")
     async def start_scene_keep_going(self, context: Context, args: None) -> None:
-        """Bring the scene online without what cannot be connected; SceneState and ObjectState tell how it goes."""
+        """Bring the scene online without objects that cannot be connected; SceneState reports the progress."""
         self._online.task.asked_by = context.client.name
         await self._online.begin_start(dry_run=context.dry_run, keep_going=True)
 
     @rpc("StopScene")
     async def stop_scene(self, context: Context, args: None) -> None:
-        """Take the scene offline; SceneState tells how it goes."""
+        """Take the scene offline; SceneState reports the progress."""
         self._online.task.asked_by = context.client.name
         await self._online.begin_stop(dry_run=context.dry_run)
 
@@ -143,7 +143,7 @@ class ExecutionRequests:
 
     @rpc("RunPackage")
     async def run_package(self, context: Context, args: RunPackageArgs) -> None:
-        """Run a package; a scene or project that nobody uses any more does not prevent it."""
+        """Run a package. An open document that no connected user works on does not prevent it."""
         await self._package_runs.run_package(args.id, how(context, args))
 
     @rpc("TemporaryPackage")

@@ -123,7 +123,7 @@ class GeneralRequests:
 
     @rpc("SubscribeEvents")
     async def subscribe_events(self, context: Context, args: SubscribeEventsArgs) -> None:
-        """Send additional events to this connection, or no longer; first it is told how everything is now."""
+        """Subscribe this client to additional events, or unsubscribe it. The present state is sent first."""
         offered = {event.name for event in EVENTS.values() if event.additional}
         if unknown := args.events - offered:
             raise RequestRefused(

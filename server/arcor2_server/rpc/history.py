@@ -149,7 +149,7 @@ class HistoryRequests:
     # ---------------------------------------------------------------------------------------------- checks
     @asynccontextmanager
     async def _locked(self, context: Context, changes: Sequence[Change]) -> AsyncIterator[None]:
-        """Hold meanwhile what the ordinary requests for such changes lock. Locked names who holds it."""
+        """Hold the locks that ordinary requests for such changes take."""
         user = context.user
         async with self._locks.auto_skip_held(user, *ids_to_lock(self._session.document, changes)):
             for item in ids_that_move(self._session.document, changes):
@@ -219,7 +219,7 @@ class HistoryRequests:
                 await cell.object_pose_changed(change.id, change.after.pose)
 
     def _settle(self, context: Context, document: Document, changes: Sequence[Change]) -> None:
-        """Do what follows from changes beside telling of them."""
+        """Apply the consequences of changes for locks and object types."""
         for change in changes:
             if change.kind is Kind.OBJECT and change.after is None:
                 self._session.removed_types.add(change.before.type)

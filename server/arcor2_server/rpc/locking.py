@@ -65,7 +65,7 @@ class LockRequests:
 
     @rpc("ListLocks")
     async def list_locks(self, context: Context, args: None) -> list[LockHolder]:
-        """Return who holds locks, since when, and who of them left."""
+        """Return the users with locks, since when they hold them, and which of them left."""
         return [
             LockHolder(user, self._lock_takeover.held(user), self._users.left_at(user) or UNSET)
             for user in self._locks.owners()

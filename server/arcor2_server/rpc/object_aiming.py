@@ -79,7 +79,7 @@ class ObjectAimingRequests:
     async def object_aiming_add_point(
         self, context: Context, args: ObjectAimingAddPointArgs
     ) -> ObjectAimingAddPointData:
-        """Take the present place of the tip for a focus point; return those that are done."""
+        """Use the present position of the tip for a focus point; return the finished points."""
         document = self._session.require_scene_open()
         aiming = self._object_aiming.require(context.user, document)
         self._editing.require_held(context, aiming.object_id)

@@ -24,7 +24,7 @@ from arcor2_server.storage import AssetStore, Storage
 
 
 def require_mesh(assets: AssetStore, model: Models) -> None:
-    """Refuse a collision model whose mesh is no asset."""
+    """Refuse a collision model whose mesh is not an asset."""
     if isinstance(model, Mesh) and not assets.exists(model.asset_id):
         raise RequestRefused(f"There is no asset {model.asset_id!r} that could be the mesh of {model.id}.")
 
@@ -44,7 +44,7 @@ def derived_source(name: str, base: TypeCode, description: str = "") -> str:
 
 
 def _parent_value(parent: IdValue, kind: str) -> Raw:
-    """Return the value of a parent parameter as JSON: as it stands, or as text that existing clients send bare."""
+    """Return the value of a parent parameter as JSON. Existing clients send text without quotes."""
     try:
         value = msgspec.json.decode(parent.value)
     except msgspec.DecodeError as error:
@@ -163,7 +163,7 @@ class ObjectTypeRequests:
     # ------------------------------------------------------------------------------------------------ deleted ones
     @rpc("DeleteObjectTypes")
     async def delete_object_types(self, context: Context, args: set[str] | None) -> list[DeleteObjectTypesData] | None:
-        """Delete the named uploaded types, or all of them; those that are in use stay, and the answer says why."""
+        """Delete the named uploaded types, or all. Types in use stay, and the answer says why."""
         user = context.user
         wanted = (
             sorted(args) if args is not None else [name for name in self._types.names() if self._given(context, name)]

@@ -81,7 +81,7 @@ class OperationRequests:
     # ------------------------------------------------------------------------------------------------ held motion
     @rpc("JogRobot")
     async def jog_robot(self, context: Context, args: JogRobotArgs) -> JogRobotData:
-        """Let a robot move for a moment with a velocity, or go on with it; or let go."""
+        """Start, renew or end the jogging of a robot with a velocity."""
         user = context.user
         cell = self._motion.require_robot_online(args.robot_id)
         motion = {} if args.valid_ms == 0 else self._velocity(context, args)
@@ -94,7 +94,7 @@ class OperationRequests:
 
     @rpc("HoldHandTeaching")
     async def hold_hand_teaching(self, context: Context, args: HoldHandTeachingArgs) -> None:
-        """Let a robot be moved by hand for a moment, or go on with it; or let go."""
+        """Start, renew or end hand teaching of a robot."""
         user = context.user
         cell = self._motion.require_robot_online(args.robot_id)
 
@@ -121,7 +121,7 @@ class OperationRequests:
             raise RequestRefused(f"{robot.name} is being moved by hand.")
 
     def _velocity(self, context: Context, args: JogRobotArgs) -> dict[str, Any]:
-        """Return what the host's lease says of the motion; raise RequestRefused when it is not said, or twice."""
+        """Return the motion for the lease of the host; raise RequestRefused if it is missing or ambiguous."""
         motion: dict[str, Any] = {"end_effector_id": optional(args.end_effector_id)}
         in_space = not (isinstance(args.linear, Unset) and isinstance(args.angular, Unset))
         if isinstance(args.joints, Unset) != in_space:
@@ -154,7 +154,7 @@ class OperationRequests:
     # ------------------------------------------------------------------------------------------------ stop
     @rpc("StopAll")
     async def stop_all_(self, context: Context, args: None) -> StopAllData:
-        """Stop the program, every robot and device, and the action that is being tried."""
+        """Stop the program, every robot and device, and the running action."""
         data = await self._stop_all.stop_all(context.client.name)
         if any(outcome.kind is StopKind.ACTION and outcome.stopped for outcome in data.outcomes):
             context.emit("ActionCancelled")
@@ -179,7 +179,7 @@ class OperationRequests:
     # ------------------------------------------------------------------------------------------------ devices
     @rpc("RetryObject")
     async def retry_object(self, context: Context, args: RetryObjectArgs) -> None:
-        """Make and connect an object anew that has failed; answered when that is done."""
+        """Create and connect a failed object again; answer when that is done."""
         self._session.require_scene_open()
         self._online.require_online()
         self._session.scene_object(args.object_id)
@@ -187,7 +187,7 @@ class OperationRequests:
 
     @rpc("AcknowledgeStop")
     async def acknowledge_stop(self, context: Context, args: AcknowledgeStopArgs) -> None:
-        """Acknowledge a stop, a fault or an alarm in the name of the user who has looked."""
+        """Acknowledge a stop, a fault or an alarm in the name of the user."""
         user = context.user
         cell, session = self._online, self._session
         session.require_scene_open()

@@ -211,7 +211,7 @@ class ProjectRequests:
 
     @rpc("CopyProject")
     async def copy_project(self, context: Context, args: CopyProjectArgs) -> None:
-        """Copy a saved project. What is in it keeps its ids; existing clients expect to be told by update_base."""
+        """Copy a saved project. Its items keep their ids. Existing clients expect the change type update_base."""
         storage = self._storage
         async with self._locks.auto(context.user, args.source_id):
             await self._editing.require_name_free(context, args.target_name, "copy of the project")

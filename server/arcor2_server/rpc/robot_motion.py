@@ -60,7 +60,7 @@ def pose_motion(
 
 
 def _base(cell: OnlineScene, args: StepRobotEefArgs) -> Orientation:
-    """Return the orientation in the world of the frame whose axis is meant."""
+    """Return the orientation in the world of the frame of the step axis."""
     match args.mode:
         case StepMode.WORLD:
             return Orientation()
@@ -112,7 +112,7 @@ class RobotMotionRequests:
         event_data: MoveEventData,
         lock: str = "",
     ) -> None:
-        """Answer, tell the start, and move; `lock` is the user whose lock on the robot ends with the motion."""
+        """Answer, publish the start, and move; `lock`: the user whose lock on the robot ends with the motion."""
         self._motion.require_not_moving(robot_id)  # another request may have been quicker
         self._online.moving.add(robot_id)
         context.emit(event, event_data(MoveEventType.START, UNSET))
@@ -181,7 +181,7 @@ class RobotMotionRequests:
 
     @rpc("MoveToActionPoint")
     async def move_to_action_point(self, context: Context, args: MoveToActionPointArgs) -> None:
-        """Move to an orientation at its action point, or to joints kept there."""
+        """Move to an orientation or joints of an action point."""
         self._session.require_project_open()
         async with self._locks.auto(context.user, args.robot_id):
             self._motion.require_robot_online(args.robot_id)

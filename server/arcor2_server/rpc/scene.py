@@ -147,7 +147,7 @@ class SceneRequests:
 
     @rpc("CopyScene")
     async def copy_scene(self, context: Context, args: CopySceneArgs) -> None:
-        """Copy a saved scene. The objects keep their ids; existing clients expect to be told by update_base."""
+        """Copy a saved scene. The objects keep their ids. Existing clients expect the change type update_base."""
         storage = self._storage
         async with self._locks.auto(context.user, args.source_id):
             await self._editing.require_name_free(context, args.target_name, "copy of the scene")

@@ -97,7 +97,7 @@ class Client:
 
     @property
     def name(self) -> str:
-        """Return who it is: the user, else whose token it showed; empty where neither is known."""
+        """Return the name of the user, else of the token; empty if both are unknown."""
         return self.user or ("" if self.token is None else self.token.name)
 
     @property
@@ -152,7 +152,7 @@ class Client:
             asyncio.get_running_loop().call_later(ABORT_AFTER, self._wire.abort)
 
     def lost(self) -> None:
-        """Send nothing more: the connection is gone."""
+        """Stop sending, since the connection is closed."""
         if self._closing is None:
             self._end(1006, "the connection is gone")
 

@@ -181,7 +181,7 @@ class Endpoint:
             log.info("client disconnected", client=client.number, user=client.user)
 
     async def _watch_tokens(self) -> None:
-        """End the connections whose token is not valid any more, and report damage of the file of tokens."""
+        """Close the connections whose token became invalid, and report a damaged token file."""
         reported = self._access.damage
         while True:
             await asyncio.sleep(TOKENS_PERIOD)
@@ -251,7 +251,7 @@ class Endpoint:
                 task.add_done_callback(held.discard)
 
     def _answer_from_cache(self, client: Client, request: Request, route: Route) -> bool:
-        """Send a kept answer; return whether there was one."""
+        """Send the cached answer; return whether there was one."""
         if client.role < route.rpc.role or route.cached is None:
             return False
         try:
@@ -376,7 +376,7 @@ def _shortened(message: str) -> str:
 
 
 def _read_head(text: str) -> _Head:
-    """Read what can be read of the id and name of a message that is no request, or is too long."""
+    """Read the id and name of a message that is invalid or too long, as far as possible."""
     try:
         readable = _decode_head(text)
     except (msgspec.DecodeError, RecursionError):

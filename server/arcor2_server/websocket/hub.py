@@ -20,13 +20,13 @@ class Hub:
         """The greeting while nothing is open: the last ShowMainScreen, without `highlight`."""
 
     def add(self, client: Client, only: frozenset[str] | None = None) -> None:
-        """Take in a connection; `only` are the events that it gets, None for all."""
+        """Add a connection; `only`: the events for it, None for all."""
         self.clients.add(client)
         if only is not None:
             self._only[client] = only
 
     def remove(self, client: Client) -> None:
-        """Forget a connection, and tell those who keep something for it (subscriptions)."""
+        """Remove a connection and notify the observers."""
         self.clients.discard(client)
         self._only.pop(client, None)
         for subscribers in self._subscribers.values():
@@ -35,7 +35,7 @@ class Hub:
             forget(client)
 
     def subscribe(self, client: Connection, names: set[str], send: bool) -> None:
-        """Send additional events to a client, or no longer."""
+        """Subscribe a client to additional events, or unsubscribe it."""
         for name in names:
             subscribers = self._subscribers.setdefault(name, set())
             if send:
@@ -44,7 +44,7 @@ class Hub:
                 subscribers.discard(client)
 
     def broadcast(self, event: Event, *, besides: Connection | None = None) -> None:
-        """Send an event to all whose role may see it, but not to `besides`; an additional one to subscribers."""
+        """Send an event to all clients whose role permits it except `besides`; an additional event to subscribers."""
         if isinstance(event.data, ShowMainScreenData):
             self.main_screen = make_event(event.event, ShowMainScreenData(event.data.what))
         if self.clients:
@@ -87,7 +87,7 @@ class Hub:
                 client.put_newest(stream, message)
 
     def stream_to_subscribers(self, name: str, key: str, message: bytes, *, besides: Connection | None = None) -> None:
-        """Send the newest message of an additional event about `key` to who subscribed, as `stream` does."""
+        """Send the newest message of an additional event about `key` to its subscribers, as `stream` does."""
         stream = f"{name}/{key}"
         for client in self.subscribers(name):
             if client is not besides:

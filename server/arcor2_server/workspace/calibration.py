@@ -46,9 +46,9 @@ class Calibration(Protocol):
         expected: Pose | None = None,
         on_progress: ProgressCallback | None = None,
     ) -> CameraPose:
-        """Return where a camera stands that sees the configured markers.
+        """Return the pose of a camera that sees the configured markers.
 
-        expected: where it is roughly known to be, which is asked only where the markers alone leave two answers.
+        expected: its approximate pose, used only if the markers alone leave two solutions.
         """
 
     async def markers(self, parameters: CameraParameters, picture: bytes) -> list[MarkerCorners]:
@@ -57,7 +57,7 @@ class Calibration(Protocol):
     async def robot(
         self, model: RobotSource, view: RobotView, depth: list[bytes], *, on_progress: ProgressCallback | None = None
     ) -> RobotPose:
-        """Return where a robot stands in the world, from depth pictures (16 bit, mm)."""
+        """Return the pose of a robot in the world, from depth pictures (16 bit, mm)."""
 
 
 class CalibrationService:
@@ -75,7 +75,7 @@ class CalibrationService:
         expected: Pose | None = None,
         on_progress: ProgressCallback | None = None,
     ) -> CameraPose:
-        """Return where a camera stands."""
+        """Return the pose of a camera."""
         configuration = self._markers.configuration
         if not configuration.markers and not configuration.boards:
             raise CalibrationRefused(
@@ -102,7 +102,7 @@ class CalibrationService:
     async def robot(
         self, model: RobotSource, view: RobotView, depth: list[bytes], *, on_progress: ProgressCallback | None = None
     ) -> RobotPose:
-        """Return where a robot stands in the world."""
+        """Return the pose of a robot in the world."""
         placed = replace(model, base=view.robot_pose)
         task = FindRobotPose(placed, view.robot_joints, depth, view.camera_parameters, view.camera_pose)
         return await self._compute.run(task, on_progress=on_progress)

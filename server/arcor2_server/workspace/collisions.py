@@ -25,7 +25,7 @@ class Placed(Data, frozen=True):
 
     @property
     def simple(self) -> bool:
-        """Return whether lines are checked against it here: it stands by itself, and is no mesh."""
+        """Return whether lines are checked against it in this process: it is neither a mesh nor attached to a robot."""
         return self.attachment is None and not isinstance(self.model, Mesh)
 
 
@@ -45,30 +45,30 @@ class CollisionWorld:
 
     @property
     def put_in(self) -> dict[str, Placed]:
-        """Return what was put in, by id."""
+        """Return the models by id."""
         return dict(self._put)
 
     def put(self, placed: Placed) -> None:
-        """Put a model in, in place of one of its id."""
+        """Add a model, or replace the one with its id."""
         self._put[placed.model.id] = placed
         for notify in self.on_put:
             notify(placed)
         self._changed()
 
     def given(self, key: str) -> Placed:
-        """Return a model that was put in. Raise NotFound if there is none."""
+        """Return a model. Raise NotFound if there is none."""
         if (placed := self._put.get(key)) is None:
             raise NotFound(f"There is no collision model {key!r}.")
         return placed
 
     def remove(self, key: str) -> None:
-        """Take a model out. Raise NotFound if there is none."""
+        """Remove a model. Raise NotFound if there is none."""
         if self._put.pop(key, None) is None:
             raise NotFound(f"There is no collision model {key!r}.")
         self._removed([key])
 
     def stop(self) -> None:
-        """Stop, and take all models out that were put in."""
+        """Stop and remove all models."""
         self.started = False
         gone = list(self._put)
         self._put.clear()
@@ -93,7 +93,7 @@ class Hit(Data, frozen=True):
 
 
 def first_hit(start: Position, end: Position, placed: Iterable[tuple[str, Placed]], inflation: float) -> Hit | None:
-    """Return what a straight line from `start` to `end` meets first, None when it is free.
+    """Return the first body that a straight line from `start` to `end` hits, None if it is free.
 
     Boxes, spheres and cylinders (along their z) with sizes increased by `inflation`, m: edges of a box, radius and
     height. Meshes, and what is held, are not looked at: that is no business of this process.

@@ -59,9 +59,9 @@ class DisplayModels:
         self._refusals: dict[tuple[str, str], Arcor2Error] = {}
 
     async def get(self, key: str) -> Shown:
-        """Return an asset as clients show it; it is made once, however many ask.
+        """Return a converted asset. It is converted once for any number of callers.
 
-        NotFound; InvalidData and its kinds for what is no mesh or robot; ComputeStopped, ComputeTimeout, ComputeBusy,
+        Raise NotFound, InvalidData if it is neither a mesh nor a robot, ComputeStopped, ComputeTimeout, ComputeBusy,
         NotInstalled or StorageError.
         """
         asset = self._assets.info(key)

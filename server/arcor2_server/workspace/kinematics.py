@@ -47,7 +47,7 @@ class Kinematics:
     async def inverse(self, robot: SceneObject, args: InverseKinematicsArgs) -> list[Joint]:
         """Return joints that reach a pose. RequestRefused for a robot without a model, KinematicsError if none exist.
 
-        With `avoid_collisions`: of the scene's bodies, other robots as they stand now, and the robot itself.
+        `avoid_collisions`: with the bodies of the scene, other robots at their present joints, and the robot itself.
         """
         model = self._robot_models.require(robot, "from which joints could be computed")
         start = None if isinstance(args.start_joints, Unset) else args.start_joints

@@ -33,7 +33,7 @@ class ObjectAimings:
         self._aimings: dict[str, ObjectAiming] = {}
 
     def of(self, user: str, document: "Document") -> ObjectAiming | None:
-        """Return the aiming of a user in the open scene, None when he is not aiming."""
+        """Return the aiming of a user in the open scene, None if there is none."""
         aiming = self._aimings.get(user)
         if aiming is not None and aiming.document is not document:
             del self._aimings[user]

@@ -129,7 +129,7 @@ class ReachabilityBoard:
         return {robot.id}
 
     def _of_interest(self, row: _Row, wanted: set[str]) -> list[ReachOfItem]:
-        """Return items in the order of their ids; joints of other robots are none of this row's."""
+        """Return the items of a row by id, without joints of other robots."""
         project = self._session.require_project()
         own = {orientation.id for point in project.action_points for orientation in point.orientations}
         own |= {each.id for point in project.action_points for each in point.robot_joints if _is_of(each, row)}
@@ -144,7 +144,7 @@ class ReachabilityBoard:
         return self._asked or bool(self._hub.subscribers(NAME))
 
     def schedule(self) -> None:
-        """Look, a moment later, whether something changed."""
+        """Compute what changed after a short delay."""
         if not self._wanted or self._session.project is None:
             return
         self._idle.clear()
@@ -194,7 +194,7 @@ class ReachabilityBoard:
                 self._idle.set()
 
     async def _changed(self) -> None:
-        """Wait for a change of the document, or of where robots stand in each other's way."""
+        """Wait for a change of the document, or of the joints of stopped robots."""
         while not self._wake.is_set():
             try:
                 async with asyncio.timeout(PERIOD):
@@ -287,7 +287,7 @@ class ReachabilityBoard:
         return {each.id: each.joints for point in points for each in point.robot_joints if _is_of(each, row)}
 
     async def _judge(self, row: _Row, standing: list[SceneObject], targets: dict[str, Target], problem: str) -> None:
-        """Judge what is new, or may have changed. standing: its robot, and those that are in the way of that."""
+        """Compute new and possibly changed items. standing: the robot, and the robots that it may collide with."""
         for gone in row.judged.keys() - targets.keys():
             del row.judged[gone]
             row.targets.pop(gone, None)
@@ -325,7 +325,7 @@ class ReachabilityBoard:
             return await run(task, world=row.world, place=place, background=True)
 
     def _note(self, row: _Row, judged: dict[str, Judged], targets: dict[str, Target]) -> None:
-        """Keep what was judged, and tell what is another than before."""
+        """Store the results and publish those that changed."""
         changed = []
         for key, one in judged.items():
             item = ReachOfItem(key, one.reach, self._scene_collisions.in_names(one.reason) or UNSET)
@@ -342,7 +342,7 @@ def _items(point: Any) -> set[str]:
 
 
 def _is_of(joints: ProjectRobotJoints, row: _Row) -> bool:
-    """Return whether joints are meant for an end effector: of its robot, and of its arm where that is said."""
+    """Return whether joints belong to the robot of an end effector, and to its arm if they name one."""
     if joints.robot_id != row.robot:
         return False
     return isinstance(joints.arm_id, Unset) or isinstance(row.arm, Unset) or joints.arm_id == row.arm

@@ -97,7 +97,7 @@ class RobotCalibrations:
 
     @property
     def any(self) -> bool:
-        """Return whether any are kept."""
+        """Return whether any calibrations are stored."""
         return bool(self._stored)
 
     def load(self) -> None:
@@ -115,7 +115,7 @@ class RobotCalibrations:
         self._stored = {each.object_id: each for each in stored}
 
     def stored(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> RobotCalibration | None:
-        """Return what was told of a robot's arm, used or not; None when nothing was.
+        """Return the stored calibration of a robot, used or not; None if there is none.
 
         overrides: of the project that the robot is used in, else those of the open one.
         """
@@ -125,12 +125,12 @@ class RobotCalibrations:
     def in_force(
         self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None
     ) -> KinematicCalibration | None:
-        """Return the calibration with which kinematics of a robot are computed; None: they are nominal. As `kept`."""
+        """Return the calibration in use for a robot, None if its kinematics are nominal. Arguments as of `stored`."""
         found = self.stored(robot, overrides)
         return None if found is None or found.refused else found.calibration
 
     def read_connected(self) -> None:
-        """Ask the robots that got connected since; called when a connection, or the state of the scene, changed."""
+        """Read the calibrations of newly connected robots, when a connection or the state of the scene changes."""
         if not self._host.online:
             self._asked.clear()
             return
@@ -144,7 +144,7 @@ class RobotCalibrations:
                 task.add_done_callback(self._reading.discard)
 
     async def settled(self) -> None:
-        """Wait until those who were asked have told."""
+        """Wait for the pending reads."""
         while self._reading:
             await asyncio.wait(self._reading)
 
@@ -164,7 +164,7 @@ class RobotCalibrations:
         return meta.features.kinematic_calibration is True and not meta.multi_arm
 
     def _device(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> str:
-        """Return what stands for where a robot's device is: its settings that are texts or whole numbers."""
+        """Return an identifier of the robot's device, from its settings that are texts or integers."""
         settings = self._robots.settings_of(robot, overrides)
         cell = self._settings.cell
         here = None if cell is None else cell.device(robot.name)

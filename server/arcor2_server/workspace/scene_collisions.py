@@ -77,12 +77,12 @@ class SceneCollisions:
 
     # ------------------------------------------------------------------------------------------------ bodies
     def mesh_file(self, asset_id: str) -> StoredFile:
-        """Return the file of a mesh; one that is gone has no path, and is named by who tries to read it."""
+        """Return the file of a mesh. A missing asset gets an invalid path, so that the worker reports its name."""
         path = str(self._assets.file(asset_id)) if self._assets.exists(asset_id) else "/nonexistent"
         return StoredFile(path, asset_id)
 
     def body_of(self, key: str, placed: Placed) -> WorldBody:
-        """Return a placed model as the worker is told of it."""
+        """Return a placed model for the worker."""
         model = placed.model
         shape: Shape = (
             MeshShape(self.mesh_file(model.asset_id), placed.scale) if isinstance(model, Mesh) else primitive_of(model)
@@ -131,9 +131,9 @@ class SceneCollisions:
         return found
 
     def things(self, chosen: list[SceneObject], joints: Joints | None = None) -> dict[str, WorldItem]:
-        """Return the world of the open scene with the robots that are chosen, and what these hold.
+        """Return the world of the open scene with the chosen robots and the parts that they hold.
 
-        joints: of those robots; one without stands in its middle position. Of what other robots hold nothing is said.
+        joints: of those robots; others are in their middle position. Parts held by other robots are left out.
         """
         present = joints or {}
         found: dict[str, WorldItem] = {}
@@ -158,9 +158,9 @@ class SceneCollisions:
 
     # ------------------------------------------------------------------------------------------------ lines
     async def hit(self, start: Position, end: Position) -> Hit | None:
-        """Return what a straight line meets first of what is in operation, None when it is free.
+        """Return the first body of the scene in operation that a straight line hits, None if it is free.
 
-        Robots are no obstacle, as in the protocol: who asks is one of them. What they hold is.
+        As in the protocol, robots are ignored, since the caller is one of them; the parts that they hold are not.
         """
         placed = self.in_operation()
         inflation = self._collisions.inflation

@@ -32,7 +32,7 @@ class StoppedRobots:
         self.joints.clear()
 
     async def update(self, robots: Iterable[SceneObject]) -> bool:
-        """Ask robots for their joints; return whether one stands elsewhere than before."""
+        """Read the joints of robots; return whether the standstill position of one changed."""
         if not self._host.online:
             known = bool(self.joints)
             self.forget()
