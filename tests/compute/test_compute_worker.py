@@ -79,7 +79,7 @@ async def test_killed_in_the_middle_costs_one_computation(compute: Compute) -> N
     waiting = [asyncio.create_task(compute.run(question(float(each)))) for each in (2, 3)]
     await asyncio.sleep(0.1)
     os.kill(pid, signal.SIGKILL)
-    with pytest.raises(ComputeStopped, match=r"ended by SIGKILL while it worked on a frame by touch") as raised:
+    with pytest.raises(ComputeStopped, match=r"was killed by SIGKILL while it worked on a frame by touch") as raised:
         await hit
     assert str(pid) in raised.value.detail
     assert [(await each).pose.position.x for each in waiting] == pytest.approx([2.0, 3.0])

@@ -140,7 +140,7 @@ async def test_a_worker_that_dies_costs_one_answer_and_is_no_fault_of_the_mesh(
     with monkeypatch.context() as patched:
 
         async def stopped(*_: Any, **__: Any) -> None:
-            raise ComputeStopped("The compute worker ended by SIGKILL while it worked on a mesh for the editor.")
+            raise ComputeStopped("The compute worker was killed by SIGKILL while it worked on a mesh for the editor.")
 
         patched.setattr(services.compute, "run", stopped)
         refused(await http.get(SHOWN.format("unlucky.stl")), 503, "General", "SIGKILL")
