@@ -192,7 +192,7 @@ async def test_a_worker_that_is_killed_costs_the_calibration_that_it_was_at(worl
         while (event := await client.next_event("ProcessState", timeout=60.0)).data.state == "started":
             pass
         assert event.data.state == "failed"
-        assert "compute worker ended by SIGKILL while it worked on the pose of a robot" in event.data.message
+        assert "compute worker was killed by SIGKILL while it worked on the pose of a robot" in event.data.message
     # The next one finds another worker.
     async with world.holding("cam"):
         state, message = await world.calibrated("cam")

@@ -3,6 +3,7 @@
 import asyncio
 import itertools
 import os
+import signal
 import socket
 from collections.abc import Mapping
 from typing import Any, Final, Protocol, TypeVar, cast

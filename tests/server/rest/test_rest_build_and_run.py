@@ -376,9 +376,9 @@ async def test_calibration_of_a_robot_needs_its_model(server: ServerProcess) -> 
         )
         refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": args}), 404, "NotFound", "arm.zip")
         granted(await http.post("/assets", params={"id": "arm.zip"}, files={"assetData": ("arm.zip", b"PK no zip")}))
-        refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": args}), 400, "Argument", "picture")
+        refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": args}), 400, "Argument", "depth image")
         as_a_file = PICTURE | {"args": ("args.json", args.encode(), "application/json")}
-        refused(await http.put("/calibrate/robot", files=as_a_file), 400, "Argument", "picture")
+        refused(await http.put("/calibrate/robot", files=as_a_file), 400, "Argument", "depth image")
         by_address = args.replace("arm.zip", "http://127.0.0.1:10000/assets/arm.zip/data")
         refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": by_address}), 400, "Argument")
         refused(await http.put("/calibrate/robot", files=PICTURE), 400, "Argument", "args")
