@@ -3,7 +3,6 @@
 import asyncio
 import itertools
 import os
-import signal
 import socket
 from collections.abc import Mapping
 from typing import Any, Final, Protocol, TypeVar, cast
