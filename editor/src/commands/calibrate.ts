@@ -1,5 +1,6 @@
 /** Where things stand, found out by robots and cameras. Each gives why it was refused, empty when it was done or begun. */
 
+import { t } from "@lingui/core/macro";
 import { createStore } from "zustand/vanilla";
 import type { Pivot, Pose, Position } from "../protocol/types";
 import { refusedWith } from "../session/assets";
@@ -20,7 +21,7 @@ export function showAtTool(id: string, tool: Pose, pivot: Pivot): string {
   const state = now();
   const of = state.doc?.objects[id];
   const offset = pivotOffset(state.types.byName[of?.type ?? ""]?.object_model, pivot);
-  if (!of || typeof offset === "string") return typeof offset === "string" ? offset : "It is gone.";
+  if (!of || typeof offset === "string") return typeof offset === "string" ? offset : t`It is gone.`;
   const pose = composed(tool, { position: { x: 0, y: 0, z: -offset }, orientation: FLIPPED });
   setUi({ draft: { id, of, pose } });
   return "";
@@ -122,7 +123,7 @@ async function rest<T>(path: string, options: RequestInit = {}): Promise<T> {
     ...(token ? { Authorization: `Bearer ${token}` } : {}),
   };
   const response = await fetch(path, { ...options, headers });
-  if (!response.ok) throw new Error(await refusedWith(response, "The server refuses it"));
+  if (!response.ok) throw new Error(await refusedWith(response, t`The server refuses it`));
   return (await response.json()) as T;
 }
 

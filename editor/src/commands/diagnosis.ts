@@ -1,5 +1,6 @@
 /** A file for whoever helps: what the server has for it, and what this page has seen. Sent to nobody. */
 
+import { t } from "@lingui/core/macro";
 import { version } from "../../package.json";
 import { refusedWith } from "../session/assets";
 import { diary } from "../session/diary";
@@ -18,7 +19,7 @@ export function saveDiagnosis(): Promise<string> {
       headers,
       body: JSON.stringify({ client: seen() }),
     });
-    if (!response.ok) throw new Error(await refusedWith(response, "The server gives no diagnosis"));
+    if (!response.ok) throw new Error(await refusedWith(response, t`The server gives no diagnosis`));
     saveAs(await response.blob(), `diagnosis-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.zip`);
   });
 }

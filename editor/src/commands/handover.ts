@@ -1,5 +1,6 @@
 /** Asking somebody for what he holds, and being told when others ask, or when it is free. */
 
+import { t } from "@lingui/core/macro";
 import { handOver, keyOf } from "../store/handover";
 import { now, store, tell } from "../store/store";
 import { nameOf } from "../ui/names";
@@ -18,9 +19,9 @@ export function followWishes(): () => void {
   return store.subscribe((state, before) => {
     const { wanted, free } = handOver(state, before);
     for (const { id, by } of wanted)
-      tell("warn", `${by} asks for ${nameOf(state, id)}, which you hold: it is free as soon as you are done with it.`);
+      tell("warn", t`${by} asks for ${nameOf(state, id)}, which you hold: it is free as soon as you are done with it.`);
     for (const id of free) {
-      tell("info", `${nameOf(state, id)} is free now.`);
+      tell("info", t`${nameOf(state, id)} is free now.`);
       noLongerAsk(id);
     }
   });

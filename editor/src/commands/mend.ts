@@ -1,5 +1,6 @@
 /** What cannot be opened as it is: the server refuses a document with problems, so it is mended where it is kept. */
 
+import { t } from "@lingui/core/macro";
 import { refusedWith } from "../session/assets";
 import { remembered } from "../session/memory";
 import { call, loadLists } from "../session/session";
@@ -18,7 +19,7 @@ async function stored(path: string, options: RequestInit = {}): Promise<unknown>
   const token = remembered("token");
   const headers = { "Content-Type": "application/json", ...(token ? { Authorization: `Bearer ${token}` } : {}) };
   const response = await fetch(path, { ...options, headers });
-  if (!response.ok) throw new Error(await refusedWith(response, "The server refuses it"));
+  if (!response.ok) throw new Error(await refusedWith(response, t`The server refuses it`));
   return response.json();
 }
 
@@ -36,8 +37,8 @@ export async function faultyObjects(id: string, problems: readonly string[]): Pr
 export function takeOut(id: string, name: string, objects: readonly string[]): Promise<string> {
   return refusal(async () => {
     const taken = new Set(now().lists.scenes?.map((each) => each.name));
-    let copy = `${name} as it was`;
-    for (let number = 2; taken.has(copy); number++) copy = `${name} as it was ${number}`;
+    let copy = t`${name} as it was`;
+    for (let number = 2; taken.has(copy); number++) copy = t`${name} as it was ${number}`;
     const scene = await read(id);
     await call("CopyScene", { source_id: id, target_name: copy });
     const kept = { ...scene, objects: scene.objects.filter((each) => !objects.includes(each.name)) };

@@ -1,5 +1,6 @@
 /** The scene in operation: online, offline, and stop. */
 
+import { t } from "@lingui/core/macro";
 import { call, serves } from "../session/session";
 import { tell } from "../store/store";
 import { ask, sentence } from "./asking";
@@ -27,5 +28,8 @@ export async function stopMotion(): Promise<void> {
     reasons = [sentence(error)];
   }
   if (reasons.length > 0)
-    tell("error", `Not stopped: ${reasons.map((each) => each.replace(/\.$/, "")).join("; ")}. Use the emergency stop.`);
+    tell(
+      "error",
+      t`Not stopped: ${reasons.map((each) => each.replace(/\.$/, "")).join("; ")}. Use the emergency stop.`,
+    );
 }

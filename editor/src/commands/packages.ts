@@ -1,5 +1,6 @@
 /** Packages as files: taken to the server, and fetched from it. */
 
+import { t } from "@lingui/core/macro";
 import { refusedWith } from "../session/assets";
 import { remembered } from "../session/memory";
 import { now } from "../store/store";
@@ -21,7 +22,7 @@ export function uploadPackage(file: File): Promise<string> {
     const body = new FormData();
     body.append("executionPackage", file);
     const response = await fetch(`/packages/${encodeURIComponent(id)}`, { method: "POST", body, headers: headers() });
-    if (!response.ok) throw new Error(await refusedWith(response, `The server does not take ${file.name}`));
+    if (!response.ok) throw new Error(await refusedWith(response, t`The server does not take ${file.name}`));
   });
 }
 
@@ -29,7 +30,7 @@ export function uploadPackage(file: File): Promise<string> {
 export function downloadPackage(id: string, name: string): Promise<string> {
   return refusal(async () => {
     const response = await fetch(`/packages/${encodeURIComponent(id)}`, { headers: headers() });
-    if (!response.ok) throw new Error(await refusedWith(response, `The server does not give ${name}`));
+    if (!response.ok) throw new Error(await refusedWith(response, t`The server does not give ${name}`));
     saveAs(await response.blob(), `${name.replace(/[^\w-]+/g, "_")}.zip`);
   });
 }

@@ -1,5 +1,6 @@
 /** The robot in hand: which one, where it shall go, how it is shown where it would be. Holding it: holds.ts. */
 
+import { t } from "@lingui/core/macro";
 import type { Joint, Pose, RobotArg, RobotFeatures, StepAxis, StepMode, StepWhat } from "../protocol/types";
 import { call } from "../session/session";
 import { robotsOf } from "../session/streams";
@@ -78,16 +79,16 @@ export function notReady(
   chosen: Chosen | null,
   request: Parameters<typeof barred>[1] = "MoveToPose",
 ): string {
-  if (!chosen) return "There is no robot in this scene.";
-  const name = state.doc?.objects[chosen.robotId]?.name ?? "The robot";
-  if (state.live.state !== "started") return "Go online first.";
+  if (!chosen) return t`There is no robot in this scene.`;
+  const name = state.doc?.objects[chosen.robotId]?.name ?? t`The robot`;
+  if (state.live.state !== "started") return t`Go online first.`;
   const connection = state.live.objects[chosen.robotId];
   if (connection && connection.state !== "online" && connection.state !== "back")
-    return `${name} is not there: ${connection.reason || connection.state}.`;
+    return t`${name} is not there: ${connection.reason || connection.state}.`;
   const hold = state.live.holds[chosen.robotId];
-  if (hold && hold.user !== state.connection.user) return `${hold.user} holds ${name}.`;
+  if (hold && hold.user !== state.connection.user) return t`${hold.user} holds ${name}.`;
   const owner = state.locks[chosen.robotId];
-  if (owner && owner !== state.connection.user) return `${owner} works with ${name}.`;
+  if (owner && owner !== state.connection.user) return t`${owner} works with ${name}.`;
   return barred(state, request);
 }
 

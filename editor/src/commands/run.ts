@@ -1,5 +1,6 @@
 /** Running: the open project, packages, single actions; breakpoints. */
 
+import { t } from "@lingui/core/macro";
 import { call, serves } from "../session/session";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
@@ -11,11 +12,11 @@ const BUILT_WITHIN = 120;
 
 /** Give why the open project cannot be run now; empty when it can. */
 export function notRunnable(state: State): string {
-  if (!state.doc?.project) return "Open a project: a scene alone cannot be run.";
-  if (isRunning(state)) return "It runs already.";
+  if (!state.doc?.project) return t`Open a project: a scene alone cannot be run.`;
+  if (isRunning(state)) return t`It runs already.`;
   if (state.live.state === "starting" || state.live.state === "stopping")
-    return "Wait until the devices are online or offline.";
-  if (state.live.executing) return "An action is being tried. Wait for it, or press Stop motion.";
+    return t`Wait until the devices are online or offline.`;
+  if (state.live.executing) return t`An action is being tried. Wait for it, or press Stop motion.`;
   return barred(state, "TemporaryPackage");
 }
 
@@ -29,7 +30,7 @@ export async function run({ paused = false } = {}): Promise<boolean> {
     await call("TemporaryPackage", { start_paused: paused, ...shared }, { deadline: BUILT_WITHIN });
     return true;
   } catch (error) {
-    tell("error", `Not run. ${sentence(error)}`);
+    tell("error", t`Not run. ${sentence(error)}`);
     return false;
   }
 }
@@ -56,7 +57,7 @@ export async function build(name: string): Promise<boolean> {
     { project_id: doc.project.id, package_name: name },
     { deadline: BUILT_WITHIN },
   );
-  if (built) tell("info", `The package ${name} is built.`);
+  if (built) tell("info", t`The package ${name} is built.`);
   return built !== undefined;
 }
 

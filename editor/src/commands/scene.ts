@@ -1,5 +1,6 @@
 /** The objects of the open scene: add, name, copy, remove, their settings and shapes. Forms are given why something was refused. */
 
+import { t } from "@lingui/core/macro";
 import { freeName } from "../program/naming";
 import type { ObjectModel, ObjectTypeMeta, Parameter, Pose, SceneObject } from "../protocol/types";
 import { uploadAsset } from "../session/assets";
@@ -15,10 +16,10 @@ import { awaited } from "./program";
 
 /** Why objects cannot be added, removed or set up now; empty when they can. */
 export function notBuildable(state: State, request: Parameters<typeof barred>[1] = "AddObjectToScene"): string {
-  if (!state.doc) return "Nothing is open.";
-  if (state.doc.project) return "Objects belong to the scene: close the project, and open the scene.";
-  if (isRunning(state)) return "A program runs: stop it first.";
-  if (state.live.state !== "stopped") return "Go offline first: devices are set up while they are not in use.";
+  if (!state.doc) return t`Nothing is open.`;
+  if (state.doc.project) return t`Objects belong to the scene: close the project, and open the scene.`;
+  if (isRunning(state)) return t`A program runs: stop it first.`;
+  if (state.live.state !== "stopped") return t`Go offline first: devices are set up while they are not in use.`;
   return barred(state, request);
 }
 

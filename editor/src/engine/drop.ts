@@ -1,5 +1,6 @@
 /** How high something is, to be seen from any side: a dashed line down to the floor, and a ring where it stands above. */
 
+import { t } from "@lingui/core/macro";
 import {
   BufferGeometry,
   Group,
@@ -62,5 +63,6 @@ export class DropLine {
 /** A height as words; the unit is mm, as in most drawings. */
 export function heightWords(z: number): string {
   if (Math.abs(z) <= LOW) return "";
-  return `${Math.round(Math.abs(z) * 1000)} mm ${z > 0 ? "above" : "below"} the floor`;
+  const height = Math.round(Math.abs(z) * 1000);
+  return z > 0 ? t`${height} mm above the floor` : t`${height} mm below the floor`;
 }

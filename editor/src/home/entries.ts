@@ -1,5 +1,7 @@
 /** What the home screen lists, as one kind of thing: pure. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import type { Lists } from "../store/state";
 
 export interface Entry {
@@ -20,13 +22,13 @@ export interface Entry {
 }
 
 export type Sort = "changed" | "recent" | "created" | "name" | "name down" | "oldest";
-export const SORTS: readonly (readonly [Sort, string])[] = [
-  ["changed", "changed last"],
-  ["recent", "opened by you last"],
-  ["oldest", "changed first"],
-  ["created", "made last"],
-  ["name", "name, A to Z"],
-  ["name down", "name, Z to A"],
+export const SORTS: readonly (readonly [Sort, MessageDescriptor])[] = [
+  ["changed", msg`changed last`],
+  ["recent", msg`opened by you last`],
+  ["oldest", msg`changed first`],
+  ["created", msg`made last`],
+  ["name", msg`name, A to Z`],
+  ["name down", msg`name, Z to A`],
 ];
 
 export function entriesOf(lists: Lists, kind: Entry["kind"]): Entry[] | null {
@@ -79,7 +81,7 @@ export function entriesOf(lists: Lists, kind: Entry["kind"]): Entry[] | null {
 
 function from(id: string, of: { id: string; name: string }[] | null): Entry["from"] {
   const found = of?.find((each) => each.id === id);
-  return { id, name: found?.name ?? "a scene that is gone", gone: found === undefined };
+  return { id, name: found?.name ?? t`a scene that is gone`, gone: found === undefined };
 }
 
 /** Those that are looked for, sorted; starred ones are not before others unless asked for alone. */
@@ -104,12 +106,8 @@ export function chosen(
     recent: (a, b) => last(a) - last(b) || b.time.localeCompare(a.time),
     oldest: (a, b) => a.time.localeCompare(b.time),
     created: (a, b) => b.created.localeCompare(a.created),
-    name: (a, b) => a.name.localeCompare(b.name, "en", { numeric: true }),
-    "name down": (a, b) => b.name.localeCompare(a.name, "en", { numeric: true }),
+    name: (a, b) => a.name.localeCompare(b.name, i18n.locale, { numeric: true }),
+    "name down": (a, b) => b.name.localeCompare(a.name, i18n.locale, { numeric: true }),
   };
   return found.sort(by[sort]);
-}
-
-export function count(number: number, word: string): string {
-  return `${number} ${word}${number === 1 ? "" : "s"}`;
 }

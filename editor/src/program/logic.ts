@@ -1,5 +1,6 @@
 /** Questions about the steps of a program: what follows what, what can be branched on, which way is still free. */
 
+import { t } from "@lingui/core/macro";
 import type { Action, LogicItem, ObjectAction, ProjectLogicIf } from "../protocol/types";
 import type { Of, OpenDocument, State } from "../store/state";
 
@@ -104,16 +105,16 @@ export interface NewStep {
 export function freeStep(doc: OpenDocument, types: State["types"], from: string): NewStep | string {
   const siblings = outgoing(doc, from);
   if (siblings.length === 0) return {};
-  if (from === START) return "The program can begin in one place alone. Move the step from Start instead.";
+  if (from === START) return t`The program can begin in one place alone. Move the step from Start instead.`;
   const asked = siblings.find((each) => each.condition)?.condition;
   const plain = siblings.find((each) => !each.condition);
   const own = asked ? resultAt(doc, types, asked.what) : conditionsOf(doc, types, from)[0];
-  const name = doc.actions[from]?.name ?? "This action";
-  if (!own) return `${name} leads on already, and has no result that could decide between two ways.`;
+  const name = doc.actions[from]?.name ?? t`This action`;
+  if (!own) return t`${name} leads on already, and has no result that could decide between two ways.`;
   const what = asked?.what ?? linkTo(own);
   const taken = siblings.flatMap((each) => (each.condition?.what === what ? [each.condition.value] : []));
   const free = firstFree(own.type, taken);
-  if (free === undefined) return `All ways on from ${name} are taken.`;
+  if (free === undefined) return t`All ways on from ${name} are taken.`;
   if (own.type !== "boolean" || !plain) return { condition: { what, value: free } };
   return { condition: { what, value: "false" }, first: { item: plain, condition: { what, value: "true" } } };
 }
@@ -128,23 +129,27 @@ function firstFree(type: string, taken: string[]): string | undefined {
 
 /** Why a step cannot lead there; empty when it can. The server has the last word. */
 export function cannotLead(doc: OpenDocument, from: string, to: string, item = ""): string {
-  if (to === START) return "A step cannot lead to Start.";
-  if (from === END) return "Nothing follows the end.";
-  if (from === to) return "An action cannot lead to itself.";
-  if (from === START && to === END) return "Put an action between Start and End.";
+  if (to === START) return t`A step cannot lead to Start.`;
+  if (from === END) return t`Nothing follows the end.`;
+  if (from === to) return t`An action cannot lead to itself.`;
+  if (from === START && to === END) return t`Put an action between Start and End.`;
   const others = outgoing(doc, from).filter((each) => each.id !== item);
-  if (others.some((each) => placeOf(each.end) === to)) return "It leads there already.";
-  if (after(doc, to).has(from)) return "It would close a loop.";
+  if (others.some((each) => placeOf(each.end) === to)) return t`It leads there already.`;
+  if (after(doc, to).has(from)) return t`It would close a loop.`;
   return "";
 }
 
 /** A condition as words: "passed is yes". */
 export function conditionWords(doc: OpenDocument, types: State["types"], item: LogicItem): string {
   const { condition } = item;
-  if (!condition) return outgoing(doc, placeOf(item.start)).length > 1 ? "else" : "";
+  if (!condition) return outgoing(doc, placeOf(item.start)).length > 1 ? t`else` : "";
   const result = resultAt(doc, types, condition.what);
   const own = result?.action.id === placeOf(item.start);
   const value =
-    condition.value === "true" ? "yes" : condition.value === "false" ? "no" : condition.value.replace(/^"(.*)"$/, "$1");
-  return own && result?.type === "boolean" ? value : `${result?.name ?? "result"} = ${value}`;
+    condition.value === "true"
+      ? t`yes`
+      : condition.value === "false"
+        ? t`no`
+        : condition.value.replace(/^"(.*)"$/, "$1");
+  return own && result?.type === "boolean" ? value : `${result?.name ?? t`result`} = ${value}`;
 }

@@ -1,5 +1,6 @@
 /** What is wrong with a program before it is run: each fault in words, and where it is. */
 
+import { t } from "@lingui/core/macro";
 import type { OpenDocument, State } from "../store/state";
 import { after, END, incoming, linkTo, metaOf, outgoing, placeOf, resultAt, resultsOf, START } from "./logic";
 import { reachOfAction } from "./reach";
@@ -28,7 +29,11 @@ export function problemsOf(doc: OpenDocument, types: State["types"], reach: Stat
     if (there?.reach !== "out_of_reach" && there?.reach !== "in_collision") continue;
     warn(
       action.id,
-      `${action.name}: ${there.reason || (there.reach === "in_collision" ? "the robot would touch something there." : "the robot does not reach there.")}`,
+      there.reason
+        ? t`${action.name}: ${there.reason}`
+        : there.reach === "in_collision"
+          ? t`${action.name}: the robot collides at this pose.`
+          : t`${action.name}: the robot cannot reach this pose.`,
     );
   }
   return found;
@@ -38,7 +43,7 @@ type Tell = (id: string, text: string) => void;
 
 function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Tell): void {
   const used = after(doc, START);
-  if (outgoing(doc, START).length === 0) error(START, "Nothing follows Start: connect it to the first action.");
+  if (outgoing(doc, START).length === 0) error(START, t`Nothing follows Start: connect it to the first action.`);
   for (const action of Object.values(doc.actions)) {
     const ways = outgoing(doc, action.id);
     if (!used.has(action.id)) {
@@ -46,13 +51,13 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
       warn(
         action.id,
         loose
-          ? `${action.name} is never run: nothing leads to it.`
-          : `${action.name} is never run: no way from Start leads there.`,
+          ? t`${action.name} is never run: nothing leads to it.`
+          : t`${action.name} is never run: no way from Start leads there.`,
       );
       continue;
     }
     if (ways.length === 0) {
-      error(action.id, `Nothing follows ${action.name}: connect it to the next action, or to End.`);
+      error(action.id, t`Nothing follows ${action.name}: connect it to the next action, or to End.`);
       continue;
     }
     const conditions = ways.flatMap((way) => (way.condition ? [way.condition] : []));
@@ -63,17 +68,23 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
     const both = conditions.some((each) => each.value === "true") && conditions.some((each) => each.value === "false");
     if (!both) {
       const bool = first.value === "true" || first.value === "false";
-      const missing = bool
-        ? `${result?.name ?? "its result"} is ${first.value === "true" ? "no" : "yes"}`
-        : "no condition holds";
-      error(action.id, `Nothing follows ${action.name} when ${missing}.`);
+      const name = action.name;
+      const output = result?.name ?? t`its result`;
+      error(
+        action.id,
+        !bool
+          ? t`${name}: no next step if none of the conditions is met.`
+          : first.value === "true"
+            ? t`${name}: no next step if ${output} is no.`
+            : t`${name}: no next step if ${output} is yes.`,
+      );
     }
   }
   for (const item of Object.values(doc.logic)) {
     if (item.condition && !resultAt(doc, types, item.condition.what) && typesKnown(doc, types)) {
       error(
         item.id,
-        `A step from ${doc.actions[placeOf(item.start)]?.name ?? "an action"} asks for a result that does not exist any more.`,
+        t`${doc.actions[placeOf(item.start)]?.name ?? ""}: a step depends on a result that no longer exists.`,
       );
     }
   }
@@ -82,7 +93,7 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
     Object.keys(doc.actions).length > 0 &&
     outgoing(doc, START).length > 0
   ) {
-    error(END, "No way leads to End.");
+    error(END, t`No way leads to End.`);
   }
 }
 
@@ -99,32 +110,36 @@ function ofAction(
 ): void {
   const [objectId = ""] = action.type.split("/");
   const object = doc.objects[objectId];
-  if (!object) return error(action.id, `${action.name}: its device is not in the scene any more.`);
+  if (!object) return error(action.id, t`${action.name}: its device is not in the scene any more.`);
   if (!(object.type in types.actions)) return;
   const meta = metaOf(types, doc, action);
-  if (!meta) return error(action.id, `${action.name}: ${object.name} cannot do this any more.`);
-  if (meta.disabled) error(action.id, `${action.name}: ${meta.problem ?? "this action cannot be used."}`);
+  if (!meta) return error(action.id, t`${action.name}: ${object.name} cannot do this any more.`);
+  if (meta.disabled)
+    error(
+      action.id,
+      meta.problem ? t`${action.name}: ${meta.problem}` : t`${action.name}: this action cannot be used.`,
+    );
   for (const wanted of meta.parameters) {
     const parameter = action.parameters.find((each) => each.name === wanted.name);
     const value = decoded(parameter?.value);
     if (!parameter) {
-      if (wanted.default_value === undefined) error(action.id, `${action.name}: ${wanted.name} is missing.`);
+      if (wanted.default_value === undefined) error(action.id, t`${action.name}: ${wanted.name} is missing.`);
     } else if (parameter.type === "project_parameter") {
       if (!(String(value) in doc.parameters))
-        error(action.id, `${action.name}: the parameter for ${wanted.name} is gone.`);
+        error(action.id, t`${action.name}: the parameter for ${wanted.name} is gone.`);
     } else if (parameter.type === "link") {
       const result = resultAt(doc, types, String(value));
-      if (!result) error(action.id, `${action.name}: the result for ${wanted.name} is gone.`);
+      if (!result) error(action.id, t`${action.name}: the result for ${wanted.name} is gone.`);
       else if (doc.project?.has_logic && !after(doc, result.action.id).has(action.id)) {
         warn(
           action.id,
-          `${action.name}: ${wanted.name} uses a result of ${result.action.name}, which does not come before it.`,
+          t`${action.name}: ${wanted.name} uses a result of ${result.action.name}, which does not come before it.`,
         );
       }
     } else if (wanted.type === "joints" && doc.joints[String(value)]?.is_valid === false) {
       warn(
         action.id,
-        `${action.name}: the joints ${doc.joints[String(value)]?.name} were taken before their point was moved.`,
+        t`${action.name}: the joints ${doc.joints[String(value)]?.name ?? ""} were taken before their point was moved.`,
       );
     }
   }

@@ -1,5 +1,6 @@
 /** Results of runs. Every screen takes them from the run history of the server. */
 
+import { t } from "@lingui/core/macro";
 import type { Run } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
@@ -30,16 +31,16 @@ export function resultOf(run: Run | undefined): Result | null {
   const name = (run.temporary && run.project_name) || run.package_name;
   const detail = run.end === "failed" || run.end === "lost" ? (run.error ?? "") : "";
   const result = { name, detail, actionId: run.last_action?.id ?? "" };
-  const where = run.last_action?.name ? ` in ${run.last_action.name}` : "";
+  const at = run.last_action?.name;
   switch (run.end) {
     case "finished":
-      return { ...result, tone: "good", title: "Run finished" };
+      return { ...result, tone: "good", title: t`Run finished` };
     case "stopped":
-      return { ...result, tone: "", title: run.stopped_by ? `Run stopped by ${run.stopped_by}` : "Run stopped" };
+      return { ...result, tone: "", title: run.stopped_by ? t`Run stopped by ${run.stopped_by}` : t`Run stopped` };
     case "failed":
-      return { ...result, tone: "bad", title: `Run failed${where}` };
+      return { ...result, tone: "bad", title: at ? t`Run failed in ${at}` : t`Run failed` };
     case "lost":
-      return { ...result, tone: "warn", title: `Run interrupted${where}` };
+      return { ...result, tone: "warn", title: at ? t`Run interrupted in ${at}` : t`Run interrupted` };
   }
 }
 

@@ -1,5 +1,7 @@
 /** Values of parameters: how they are written, read, and checked before the server sees them. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import type { ActionParameter, ParameterMeta } from "../protocol/types";
 
 /** What an action says of a parameter beside its type. */
@@ -16,19 +18,25 @@ export type Source = "value" | "link" | "project_parameter";
 export const SIMPLE = ["integer", "double", "boolean", "string"] as const;
 export type Simple = (typeof SIMPLE)[number];
 
-export const TYPE_WORDS: Record<string, string> = {
-  integer: "whole number",
-  double: "number",
-  boolean: "yes or no",
-  string: "text",
-  string_enum: "choice",
-  integer_enum: "choice",
-  pose: "pose",
-  position: "position",
-  joints: "joints",
-  image: "picture",
-  relative_pose: "relative pose",
+const TYPE_NAMES: Record<string, MessageDescriptor> = {
+  integer: msg`whole number`,
+  double: msg`number`,
+  boolean: msg`yes or no`,
+  string: msg`text`,
+  string_enum: msg`choice`,
+  integer_enum: msg`choice`,
+  pose: msg`pose`,
+  position: msg`position`,
+  joints: msg`joints`,
+  image: msg`picture`,
+  relative_pose: msg`relative pose`,
 };
+
+/** Return the name of a parameter type as shown to users. */
+export function typeName(type: string): string {
+  const name = TYPE_NAMES[type];
+  return name ? i18n._(name) : type;
+}
 
 export function extraOf(meta: Pick<ParameterMeta, "extra"> | undefined): Extra {
   if (!meta?.extra) return {};
@@ -78,18 +86,18 @@ export function read(type: string, text: string, extra: Extra = {}): Read {
     case "integer_enum":
       return { json: String(Number(clean)) };
     case "relative_pose":
-      return decoded(clean) === undefined ? { problem: "This is no pose." } : { json: clean };
+      return decoded(clean) === undefined ? { problem: t`This is no pose.` } : { json: clean };
     default:
-      return clean ? { json: JSON.stringify(clean) } : { problem: "Choose one." };
+      return clean ? { json: JSON.stringify(clean) } : { problem: t`Choose one.` };
   }
 }
 
 function readNumber(type: "integer" | "double", text: string, { minimum, maximum }: Extra): Read {
   const value = Number(text.replace(",", "."));
-  if (text === "" || !Number.isFinite(value)) return { problem: "Type a number." };
-  if (type === "integer" && !Number.isInteger(value)) return { problem: "Type a whole number." };
-  if (minimum !== undefined && value < minimum) return { problem: `At least ${minimum}.` };
-  if (maximum !== undefined && value > maximum) return { problem: `At most ${maximum}.` };
+  if (text === "" || !Number.isFinite(value)) return { problem: t`Type a number.` };
+  if (type === "integer" && !Number.isInteger(value)) return { problem: t`Type a whole number.` };
+  if (minimum !== undefined && value < minimum) return { problem: t`At least ${minimum}.` };
+  if (maximum !== undefined && value > maximum) return { problem: t`At most ${maximum}.` };
   return { json: type === "double" ? double(value) : String(value) };
 }
 
@@ -124,8 +132,8 @@ export function initial(meta: ParameterMeta): string | undefined {
 /** The range as words, with its unit; empty where there is none. */
 export function rangeWords({ minimum, maximum, unit = "" }: Extra): string {
   const tail = unit ? ` ${unit}` : "";
-  if (minimum !== undefined && maximum !== undefined) return `${minimum} to ${maximum}${tail}`;
-  if (minimum !== undefined) return `at least ${minimum}${tail}`;
-  if (maximum !== undefined) return `at most ${maximum}${tail}`;
+  if (minimum !== undefined && maximum !== undefined) return t`${minimum} to ${maximum}${tail}`;
+  if (minimum !== undefined) return t`at least ${minimum}${tail}`;
+  if (maximum !== undefined) return t`at most ${maximum}${tail}`;
   return "";
 }

@@ -5,6 +5,7 @@
  * be sent later: no motion begins by itself when the connection is back.
  */
 
+import { t } from "@lingui/core/macro";
 import { ConnectionLost, DeadlineExceeded, Refused } from "./errors";
 import type { Requests, ServerEvent } from "./types";
 
@@ -194,7 +195,7 @@ export class ProtocolClient {
       this.call("SystemInfo", undefined, { deadline: this.liveness.answer }).catch((error: unknown) => {
         if (!(error instanceof DeadlineExceeded)) return;
         const socket = this.detach();
-        this.lost(1006, "The server does not answer.");
+        this.lost(1006, t`The server does not answer.`);
         socket?.close();
       });
     }, this.liveness.quiet * 1000);

@@ -1,5 +1,7 @@
 /** Why a request was not granted. */
 
+import { t } from "@lingui/core/macro";
+
 /** The server refuses; the message is the sentence for the user, `code` names the reason where the server tells it. */
 export class Refused extends Error {
   override readonly name = "Refused";
@@ -8,7 +10,7 @@ export class Refused extends Error {
     readonly messages: string[],
     readonly code?: string,
   ) {
-    super(messages.join(" ") || `${request} was refused.`);
+    super(messages.join(" ") || t`${request} was refused.`);
   }
 }
 
@@ -20,7 +22,7 @@ export class ConnectionLost extends Error {
     /** Whether the request had been sent: then it may have been carried out. */
     readonly sent: boolean,
   ) {
-    super(sent ? `The connection was lost before ${request} was answered.` : "There is no connection to the server.");
+    super(sent ? t`The connection was lost before ${request} was answered.` : t`There is no connection to the server.`);
   }
 }
 
@@ -31,6 +33,6 @@ export class DeadlineExceeded extends Error {
     readonly request: string,
     readonly seconds: number,
   ) {
-    super(`The server did not answer ${request} within ${seconds} s.`);
+    super(t`The server did not answer ${request} within ${seconds} s.`);
   }
 }

@@ -1,5 +1,6 @@
 /** A mesh before it is uploaded: how large it is, and the same in m. A chunk of its own, with the loaders. */
 
+import { t } from "@lingui/core/macro";
 import type { BufferGeometry } from "three";
 import { loadMesh } from "../engine/loaders/mesh";
 
@@ -17,7 +18,9 @@ export async function readMesh(file: File): Promise<MeshFile> {
   try {
     geometry = await loadMesh(await file.arrayBuffer(), file.name);
   } catch (error) {
-    throw new Error(`${file.name} cannot be read as a mesh: ${error instanceof Error ? error.message : String(error)}`);
+    throw new Error(
+      t`${file.name} cannot be read as a mesh: ${error instanceof Error ? error.message : String(error)}`,
+    );
   }
   geometry.computeBoundingBox();
   const box = geometry.boundingBox;
@@ -26,7 +29,7 @@ export async function readMesh(file: File): Promise<MeshFile> {
     ? [box.max.x - box.min.x, box.max.y - box.min.y, box.max.z - box.min.z]
     : [0, 0, 0];
   if (count < 1 || !size.every(Number.isFinite) || Math.max(...size) <= 0)
-    throw new Error(`There is no surface in ${file.name}.`);
+    throw new Error(t`There is no surface in ${file.name}.`);
   return { file, geometry, triangles: Math.floor(count), size };
 }
 

@@ -1,5 +1,6 @@
 /** Assets of the server: meshes, models of robots. */
 
+import { t } from "@lingui/core/macro";
 import { remembered } from "./memory";
 
 /** Give an asset as the server makes it ready to be shown, binary glTF; rejects with the server's sentence. */
@@ -7,7 +8,7 @@ export async function readShown(id: string): Promise<ArrayBuffer> {
   const token = remembered("token");
   const headers: HeadersInit = token ? { Authorization: `Bearer ${token}` } : {};
   const response = await fetch(`/api/assets/${encodeURIComponent(id)}/shown`, { headers });
-  if (!response.ok) throw new Error(await refusedWith(response, `The server does not give the mesh ${id}`));
+  if (!response.ok) throw new Error(await refusedWith(response, t`The server does not give the mesh ${id}`));
   return response.arrayBuffer();
 }
 
@@ -21,7 +22,7 @@ export async function uploadAsset(file: File): Promise<string> {
     body,
     headers: token ? { Authorization: `Bearer ${token}` } : {},
   });
-  if (!response.ok) throw new Error(await refusedWith(response, `The server does not take ${file.name}`));
+  if (!response.ok) throw new Error(await refusedWith(response, t`The server does not take ${file.name}`));
   return ((await response.json()) as { id: string }).id;
 }
 

@@ -1,5 +1,6 @@
 /** Straight lines in the world, looked at by the server. */
 
+import { t } from "@lingui/core/macro";
 import type { Position } from "../protocol/types";
 import { refusedWith } from "./assets";
 import { remembered } from "./memory";
@@ -16,7 +17,7 @@ export async function metBy(from: Position, to: Position): Promise<string | null
     headers,
     body: JSON.stringify({ pt1: from, pt2: to }),
   });
-  if (!response.ok) throw new Error(await refusedWith(response, "The server does not look at the way"));
+  if (!response.ok) throw new Error(await refusedWith(response, t`The server does not look at the way`));
   const { safe, object_id } = (await response.json()) as { safe: boolean; object_id?: string };
   return safe ? null : (object_id ?? "");
 }

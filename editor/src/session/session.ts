@@ -3,6 +3,7 @@
  * whenever the connection comes back. Motion is never asked for here.
  */
 
+import { t } from "@lingui/core/macro";
 import { type CallOptions, ProtocolClient } from "../protocol/client";
 import { Refused } from "../protocol/errors";
 import { ADDITIONAL_EVENTS, type Requests, ROLES, type ServerEvent } from "../protocol/types";
@@ -52,7 +53,7 @@ function address(): string {
 export function join(user: string, withToken: string): void {
   token = withToken;
   setConnection({ status: "connecting", user, reason: "", role: ROLES.programmer });
-  client.stop("joining anew");
+  client.stop(t`joining anew`);
   client.start();
 }
 
@@ -97,16 +98,16 @@ client.onState = (state, reason, code) => {
     const was = now().connection.status;
     setConnection({
       status: was === "ready" || was === "joining" || was === "lost" ? "lost" : "connecting",
-      reason: reason || "The server cannot be reached.",
+      reason: reason || t`The server cannot be reached.`,
     });
   } else if (state === "closed" && code === 4401) {
-    setConnection({ status: "refused", reason: token ? reason || "The token is not valid." : "A token is needed." });
+    setConnection({ status: "refused", reason: token ? reason || t`The token is not valid.` : t`A token is needed.` });
   }
 };
 
 client.onOddity = (text) => {
-  note("fault", `not understood: ${text}`);
-  console.warn("not understood:", text);
+  note("fault", t`not understood: ${text}`);
+  console.warn(t`not understood:`, text);
 };
 
 async function enter(mine: number): Promise<void> {
@@ -128,7 +129,7 @@ async function enter(mine: number): Promise<void> {
   } catch (error) {
     if (!current()) return; // the connection is lost again: it will be tried anew
     if (error instanceof Refused) {
-      client.stop("not let in");
+      client.stop(t`not let in`);
       setConnection({ status: "refused", reason: error.message });
     } else {
       tell("error", error instanceof Error ? error.message : String(error));

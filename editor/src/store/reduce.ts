@@ -1,5 +1,6 @@
 /** What an event makes of the state: a pure function; what is not named stays. */
 
+import { t } from "@lingui/core/macro";
 import type { Run, ServerEvent, TaskStateData } from "../protocol/types";
 import { changed, opened } from "./document";
 import { put, without } from "./records";
@@ -179,8 +180,6 @@ function viewState(state: State, data: import("../protocol/types").ViewState): P
 }
 
 /** The scene in operation; null when the event is about something else. */
-const SILENT =
-  "The devices do not answer: the process that controls them is frozen or overloaded. If something moves, use the emergency stop.";
 
 function isAnswering(objects: State["live"]["objects"]): boolean {
   return Object.values(objects).every((each) => each.answering !== false);
@@ -200,10 +199,18 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
       const objects = put(now.objects, event.data.object_id, event.data);
       const was = isAnswering(now.objects);
       if (was === isAnswering(objects)) return become({ objects });
-      if (was) return { ...become({ objects }), ...notice(state, "error", SILENT) };
+      if (was)
+        return {
+          ...become({ objects }),
+          ...notice(
+            state,
+            "error",
+            t`The devices do not answer: the process that controls them is frozen or overloaded. If something moves, use the emergency stop.`,
+          ),
+        };
       return {
         ...become({ objects }),
-        ...(event.data.state === "offline" ? {} : notice(state, "info", "The devices answer again.")),
+        ...(event.data.state === "offline" ? {} : notice(state, "info", t`The devices answer again.`)),
       };
     }
     case "ObjectHealth":
@@ -227,7 +234,7 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
             ? event.data.joints_id
             : "";
       const motions = put(now.motions, robot_id, { phase, goal, message: message ?? "" });
-      const told = phase === "failed" ? notice(state, "error", message || "The robot did not reach its goal.") : {};
+      const told = phase === "failed" ? notice(state, "error", message || t`The robot did not reach its goal.`) : {};
       return { ...become({ moving, motions }), ...told };
     }
     case "ActionExecution":
@@ -243,7 +250,7 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
       const { id, state: phase, message } = event.data;
       // The task of it says the same, and stays; an older server has none.
       const told = Object.values(state.tasks).some((each) => each.kind === "calibration");
-      return phase === "failed" && !told ? notice(state, "error", message || `${id} failed.`) : {};
+      return phase === "failed" && !told ? notice(state, "error", message || t`${id} failed.`) : {};
     }
     default:
       return null;

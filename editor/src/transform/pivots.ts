@@ -1,5 +1,6 @@
 /** Where an object is put that a tool touches, as the server does it (protocol, 7.3): pure. */
 
+import { t } from "@lingui/core/macro";
 import type { ObjectModel, Orientation, Pivot } from "../protocol/types";
 
 /** The tool points at the object: their z axes are opposite. */
@@ -10,6 +11,6 @@ export function pivotOffset(model: ObjectModel | undefined, pivot: Pivot): numbe
   if (pivot === "middle") return 0;
   // Of a sphere the protocol takes half the radius.
   const height = model?.box?.size_z ?? model?.cylinder?.height ?? model?.sphere?.radius;
-  if (height === undefined) return "Only a box, a cylinder or a sphere has a top and a bottom: use the middle.";
+  if (height === undefined) return t`Only a box, a cylinder or a sphere has a top and a bottom: use the middle.`;
   return ((pivot === "top" ? -1 : 1) * height) / 2;
 }

@@ -1,5 +1,6 @@
 /** Sizes of shapes: what pulling a face, or a number, makes of them. Pure; all in m. */
 
+import { t } from "@lingui/core/macro";
 import type { ObjectModel, Pose, Position } from "../protocol/types";
 import { inverted, rotated } from "../viewmodel/frames";
 import { type Axis, dot, plusOf } from "./placing";
@@ -61,12 +62,12 @@ export function measures(model: ObjectModel): Measure[] {
   if (cylinder) {
     return [
       {
-        label: "Radius",
+        label: t`Radius`,
         value: cylinder.radius,
         put: (value) => ({ ...model, cylinder: { ...cylinder, radius: within(value) } }),
       },
       {
-        label: "Height",
+        label: t`Height`,
         value: cylinder.height,
         put: (value) => ({ ...model, cylinder: { ...cylinder, height: within(value) } }),
       },
@@ -75,7 +76,7 @@ export function measures(model: ObjectModel): Measure[] {
   if (!sphere) return [];
   return [
     {
-      label: "Radius",
+      label: t`Radius`,
       value: sphere.radius,
       put: (value) => ({ ...model, sphere: { ...sphere, radius: within(value) } }),
     },

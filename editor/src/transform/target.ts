@@ -1,5 +1,6 @@
 /** What can be moved, where it is, and by which request it gets elsewhere. */
 
+import { t } from "@lingui/core/macro";
 import { barred } from "../commands/asking";
 import type { ObjectModel, Pose } from "../protocol/types";
 import { heldBy, isOnline, isRunning } from "../store/selectors";
@@ -78,14 +79,14 @@ const REQUESTS = {
 /** Why it cannot be moved now, as a sentence; empty when it can. */
 export function notMovable(state: State, { kind, id }: Pick<Target, "kind" | "id">): string {
   const { doc } = state;
-  if (isRunning(state)) return "A program runs: stop it first.";
+  if (isRunning(state)) return t`A program runs: stop it first.`;
   if (kind === "object" && doc?.project)
-    return "Objects are moved in the scene: close the project, and open the scene.";
+    return t`Objects are moved in the scene: close the project, and open the scene.`;
   const type = doc?.objects[id]?.type ?? "";
   if (kind === "object" && type in state.types.robots && isOnline(state))
-    return "A robot cannot be moved in the scene while it is online.";
+    return t`A robot cannot be moved in the scene while it is online.`;
   const holder = heldBy(state, id);
-  if (holder) return `${holder} works on it.`;
+  if (holder) return t`${holder} works on it.`;
   return barred(state, REQUESTS[kind]);
 }
 
@@ -93,7 +94,7 @@ export function notMovable(state: State, { kind, id }: Pick<Target, "kind" | "id
 export function notSizable(state: State, target: Pick<Target, "kind" | "id">): string {
   return (
     notMovable(state, target) ||
-    (state.live.state !== "stopped" ? "Go offline to change its size." : "") ||
+    (state.live.state !== "stopped" ? t`Go offline to change its size.` : "") ||
     barred(state, "UpdateObjectModel")
   );
 }

@@ -1,5 +1,6 @@
 /** Choose the screen (join, home, workplace or operator) and frame it: connection and result above, Stop dock below. */
 
+import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useState, useSyncExternalStore } from "react";
 import { rememberPerson } from "../session/memory";
 import { isLive, isRunning, openId } from "../store/selectors";
@@ -67,13 +68,13 @@ export function App() {
       )}
       <div className="screen">
         {operator ? (
-          <Suspense fallback={<Waiting>Preparing the screen…</Waiting>}>
+          <Suspense fallback={<Waiting>{t`Preparing the screen…`}</Waiting>}>
             <Operator kiosk={hash.includes("kiosk")} />
           </Suspense>
         ) : open ? (
           <Workplace />
         ) : (
-          <Suspense fallback={<Waiting>Reading the lists…</Waiting>}>
+          <Suspense fallback={<Waiting>{t`Reading the lists…`}</Waiting>}>
             <Home />
           </Suspense>
         )}

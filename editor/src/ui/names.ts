@@ -1,21 +1,26 @@
 /** What things are called on the screen: by their names, never by ids. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import type { Kind, Selection, State } from "../store/state";
 
-export const KINDS: Record<Kind, string> = {
-  object: "Object",
-  point: "Action point",
-  orientation: "Orientation",
-  joints: "Joints",
-  action: "Action",
-  logic: "Step",
-  terminal: "Program",
+const KINDS: Record<Kind, MessageDescriptor> = {
+  object: msg`Object`,
+  point: msg`Action point`,
+  orientation: msg`Orientation`,
+  joints: msg`Joints`,
+  action: msg`Action`,
+  logic: msg`Step`,
+  terminal: msg`Program`,
 };
+
+/** Return the name of a kind as shown to users. */
+export const kindName = (kind: Kind): string => i18n._(KINDS[kind]);
 
 export function nameOf(state: State, id: string): string {
   const { doc } = state;
-  if (id === "START") return "Start";
-  if (id === "END") return "End";
+  if (id === "START") return t`Start`;
+  if (id === "END") return t`End`;
   if (!doc) return "";
   const step = doc.logic[id];
   if (step) return `${nameOf(state, step.start)} → ${nameOf(state, step.end)}`;

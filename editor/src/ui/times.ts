@@ -1,5 +1,7 @@
 /** Times in words. */
 
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 
 const STEPS: [number, Intl.RelativeTimeFormatUnit][] = [
@@ -8,7 +10,6 @@ const STEPS: [number, Intl.RelativeTimeFormatUnit][] = [
   [86_400, "hour"],
   [7 * 86_400, "day"],
 ];
-const format = new Intl.RelativeTimeFormat("en", { numeric: "auto" });
 
 /** Redraw the component every 20 s, so that its relative times stay correct. */
 export function useTicking(): void {
@@ -19,14 +20,25 @@ export function useTicking(): void {
   }, []);
 }
 
+/** Return the time of day, "12:31", or with seconds "12:31:07". `time` is RFC 3339 or in ms since 1970. */
+export function clock(time: string | number, seconds = false): string {
+  return new Date(time).toLocaleTimeString(i18n.locale, {
+    hour: "2-digit",
+    minute: "2-digit",
+    ...(seconds && { second: "2-digit" }),
+    hourCycle: "h23",
+  });
+}
+
 /** "5 minutes ago", or the date when that is longer than a week ago. `time` is RFC 3339. */
 export function ago(time: string, present = Date.now()): string {
   const seconds = Math.round((Date.parse(time) - present) / 1000);
-  if (Math.abs(seconds) < 10) return "just now";
+  if (Math.abs(seconds) < 10) return t`just now`;
   let before = 1;
   for (const [limit, unit] of STEPS) {
-    if (Math.abs(seconds) < limit) return format.format(Math.round(seconds / before), unit);
+    if (Math.abs(seconds) < limit)
+      return new Intl.RelativeTimeFormat(i18n.locale, { numeric: "auto" }).format(Math.round(seconds / before), unit);
     before = limit === 60 ? 60 : limit === 3600 ? 3600 : 86_400;
   }
-  return new Date(time).toLocaleDateString("en", { day: "numeric", month: "short", year: "numeric" });
+  return new Date(time).toLocaleDateString(i18n.locale, { day: "numeric", month: "short", year: "numeric" });
 }

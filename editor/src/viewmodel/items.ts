@@ -1,5 +1,6 @@
 /** From the state to what the 3D view shows: pure, and the same object for what did not change. */
 
+import { t } from "@lingui/core/macro";
 import type { Item, LinkItem, RobotItem, Shape } from "../engine/items";
 import { reachOfAction, worse } from "../program/reach";
 import type { LogicItem, ObjectTypeMeta, Pose, Position, Reach } from "../protocol/types";
@@ -158,7 +159,7 @@ export class ItemMaker {
     ] as const) {
       const place = state.view.shared[`place/${id}`];
       add(id, [place, ...tell(id)], () => ({
-        ...common(id, role === "start" ? "Start" : "End"),
+        ...common(id, role === "start" ? t`Start` : t`End`),
         kind: "action",
         position: isPosition(place) ? place : (PLACES[id] ?? NO_PLACE),
         level: 0,

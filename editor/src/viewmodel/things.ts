@@ -1,5 +1,7 @@
 /** All that is in the workplace, as the list of things shows it: what hangs on what, by kinds, found by words. */
 
+import { i18n } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import type { Kind, State } from "../store/state";
 import { GROUPS, type Group } from "./seeing";
 
@@ -22,12 +24,12 @@ export interface Things {
 }
 
 const WORDS = {
-  point: "Action point",
-  orientation: "Orientation",
-  joints: "Joints",
-  action: "Action",
-  logic: "Step",
-  terminal: "Program",
+  point: msg`Action point`,
+  orientation: msg`Orientation`,
+  joints: msg`Joints`,
+  action: msg`Action`,
+  logic: msg`Step`,
+  terminal: msg`Program`,
 } as const;
 
 export function thingsOf({ doc, types }: Pick<State, "doc" | "types">): Things {
@@ -38,7 +40,7 @@ export function thingsOf({ doc, types }: Pick<State, "doc" | "types">): Things {
     kind,
     group,
     name,
-    detail: WORDS[kind],
+    detail: i18n._(WORDS[kind]),
     below,
   });
   const on = (parent: string | undefined): Row[] =>
@@ -69,14 +71,14 @@ export function thingsOf({ doc, types }: Pick<State, "doc" | "types">): Things {
     below: on(id),
   });
   const hasPlace = (each: (typeof objects)[number]) => each.pose !== undefined || each.type in types.robots;
-  const called = (id: string) => (id === "START" ? "Start" : id === "END" ? "End" : (doc.actions[id]?.name ?? ""));
+  const called = (id: string) => (id === "START" ? t`Start` : id === "END" ? t`End` : (doc.actions[id]?.name ?? ""));
   return {
     placed: [...objects.filter(hasPlace).map(object), ...on(undefined)],
     unplaced: objects.filter((each) => !hasPlace(each)).map(object),
     program: doc.project?.has_logic
       ? [
-          row("START", "terminal", "program", "Start"),
-          row("END", "terminal", "program", "End"),
+          row("START", "terminal", "program", t`Start`),
+          row("END", "terminal", "program", t`End`),
           ...Object.values(doc.logic).map((each) =>
             row(each.id, "logic", "program", `${called(each.start)} → ${called(each.end)}`),
           ),

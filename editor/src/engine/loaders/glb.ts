@@ -1,5 +1,6 @@
 /** Reads the binary glTF that the server makes of meshes and robots (docs/protocol.md): no other, and nothing else of it. */
 
+import { t } from "@lingui/core/macro";
 import { BufferAttribute, BufferGeometry } from "three";
 
 /** Of a robot: its URDF, the mesh of each file that it names, and why others are not there. */
@@ -38,7 +39,7 @@ const NAMES = { POSITION: "position", NORMAL: "normal", COLOR_0: "color" } as co
 export function readGlb(content: ArrayBuffer): Shown {
   const head = new DataView(content);
   if (content.byteLength < 20 || head.getUint32(0, true) !== 0x46546c67)
-    throw new Error("what the server gave is no binary glTF");
+    throw new Error(t`The model is not a binary glTF file.`);
   const length = head.getUint32(12, true);
   const told = JSON.parse(new TextDecoder().decode(new Uint8Array(content, 20, length))) as Told;
   const start = 20 + length + 8;
@@ -71,6 +72,6 @@ export function readGlb(content: ArrayBuffer): Shown {
 /** The one mesh of an asset that is no robot. */
 export function readMesh(content: ArrayBuffer): BufferGeometry {
   const [mesh] = readGlb(content).meshes.values();
-  if (!mesh) throw new Error("there is no surface in it");
+  if (!mesh) throw new Error(t`The model contains no surface.`);
   return mesh;
 }

@@ -1,5 +1,6 @@
 /** Meshes of the kinds that people upload, before they are: as one geometry, in the file's unit. A chunk of its own. */
 
+import { t } from "@lingui/core/macro";
 import { type BufferGeometry, type Group, LoadingManager, Matrix4, type Mesh, type Object3D } from "three";
 import { ColladaLoader } from "three/examples/jsm/loaders/ColladaLoader.js";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
@@ -20,7 +21,7 @@ export async function loadMesh(content: ArrayBuffer, name: string): Promise<Buff
   if (head.startsWith("ply")) return withNormals(new PLYLoader().parse(content));
   if (head.includes("<COLLADA")) {
     const read = new ColladaLoader(noFetch()).parse(new TextDecoder().decode(content), "");
-    if (!read) throw new Error("the COLLADA file cannot be read");
+    if (!read) throw new Error(t`The COLLADA file cannot be read.`);
     // The loader turns what has z up so that y is; we want it back.
     return whole(read.scene as unknown as Group, new Matrix4().makeRotationX(Math.PI / 2));
   }
@@ -52,6 +53,6 @@ function whole(root: Object3D, turned = new Matrix4()): BufferGeometry {
     }
     parts.push(withNormals(part).applyMatrix4(new Matrix4().multiplyMatrices(turned, mesh.matrixWorld)));
   });
-  if (parts.length === 0) throw new Error("there is no surface in it");
+  if (parts.length === 0) throw new Error(t`The file contains no surface.`);
   return mergeGeometries(parts);
 }

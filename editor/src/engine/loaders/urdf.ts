@@ -1,5 +1,6 @@
 /** A robot as the server makes it ready to be shown: its URDF with its meshes. A chunk of its own. */
 
+import { t } from "@lingui/core/macro";
 import { LoadingManager, type Material, Mesh, type Object3D, SphereGeometry } from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import URDFLoader, { type URDFLink, type URDFRobot, type URDFVisual } from "urdf-loader";
@@ -20,7 +21,7 @@ export interface LoadedRobot {
 /** Give the robot; what of it cannot be shown is left out. Throws when there is no URDF in it. */
 export function loadRobot(content: ArrayBuffer, { plain, coloured }: RobotMaterials): LoadedRobot {
   const { meshes, extras } = readGlb(content);
-  if (extras.urdf === undefined) throw new Error("it is no robot");
+  if (extras.urdf === undefined) throw new Error(t`The file describes no robot.`);
   // The loader takes the scheme away before it asks.
   const named = new Map(
     Object.entries(extras.meshes ?? {}).map(([reference, name]) => [reference.replace(/^package:\/\//, ""), name]),

@@ -1,5 +1,6 @@
 /** An action point: a ball, drawn with all others at once. From afar it grows, so that it stays as large as is seen and hit. */
 
+import { t } from "@lingui/core/macro";
 import { Matrix4, MeshLambertMaterial, Object3D, SphereGeometry, Vector3 } from "three";
 import type { Batch, Instance } from "../batches";
 import type { PointItem } from "../items";
@@ -65,7 +66,7 @@ export class PointThing extends Thing<PointItem> {
   }
 
   override badge(): string {
-    return this.item.lockedBy ? `locked by ${this.item.lockedBy}` : "";
+    return this.item.lockedBy ? t`locked by ${this.item.lockedBy}` : "";
   }
 
   override dispose(): void {

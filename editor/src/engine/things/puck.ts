@@ -3,6 +3,8 @@
  * them. From afar they grow, so that they stay as large as fingers need.
  */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import {
   type BufferGeometry,
   CylinderGeometry,
@@ -47,10 +49,10 @@ const SIGNS: Partial<Record<ReachShown, () => BufferGeometry>> = {
   out_of_reach: cross,
 };
 
-const REASONS: Partial<Record<ReachShown, string>> = {
-  near_limit: "near a limit",
-  in_collision: "in collision",
-  out_of_reach: "out of reach",
+const REASONS: Partial<Record<ReachShown, MessageDescriptor>> = {
+  near_limit: msg`near a limit`,
+  in_collision: msg`in collision`,
+  out_of_reach: msg`out of reach`,
 };
 
 export class PuckThing extends Thing<PuckItem> {
@@ -153,8 +155,9 @@ export class PuckThing extends Thing<PuckItem> {
   }
 
   override badge(): string {
-    if (this.item.lockedBy) return `locked by ${this.item.lockedBy}`;
-    return this.item.selected ? (REASONS[this.item.reach] ?? "") : "";
+    if (this.item.lockedBy) return t`locked by ${this.item.lockedBy}`;
+    const reason = REASONS[this.item.reach];
+    return reason && this.item.selected ? i18n._(reason) : "";
   }
 
   override dispose(): void {

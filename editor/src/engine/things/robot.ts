@@ -1,5 +1,6 @@
 /** A robot: its URDF moved by live joints, or a stand-in; a frame at each end effector; greyed when nothing is heard. */
 
+import { t } from "@lingui/core/macro";
 import { AxesHelper, CylinderGeometry, Group, Matrix4, Mesh, type Object3D, SphereGeometry, Vector3 } from "three";
 import type { URDFRobot } from "urdf-loader";
 import { STALE, STILL } from "../../store/telemetry";
@@ -122,9 +123,9 @@ export class RobotThing extends Thing<RobotItem> {
   }
 
   override badge(): string {
-    if (this.item.lockedBy) return `locked by ${this.item.lockedBy}`;
-    if (this.stale) return "not heard of: shown where it was";
-    return this.reason && (this.robot ? "shown in part" : "cannot be shown as it looks");
+    if (this.item.lockedBy) return t`locked by ${this.item.lockedBy}`;
+    if (this.stale) return t`not heard of: shown where it was`;
+    return this.reason && (this.robot ? t`shown in part` : t`cannot be shown as it looks`);
   }
 
   override get problem(): string {
@@ -202,7 +203,11 @@ export class RobotThing extends Thing<RobotItem> {
     if (!current()) return;
     this.reason = reason;
     if (reason)
-      this.context.trouble(`${this.item.name} is shown ${robot ? "in part" : "without its shape"}. ${reason}`);
+      this.context.trouble(
+        robot
+          ? t`Part of ${this.item.name} cannot be shown. ${reason}`
+          : t`The model of ${this.item.name} cannot be shown. ${reason}`,
+      );
     for (const child of [...this.body.children]) {
       child.removeFromParent();
       disposeTree(child);

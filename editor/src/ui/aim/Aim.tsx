@@ -1,5 +1,7 @@
 /** The cross in the middle of the view, what it means, and the next that it may mean. */
 
+import { i18n } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useEffect, useRef } from "react";
 import { keepGeneral } from "../../commands/viewstate";
 import { bearingOf } from "../../engine/bearing";
@@ -7,11 +9,11 @@ import type { Engine } from "../../engine/engine";
 import { followCross, nextCandidate, useAiming } from "../../session/aiming";
 import { now, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
-import { KINDS, nameOf, selectionOf } from "../names";
+import { kindName, nameOf, selectionOf } from "../names";
 import { writing } from "../search/Overlays";
 import { pick } from "../workplace/pick";
 
-const NOTHING = "Nothing is near the cross: turn the view.";
+const NOTHING = msg`Nothing is near the cross: turn the view.`;
 
 export function takeCandidate(): void {
   const { chosen } = useAiming.getState();
@@ -56,31 +58,31 @@ export function Aim({ engine }: { engine: Engine }) {
     <>
       <span className="view-cross" aria-hidden="true" />
       <span ref={mark} className="aim-mark" aria-hidden="true" />
-      <div className="aim-bar" role="group" aria-label="At the cross">
+      <div className="aim-bar" role="group" aria-label={t`At the cross`}>
         <span className="aim-name" role="status">
           {kind ? (
             <>
-              {name} <small className="quiet">{KINDS[kind]}</small>
+              {name} <small className="quiet">{kindName(kind)}</small>
             </>
           ) : (
-            <small className="quiet">Nothing near</small>
+            <small className="quiet">{t`Nothing near`}</small>
           )}
         </span>
         <Button
           look="primary"
-          aria-label={name ? `Select ${name}` : "Select"}
-          why={chosen ? "" : NOTHING}
+          aria-label={name ? t`Select ${name}` : t`Select`}
+          why={chosen ? "" : i18n._(NOTHING)}
           onPress={takeCandidate}
         >
-          Select
+          {t`Select`}
         </Button>
         <Button
-          aria-label={`Next ${at}/${candidates.length}, of what is at the cross`}
+          aria-label={t`Next ${at}/${candidates.length}, of what is at the cross`}
           aria-keyshortcuts="N"
-          why={candidates.length > 1 ? "" : chosen ? "Nothing else is near the cross." : NOTHING}
+          why={candidates.length > 1 ? "" : chosen ? t`Nothing else is near the cross.` : i18n._(NOTHING)}
           onPress={() => nextCandidate()}
         >
-          Next{" "}
+          {t`Next`}{" "}
           <small>
             {at}/{candidates.length}
           </small>
@@ -89,7 +91,7 @@ export function Aim({ engine }: { engine: Engine }) {
           <Button
             look="plain"
             icon="close"
-            aria-label="No more picking by the cross"
+            aria-label={t`No more picking by the cross`}
             onPress={() => keepGeneral({ aiming: null })}
           />
         )}

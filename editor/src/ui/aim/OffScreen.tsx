@@ -1,5 +1,6 @@
 /** An arrow at the edge of the view to what is selected and not in it; a tap turns there. */
 
+import { t } from "@lingui/core/macro";
 import { useLayoutEffect, useRef, useState } from "react";
 import { bearingOf, lookAt } from "../../engine/bearing";
 import type { Engine } from "../../engine/engine";
@@ -43,7 +44,7 @@ export function OffScreen({ engine }: { engine: Engine }) {
       ref={button}
       type="button"
       className="off-screen"
-      aria-label={`Look at ${name || "what is selected"}, which is out of the view`}
+      aria-label={t`Turn the view to ${name || t`the selected object`}`}
       title={name}
       onClick={() => lookAt(engine, id)}
     >

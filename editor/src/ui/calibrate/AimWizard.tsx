@@ -1,5 +1,6 @@
 /** Where a mesh stands, by touching its focus points one after the other. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { useStore } from "zustand";
 import { createStore } from "zustand/vanilla";
@@ -76,10 +77,10 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
   if (!aiming) {
     return (
       <>
-        <p className="quiet small">{`Touch its ${points} focus points with the robot's tool: then it is known where it stands.`}</p>
+        <p className="quiet small">{t`Touch its ${points} focus points with the robot's tool: then it is known where it stands.`}</p>
         <Button
           icon="robot"
-          why={why || noRobot || (current ? "Something else is aimed at: finish that first." : "")}
+          why={why || noRobot || (current ? t`Something else is aimed at: finish that first.` : "")}
           onPress={() =>
             chosen &&
             void trying(async () => {
@@ -87,7 +88,7 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
             })
           }
         >
-          Begin to aim
+          {t`Begin to aim`}
         </Button>
         {told && (
           <p className="small good" role="status">
@@ -113,7 +114,7 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
   return (
     <>
       <p role="status">
-        {next < 0 ? "All points are taken." : `Point ${next + 1} of ${points}: put the tool's tip on it.`}
+        {next < 0 ? t`All points are taken.` : t`Point ${next + 1} of ${points}: put the tool's tip on it.`}
       </p>
       <ol className="focus-points">
         {Array.from({ length: points }, (_, n) => (
@@ -123,7 +124,7 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
               icon={done.includes(n) ? "check" : "point"}
               onPress={() => void trying(() => take(n))}
             >
-              {done.includes(n) ? `Take point ${n + 1} again` : `The tool is on point ${n + 1}`}
+              {done.includes(n) ? t`Take point ${n + 1} again` : t`The tool is on point ${n + 1}`}
             </Button>
           </li>
         ))}
@@ -132,19 +133,19 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
       <div className="actions start">
         <Button
           look="primary"
-          why={next < 0 ? "" : `Point ${next + 1} is missing.`}
+          why={next < 0 ? "" : t`Point ${next + 1} is missing.`}
           onPress={() =>
-            void trying(async () => aiming.done().then(() => end("It stands where its points were found.")))
+            void trying(async () => aiming.done().then(() => end(t`It stands where its points were found.`)))
           }
         >
-          Put it there
+          {t`Put it there`}
         </Button>
-        <Button onPress={() => void aiming.cancel().then(() => end(""))}>Give up</Button>
+        <Button onPress={() => void aiming.cancel().then(() => end(""))}>{t`Give up`}</Button>
       </div>
       <RefusedText>{refused}</RefusedText>
       {chosen && (
         <details className="by-numbers">
-          <summary>Move the robot</summary>
+          <summary>{t`Move the robot`}</summary>
           <ToolTab chosen={chosen} />
         </details>
       )}
@@ -160,10 +161,10 @@ function FitSoFar({ of, found }: Fit) {
   return (
     <p className="small" role="status">
       {checked
-        ? `The points fit within ${millimetres(residual)} (root mean square); point ${number} is ${millimetres(residuals[worst] ?? 0)} off.`
-        : "Three points give its place; the next shows how well they fit."}
+        ? t`The points fit within ${millimetres(residual)} (root mean square); point ${number} is ${millimetres(residuals[worst] ?? 0)} off.`
+        : t`Three points give its place; the next shows how well they fit.`}
     </p>
   );
 }
 
-const millimetres = (metres: number) => `${(metres * 1000).toFixed(1)} mm`;
+const millimetres = (metres: number) => t`${(metres * 1000).toFixed(1)} mm`;

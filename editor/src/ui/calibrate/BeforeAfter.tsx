@@ -1,5 +1,6 @@
 /** By how much a calibration has moved a thing, and where it stood before: to be kept, or put back. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { useStore } from "zustand";
 import { before, keepPlace, placeAt } from "../../commands/calibrate";
@@ -30,21 +31,21 @@ export function BeforeAfter({ id }: { id: string }) {
   }, [shown, isRobot, id, was]);
   if (!shown || !was) return null;
   return (
-    <div className="before-after" role="group" aria-label="Before and after">
+    <div className="before-after" role="group" aria-label={t`Before and after`}>
       <p role="status">
-        {`It stands ${(moved.distance * 1000).toFixed(1)} mm and ${moved.degrees.toFixed(2)}° from where it stood.`}
-        {isRobot && <span className="quiet small"> Seen through: where it stood before.</span>}
+        {t`It stands ${(moved.distance * 1000).toFixed(1)} mm and ${moved.degrees.toFixed(2)}° from where it stood.`}
+        {isRobot && <span className="quiet small"> {t`Seen through: where it stood before.`}</span>}
       </p>
       <div className="actions start">
         <Button look="primary" onPress={keepPlace}>
-          Keep the new place
+          {t`Keep the new place`}
         </Button>
         <Button
           why={why}
           isDisabled={busy}
           onPress={() => void ask(placeAt(id, was)).then((done) => done && keepPlace())}
         >
-          Put it back
+          {t`Put it back`}
         </Button>
       </div>
       <RefusedText>{refused}</RefusedText>

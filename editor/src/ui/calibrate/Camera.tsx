@@ -1,5 +1,6 @@
 /** What a camera sees, and where it stands by the markers that it sees. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { sentence } from "../../commands/asking";
 import { calibrateCamera, takePicture } from "../../commands/calibrate";
@@ -56,13 +57,13 @@ const Camera: Section["Body"] = ({ selection: { id } }) => {
   }, [follow, offline, id]);
   return (
     <>
-      {picture && <img className="camera-picture" src={picture} alt="What the camera sees" />}
+      {picture && <img className="camera-picture" src={picture} alt={t`What the camera sees`} />}
       <div className="actions start">
         <Button why={offline} onPress={() => void take()}>
-          Take a picture
+          {t`Take a picture`}
         </Button>
         <OnOff isSelected={follow} onChange={(on) => (offline ? setFailed(offline) : setFollow(on))}>
-          Keep taking
+          {t`Keep taking`}
         </OnOff>
       </div>
       <RefusedText>{failed}</RefusedText>
@@ -73,7 +74,7 @@ const Camera: Section["Body"] = ({ selection: { id } }) => {
         isDisabled={busy}
         onPress={() => void ask(calibrateCamera(id))}
       >
-        Find where it stands by markers
+        {t`Find where it stands by markers`}
       </Button>
       <RefusedText>{refused}</RefusedText>
       <Records id={id} />

@@ -1,9 +1,12 @@
 /** Where an object stands, shown by the robot: one touch with a straight tool, or three points of its frame. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { refusal } from "../../commands/asking";
 import { frameByAxes, hideAtTool, placeAt, placeByRobot, showAtTool } from "../../commands/calibrate";
 import { chosenRobot, effectorPose, notReady } from "../../commands/robot";
+import { translated } from "../../i18n/choices";
 import type { Pivot, Position } from "../../protocol/types";
 import { now, useEditor } from "../../store/store";
 import { OneOf, OnOff } from "../kit/fields";
@@ -18,10 +21,10 @@ import "../points/points.css";
 import "../robot/robot.css";
 import type { Section } from "../workplace/sections";
 
-const PIVOTS: readonly (readonly [Pivot, string])[] = [
-  ["top", "Its top"],
-  ["middle", "Its middle"],
-  ["bottom", "Its bottom"],
+const PIVOTS: readonly (readonly [Pivot, MessageDescriptor])[] = [
+  ["top", msg`Its top`],
+  ["middle", msg`Its middle`],
+  ["bottom", msg`Its bottom`],
 ];
 
 const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
@@ -33,7 +36,7 @@ const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
   return (
     <>
       <RobotChooser />
-      <OneOf label="The tool touches" value={pivot} choices={PIVOTS} onChange={setPivot} />
+      <OneOf label={t`The tool touches`} value={pivot} choices={translated(PIVOTS)} onChange={setPivot} />
       <Preview key={id} id={id} pivot={pivot} why={why || noRobot} />
       <Button
         icon="robot"
@@ -41,7 +44,7 @@ const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
         isDisabled={busy}
         onPress={() => chosen && void ask(placeByRobot(id, chosen, pivot))}
       >
-        It stands where the tool is
+        {t`It stands where the tool is`}
       </Button>
       <RefusedText>{refused}</RefusedText>
       <ThreePoints key={id} id={id} why={why || noRobot} />
@@ -64,14 +67,14 @@ function Preview({ id, pivot, why }: { id: string; pivot: Pivot; why: string }) 
   return (
     <>
       <OnOff isSelected={shown} onChange={(to) => (why ? setCannot(why) : setOn(to))}>
-        Show it on the tool first
+        {t`Show it on the tool first`}
       </OnOff>
       <RefusedText>{cannot}</RefusedText>
     </>
   );
 }
 
-const STEPS = ["Origin", "On its x axis", "In its xy plane"] as const;
+const STEPS = [msg`Origin`, msg`On its x axis`, msg`In its xy plane`] as const;
 
 function ThreePoints({ id, why }: { id: string; why: string }) {
   const chosen = useEditor(chosenRobot);
@@ -96,22 +99,22 @@ function ThreePoints({ id, why }: { id: string; why: string }) {
     });
   return (
     <details className="by-numbers">
-      <summary>By three points of its frame</summary>
+      <summary>{t`By three points of its frame`}</summary>
       <div className="actions start">
         {STEPS.map((words, n) => (
-          <Button key={words} why={why} onPress={() => touch(n)}>
+          <Button key={n} why={why} onPress={() => touch(n)}>
             {touched[n] && <Icon name="check" size={16} />}
-            {words}
+            {i18n._(words)}
           </Button>
         ))}
       </div>
       <Button
         look="primary"
-        why={why || (origin && onX && inPlane ? "" : "Touch all three points first.")}
+        why={why || (origin && onX && inPlane ? "" : t`Touch all three points first.`)}
         isDisabled={busy}
         onPress={() => void ask(place())}
       >
-        Put it there
+        {t`Put it there`}
       </Button>
       {verdict && (
         <p className="small" role="status">

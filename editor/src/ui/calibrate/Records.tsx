@@ -1,5 +1,7 @@
 /** How the calibrations of a thing went: the verdicts, newest first; what is under way is told as it goes. */
 
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { type CalibrationRecord, recordsOf } from "../../commands/calibrate";
 import { useEditor } from "../../store/store";
@@ -28,18 +30,21 @@ export function Records({ id }: { id: string }) {
     <>
       {task && (
         <p className={`small ${state === "failed" ? "error" : ""}`} role="status">
-          {state === "running" ? "Under way: " : state === "failed" ? "It failed: " : ""}
-          {task.message}
+          {state === "running"
+            ? t`In progress: ${task.message ?? ""}`
+            : state === "failed"
+              ? t`Failed: ${task.message ?? ""}`
+              : task.message}
         </p>
       )}
       <BeforeAfter id={id} />
       {records.length > 0 && (
-        <ul className="records" aria-label="How it was calibrated">
+        <ul className="records" aria-label={t`How it was calibrated`}>
           {records.map((each) => (
             <li key={each.id}>
               <span>{each.verdict}</span>
               <span className="quiet small">
-                {new Date(each.date).toLocaleString()} · {each.person}
+                {new Date(each.date).toLocaleString(i18n.locale)} · {each.person}
                 {each.residual !== undefined && ` · ${each.residual.toFixed(2)} ${each.residual_unit ?? ""}`}
               </span>
             </li>

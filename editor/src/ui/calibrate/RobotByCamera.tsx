@@ -1,5 +1,6 @@
 /** Where a robot stands, by a depth camera that sees it. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { calibrateRobot } from "../../commands/calibrate";
 import { notReady } from "../../commands/robot";
@@ -37,23 +38,23 @@ const RobotByCamera: Section["Body"] = ({ selection: { id } }) => {
     <>
       {ids.length > 1 && (
         <Pick
-          label="Camera"
+          label={t`Camera`}
           value={camera}
           choices={ids.map((each, n) => [each, names[n] ?? ""] as const)}
           onChange={setWanted}
         />
       )}
       <OnOff isSelected={moves} onChange={setMoves}>
-        Let it move to where it is seen well
+        {t`Let it move to where it is seen well`}
       </OnOff>
       <Button
         icon="robot"
         className="wraps"
-        why={why || offline || (camera ? "" : "There is no camera in this scene.")}
+        why={why || offline || (camera ? "" : t`There is no camera in this scene.`)}
         isDisabled={busy}
         onPress={() => void ask(calibrateRobot(id, camera, moves))}
       >
-        {camera ? `Find where it stands by ${names[ids.indexOf(camera)] ?? "the camera"}` : "Find where it stands"}
+        {camera ? t`Calibrate with ${names[ids.indexOf(camera)] ?? ""}` : t`Calibrate`}
       </Button>
       <RefusedText>{refused}</RefusedText>
       <Records id={id} />

@@ -1,5 +1,6 @@
 /** What the panel shows of objects whose place a robot or a camera can tell: in a scene, where objects are placed. */
 
+import { msg } from "@lingui/core/macro";
 import type { SceneObject } from "../../protocol/types";
 import { derivesFrom } from "../../store/selectors";
 import type { Selection, State } from "../../store/state";
@@ -19,7 +20,7 @@ const hasRobots = (state: State) => Object.values(state.doc?.objects ?? {}).some
 export const calibrateSections: readonly Section[] = [
   {
     id: "camera",
-    title: "Camera",
+    title: msg`Camera`,
     applies: ({ id }, state) => {
       const object = state.doc?.objects[id];
       return object !== undefined && isCamera(state, object);
@@ -28,13 +29,13 @@ export const calibrateSections: readonly Section[] = [
   },
   {
     id: "robot-by-camera",
-    title: "Calibration",
+    title: msg`Calibration`,
     applies: inScene(isRobot),
     Body: lazily(() => import("./RobotByCamera")),
   },
   {
     id: "aim",
-    title: "Aim at it",
+    title: msg`Aim at it`,
     applies: inScene(
       (state, { type, pose }) =>
         pose !== undefined &&
@@ -45,7 +46,7 @@ export const calibrateSections: readonly Section[] = [
   },
   {
     id: "place-by-robot",
-    title: "Place by the robot",
+    title: msg`Place by the robot`,
     applies: inScene((state, object) => object.pose !== undefined && hasRobots(state) && !isRobot(state, object)),
     Body: lazily(() => import("./PlaceByRobot")),
   },

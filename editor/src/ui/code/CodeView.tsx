@@ -1,5 +1,6 @@
 /** The program as the Python that runs, made by the server from what is saved. It is read, not edited. */
 
+import { t } from "@lingui/core/macro";
 import { useCallback, useEffect, useMemo, useState } from "react";
 import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
@@ -19,10 +20,10 @@ async function scriptOf(projectId: string): Promise<Code> {
   const response = await fetch(`/project/publish?projectId=${encodeURIComponent(projectId)}`, { headers });
   if (!response.ok) {
     const said = (await response.json().catch(() => null)) as { message?: string } | null;
-    return { problem: said?.message ?? `The server does not give it (${response.status}).` };
+    return { problem: said?.message ?? t`The server does not give it (${response.status}).` };
   }
   const source = await textOfZip(await response.arrayBuffer(), "script.py");
-  return source === undefined ? { problem: "The package has no script." } : { source };
+  return source === undefined ? { problem: t`The package has no script.` } : { source };
 }
 
 export default function CodeView() {
@@ -35,7 +36,7 @@ export default function CodeView() {
     state.program.running.map((each) => state.doc?.actions[each]?.name ?? "").join("\n"),
   );
   const cannotSave = useEditor(
-    (state) => barred(state, "SaveProject") || (isRunning(state) ? "The program runs." : ""),
+    (state) => barred(state, "SaveProject") || (isRunning(state) ? t`The program runs.` : ""),
   );
   const [code, setCode] = useState<Code | null>(null);
   const load = useCallback(() => {
@@ -54,21 +55,21 @@ export default function CodeView() {
   const lines = useMemo(() => (code && "source" in code ? pieces(code.source) : []), [code]);
   const byName = useMemo(() => new Map(Object.values(actions ?? {}).map((each) => [each.name, each.id])), [actions]);
 
-  if (!code) return <Waiting>Reading the program…</Waiting>;
+  if (!code) return <Waiting>{t`Reading the program…`}</Waiting>;
   const lit = new Set(runningNames.split("\n").filter(Boolean));
   return (
-    <section className="code" aria-label="The program as Python">
+    <section className="code" aria-label={t`The program as Python`}>
       {unsaved && !running && (
         <p className="code-note">
-          This is the program as it was saved.{" "}
+          {t`This is the last saved program.`}{" "}
           <Button why={cannotSave} onPress={() => void documents.save()}>
-            Save and read anew
+            {t`Save and read anew`}
           </Button>
         </p>
       )}
       {"problem" in code ? (
         <p className="code-note" role="alert">
-          It is no program yet: {code.problem}
+          {t`No program yet: ${code.problem}`}
         </p>
       ) : (
         <>
@@ -76,12 +77,12 @@ export default function CodeView() {
             <Button
               onPress={() => {
                 navigator.clipboard?.writeText(code.source).then(
-                  () => tell("info", "Copied."),
-                  () => tell("warn", "This browser does not let the page copy."),
+                  () => tell("info", t`Copied.`),
+                  () => tell("warn", t`This browser does not let the page copy.`),
                 );
               }}
             >
-              Copy
+              {t`Copy`}
             </Button>
           </div>
           <pre tabIndex={0}>

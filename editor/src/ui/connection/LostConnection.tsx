@@ -1,5 +1,6 @@
 /** Says that the server is away. The view stays, and can be looked at; it comes back by itself. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { client } from "../../session/session";
 import { now, tell, useEditor } from "../../store/store";
@@ -13,21 +14,28 @@ export function LostConnection() {
   useEffect(() => {
     // What is open is told before anybody is let in.
     if (status === "ready" && now().doc?.unsaved)
-      tell("info", "What was changed and not saved is still here: the server has kept it.");
+      tell("info", t`What was changed and not saved is still here: the server has kept it.`);
   }, [status]);
   if (status === "ready") return null;
   return (
     <div className="lost" role="alert">
       <Icon name="warn" />
       <p>
-        <strong>{status === "joining" ? "The server is back." : "No connection to the server."}</strong>{" "}
+        <strong>{status === "joining" ? t`The server is back.` : t`No connection to the server.`}</strong>{" "}
         {status === "joining"
-          ? "Reading what has changed…"
-          : `What you see is as it was. ${reason ? `${reason} ` : ""}${unsaved ? "What was changed and not saved, the server keeps. " : ""}Trying again…`}
+          ? t`Reading what has changed…`
+          : [
+              t`The screen shows the last known state.`,
+              reason,
+              unsaved && t`Unsaved changes are kept on the server.`,
+              t`Reconnecting…`,
+            ]
+              .filter(Boolean)
+              .join(" ")}
       </p>
       {status === "lost" && (
         <Button look="plain" onPress={() => client.hurry()}>
-          Try now
+          {t`Try now`}
         </Button>
       )}
     </div>

@@ -1,5 +1,6 @@
 /** The Stop button. It acts on press, not on release. It stops motion by software and is not an emergency stop. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect, useRef, useState } from "react";
 import { stopMotion } from "../../commands/operation";
 import { useEditor } from "../../store/store";
@@ -50,14 +51,15 @@ export function StopMotion() {
         <rect x="11" y="11" width="12" height="12" rx="1.500" fill="currentColor" />
       </svg>
       <span>
-        <strong>{stopping ? "Stopping…" : "Stop motion"}</strong>
+        <strong>{stopping ? t`Stopping…` : t`Stop motion`}</strong>
         <small>
           {connected ? (
             <>
-              Not an emergency stop<span className="stop-key"> · Esc twice</span>
+              {t`Not an emergency stop`}
+              <span className="stop-key"> {t`· Esc twice`}</span>
             </>
           ) : (
-            "No connection: use the emergency stop"
+            t`No connection: use the emergency stop`
           )}
         </small>
       </span>

@@ -1,5 +1,6 @@
 /** One action in the graph, with the places at which steps begin: tap one, then the action that follows; or drag. */
 
+import { t } from "@lingui/core/macro";
 import { Handle, type Node, type NodeProps, Position } from "@xyflow/react";
 import { beginStep, notEditable } from "../../commands/program";
 import { now, tell } from "../../store/store";
@@ -21,7 +22,7 @@ export function FlowNode({ data }: NodeProps<FlowNodeType>) {
       )}
       <div className="flow-name">
         {box.kind === "fold" && <Icon name="list" size={18} />}
-        {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label="pauses before it" />}
+        {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label={t`pauses before it`} />}
         {box.name}
         {box.kind === "action" && <ReachBadge id={box.id} />}
         {running && <span className="tag good">{paused ? "next" : "runs"}</span>}

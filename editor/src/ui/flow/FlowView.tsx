@@ -1,5 +1,6 @@
 /** The program as a graph. What is selected here is selected everywhere; a program that runs is followed. */
 
+import { t } from "@lingui/core/macro";
 import {
   Background,
   ControlButton,
@@ -28,6 +29,9 @@ import "./flow.css";
 const WHOLE = { padding: { top: "70px", right: "16px", bottom: "16px", left: "70px" }, maxZoom: 1.1 } as const;
 const NODE_TYPES = { box: FlowNode };
 const COLOURS = { always: "var(--ink-2)", true: "var(--good)", false: "var(--warn)", value: "var(--accent)" } as const;
+/** Return the name shown at a node of the graph. */
+const nameIn = (graph: { boxes: Box[] }, id: string): string => graph.boxes.find((each) => each.id === id)?.name ?? "";
+
 const DASHES = { always: undefined, true: "14 4", false: "3 5", value: "9 6" } as const;
 
 export default function FlowView() {
@@ -68,7 +72,7 @@ function Flow() {
       width: box.width,
       height: box.height,
       selected: box.id === selected,
-      ariaLabel: `${box.name}${box.kind === "fold" ? " folded into one" : ""}${box.detail ? `, ${box.detail}` : ""}`,
+      ariaLabel: [box.kind === "fold" ? t`${box.name}, folded` : box.name, box.detail].filter(Boolean).join(", "),
       data: {
         box,
         running: running.includes(box.id) || executing === box.id,
@@ -92,7 +96,9 @@ function Flow() {
       selected: line.id === selected,
       className: `flow-line ${line.branch}`,
       interactionWidth: 44,
-      ariaLabel: `Step from ${graph.boxes.find((each) => each.id === line.from)?.name} to ${graph.boxes.find((each) => each.id === line.to)?.name}${line.words ? `, ${line.words}` : ""}`,
+      ariaLabel: [t`Step from ${nameIn(graph, line.from)} to ${nameIn(graph, line.to)}`, line.words]
+        .filter(Boolean)
+        .join(", "),
       markerEnd: { type: MarkerType.ArrowClosed, color: colour, width: 20, height: 20 },
       style: { stroke: colour, strokeWidth: line.id === selected ? 4 : 2.5, strokeDasharray: DASHES[line.branch] },
     };
@@ -113,7 +119,7 @@ function Flow() {
     graph.boxes.find((each) => each.id === id) ?? { id, kind: "action", run: [], ways: [] };
 
   return (
-    <div className="flow" role="region" aria-label="The program as a graph" ref={host}>
+    <div className="flow" role="region" aria-label={t`The program as a graph`} ref={host}>
       <ReactFlow
         nodes={nodes}
         edges={edges}
@@ -157,10 +163,10 @@ function Flow() {
           {folds.runs > 0 && (
             <ControlButton
               className="flow-fold-all"
-              aria-label={folds.wished ? "Unfold all" : "Fold straight runs"}
+              aria-label={folds.wished ? t`Unfold all` : t`Fold straight runs`}
               onClick={() => foldAll(!folds.wished)}
             >
-              {folds.wished ? "Unfold" : "Fold"}
+              {folds.wished ? t`Unfold` : t`Fold`}
             </ControlButton>
           )}
         </Controls>

@@ -1,6 +1,7 @@
 /** The program as nodes and edges, laid out from top to bottom: pure. */
 
 import { Graph, layout } from "@dagrejs/dagre";
+import { plural, t } from "@lingui/core/macro";
 import { conditionWords, END, outgoing, placeOf, resultsOf, START } from "../../program/logic";
 import type { OpenDocument, State } from "../../store/state";
 
@@ -66,9 +67,9 @@ export function graphOf(
     {
       id: START,
       kind: "start",
-      name: "Start",
+      name: t`Start`,
       detail: "",
-      ways: lines.some((each) => each.from === START) ? [] : [{ id: "next", label: "next" }],
+      ways: lines.some((each) => each.from === START) ? [] : [{ id: "next", label: t`next` }],
       run: [],
       ...BORDER,
     },
@@ -78,19 +79,19 @@ export function graphOf(
         id: action.id,
         kind: "action" as const,
         name: action.name,
-        detail: `${doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?"} at ${doc.points[action.pointId]?.name ?? "?"}`,
+        detail: t`${doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?"} at ${doc.points[action.pointId]?.name ?? "?"}`,
         run: [],
         ...sized(waysOf(doc, types, action.id)),
       })),
     ...folded.map((run) => ({
       id: foldOf(run),
       kind: "fold" as const,
-      name: `${run.length} actions`,
+      name: plural(run.length, { one: "# action", other: "# actions" }),
       detail: run.map((id) => doc.actions[id]?.name ?? "").join(", "),
       run,
       ...sized(waysOf(doc, types, run.at(-1) ?? "")),
     })),
-    { id: END, kind: "end", name: "End", detail: "", ways: [], run: [], ...BORDER },
+    { id: END, kind: "end", name: t`End`, detail: "", ways: [], run: [], ...BORDER },
   ];
   const places = placed(bare, lines);
   return { boxes: bare.map((box) => ({ ...box, ...(places.get(box.id) ?? { x: 0, y: 0 }) })), lines };
@@ -114,16 +115,16 @@ export function waysOf(doc: OpenDocument, types: State["types"], id: string): Wa
   const result = resultsOf(doc, types, action).find(
     (each) => each.type === "boolean" || each.type === "integer" || each.type.endsWith("_enum"),
   );
-  if (!result) return ways.length === 0 ? [{ id: "next", label: "next" }] : [];
+  if (!result) return ways.length === 0 ? [{ id: "next", label: t`next` }] : [];
   if (result.type !== "boolean")
-    return [ways.length === 0 ? { id: "next", label: "next" } : { id: "branch", label: "branch" }];
+    return [ways.length === 0 ? { id: "next", label: t`next` } : { id: "branch", label: t`branch` }];
   const what = `${id}/default/${result.index}`;
   const asked = (value: string) => ways.some((each) => each.condition?.value === value);
-  if (ways.some((each) => !each.condition)) return [{ id: "branch", label: "branch" }];
+  if (ways.some((each) => !each.condition)) return [{ id: "branch", label: t`branch` }];
   const free: Way[] = [];
-  if (!asked("true")) free.push({ id: "true", label: "yes", what });
-  if (ways.length === 0) free.push({ id: "next", label: "next" });
-  if (!asked("false")) free.push({ id: "false", label: "no", what });
+  if (!asked("true")) free.push({ id: "true", label: t`yes`, what });
+  if (ways.length === 0) free.push({ id: "next", label: t`next` });
+  if (!asked("false")) free.push({ id: "false", label: t`no`, what });
   return free;
 }
 

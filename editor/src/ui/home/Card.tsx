@@ -1,5 +1,6 @@
 /** One scene, project or package, with what can be done to it. */
 
+import { plural, t } from "@lingui/core/macro";
 import { useRef, useState } from "react";
 import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
@@ -7,13 +8,13 @@ import { downloadPackage } from "../../commands/packages";
 import { runPackage } from "../../commands/run";
 import { keepOwnPicture, useOwn } from "../../commands/thumbnail";
 import { keepGeneral } from "../../commands/viewstate";
-import { count, type Entry } from "../../home/entries";
+import type { Entry } from "../../home/entries";
 import type { Requests, Run } from "../../protocol/types";
 import { isRunning } from "../../store/selectors";
 import { now, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { AskName, Button, type Choice, More } from "../kit/kit";
-import { WORDS } from "../run/History";
+import { endName } from "../run/History";
 import { ago } from "../times";
 import { Deleting } from "./Deleting";
 import { Inline } from "./Inline";
@@ -61,13 +62,15 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   const running = useEditor(isRunning);
   const why = (what: Doing) => {
     const request = DO[kind][what];
-    if (owner && owner !== connection.user && what !== "open" && what !== "copy") return `${owner} works on it.`;
+    if (owner && owner !== connection.user && what !== "open" && what !== "copy") return t`${owner} works on it.`;
     return request ? barred({ ...now(), connection }, request) : "";
   };
-  const whyOpen = why("open") || (running ? "A program runs: stop it first." : "");
+  const whyOpen = why("open") || (running ? t`A program runs: stop it first.` : "");
   const whyThis =
     whyOpen ||
-    (problems.length > 0 ? "Something is wrong with it, see its problems: it can be opened once they are mended." : "");
+    (problems.length > 0
+      ? t`Something is wrong with it, see its problems: it can be opened once they are mended.`
+      : "");
   const run = useEditor((state) =>
     kind === "package" ? state.program.runs.find((each) => each.package_id === id) : undefined,
   );
@@ -94,30 +97,35 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
       ? [
           {
             id: "project",
-            label: "New project on it…",
+            label: t`New project on it…`,
             not: barred({ ...now(), connection }, "NewProject"),
             act: () => onProject(id),
           },
         ]
       : []),
-    ...(kind === "package" ? [{ id: "paused", label: "Start paused", not: whyOpen, act: () => open(true) }] : []),
+    ...(kind === "package" ? [{ id: "paused", label: t`Start paused`, not: whyOpen, act: () => open(true) }] : []),
     ...(kind === "package"
       ? [
           {
             id: "download",
-            label: "Download",
+            label: t`Download`,
             act: () => void downloadPackage(id, name).then((wrong) => wrong && tell("error", wrong)),
           },
         ]
       : [
-          { id: "copy", label: "Duplicate…", not: why("copy"), act: () => setDoing("copy") },
-          { id: "describe", label: "Describe…", not: why("describe"), act: () => setDoing("describe") },
-          { id: "picture", label: "A picture of your own…", not: why("describe"), act: () => picture.current?.click() },
+          { id: "copy", label: t`Duplicate…`, not: why("copy"), act: () => setDoing("copy") },
+          { id: "describe", label: t`Describe…`, not: why("describe"), act: () => setDoing("describe") },
+          {
+            id: "picture",
+            label: t`A picture of your own…`,
+            not: why("describe"),
+            act: () => picture.current?.click(),
+          },
           ...(own
             ? [
                 {
                   id: "view",
-                  label: "Its picture from the view again",
+                  label: t`Its picture from the view again`,
                   not: why("describe"),
                   act: () => keepPicture(null),
                 },
@@ -125,13 +133,13 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
             : []),
           {
             id: "template",
-            label: template ? "No template any more" : "Use as a template",
+            label: template ? t`No template any more` : t`Use as a template`,
             not: why("describe"),
             act: () => keepTemplate(id, !template),
           },
         ]),
-    { id: "rename", label: "Rename…", not: why("rename"), act: () => setDoing("rename") },
-    { id: "remove", label: "Delete…", not: why("remove"), act: () => setDoing("remove") },
+    { id: "rename", label: t`Rename…`, not: why("rename"), act: () => setDoing("rename") },
+    { id: "remove", label: t`Delete…`, not: why("remove"), act: () => setDoing("remove") },
   ];
   return (
     <li className="card" data-marked={marked} data-id={id}>
@@ -144,7 +152,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           className="hidden-but-read"
           tabIndex={-1}
           aria-hidden="true"
-          aria-label={`Picture of ${name}`}
+          aria-label={t`Picture of ${name}`}
           onChange={(event) => {
             const file = event.target.files?.[0];
             if (file) keepPicture(file);
@@ -156,7 +164,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
         <div className="card-name">
           {doing === "rename" ? (
             <Inline
-              label={`New name of ${name}`}
+              label={t`New name of ${name}`}
               value={name}
               taken={taken}
               onSave={(to) => documents.rename(kind, id, to)}
@@ -169,7 +177,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
             look="plain"
             className="star"
             aria-pressed={starred}
-            aria-label={starred ? `Take the star of ${name} away` : `Give ${name} a star`}
+            aria-label={starred ? t`Take the star of ${name} away` : t`Give ${name} a star`}
             onPress={star}
           >
             <span aria-hidden="true">{starred ? "★" : "☆"}</span>
@@ -177,21 +185,21 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
         </div>
         <p className="quiet small">
           {detail(entry, run)}
-          {entry.time && ` · ${kind === "package" ? "built" : "changed"} ${ago(entry.time)}`}
+          {entry.time && ` · ${kind === "package" ? t`built ${ago(entry.time)}` : t`changed ${ago(entry.time)}`}`}
         </p>
         {template && (
           <p>
-            <span className="tag">template</span>
+            <span className="tag">{t`template`}</span>
           </p>
         )}
         {owner && owner !== connection.user && (
           <p className="tag warn">
-            <Icon name="lock" size={16} /> {owner} works on it
+            <Icon name="lock" size={16} /> {t`In use by ${owner}`}
           </p>
         )}
         {doing === "describe" && kind !== "package" ? (
           <Inline
-            label={`Description of ${name}`}
+            label={t`Description of ${name}`}
             value={entry.description}
             many
             onSave={(to) => documents.describe(kind, id, to)}
@@ -210,19 +218,19 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           icon={kind === "package" ? "play" : undefined}
           why={whyThis}
           onPress={() => open()}
-          aria-label={`${kind === "package" ? "Run" : "Open"} ${name}`}
+          aria-label={kind === "package" ? t`Run ${name}` : t`Open ${name}`}
         >
-          {kind === "package" ? "Run" : "Open"}
+          {kind === "package" ? t`Run` : t`Open`}
         </Button>
         <Related entry={entry} onRelated={onRelated} />
-        <More label={`More about ${name}`} choices={choices} />
+        <More label={t`More about ${name}`} choices={choices} />
       </div>
       {doing === "copy" && (
         <AskName
-          title={`Duplicate ${name}`}
-          initial={`${name} copy`}
+          title={t`Duplicate ${name}`}
+          initial={t`${name} copy`}
           taken={taken}
-          yes="Duplicate"
+          yes={t`Duplicate`}
           onClose={close}
           onYes={(to) =>
             void (kind === "scene" ? documents.duplicateScene(id, to) : documents.duplicateProject(id, to))
@@ -235,10 +243,10 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
 }
 
 function detail({ kind, from, projects, executed }: Entry, run: Run | undefined): string {
-  if (kind === "scene") return count(projects ?? 0, "project");
-  if (kind === "project") return `on ${from?.name ?? "a scene that is gone"}`;
-  const last = run ? `${ago(run.started)}: ${WORDS[run.end]}` : executed ? ago(executed) : "";
-  return [from && `from ${from.name}`, last ? `last run ${last}` : "not run yet"].filter(Boolean).join(" · ");
+  if (kind === "scene") return plural(projects ?? 0, { one: "# project", other: "# projects" });
+  if (kind === "project") return from ? t`on ${from.name}` : t`on a deleted scene`;
+  const last = run ? `${ago(run.started)}: ${endName(run.end)}` : executed ? ago(executed) : "";
+  return [from && t`from ${from.name}`, last ? t`last run ${last}` : t`not run yet`].filter(Boolean).join(" · ");
 }
 
 /** What it belongs to, or what belongs to it. */
@@ -251,8 +259,8 @@ function Related({
 }) {
   if (kind === "scene") {
     return projects ? (
-      <Button look="plain" aria-label={`Projects on ${name}`} onPress={() => onRelated("project", name)}>
-        Projects
+      <Button look="plain" aria-label={t`Projects on ${name}`} onPress={() => onRelated("project", name)}>
+        {t`Projects`}
       </Button>
     ) : null;
   }
@@ -261,10 +269,10 @@ function Related({
   return (
     <Button
       look="plain"
-      aria-label={`${to === "scene" ? "Scene" : "Project"} of ${name}`}
+      aria-label={to === "scene" ? t`Scene of ${name}` : t`Project of ${name}`}
       onPress={() => onRelated(to, from.name)}
     >
-      {to === "scene" ? "Scene" : "Project"}
+      {to === "scene" ? t`Scene` : t`Project`}
     </Button>
   );
 }

@@ -1,5 +1,6 @@
 /** Asks before something is deleted for good; what needs it is listed, and can be opened from here. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import * as documents from "../../commands/documents";
 import type { Entry } from "../../home/entries";
@@ -14,34 +15,34 @@ export function Deleting({ entry: { kind, id, name }, onClose }: { entry: Entry;
   }, [kind, id]);
   return (
     <Confirm
-      title={`Delete ${name}?`}
-      yes="Delete"
-      not={needing.length > 0 ? "Its projects have to be deleted first." : ""}
+      title={t`Delete ${name}?`}
+      yes={t`Delete`}
+      not={needing.length > 0 ? t`Its projects have to be deleted first.` : ""}
       onClose={onClose}
       onYes={() => void DELETE[kind](id)}
     >
       {needing.length > 0 ? (
         <>
-          <p>These projects are on this scene, and have to be deleted first:</p>
+          <p>{t`These projects are on this scene, and have to be deleted first:`}</p>
           <ul className="needing">
             {needing.map((each) => (
               <li key={each.id}>
                 <span>{each.name}</span>
                 <Button
-                  aria-label={`Open ${each.name}`}
+                  aria-label={t`Open ${each.name}`}
                   onPress={() => {
                     onClose();
                     void documents.openProject(each.id);
                   }}
                 >
-                  Open
+                  {t`Open`}
                 </Button>
               </li>
             ))}
           </ul>
         </>
       ) : (
-        <p>{kind === "package" ? "The project that it was built from stays." : "This cannot be undone."}</p>
+        <p>{kind === "package" ? t`The project that it was built from stays.` : t`This cannot be undone.`}</p>
       )}
     </Confirm>
   );

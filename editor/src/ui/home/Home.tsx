@@ -1,5 +1,7 @@
 /** What there is to open: scenes, projects, packages, kept up to date by the server's events. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import { barred } from "../../commands/asking";
@@ -21,11 +23,15 @@ import "./home.css";
 
 const TABS = ["projects", "scenes", "packages"] as const;
 type TabName = (typeof TABS)[number];
-const TITLES: Record<TabName, string> = { projects: "Projects", scenes: "Scenes", packages: "Packages" };
-const EMPTY: Record<TabName, string> = {
-  projects: "No project yet. A project is a program for a scene: make a scene first, then a project on it.",
-  scenes: "No scene yet. A scene says which devices stand in the workplace, and where.",
-  packages: "No package yet. A package is a project that was built, ready to be run.",
+const TITLES: Record<TabName, MessageDescriptor> = {
+  projects: msg`Projects`,
+  scenes: msg`Scenes`,
+  packages: msg`Packages`,
+};
+const EMPTY: Record<TabName, MessageDescriptor> = {
+  projects: msg`No project yet. A project is a program for a scene: make a scene first, then a project on it.`,
+  scenes: msg`No scene yet. A scene says which devices stand in the workplace, and where.`,
+  packages: msg`No package yet. A package is a project that was built, ready to be run.`,
 };
 const KINDS: Record<TabName, Entry["kind"]> = { projects: "project", scenes: "scene", packages: "package" };
 const TAB_OF: Record<Entry["kind"], TabName> = { project: "projects", scene: "scenes", package: "packages" };
@@ -52,19 +58,19 @@ export function Home() {
     Entry[] | null
   >;
   const here = entries[tab];
-  const noProject = noRight || (lists.scenes?.length ? "" : "Make a scene first: a project is a program for a scene.");
+  const noProject = noRight || (lists.scenes?.length ? "" : t`Make a scene first: a project is a program for a scene.`);
   return (
     <div className="home">
       <header className="bar">
-        <h1>Workplace</h1>
+        <h1>{t`Workplace`}</h1>
         <Button
           look="plain"
           icon="play"
-          aria-label="Operator"
+          aria-label={t`Operator`}
           className="to-operator"
           onPress={() => (location.hash = "#/operator")}
         >
-          <span>Operator</span>
+          <span>{t`Operator`}</span>
         </Button>
         <People />
         <Settings />
@@ -73,7 +79,7 @@ export function Home() {
         <div className="home-tools">
           <ToggleButtonGroup
             className="tabs"
-            aria-label="What is listed"
+            aria-label={t`What is listed`}
             selectionMode="single"
             disallowEmptySelection
             selectedKeys={[tab]}
@@ -81,30 +87,34 @@ export function Home() {
           >
             {TABS.map((each) => (
               <ToggleButton key={each} id={each} className="tab">
-                {TITLES[each]} <span className="tag">{entries[each]?.length ?? "…"}</span>
+                {i18n._(TITLES[each])} <span className="tag">{entries[each]?.length ?? "…"}</span>
               </ToggleButton>
             ))}
           </ToggleButtonGroup>
           <SearchField className="field search" value={search} onChange={setSearch}>
-            <Label className="hidden-but-read">Search</Label>
-            <Input placeholder="Search by name or description" />
+            <Label className="hidden-but-read">{t`Search`}</Label>
+            <Input placeholder={t`Search by name or description`} />
           </SearchField>
           <div className="field sorting">
-            <label htmlFor="sort">Sort by</label>
+            <label htmlFor="sort">{t`Sort by`}</label>
             <select id="sort" value={sort} onChange={(event) => keepGeneral({ sort: event.target.value })}>
               {SORTS.map(([each, words]) => (
                 <option key={each} value={each}>
-                  {words}
+                  {i18n._(words)}
                 </option>
               ))}
             </select>
           </div>
-          <Button aria-pressed={onlyStars} aria-label="Only what has a star" onPress={() => setOnlyStars(!onlyStars)}>
+          <Button
+            aria-pressed={onlyStars}
+            aria-label={t`Only what has a star`}
+            onPress={() => setOnlyStars(!onlyStars)}
+          >
             <span aria-hidden="true">{onlyStars ? "★" : "☆"}</span>
           </Button>
           {tab === "scenes" && (
             <Button look="primary" icon="plus" why={noScene} onPress={() => setAsking("scene")}>
-              New scene
+              {t`New scene`}
             </Button>
           )}
           {tab === "projects" && (
@@ -117,17 +127,17 @@ export function Home() {
                 setAsking("project");
               }}
             >
-              New project
+              {t`New project`}
             </Button>
           )}
           {tab === "packages" && <UploadPackage />}
         </div>
-        <section aria-label={TITLES[tab]}>
+        <section aria-label={i18n._(TITLES[tab])}>
           <Cards
             entries={here}
             found={chosen(here ?? [], search, sort, onlyStars ? stars : null, recent)}
             search={search}
-            empty={EMPTY[tab]}
+            empty={i18n._(EMPTY[tab])}
             highlight={lists.highlight}
             onRelated={(kind, name) => {
               setTab(TAB_OF[kind]);
@@ -165,14 +175,14 @@ interface ListProps {
 }
 
 function Cards({ entries, found, search, empty, highlight, onRelated, onProject }: ListProps) {
-  if (entries === null) return <Waiting>Reading the list…</Waiting>;
+  if (entries === null) return <Waiting>{t`Reading the list…`}</Waiting>;
   if (entries.length === 0) return <p className="empty quiet">{empty}</p>;
   if (found.length === 0)
     return (
       <p className="empty quiet">
         {search.trim()
-          ? `Nothing is called “${search.trim()}”.`
-          : "Nothing has a star. Tap the star of a tile to find it here."}
+          ? t`Nothing is called “${search.trim()}”.`
+          : t`Nothing has a star. Tap the star of a tile to find it here.`}
       </p>
     );
   const taken = entries.map((each) => each.name);

@@ -1,5 +1,6 @@
 /** A name or description that is written where it stands: Enter keeps it, Escape leaves it. */
 
+import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { Button } from "../kit/kit";
 import { RefusedText, useAsking } from "../points/Doing";
@@ -18,7 +19,7 @@ export function Inline({ label, value, taken = [], many = false, onSave, onClose
   const [text, setText] = useState(value);
   const { refused, busy, ask } = useAsking();
   const clean = text.trim();
-  const problem = clean !== value && taken.includes(clean) ? "There is one of that name." : "";
+  const problem = clean !== value && taken.includes(clean) ? t`There is one of that name.` : "";
   const save = (event?: FormEvent) => {
     event?.preventDefault();
     if (clean === value) return onClose();
@@ -49,9 +50,9 @@ export function Inline({ label, value, taken = [], many = false, onSave, onClose
       )}
       <RefusedText>{problem || refused}</RefusedText>
       <div className="actions">
-        <Button onPress={onClose}>Cancel</Button>
+        <Button onPress={onClose}>{t`Cancel`}</Button>
         <Button look="primary" type="submit" isDisabled={busy || problem !== "" || (!many && !clean)}>
-          Keep
+          {t`Keep`}
         </Button>
       </div>
     </form>

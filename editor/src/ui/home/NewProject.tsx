@@ -1,5 +1,6 @@
 /** Asks for the name and the scene of a new project. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import * as documents from "../../commands/documents";
 import { useEditor } from "../../store/store";
@@ -17,8 +18,8 @@ export function NewProject({ initial = "", onClose }: { initial?: string; onClos
     void (from ? documents.fromTemplate("project", from, name) : documents.newProject(scene, name, "", logic));
   return (
     <AskName
-      title="New project"
-      yes="Make and open"
+      title={t`New project`}
+      yes={t`Make and open`}
       taken={projects.map((each) => each.name)}
       onYes={make}
       onClose={onClose}
@@ -27,7 +28,7 @@ export function NewProject({ initial = "", onClose }: { initial?: string; onClos
       {!from && (
         <>
           <div className="field">
-            <label htmlFor="scene-of-project">Scene</label>
+            <label htmlFor="scene-of-project">{t`Scene`}</label>
             <select id="scene-of-project" value={scene} onChange={(event) => setScene(event.target.value)}>
               {scenes.map((each) => (
                 <option key={each.id} value={each.id}>
@@ -39,8 +40,11 @@ export function NewProject({ initial = "", onClose }: { initial?: string; onClos
           <label className="check">
             <input type="checkbox" checked={logic} onChange={(event) => setLogic(event.target.checked)} />
             <span>
-              Steps are connected here
-              <span className="quiet small"> – without, the project holds points for a script written by hand</span>
+              {t`Connect the actions in the editor`}
+              <span className="quiet small">
+                {" "}
+                {t`– if off, the project only holds points for a script of your own`}
+              </span>
             </span>
           </label>
         </>

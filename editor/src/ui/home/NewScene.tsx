@@ -1,5 +1,6 @@
 /** Asks for the name of a new scene, and what it begins with. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import * as documents from "../../commands/documents";
 import { useEditor } from "../../store/store";
@@ -12,8 +13,8 @@ export function NewScene({ onClose }: { onClose: () => void }) {
   const make = (name: string) => void (from ? documents.fromTemplate("scene", from, name) : documents.newScene(name));
   return (
     <AskName
-      title="New scene"
-      yes="Make and open"
+      title={t`New scene`}
+      yes={t`Make and open`}
       taken={scenes.map((each) => each.name)}
       onYes={make}
       onClose={onClose}

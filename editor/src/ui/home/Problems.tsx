@@ -1,10 +1,11 @@
 /** All that is wrong with a scene or project, and the way to mend it: as it is, the server does not open it. */
 
+import { plural, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { barred, sentence } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { faultyObjects, takeOut } from "../../commands/mend";
-import { count, type Entry } from "../../home/entries";
+import type { Entry } from "../../home/entries";
 import { tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button, Confirm } from "../kit/kit";
@@ -24,7 +25,7 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
     <details className="problems">
       <summary>
         <span className="tag bad">
-          <Icon name="warn" size={16} /> {count(problems.length, "problem")}
+          <Icon name="warn" size={16} /> {plural(problems.length, { one: "# problem", other: "# problems" })}
         </span>
       </summary>
       <ul>
@@ -36,46 +37,46 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
         from &&
         !from.gone &&
         (ofScene ? (
-          <Button aria-label={`Show the scene of ${name} to mend it`} onPress={onScene}>
-            Show the scene
+          <Button aria-label={t`Show the scene of ${name} to mend it`} onPress={onScene}>
+            {t`Show the scene`}
           </Button>
         ) : (
           <Button
             why={whyOpen}
-            aria-label={`Open the scene of ${name} to mend it`}
+            aria-label={t`Open the scene of ${name} to mend it`}
             onPress={() => void documents.openScene(from.id)}
           >
-            Open the scene
+            {t`Open the scene`}
           </Button>
         ))}
       {kind === "scene" && (
         <Button
           why={noScene}
-          aria-label={`Mend ${name}`}
+          aria-label={t`Mend ${name}`}
           onPress={() => void faultyObjects(id, problems).then(setFaulty, (error) => tell("error", sentence(error)))}
         >
-          Mend
+          {t`Mend`}
         </Button>
       )}
       {faulty && (
         <Confirm
-          title={`Mend ${name}?`}
-          yes="Take them out"
-          not={faulty.length > 0 ? "" : "None of its objects is at fault by itself: import the scene anew."}
+          title={t`Mend ${name}?`}
+          yes={t`Take them out`}
+          not={faulty.length > 0 ? "" : t`None of its objects is at fault by itself: import the scene anew.`}
           onClose={() => setFaulty(null)}
           onYes={() =>
             void takeOut(id, name, faulty).then((wrong) =>
-              wrong ? tell("error", wrong) : tell("info", `${name} can be opened again.`),
+              wrong ? tell("error", wrong) : tell("info", t`${name} can be opened again.`),
             )
           }
         >
           <p>
             {faulty.length > 0
-              ? `What is wrong goes out of the scene: ${faulty.join(", ")}. The scene as it is now stays as a copy.`
-              : "The names of its objects do not stand in the problems."}
+              ? t`What is wrong goes out of the scene: ${faulty.join(", ")}. The scene as it is now stays as a copy.`
+              : t`The names of its objects do not stand in the problems.`}
           </p>
           <p className="quiet small">
-            Is a kind of device missing? Once its driver is installed again, the problem goes by itself.
+            {t`Is a kind of device missing? Once its driver is installed again, the problem goes by itself.`}
           </p>
         </Confirm>
       )}

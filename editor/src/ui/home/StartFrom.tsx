@@ -1,5 +1,6 @@
 /** What a new scene or project begins with: nothing, or a copy of a template; not there where there is no template. */
 
+import { t } from "@lingui/core/macro";
 import { useEditor } from "../../store/store";
 import { isTemplate } from "./kept";
 
@@ -15,12 +16,12 @@ export function StartFrom({ of, value, onChange }: StartFromProps) {
   if (templates.length === 0) return null;
   return (
     <div className="field">
-      <label htmlFor="start-from">Start from</label>
+      <label htmlFor="start-from">{t`Start from`}</label>
       <select id="start-from" value={value} onChange={(event) => onChange(event.target.value)}>
-        <option value="">nothing</option>
+        <option value="">{t`nothing`}</option>
         {templates.map(({ id, name }) => (
           <option key={id} value={id}>
-            a copy of {name}
+            {t`a copy of ${name}`}
           </option>
         ))}
       </select>

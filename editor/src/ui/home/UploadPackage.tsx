@@ -1,5 +1,6 @@
 /** Takes a package from a file of this device. */
 
+import { t } from "@lingui/core/macro";
 import { useRef, useState } from "react";
 import { barred } from "../../commands/asking";
 import { uploadPackage } from "../../commands/packages";
@@ -15,12 +16,12 @@ export function UploadPackage() {
     setBusy(true);
     const wrong = await uploadPackage(file);
     setBusy(false);
-    tell(wrong ? "error" : "info", wrong || `${file.name} is taken in.`);
+    tell(wrong ? "error" : "info", wrong || t`${file.name} is taken in.`);
   };
   return (
     <>
       <Button icon="plus" why={why} isDisabled={busy} onPress={() => input.current?.click()}>
-        {busy ? "Uploading…" : "Upload a package"}
+        {busy ? t`Uploading…` : t`Upload a package`}
       </Button>
       <input
         ref={input}

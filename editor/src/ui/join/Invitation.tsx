@@ -1,5 +1,6 @@
 /** How others join: the address, as a code that a tablet's camera reads, and the fingerprint to compare. */
 
+import { t } from "@lingui/core/macro";
 import encodeQR from "qr";
 import { useEffect, useState } from "react";
 import { howToJoin, type Joining } from "../../commands/joining";
@@ -18,17 +19,18 @@ export function Invitation() {
       over = true;
     };
   }, []);
-  if (!joining) return <Waiting>Asking how others join…</Waiting>;
+  if (!joining) return <Waiting>{t`Asking how others join…`}</Waiting>;
   const { addresses, fingerprint } = joining;
   const [best, ...others] = addresses;
   return (
-    <section className="invitation" aria-label="How others join">
-      <h3>Others join at</h3>
+    <section className="invitation" aria-label={t`How others join`}>
+      <h3>{t`Others join at`}</h3>
       {best === undefined ? (
         <p className="small">
-          Only this machine reaches the server, at {location.origin}. For others, start it with{" "}
-          <code>arcor2-hw serve --host 0.0.0.0</code>: it then speaks TLS alone, and asks each for a token made by{" "}
-          <code>arcor2-hw token add</code>.
+          {t`The server at ${location.origin} accepts connections from this computer only. To let others join, start it with:`}
+          <code>arcor2-hw serve --host 0.0.0.0</code>
+          {t`It then requires TLS and a token per user. Create a token with:`}
+          <code>arcor2-hw token add</code>
         </p>
       ) : (
         <>
@@ -37,16 +39,16 @@ export function Invitation() {
             <p>
               <strong>{best}</strong>
             </p>
-            {others.length > 0 && <p className="quiet small">or at {others.join(", ")}</p>}
+            {others.length > 0 && <p className="quiet small">{t`or at ${others.join(", ")}`}</p>}
             <p className="quiet small">
-              Point a tablet’s camera at the code. Where the server asks for a token, each has one of his own.
+              {t`Point a tablet’s camera at the code. Where the server asks for a token, each has one of his own.`}
             </p>
           </div>
         </>
       )}
       {fingerprint && (
         <p className="small fingerprint">
-          A browser that does not know the certificate shows its SHA-256 fingerprint, which has to be:
+          {t`If the browser warns about the certificate, compare its SHA-256 fingerprint:`}
           <code>{fingerprint}</code>
         </p>
       )}
@@ -63,7 +65,7 @@ function Code({ text }: { text: string }) {
       className="join-code"
       viewBox={`0 0 ${rows.length} ${rows.length}`}
       role="img"
-      aria-label={`A code with the address ${text}`}
+      aria-label={t`A code with the address ${text}`}
       shapeRendering="crispEdges"
     >
       <path className="paper" d={`M0 0h${rows.length}v${rows.length}h-${rows.length}z`} />

@@ -1,5 +1,6 @@
 /** The first screen: a name, and a token where the server asks for one. The name is remembered. */
 
+import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { peopleHere, remember, remembered } from "../../session/memory";
 import { join } from "../../session/session";
@@ -30,22 +31,22 @@ export function Join() {
     <main className="join">
       <form onSubmit={submit}>
         <h1>ARCOR2-HW</h1>
-        <p className="quiet">Set up, program and run this workplace, together with everyone who is here.</p>
+        <p className="quiet">{t`Set up, program and run this workplace, together with everyone who is here.`}</p>
         <Field
-          label="Your name"
+          label={t`Your name`}
           value={name}
           onChange={setName}
           autoFocus
           autoComplete="nickname"
           maxLength={60}
-          hint="Others see it beside what you work on."
+          hint={t`Others see it beside what you work on.`}
         />
         {people.length > 0 && (
-          <div className="people-here" role="group" aria-label="Who was here with this device">
+          <div className="people-here" role="group" aria-label={t`Who was here with this device`}>
             {people.map((each) => (
               <Button
                 key={each}
-                aria-label={`Join as ${each}`}
+                aria-label={t`Join as ${each}`}
                 isDisabled={status === "joining"}
                 onPress={() => enter(each)}
               >
@@ -56,12 +57,12 @@ export function Join() {
         )}
         {(asksForToken || token) && (
           <Field
-            label="Token"
+            label={t`Token`}
             type="password"
             value={token}
             onChange={setToken}
             autoComplete="off"
-            hint="Who looks after the server makes it: arcor2-hw token add"
+            hint={t`Who looks after the server makes it: arcor2-hw token add`}
           />
         )}
         {status === "refused" && (
@@ -69,9 +70,9 @@ export function Join() {
             {reason}
           </p>
         )}
-        {trying && <Waiting>{reason ? `${reason} Trying again…` : "Connecting…"}</Waiting>}
+        {trying && <Waiting>{reason ? t`${reason} Trying again…` : t`Connecting…`}</Waiting>}
         <Button look="primary" type="submit" isDisabled={!name.trim() || status === "joining"}>
-          Join
+          {t`Join`}
         </Button>
       </form>
     </main>

@@ -1,5 +1,6 @@
 /** Windows over all others; a chunk of its own. `kit.tsx` has what most need of them. */
 
+import { t } from "@lingui/core/macro";
 import { type FormEvent, type ReactNode, useState } from "react";
 import { Dialog, Heading, Modal, ModalOverlay } from "react-aria-components";
 import { Button, Field } from "./kit";
@@ -57,7 +58,7 @@ export function Confirm({ title, children, yes, not = "", onYes, onClose }: Conf
       <div>{children}</div>
       <div className="actions">
         <Button onPress={onClose} autoFocus>
-          Cancel
+          {t`Cancel`}
         </Button>
         <Button
           look="danger"
@@ -77,7 +78,7 @@ export function Confirm({ title, children, yes, not = "", onYes, onClose }: Conf
 /** Asks for a name. */
 export function AskName({
   title,
-  label = "Name",
+  label = t`Name`,
   initial = "",
   yes,
   taken = [],
@@ -87,7 +88,7 @@ export function AskName({
 }: AskNameProps) {
   const [name, setName] = useState(initial);
   const clean = name.trim();
-  const problem = clean !== initial && taken.includes(clean) ? "There is one of that name." : "";
+  const problem = clean !== initial && taken.includes(clean) ? t`There is one of that name.` : "";
   const submit = (event: FormEvent) => {
     event.preventDefault();
     if (!clean || problem) return;
@@ -108,7 +109,7 @@ export function AskName({
         />
         {children}
         <div className="actions">
-          <Button onPress={onClose}>Cancel</Button>
+          <Button onPress={onClose}>{t`Cancel`}</Button>
           <Button look="primary" type="submit" isDisabled={!clean || problem !== ""}>
             {yes}
           </Button>

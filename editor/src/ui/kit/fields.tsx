@@ -1,5 +1,6 @@
 /** Choices and amounts in panels: one of a few, a number with its unit, more or less of something, on or off. */
 
+import { t } from "@lingui/core/macro";
 import { type KeyboardEvent, type ReactNode, useId, useState } from "react";
 import { Switch, ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import "./fields.css";
@@ -99,7 +100,7 @@ export function Amount({
   const [wrong, setWrong] = useState("");
   const give = (next: number) => {
     if (next < least || next > most) {
-      setWrong(`From ${round(least, digits)} to ${round(most, digits)} ${unit}.`);
+      setWrong(t`From ${round(least, digits)} to ${round(most, digits)} ${unit}.`);
       return;
     }
     setWrong("");
@@ -109,7 +110,7 @@ export function Amount({
   const commit = () => {
     if (text === null) return;
     const next = parsed(text, value);
-    if (next === null) setWrong("That is no number.");
+    if (next === null) setWrong(t`That is no number.`);
     else give(next);
   };
   const key = (event: KeyboardEvent) => {

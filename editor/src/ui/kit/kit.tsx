@@ -1,5 +1,6 @@
 /** Controls of all screens: react-aria's behaviour in our clothes. */
 
+import { t } from "@lingui/core/macro";
 import { type ReactNode, Suspense } from "react";
 import {
   Button as AriaButton,
@@ -44,7 +45,7 @@ export function Button({ look = "", icon, children, className, why = "", onPress
     >
       {icon && <Icon name={icon} />}
       {children}
-      {why && <span className="hidden-but-read">, not now: {why}</span>}
+      {why && <span className="hidden-but-read">{t`, not available: ${why}`}</span>}
     </AriaButton>
   );
 }

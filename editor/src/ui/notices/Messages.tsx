@@ -1,27 +1,30 @@
 /** All that was told since the page is open, with times, the newest first: also what went by itself. */
 
+import { i18n } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useEditor } from "../../store/store";
 import { Window } from "../kit/dialogs";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
+import { clock } from "../times";
 import "./messages.css";
 
-const WORDS = { info: "told", warn: "warning", error: "error" } as const;
+const WORDS = { info: msg`note`, warn: msg`warning`, error: msg`error` };
 
 export default function Messages({ onClose }: { onClose: () => void }) {
   const said = useEditor((state) => state.said);
   return (
-    <Window title="Messages" onClose={onClose}>
-      {said.length === 0 && <p className="quiet">Nothing has been told since the page is open.</p>}
-      <ol className="messages" tabIndex={0} aria-label="Messages, the newest first">
+    <Window title={t`Messages`} onClose={onClose}>
+      {said.length === 0 && <p className="quiet">{t`Nothing has been told since the page is open.`}</p>}
+      <ol className="messages" tabIndex={0} aria-label={t`Messages, the newest first`}>
         {[...said].reverse().map(({ id, level, text, time }) => (
           <li key={id} className={level}>
             <Icon name={level === "info" ? "info" : "warn"} size={18} />
             <time className="quiet" dateTime={new Date(time).toISOString()}>
-              {new Date(time).toLocaleTimeString("en-GB")}
+              {clock(time, true)}
             </time>
             <span>
-              <span className="hidden-but-read">{WORDS[level]}: </span>
+              <span className="hidden-but-read">{i18n._(WORDS[level])}: </span>
               {text}
             </span>
           </li>
@@ -29,7 +32,7 @@ export default function Messages({ onClose }: { onClose: () => void }) {
       </ol>
       <div className="actions">
         <Button look="primary" onPress={onClose}>
-          Close
+          {t`Close`}
         </Button>
       </div>
     </Window>

@@ -5,6 +5,7 @@
  * cover a control: the newest message and the newest task, each in a fixed space. A tap shows all messages.
  */
 
+import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import type { TaskStateData } from "../../protocol/types";
 import { without } from "../../store/records";
@@ -35,7 +36,7 @@ export function Notices({ docked = false }: { docked?: boolean }) {
   const number = docked ? 1 : SHOWN;
   const more = notices.length - number;
   return (
-    <section className={docked ? "docked-notices" : "tray"} aria-label="Tasks and messages" aria-live="polite">
+    <section className={docked ? "docked-notices" : "tray"} aria-label={t`Tasks and messages`} aria-live="polite">
       {shown.slice(docked ? -1 : 0).map((each) => (
         <Task key={each.id} task={each} />
       ))}
@@ -46,7 +47,7 @@ export function Notices({ docked = false }: { docked?: boolean }) {
             <button
               type="button"
               className="notice-text"
-              title="Show all messages"
+              title={t`Show all messages`}
               onClick={() => openOverlay("messages")}
             >
               <span>{each.text}</span>
@@ -55,12 +56,12 @@ export function Notices({ docked = false }: { docked?: boolean }) {
           ) : (
             <p>{each.text}</p>
           )}
-          <Button look="plain" icon="close" aria-label="Dismiss" onPress={() => dismiss(each.id)} />
+          <Button look="plain" icon="close" aria-label={t`Dismiss`} onPress={() => dismiss(each.id)} />
         </div>
       ))}
       {!docked && more > 0 && (
         <Button className="notices-before" onPress={() => openOverlay("messages")}>
-          {more} more
+          {t`${more} more`}
         </Button>
       )}
     </section>
@@ -103,7 +104,7 @@ function Task({ task }: { task: TaskStateData }) {
         <Button
           look="plain"
           icon="close"
-          aria-label="Dismiss"
+          aria-label={t`Dismiss`}
           onPress={() => store.setState((now) => ({ tasks: without(now.tasks, id) }))}
         />
       )}

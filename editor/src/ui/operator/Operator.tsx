@@ -3,6 +3,7 @@
  * operator role only. `/#/operator?kiosk` has no link to the editor.
  */
 
+import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { barred } from "../../commands/asking";
 import * as commands from "../../commands/run";
@@ -18,9 +19,9 @@ import { Button } from "../kit/kit";
 import { nameOf, withNames } from "../names";
 import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
-import { History, WORDS } from "../run/History";
+import { endName, History } from "../run/History";
 import { ICONS } from "../run/Result";
-import { RunButtons, STATES } from "../run/RunBar";
+import { phaseName, RunButtons } from "../run/RunBar";
 import { Settings } from "../settings/Settings";
 import { ago, useTicking } from "../times";
 import "../run/run.css";
@@ -37,15 +38,15 @@ interface Shown {
 /** Return what the state area shows. A result takes precedence over "Ready" until it is dismissed. */
 function shownState(state: State, starting: boolean, result: Result | null): Shown {
   const { state: phase } = state.program;
-  if (starting) return { tone: "idle", word: "Starting…", icon: "play" };
+  if (starting) return { tone: "idle", word: t`Starting…`, icon: "play" };
   if (isRunning(state))
     return phase === "paused"
-      ? { tone: "paused", word: STATES[phase], icon: "pause" }
-      : { tone: "running", word: STATES[phase], icon: "play" };
+      ? { tone: "paused", word: phaseName(phase), icon: "pause" }
+      : { tone: "running", word: phaseName(phase), icon: "play" };
   if (result) return { tone: TONES[result.tone], word: result.title, icon: ICONS[result.tone] };
   if (state.live.state === "started" && usersOfDocument(state).length > 0)
-    return { tone: "idle", word: "Devices are in use by the editor", icon: "plug" };
-  return { tone: "idle", word: "Ready", icon: "check" };
+    return { tone: "idle", word: t`Devices are in use by the editor`, icon: "plug" };
+  return { tone: "idle", word: t`Ready`, icon: "check" };
 }
 
 export default function Operator({ kiosk }: { kiosk: boolean }) {
@@ -72,9 +73,9 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
   const opened = doc && !runs ? (doc.project?.name ?? doc.scene.name) : "";
   const users = usersOfDocument(state);
   const why = !known
-    ? "There is no package yet: build one in the editor."
+    ? t`There is no package yet: build one in the editor.`
     : opened && users.length > 0
-      ? `${new Intl.ListFormat("en").format(users)} ${users.length === 1 ? "has" : "have"} ${opened} open in the editor. Ask them to close it.`
+      ? t`${opened} is open in the editor (${users.join(", ")}). Ask them to close it.`
       : barred(state, "RunPackage");
   const start = async () => {
     if (!known) return;
@@ -89,13 +90,15 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
   return (
     <div className="operator" data-tone={tone}>
       <header className="bar">
-        {!kiosk && <Button look="plain" icon="home" aria-label="To the editor" onPress={() => (location.hash = "")} />}
-        <h1>{runs ? program.packageName || "A program" : "Operator"}</h1>
+        {!kiosk && (
+          <Button look="plain" icon="home" aria-label={t`To the editor`} onPress={() => (location.hash = "")} />
+        )}
+        <h1>{runs ? program.packageName || t`A program` : t`Operator`}</h1>
         <People />
         <Settings />
       </header>
       <main>
-        <section className="operator-state" aria-label="State" role="status">
+        <section className="operator-state" aria-label={t`State`} role="status">
           <Icon name={icon} size={56} />
           <div>
             <p className="operator-word">{word}</p>
@@ -112,13 +115,13 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
             )}
             {result?.detail && <p>{withNames(state, result.detail)}</p>}
             {result?.tone === "bad" && (
-              <p className="operator-advice">Fix the cause, then press Start. If it fails again, call a programmer.</p>
+              <p className="operator-advice">{t`Fix the cause, then press Start. If it fails again, call a programmer.`}</p>
             )}
             {idle && !run && <LastRun />}
           </div>
           {run && (
             <Button className="operator-dismiss" onPress={() => keepGeneral(dismissal(run))}>
-              Dismiss
+              {t`Dismiss`}
             </Button>
           )}
         </section>
@@ -128,8 +131,8 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
             <RunButtons />
           </div>
         ) : (
-          <section className="operator-start" aria-label="Start">
-            <ul className="operator-packages" role="radiogroup" aria-label="What is run">
+          <section className="operator-start" aria-label={t`Start`}>
+            <ul className="operator-packages" role="radiogroup" aria-label={t`What is run`}>
               {packages.map((each) => (
                 <li key={each.id}>
                   <label className="operator-package" data-selected={each.id === known?.id}>
@@ -141,12 +144,12 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
                       onChange={() => setChosen(each.id)}
                     />
                     <strong>{each.package_meta.name}</strong>
-                    <span className="quiet small">{each.project_meta ? `from ${each.project_meta.name}` : ""}</span>
+                    <span className="quiet small">{each.project_meta ? t`from ${each.project_meta.name}` : ""}</span>
                   </label>
                 </li>
               ))}
               {packages.length === 0 && (
-                <p className="quiet">There is no package yet. Build one in the editor, under Run.</p>
+                <p className="quiet">{t`There is no package yet. Build one in the editor, under Run.`}</p>
               )}
             </ul>
             <Button
@@ -157,13 +160,13 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
               isDisabled={starting}
               onPress={() => void start()}
             >
-              Start
+              {t`Start`}
             </Button>
             {opened && (
               <p className="quiet">
                 {users.length > 0
                   ? why
-                  : `${opened} was left open in the editor. It is set aside while the program runs and keeps its unsaved changes.`}
+                  : t`${opened} was left open in the editor. It is set aside while the program runs and keeps its unsaved changes.`}
               </p>
             )}
           </section>
@@ -179,11 +182,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
 function LastRun() {
   const run = useEditor((state) => lastRun(state));
   if (!run) return null;
-  return (
-    <p className="operator-advice">
-      Last run {ago(run.ended ?? run.started)}: {WORDS[run.end]}
-    </p>
-  );
+  return <p className="operator-advice">{t`Last run ${ago(run.ended ?? run.started)}: ${endName(run.end)}`}</p>;
 }
 
 /** List the devices that are not connected; nothing if there are none. */
@@ -198,8 +197,8 @@ function Devices() {
     <section className="exception" role="alert">
       {wrong.map((each) => (
         <p key={each.object_id}>
-          <Icon name="plug" /> <strong>{doc.objects[each.object_id]?.name ?? "A device"} does not answer.</strong>{" "}
-          {each.reason}
+          <Icon name="plug" />{" "}
+          <strong>{t`${doc.objects[each.object_id]?.name ?? t`A device`} does not answer.`}</strong> {each.reason}
         </p>
       ))}
     </section>

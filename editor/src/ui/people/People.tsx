@@ -1,5 +1,6 @@
 /** Who is connected, and who left and still holds locks. */
 
+import { plural, t } from "@lingui/core/macro";
 import { Suspense, useState } from "react";
 import { serves } from "../../session/session";
 import { goneHolders } from "../../store/left";
@@ -18,10 +19,10 @@ export function People() {
   const me = useEditor((state) => state.connection.user);
   const doc = useEditor((state) => state.doc);
   const called = (name: string) => {
-    if (name === me) return `${name} (you)`;
+    if (name === me) return t`${name} (you)`;
     const looked = users[name]?.presence?.selected[0];
     const thing = looked && doc ? nameOf(now(), looked) : "";
-    return thing ? `${name}, at ${thing}` : name;
+    return thing ? t`${name}, at ${thing}` : name;
   };
   const names = [
     me,
@@ -34,7 +35,11 @@ export function People() {
     <div
       className="people"
       role="group"
-      aria-label={names.length === 1 ? "Only you are here" : `${names.length} people are here`}
+      aria-label={
+        names.length === 1
+          ? t`Only you are here`
+          : plural(names.length, { one: "# user is here", other: "# users are here" })
+      }
     >
       {shown.map((name) => (
         <span
@@ -74,14 +79,14 @@ function Gone() {
             key={name}
             look="plain"
             className="gone"
-            aria-label={`${name} left and still holds locks: take over`}
+            aria-label={t`${name} left and still holds locks: take over`}
             onPress={() => setAsked(name)}
           >
             <span className="person" aria-hidden="true">
               {initials(name)}
             </span>
             <Icon name="lock" size={16} />
-            <span className="gone-word">{name} left</span>
+            <span className="gone-word">{t`${name} left`}</span>
           </Button>
         ))}
       {asked && (

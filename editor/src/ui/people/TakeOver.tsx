@@ -1,12 +1,13 @@
 /** Asks before the locks of a user who left are released: what is locked, by whom, and since when. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { ask, barred } from "../../commands/asking";
 import type { LockHolder } from "../../protocol/types";
 import { now, tell, useEditor } from "../../store/store";
 import { Confirm } from "../kit/dialogs";
 import { nameOf } from "../names";
-import { ago } from "../times";
+import { ago, clock } from "../times";
 
 export default function TakeOver({ user, onClose }: { user: string; onClose: () => void }) {
   const [holder, setHolder] = useState<LockHolder | null>(null);
@@ -27,20 +28,20 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
   const not =
     cannot ||
     (present
-      ? `${user} is connected again.`
+      ? t`${user} is connected again.`
       : missing
-        ? `${user} holds no locks any more.`
+        ? t`${user} holds no locks any more.`
         : holder
           ? ""
-          : "Wait until the locks are listed.");
+          : t`Wait until the locks are listed.`);
   const takeOver = async () => {
     const answer = await ask("TakeOverLocks", { user });
-    if (answer) tell("info", `You took over from ${user}: ${answer.data.locks.map(called).join(", ")}.`);
+    if (answer) tell("info", t`You took over from ${user}: ${answer.data.locks.map(called).join(", ")}.`);
   };
   return (
     <Confirm
-      title={`Take over from ${user}?`}
-      yes="Take over"
+      title={t`Take over from ${user}?`}
+      yes={t`Take over`}
       not={not}
       onYes={() => void takeOver()}
       onClose={onClose}
@@ -48,23 +49,21 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
       {missing || present ? (
         <p>{not}</p>
       ) : !holder ? (
-        <p role="status">Reading the locks…</p>
+        <p role="status">{t`Reading the locks…`}</p>
       ) : (
         <>
           <p>
             {holder.left
-              ? `${user} lost the connection at ${when(holder.left)} and still holds:`
-              : `${user} still holds:`}
+              ? t`${user} lost the connection at ${when(holder.left)} and still holds:`
+              : t`${user} still holds:`}
           </p>
           <ul className="taken-over">
             {holder.locks.map((lock) => (
-              <li key={lock.object_id}>
-                <strong>{called(lock)}</strong>, since {when(lock.since)}
-              </li>
+              <li key={lock.object_id}>{t`${called(lock)}, since ${when(lock.since)}`}</li>
             ))}
           </ul>
           <p>
-            Everybody can edit these afterwards. Changes made by {user} stay. {user} is notified on returning.
+            {t`Everybody can edit these afterwards. Changes made by ${user} stay. ${user} is notified on returning.`}
           </p>
         </>
       )}
@@ -73,11 +72,10 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
 }
 
 function called({ object_id, name }: LockHolder["locks"][number]): string {
-  return name || nameOf(now(), object_id) || "an item that is not open";
+  return name || nameOf(now(), object_id) || t`an item that is not open`;
 }
 
 /** "12:31 (5 minutes ago)". */
 function when(time: string): string {
-  const clock = new Date(time).toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" });
-  return `${clock} (${ago(time)})`;
+  return `${clock(time)} (${ago(time)})`;
 }

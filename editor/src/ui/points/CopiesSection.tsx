@@ -1,5 +1,6 @@
 /** A point copied with all that hangs on it: once, or in a row. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { copyPoint } from "../../commands/points";
 import type { Position } from "../../protocol/types";
@@ -16,12 +17,12 @@ const CopiesSection: Section["Body"] = ({ selection: { id } }) => {
   const { refused, busy, ask } = useAsking();
   return (
     <details className="by-numbers">
-      <summary>Copies in a row</summary>
+      <summary>{t`Copies in a row`}</summary>
       <div className="amounts">
         {(["x", "y", "z"] as const).map((axis) => (
           <Amount
             key={axis}
-            label={`Step ${axis.toUpperCase()}`}
+            label={t`Step ${axis.toUpperCase()}`}
             unit="mm"
             value={step[axis] * 1000}
             step={10}
@@ -29,7 +30,7 @@ const CopiesSection: Section["Body"] = ({ selection: { id } }) => {
           />
         ))}
         <Amount
-          label="Copies"
+          label={t`Copies`}
           unit=""
           digits={0}
           value={count}
@@ -39,7 +40,7 @@ const CopiesSection: Section["Body"] = ({ selection: { id } }) => {
         />
       </div>
       <Button why={why} isDisabled={busy} onPress={() => void ask(copyPoint(id, count, step))}>
-        {count === 1 ? "Make a copy" : `Make ${count} copies`}
+        {count === 1 ? t`Make a copy` : t`Make ${count} copies`}
       </Button>
       <RefusedText>{refused}</RefusedText>
     </details>

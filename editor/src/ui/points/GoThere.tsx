@@ -1,5 +1,6 @@
 /** The robot sent to what is taught: shown by a ghost first, then moved. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { chosenRobot, hideGhost, moveToTaught, notReady, showAt, showJoints } from "../../commands/robot";
 import { theEngine } from "../../session/engine";
@@ -25,8 +26,8 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
     state.connection.status === "ready"
       ? chosen?.effector || joints
         ? ""
-        : "Go online first: its end effectors are not known."
-      : "There is no connection to the server.",
+        : t`Go online first: its end effectors are not known.`
+      : t`There is no connection to the server.`,
   );
   const why = useEditor((state) => notReady(state, chosen && { ...chosen, robotId }, "MoveToActionPoint"));
   const { speed } = useManner();
@@ -36,7 +37,7 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
     setAnswer(null);
     return hideGhost;
   }, [id]);
-  if (!chosen) return <p className="quiet">There is no robot in this scene.</p>;
+  if (!chosen) return <p className="quiet">{t`There is no robot in this scene.`}</p>;
   const show = () => {
     const { doc } = now();
     // A ghost that nobody sees would tell nothing.
@@ -55,7 +56,7 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
     <>
       <div className="actions start">
         <Button why={cannotAsk} onPress={show}>
-          Show {name} there
+          {t`Preview ${name}`}
         </Button>
         <Button
           look="primary"
@@ -71,13 +72,13 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
             )
           }
         >
-          Move it there
+          {t`Move it there`}
         </Button>
       </div>
       <Answer answer={answer} />
       <RefusedText>{refused}</RefusedText>
       <details className="by-numbers">
-        <summary>{`At ${Math.round(speed * 100)} % of its speed`}</summary>
+        <summary>{t`At ${Math.round(speed * 100)} % of its speed`}</summary>
         <MannerFields />
       </details>
     </>

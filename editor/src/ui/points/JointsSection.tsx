@@ -1,5 +1,6 @@
 /** Joints kept at a point: their values within the limits, taken over from the robot, or computed anew when the point moved. */
 
+import { t } from "@lingui/core/macro";
 import { removeJoints, renameJoints, setJoints, setJointsToRobot, solveJoints } from "../../commands/points";
 import { notReady } from "../../commands/robot";
 import { select, useEditor } from "../../store/store";
@@ -38,15 +39,15 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
     <>
       <NameField
         key={id}
-        label="Name of the joints"
+        label={t`Name of the joints`}
         name={kept.name}
         why={why}
         onRename={(name) => renameJoints(id, name)}
       />
       <Button look="plain" icon="point" onPress={() => select({ kind: "point", id: kept.pointId })}>
-        of {robot}, at {point}
+        {t`${robot} at ${point}`}
       </Button>
-      {!kept.is_valid && <p className="tag warn">The point has moved since: these joints no longer lead to it.</p>}
+      {!kept.is_valid && <p className="tag warn">{t`The point has moved since: these joints no longer lead to it.`}</p>}
       <ul className="joints">
         {shown.map((joint) => (
           <li key={joint.name} className="kept">
@@ -77,30 +78,30 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
       </ul>
       <div className="actions start">
         <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => void ask(setJointsToRobot(id))}>
-          As the robot is
+          {t`As the robot is`}
         </Button>
         {orientations.length > 1 ? (
           <More
-            label="Compute them anew"
+            label={t`Compute them anew`}
             look=""
             icon="redo"
             choices={orientations.map((each) => ({
               id: each.id,
-              label: `for ${each.name}`,
+              label: t`for ${each.name}`,
               not: why,
               act: () => void ask(solveJoints(id, each.id)),
             }))}
           >
-            Compute anew
+            {t`Compute anew`}
           </More>
         ) : (
           <Button
             icon="redo"
-            why={why || (only ? "" : "The point has no orientation to compute them for.")}
+            why={why || (only ? "" : t`The point has no orientation to compute them for.`)}
             isDisabled={busy}
             onPress={() => only && void ask(solveJoints(id, only.id))}
           >
-            Compute anew
+            {t`Compute anew`}
           </Button>
         )}
       </div>

@@ -1,5 +1,6 @@
 /** An orientation: its name, its angles, which robots get there, and the robot's own taken over. */
 
+import { t } from "@lingui/core/macro";
 import { removeOrientation, renameOrientation, turnOrientation, turnOrientationToRobot } from "../../commands/points";
 import { chosenRobot, notReady } from "../../commands/robot";
 import { select, useEditor } from "../../store/store";
@@ -29,16 +30,16 @@ const OrientationSection: Section["Body"] = ({ selection: { id } }) => {
     <>
       <NameField
         key={id}
-        label="Name of the orientation"
+        label={t`Name of the orientation`}
         name={one.name}
         why={why}
         onRename={(name) => renameOrientation(id, name)}
       />
       <Button look="plain" icon="point" onPress={() => select({ kind: "point", id: one.pointId })}>
-        at {point}
+        {t`at ${point}`}
       </Button>
       <div className="amounts">
-        {(["Roll", "Pitch", "Yaw"] as const).map((name, n) => (
+        {([t`Roll`, t`Pitch`, t`Yaw`] as const).map((name, n) => (
           <Amount
             key={name}
             label={name}
@@ -60,7 +61,7 @@ const OrientationSection: Section["Body"] = ({ selection: { id } }) => {
         isDisabled={busy}
         onPress={() => chosen && void ask(turnOrientationToRobot(id, chosen))}
       >
-        Turn it as the robot is
+        {t`Turn it as the robot is`}
       </Button>
       <RefusedText>{refused}</RefusedText>
       <ReachAnswers id={id} />

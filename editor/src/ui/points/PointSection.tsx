@@ -1,5 +1,6 @@
 /** A point: its name, what it hangs on, a note, and its place taken over from the robot. */
 
+import { plural, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { holdHandTeaching } from "../../commands/holds";
 import { movePointToRobot, possibleParents, removePoint, renamePoint, setParent } from "../../commands/points";
@@ -29,25 +30,25 @@ const PointSection: Section["Body"] = ({ selection: { id } }) => {
   const why = useWhyNot(id, "UpdateActionPointPosition");
   const noRobot = useEditor((state) => notReady(state, chosen, "UpdateActionPointUsingRobot"));
   const byHand = useEditor((state) =>
-    chosen && featuresOf(state, chosen.robotId)?.hand_teaching ? "" : "This robot cannot be moved by hand.",
+    chosen && featuresOf(state, chosen.robotId)?.hand_teaching ? "" : t`This robot cannot be moved by hand.`,
   );
   const { refused, busy, ask } = useAsking();
   if (!point) return null;
   const labels = names.split("\n");
-  const choices = parents ? parents.split("\n").map((each, n) => [each, `on ${labels[n] ?? ""}`] as const) : [];
+  const choices = parents ? parents.split("\n").map((each, n) => [each, t`on ${labels[n] ?? ""}`] as const) : [];
   return (
     <>
       <NameField
         key={id}
-        label="Name of the point"
+        label={t`Name of the point`}
         name={point.name}
         why={why}
         onRename={(name) => renamePoint(id, name)}
       />
       <Pick
-        label="Hangs"
+        label={t`Hangs`}
         value={point.parent ?? ""}
-        choices={[["", "in the world"], ...choices]}
+        choices={[["", t`in the world`], ...choices]}
         isDisabled={why !== "" || busy}
         onChange={(parent) => void ask(setParent(id, parent))}
       />
@@ -58,15 +59,15 @@ const PointSection: Section["Body"] = ({ selection: { id } }) => {
           isDisabled={busy}
           onPress={() => chosen && void ask(movePointToRobot(id, chosen))}
         >
-          Put it where the robot is
+          {t`Put it where the robot is`}
         </Button>
         <HoldButton
-          label="Hold: by hand. Move the arm, and let go: the point is put there"
+          label={t`Hold: by hand. Move the arm, and let go: the point is put there`}
           why={why || noRobot || byHand}
           onHold={() => holdHandTeaching(chosen?.robotId ?? "", chosen?.armId || undefined)}
           onOver={(reason) => void ask(reason || !chosen ? Promise.resolve(reason) : movePointToRobot(id, chosen))}
         >
-          Hold: by hand
+          {t`Hold: by hand`}
         </HoldButton>
       </div>
       <RefusedText>{refused}</RefusedText>
@@ -82,15 +83,16 @@ export const RemovePoint: Section["Body"] = ({ selection: { id } }) => {
   const doc = useEditor((state) => state.doc);
   const why = useWhyNot(id, "RemoveActionPoint");
   if (!doc?.points[id]) return null;
-  const count = (of: Record<string, { pointId: string }>, one: string, several: string) => {
-    const found = Object.values(of).filter((each) => each.pointId === id).length;
-    return found === 0 ? [] : [found === 1 ? `1 ${one}` : `${found} ${several}`];
-  };
+  const count = (of: Record<string, { pointId: string }>) =>
+    Object.values(of).filter((each) => each.pointId === id).length;
+  const actions = count(doc.actions);
+  const orientations = count(doc.orientations);
+  const joints = count(doc.joints);
   const along = [
-    ...count(doc.actions, "action", "actions"),
-    ...count(doc.orientations, "orientation", "orientations"),
-    ...count(doc.joints, "set of joints", "sets of joints"),
-  ];
+    actions > 0 && plural(actions, { one: "# action", other: "# actions" }),
+    orientations > 0 && plural(orientations, { one: "# orientation", other: "# orientations" }),
+    joints > 0 && plural(joints, { one: "# joint configuration", other: "# joint configurations" }),
+  ].filter(Boolean);
   return (
     <Remove key={id} name={doc.points[id].name} why={why} along={along.join(", ")} onRemove={() => removePoint(id)} />
   );
@@ -101,12 +103,12 @@ function Note({ id }: { id: string }) {
   const key = `note/${id}`;
   const kept = useEditor((state) => state.view.shared[key]);
   const why = useEditor((state) =>
-    state.connection.status === "ready" && state.connection.role >= 2 ? "" : "read only",
+    state.connection.status === "ready" && state.connection.role >= 2 ? "" : t`read only`,
   );
   const [text, setText] = useState<string | null>(null);
   return (
     <label className="field">
-      <span>Note</span>
+      <span>{t`Note`}</span>
       <textarea
         className="note"
         maxLength={2000}

@@ -1,5 +1,6 @@
 /** All points below what they hang on; one is dragged onto another, or into the world, to hang there. */
 
+import { t } from "@lingui/core/macro";
 import { useMemo } from "react";
 import { type DropItem, isTextDropItem, ListBox, ListBoxItem, useDragAndDrop } from "react-aria-components";
 import { possibleParents, setParent } from "../../commands/points";
@@ -44,7 +45,7 @@ function rowsOf(doc: OpenDocument): Row[] {
       { id: object.id, name: object.name, kind: "object" as const, depth: 0, orientations: [] },
       ...below(object.id, 1),
     ]),
-    { id: WORLD, name: "In the world", kind: "world", depth: 0, orientations: [] },
+    { id: WORLD, name: t`In the world`, kind: "world", depth: 0, orientations: [] },
     ...below(undefined, 1),
   ];
 }
@@ -64,7 +65,7 @@ export function PointTree() {
   });
   return (
     <ListBox
-      aria-label="Points. Drag one onto what it shall hang on."
+      aria-label={t`Points. Drag one onto what it shall hang on.`}
       className="things"
       items={rows}
       dependencies={[reach]}
@@ -107,7 +108,7 @@ async function hang(id: string, target: string): Promise<void> {
   const state = now();
   if ((state.doc?.points[id]?.parent ?? "") === parent) return;
   if (parent && !possibleParents(state, id).includes(parent)) {
-    tell("info", `${nameOf(state, id)} cannot hang on ${nameOf(state, parent)}: that hangs on it.`);
+    tell("info", t`${nameOf(state, id)} cannot hang on ${nameOf(state, parent)}: that hangs on it.`);
     return;
   }
   const refused = await setParent(id, parent);

@@ -1,5 +1,6 @@
 /** Points of the project: added on a surface that is tapped, at the cross, by numbers, or where the robot is. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { createPortal } from "react-dom";
 import { against, aimedPlace } from "../../commands/aimed";
@@ -35,7 +36,7 @@ export default function PointsPanel() {
   const selected = useEditor((state) => state.ui.selection?.id);
   const candidate = selected === undefined ? "" : parentOfSelection();
   const parentName = useEditor((state) => (candidate ? nameOf(state, candidate) : ""));
-  const why = useEditor((state) => (isRunning(state) ? "A program runs." : barred(state, "AddActionPoint")));
+  const why = useEditor((state) => (isRunning(state) ? t`A program runs.` : barred(state, "AddActionPoint")));
   const noRobot = useEditor((state) => notReady(state, chosen, "AddApUsingRobot"));
   const [on, setOn] = useState<"parent" | "world">("parent");
   const [tapping, setTapping] = useState(false);
@@ -58,19 +59,19 @@ export default function PointsPanel() {
   const atCross = () => {
     const place = aimedPlace();
     if (place) added(addPoint(place.position, parent, standing ? place.orientation : undefined));
-    else tell("info", "The cross points at nothing: turn the view so that it is on the table or a thing.");
+    else tell("info", t`The cross points at nothing: turn the view so that it is on the table or a thing.`);
   };
   return (
     <>
       <Cross />
       {parentName && (
         <OneOf
-          label="A new point hangs"
+          label={t`A new point hangs`}
           value={on}
           onChange={setOn}
           choices={[
-            ["parent", `on ${parentName}`],
-            ["world", "in the world"],
+            ["parent", t`on ${parentName}`],
+            ["world", t`in the world`],
           ]}
         />
       )}
@@ -82,21 +83,21 @@ export default function PointsPanel() {
           isDisabled={busy}
           onPress={() => chosen && added(addPointFromRobot(chosen))}
         >
-          Where the robot is
+          {t`Where the robot is`}
         </Button>
         <Button icon="point" why={why} isDisabled={busy} aria-pressed={tapping} onPress={() => setTapping(!tapping)}>
-          {tapping ? "Tap a place…" : "Where I tap"}
+          {tapping ? t`Tap a place…` : t`Where I tap`}
         </Button>
         <Button icon="plus" why={why} isDisabled={busy} onPress={atCross}>
-          At the cross
+          {t`At the cross`}
         </Button>
       </div>
       <OnOff isSelected={standing} onChange={setStanding}>
-        With an orientation: tool onto the surface
+        {t`With an orientation: tool onto the surface`}
       </OnOff>
       <details className="by-numbers">
-        <summary>By numbers</summary>
-        <p className="quiet small">{parent ? `In the frame of ${parentName}.` : "In the world."}</p>
+        <summary>{t`By numbers`}</summary>
+        <p className="quiet small">{parent ? t`In the frame of ${parentName}.` : t`In the world.`}</p>
         <div className="amounts">
           {(["x", "y", "z"] as const).map((axis) => (
             <Amount
@@ -117,13 +118,13 @@ export default function PointsPanel() {
             if (doc) added(addPoint(composed(worldOf(doc, parent), { ...ORIGIN, position: typed }).position, parent));
           }}
         >
-          Add the point
+          {t`Add the point`}
         </Button>
       </details>
       <RefusedText>{refused}</RefusedText>
       <PointTree />
       <MoreOrLess
-        label="Size of points in the view"
+        label={t`Size of points in the view`}
         value={size}
         least={0.5}
         most={4}

@@ -1,5 +1,7 @@
 /** Whether robots get there: a word and a sign of its own for each answer, not the colour alone. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { reachOfAction, worse } from "../../program/reach";
 import type { Reach, ReachOfItem } from "../../protocol/types";
 import type { State } from "../../store/state";
@@ -14,12 +16,12 @@ const SIGNS: Record<Reach, string> = {
   out_of_reach: "✕",
   unknown: "?",
 };
-const WORDS: Record<Reach, string> = {
-  reachable: "reaches it",
-  near_limit: "near a limit",
-  in_collision: "in collision",
-  out_of_reach: "out of reach",
-  unknown: "not known",
+const WORDS: Record<Reach, MessageDescriptor> = {
+  reachable: msg`reaches it`,
+  near_limit: msg`near a limit`,
+  in_collision: msg`in collision`,
+  out_of_reach: msg`out of reach`,
+  unknown: msg`not known`,
 };
 const TONES: Record<Reach, string> = {
   reachable: "good",
@@ -55,9 +57,9 @@ export function ReachBadge({ id }: { id: string }) {
   });
   if (!reach) return null;
   return (
-    <span className={`tag reach ${TONES[reach]}`} title={WORDS[reach]}>
+    <span className={`tag reach ${TONES[reach]}`} title={i18n._(WORDS[reach])}>
       <span aria-hidden="true">{SIGNS[reach]}</span>
-      <span className="hidden-but-read">{WORDS[reach]}</span>
+      <span className="hidden-but-read">{i18n._(WORDS[reach])}</span>
     </span>
   );
 }
@@ -67,13 +69,13 @@ export function ReachAnswers({ id }: { id: string }) {
   const reach = useEditor((state) => state.reach);
   const doc = useEditor((state) => state.doc);
   const found = reach && doc ? answers({ reach, doc } as State, id) : [];
-  if (found.length === 0) return <p className="quiet small">Whether a robot gets there is not known.</p>;
+  if (found.length === 0) return <p className="quiet small">{t`Whether a robot gets there is not known.`}</p>;
   return (
     <ul className="reaches">
       {found.map((one) => (
         <li key={one.robot}>
           <span className={`tag reach ${TONES[one.reach]}`}>
-            <span aria-hidden="true">{SIGNS[one.reach]}</span> {one.robot}: {WORDS[one.reach]}
+            <span aria-hidden="true">{SIGNS[one.reach]}</span> {one.robot}: {i18n._(WORDS[one.reach])}
           </span>
           {one.reason && <span className="small quiet">{one.reason}</span>}
         </li>
@@ -93,7 +95,7 @@ export function ReachOfAction({ id }: { id: string }) {
   return (
     <p className="reach-of-action">
       <span className={`tag reach ${TONES[found.reach]}`}>
-        <span aria-hidden="true">{SIGNS[found.reach]}</span> {robot}: {WORDS[found.reach]}
+        <span aria-hidden="true">{SIGNS[found.reach]}</span> {robot}: {i18n._(WORDS[found.reach])}
       </span>
       {found.reason && <span className="small quiet">{found.reason}</span>}
     </p>

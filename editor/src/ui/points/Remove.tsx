@@ -1,5 +1,6 @@
 /** Takes a point, an orientation or joints away: says what goes with it, and how to have it back. */
 
+import { t } from "@lingui/core/macro";
 import { tell } from "../../store/store";
 import { Button } from "../kit/kit";
 import { RefusedText, useAsking } from "./Doing";
@@ -24,13 +25,20 @@ export function Remove({
         isDisabled={busy}
         onPress={() =>
           void ask(onRemove()).then(
-            (done) => done && tell("info", `${name} is gone${along ? `, with ${along}` : ""}. Undo brings it back.`),
+            (done) =>
+              done &&
+              tell(
+                "info",
+                along
+                  ? t`Removed ${name} with ${along}. Press Undo to restore.`
+                  : t`Removed ${name}. Press Undo to restore.`,
+              ),
           )
         }
       >
-        Remove {name}
+        {t`Remove ${name}`}
       </Button>
-      {along && <p className="quiet small">{`With it: ${along}.`}</p>}
+      {along && <p className="quiet small">{t`With it: ${along}.`}</p>}
       <RefusedText>{refused}</RefusedText>
     </div>
   );

@@ -1,5 +1,6 @@
 /** What is taught at a point: orientations and joints, with whether robots get there. */
 
+import { t } from "@lingui/core/macro";
 import {
   addJointsFromRobot,
   addOrientation,
@@ -44,7 +45,7 @@ export const Orientations: Section["Body"] = ({ selection: { id } }) => {
             <Button
               look="plain"
               icon="close"
-              aria-label={`Remove the orientation ${each.name}`}
+              aria-label={t`Remove the orientation ${each.name}`}
               why={why}
               isDisabled={busy}
               onPress={() => void ask(removeOrientation(each.id))}
@@ -59,23 +60,23 @@ export const Orientations: Section["Body"] = ({ selection: { id } }) => {
           isDisabled={busy}
           onPress={() => chosen && void ask(addOrientationFromRobot(id, chosen))}
         >
-          From the robot
+          {t`From the robot`}
         </Button>
         <More
-          label="Add an orientation"
+          label={t`Add an orientation`}
           icon="plus"
           look=""
           choices={[
-            { id: "down", label: "Tool straight down", not: why, act: down },
+            { id: "down", label: t`Tool straight down`, not: why, act: down },
             {
               id: "parent",
-              label: "As what the point hangs on",
+              label: t`As what the point hangs on`,
               not: why,
               act: () => void ask(addOrientation(id, { x: 0, y: 0, z: 0, w: 1 })),
             },
           ]}
         >
-          Add
+          {t`Add`}
         </More>
       </div>
       <RefusedText>{refused}</RefusedText>
@@ -103,11 +104,11 @@ export const JointsList: Section["Body"] = ({ selection: { id } }) => {
         {taught.map((each) => (
           <li key={each.id}>
             <Taught kind="joints" id={each.id} name={`${each.name} · ${each.robot}`} />
-            {!each.is_valid && <span className="tag warn">point has moved</span>}
+            {!each.is_valid && <span className="tag warn">{t`point has moved`}</span>}
             <Button
               look="plain"
               icon="close"
-              aria-label={`Remove the joints ${each.name}`}
+              aria-label={t`Remove the joints ${each.name}`}
               why={why}
               isDisabled={busy}
               onPress={() => void ask(removeJoints(each.id))}
@@ -121,7 +122,7 @@ export const JointsList: Section["Body"] = ({ selection: { id } }) => {
         isDisabled={busy}
         onPress={() => chosen && void ask(addJointsFromRobot(id, chosen))}
       >
-        From the robot
+        {t`From the robot`}
       </Button>
       <RefusedText>{refused}</RefusedText>
     </>

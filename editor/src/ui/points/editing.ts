@@ -1,5 +1,6 @@
 /** Why something of the open document cannot be changed by this user just now. */
 
+import { t } from "@lingui/core/macro";
 import { barred } from "../../commands/asking";
 import type { Requests } from "../../protocol/types";
 import { heldBy, isRunning } from "../../store/selectors";
@@ -7,9 +8,9 @@ import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
 
 export function whyNotNow(state: State, id: string, request: keyof Requests): string {
-  if (isRunning(state)) return "A program runs.";
+  if (isRunning(state)) return t`A program runs.`;
   const holder = heldBy(state, id);
-  if (holder) return `${holder} works on it.`;
+  if (holder) return t`${holder} works on it.`;
   return barred(state, request);
 }
 

@@ -1,5 +1,6 @@
 /** What the panel shows of points, orientations and joints. */
 
+import { msg } from "@lingui/core/macro";
 import type { Kind } from "../../store/state";
 import { lazily } from "../kit/lazily";
 import type { Section } from "../workplace/sections";
@@ -10,31 +11,31 @@ const of =
     kinds.includes(kind);
 
 export const pointSections: readonly Section[] = [
-  { id: "point", title: "Point", applies: of("point"), Body: lazily(() => import("./PointSection")) },
+  { id: "point", title: msg`Point`, applies: of("point"), Body: lazily(() => import("./PointSection")) },
   {
     id: "orientation",
-    title: "Orientation",
+    title: msg`Orientation`,
     applies: of("orientation"),
     Body: lazily(() => import("./OrientationSection")),
   },
-  { id: "joints", title: "Joints", applies: of("joints"), Body: lazily(() => import("./JointsSection")) },
-  { id: "go", title: "Robot", applies: of("orientation", "joints"), Body: lazily(() => import("./GoThere")) },
+  { id: "joints", title: msg`Joints`, applies: of("joints"), Body: lazily(() => import("./JointsSection")) },
+  { id: "go", title: msg`Robot`, applies: of("orientation", "joints"), Body: lazily(() => import("./GoThere")) },
   {
     id: "orientations",
-    title: "Orientations",
+    title: msg`Orientations`,
     applies: of("point"),
     Body: lazily(() => import("./TaughtSection").then((module) => ({ default: module.Orientations }))),
   },
   {
     id: "joints-list",
-    title: "Joints",
+    title: msg`Joints`,
     applies: of("point"),
     Body: lazily(() => import("./TaughtSection").then((module) => ({ default: module.JointsList }))),
   },
-  { id: "copies", title: "Copies", applies: of("point"), Body: lazily(() => import("./CopiesSection")) },
+  { id: "copies", title: msg`Copies`, applies: of("point"), Body: lazily(() => import("./CopiesSection")) },
   {
     id: "remove-point",
-    title: "Remove",
+    title: msg`Remove`,
     applies: of("point"),
     Body: lazily(() => import("./PointSection").then((module) => ({ default: module.RemovePoint }))),
   },

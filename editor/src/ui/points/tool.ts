@@ -1,11 +1,12 @@
 /** Points of the project: to add them, and what there is. */
 
+import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";
 import type { Tool } from "../workplace/tools";
 
 export const points: Tool = {
   id: "points",
-  label: "Points",
+  label: msg`Points`,
   icon: "point",
   shown: (state) => state.doc?.project != null,
   Panel: lazily(() => import("./PointsPanel")),

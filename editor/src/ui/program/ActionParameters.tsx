@@ -1,5 +1,7 @@
 /** What an action is told: each parameter from a value, the result of an earlier action, or a parameter of the project. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import {
   addParameter,
@@ -11,7 +13,7 @@ import {
 } from "../../commands/program";
 import { linkTo, metaOf, usable } from "../../program/logic";
 import { freeName, words } from "../../program/naming";
-import { decoded, extraOf, initial, SIMPLE, type Source, sourceOf, TYPE_WORDS } from "../../program/values";
+import { decoded, extraOf, initial, SIMPLE, type Source, sourceOf, typeName } from "../../program/values";
 import type { ActionParameter, ParameterMeta } from "../../protocol/types";
 import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
@@ -21,7 +23,11 @@ import type { Section } from "../workplace/sections";
 import { type Choice, ValueField } from "./ValueField";
 import "./program.css";
 
-const SOURCES: Record<Source, string> = { value: "Value", link: "Result", project_parameter: "Project" };
+const SOURCES: Record<Source, MessageDescriptor> = {
+  value: msg`Value`,
+  link: msg`Result`,
+  project_parameter: msg`Project`,
+};
 
 const ActionParameters: Section["Body"] = ({ selection: { id } }) => {
   const doc = useEditor((state) => state.doc);
@@ -31,9 +37,9 @@ const ActionParameters: Section["Body"] = ({ selection: { id } }) => {
   const meta = metaOf(types, doc, action);
   if (!meta)
     return (
-      <p className="quiet small">What it can be told is not known: its device is gone, or cannot do this any more.</p>
+      <p className="quiet small">{t`What it can be told is not known: its device is gone, or cannot do this any more.`}</p>
     );
-  if (meta.parameters.length === 0) return <p className="quiet small">It needs nothing.</p>;
+  if (meta.parameters.length === 0) return <p className="quiet small">{t`It needs nothing.`}</p>;
   return (
     <>
       <ReachOfAction id={id} />
@@ -102,9 +108,9 @@ function One({
           json={chosen === "link" ? parameter?.value : undefined}
           choices={results.map((each) => ({
             json: JSON.stringify(linkTo(each)),
-            label: `${each.name} of ${each.action.name}`,
+            label: t`${each.name} of ${each.action.name}`,
           }))}
-          hint="what an earlier action found out"
+          hint={t`what an earlier action found out`}
           onSet={(json) => set("link", json)}
         />
       ) : (
@@ -117,9 +123,9 @@ function One({
               json: JSON.stringify(each.id),
               label: `${each.name} = ${String(decoded(each.value))}`,
             })),
-            { json: NEW, label: `New, with the present value…` },
+            { json: NEW, label: t`New, with the present value…` },
           ]}
-          hint="one value for the whole program"
+          hint={t`one value for the whole program`}
           onSet={async (json) => {
             if (json !== NEW) return set("project_parameter", json);
             const made = await sharedFrom(
@@ -132,7 +138,7 @@ function One({
         />
       )}
       {sources.length > 1 && (
-        <div className="chips sources" role="radiogroup" aria-label={`Where ${label} comes from`}>
+        <div className="chips sources" role="radiogroup" aria-label={t`Where ${label} comes from`}>
           {sources.map((each) => (
             <label key={each} className="chip" data-selected={source === each}>
               <input
@@ -143,7 +149,7 @@ function One({
                 disabled={why !== ""}
                 onChange={() => setSource(each)}
               />
-              {SOURCES[each]}
+              {i18n._(SOURCES[each])}
             </label>
           ))}
         </div>
@@ -182,7 +188,7 @@ interface LiteralProps {
 function Literal({ state, actionId, wanted, json, field, onSet }: LiteralProps) {
   const dynamic = useDynamic(state, actionId, wanted);
   const choices = dynamic.choices ?? placesFor(state, actionId, wanted.type);
-  const hint = [field.hint, dynamic.note, choices && !dynamic.choices && TYPE_WORDS[wanted.type]]
+  const hint = [field.hint, dynamic.note, choices && !dynamic.choices && typeName(wanted.type)]
     .filter(Boolean)
     .join(" · ");
   return (
@@ -213,7 +219,7 @@ function placesFor(state: State, actionId: string, type: string): Choice[] | und
     if (robot_id !== robot) continue;
     for (const { id, reach } of items)
       if (reach === "out_of_reach" || reach === "in_collision")
-        best[id] = reach === "out_of_reach" ? " – out of reach" : " – would collide";
+        best[id] = reach === "out_of_reach" ? t` – out of reach` : t` – would collide`;
   }
   switch (type) {
     case "pose":
@@ -226,7 +232,7 @@ function placesFor(state: State, actionId: string, type: string): Choice[] | und
     case "joints":
       return first(Object.values(doc.joints).filter((each) => each.robot_id === robot)).map((each) => ({
         json: JSON.stringify(each.id),
-        label: `${on(each)}${each.is_valid ? (best[each.id] ?? "") : " – its point was moved since"}`,
+        label: on(each) + (each.is_valid ? (best[each.id] ?? "") : t` – point has moved`),
       }));
     default:
       return undefined;
@@ -273,13 +279,13 @@ function useDynamic(state: State, actionId: string, wanted: ParameterMeta): { ch
   }, [key, online, wanted.dynamic_value]);
   if (!wanted.dynamic_value) return {};
   if (missing.length > 0)
-    return { note: `what there is depends on ${missing.join(" and ")}, which is found out when it runs` };
+    return { note: t`what there is depends on ${missing.join(" and ")}, which is found out when it runs` };
   const fresh = asked?.key === key && online;
   const values = fresh ? asked.values : lastDynamicValues(objectId, wanted.name, parents as Known[]);
-  if (!values) return { note: online ? "asking the device…" : "go online to choose from what the device has" };
+  if (!values) return { note: online ? t`asking the device…` : t`go online to choose from what the device has` };
   const choices = values.map((each) => ({
     json: wanted.type.startsWith("integer") ? each : JSON.stringify(each),
     label: each,
   }));
-  return { choices, note: fresh ? undefined : "as the device told last" };
+  return { choices, note: fresh ? undefined : t`as the device told last` };
 }

@@ -3,6 +3,7 @@
  * is selected, or on a new one where the cross in the view is. What it needs (a point, an orientation) is made with it.
  */
 
+import { t } from "@lingui/core/macro";
 import { useMemo, useState } from "react";
 import {
   Button as AriaButton,
@@ -61,7 +62,7 @@ export function AddAction() {
     if (why) return tell("info", `${words(offer.meta.name)}: ${why}`);
     const where = placeFor(onPoint);
     if (!where)
-      return tell("info", "The cross points at nothing: turn the view so that it is on the table or a thing.");
+      return tell("info", t`The cross points at nothing: turn the view so that it is on the table or a thing.`);
     setBusy(offer.key);
     recent = [offer.key, ...recent.filter((each) => each !== offer.key)].slice(0, RECENT);
     await addAction(offer.objectId, offer.meta, where);
@@ -88,31 +89,31 @@ export function AddAction() {
       <div className="where">
         <ToggleButtonGroup
           className="tabs small-tabs"
-          aria-label="Where the action is put"
+          aria-label={t`Where the action is put`}
           selectionMode="single"
           disallowEmptySelection
           selectedKeys={[onPoint ? "point" : "here"]}
           onSelectionChange={(keys) => setAnew([...keys][0] === "here")}
         >
           <ToggleButton id="here" className="tab">
-            At the cross
+            {t`At the cross`}
           </ToggleButton>
           <ToggleButton id="point" className="tab" isDisabled={!selected}>
-            {selected ? `On ${pointName}` : "On a point"}
+            {selected ? t`On ${pointName}` : t`On a point`}
           </ToggleButton>
         </ToggleButtonGroup>
         <p className="quiet small">
-          {onPoint ? "It goes on the point that is selected." : "A new point is made where the cross in the view is."}
+          {onPoint ? t`It goes on the point that is selected.` : t`A new point is made where the cross in the view is.`}
         </p>
       </div>
       {!onPoint && <Cross />}
       <SearchField className="field" value={search} onChange={setSearch}>
-        <Label className="hidden-but-read">Search actions</Label>
-        <Input placeholder={`Search ${offers.length} actions`} />
+        <Label className="hidden-but-read">{t`Search actions`}</Label>
+        <Input placeholder={t`Search ${offers.length} actions`} />
       </SearchField>
       {used.length > 0 && (
-        <section className="offers" aria-label="Used before">
-          <h3>Used before</h3>
+        <section className="offers" aria-label={t`Used before`}>
+          <h3>{t`Used before`}</h3>
           <ul>{used.map((offer) => row(offer, "recent/"))}</ul>
         </section>
       )}
@@ -126,7 +127,9 @@ export function AddAction() {
         </section>
       ))}
       {found.length === 0 && (
-        <p className="quiet">{offers.length ? "No action is called that." : "No device of this scene has actions."}</p>
+        <p className="quiet">
+          {offers.length ? t`No action is called that.` : t`No device of this scene has actions.`}
+        </p>
       )}
     </>
   );
@@ -181,13 +184,13 @@ function offersOf(state: State, pointId: string): Offer[] {
 
 /** Why an action cannot be added just now; empty when it can. */
 function whyNot(state: State, objectId: string, meta: ObjectAction, pointId: string): string {
-  if (meta.disabled) return meta.problem ?? "It cannot be used.";
+  if (meta.disabled) return meta.problem ?? t`It cannot be used.`;
   const needsJoints = meta.parameters.some((each) => each.type === "joints");
   if (needsJoints && state.live.state !== "started") {
     const there = Object.values(state.doc?.joints ?? {}).some(
       (each) => each.pointId === pointId && each.robot_id === objectId,
     );
-    if (!there) return "It needs joints: go online, and they are taken from the robot.";
+    if (!there) return t`It needs joints: go online, and they are taken from the robot.`;
   }
   const needsImage = meta.parameters.some((each) => each.type === "image");
   if (needsImage) {
@@ -198,7 +201,7 @@ function whyNot(state: State, objectId: string, meta: ObjectAction, pointId: str
         ?.find((each) => each.name === method)
         ?.returns.includes("image");
     });
-    if (!given) return "It needs a picture: add the action that takes one first.";
+    if (!given) return t`It needs a picture: add the action that takes one first.`;
   }
   return "";
 }

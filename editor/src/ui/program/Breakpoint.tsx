@@ -1,5 +1,6 @@
 /** The breakpoint of a point: the program pauses before every action that uses a pose or joints of it. */
 
+import { t } from "@lingui/core/macro";
 import { barred } from "../../commands/asking";
 import { breakAt } from "../../commands/run";
 import { useEditor } from "../../store/store";
@@ -12,7 +13,7 @@ const Breakpoint: Section["Body"] = ({ selection: { id } }) => {
   const why = useEditor((state) => barred(state, "SetBreakpoints"));
   return (
     <Button aria-pressed={on} why={why} onPress={() => void breakAt(id, !on)}>
-      <span className="breakpoint-dot" data-on={on} aria-hidden="true" /> Pause whenever a robot goes here
+      <span className="breakpoint-dot" data-on={on} aria-hidden="true" /> {t`Pause when a robot moves here`}
     </Button>
   );
 };

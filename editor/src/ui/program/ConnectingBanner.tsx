@@ -1,5 +1,6 @@
 /** Says that the next tap ends a step, and how to give it up: by Escape, or the button. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { cancelStep } from "../../commands/program";
 import { now, useEditor } from "../../store/store";
@@ -19,9 +20,9 @@ export default function ConnectingBanner() {
   if (!connecting) return null;
   return (
     <div className="banner" role="status">
-      <span>Tap what follows {nameOf(now(), connecting.from)}.</span>
+      <span>{t`Tap the step that follows ${nameOf(now(), connecting.from)}.`}</span>
       <Button look="plain" onPress={cancelStep}>
-        Give up
+        {t`Give up`}
       </Button>
     </div>
   );

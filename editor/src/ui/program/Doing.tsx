@@ -1,5 +1,6 @@
 /** What can be done with an action: try it, run to it, rename, duplicate, remove; and how the last tries ended. */
 
+import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { barred } from "../../commands/asking";
 import { stopMotion } from "../../commands/operation";
@@ -25,37 +26,38 @@ const Doing: Section["Body"] = ({ selection: { id } }) => {
   const notNow =
     notEditable(state, "ExecuteAction") ||
     (live.state !== "started"
-      ? "Go online first: it moves the real devices."
+      ? t`Go online first: it moves the real devices.`
       : live.executing
-        ? "Another action is being tried."
+        ? t`Another action is being tried.`
         : "");
-  const stays = doc.project?.has_logic ? notRunnable(state) : "The project has no program.";
+  const stays = doc.project?.has_logic ? notRunnable(state) : t`The project has no program.`;
   return (
     <>
       <div className="row">
         {running ? (
           <Button icon="close" onPress={() => void (meta?.meta.cancellable ? cancel() : stopMotion())}>
-            {meta?.meta.cancellable ? "Cancel" : "Stop everything"}
+            {meta?.meta.cancellable ? t`Cancel` : t`Stop everything`}
           </Button>
         ) : (
           <Button icon="play" why={notNow} onPress={() => void execute(id)}>
-            Try it
+            {t`Try it`}
           </Button>
         )}
         <Button icon="play" why={stays} onPress={() => void runTo(id)}>
-          Run to here
+          {t`Run to here`}
         </Button>
         <Button
           aria-pressed={id in breakpoints}
           why={barred(state, "SetBreakpoints")}
           onPress={() => void breakAt(id, !(id in breakpoints))}
         >
-          <span className="breakpoint-dot" data-on={id in breakpoints} aria-hidden="true" /> Pause before it
+          <span className="breakpoint-dot" data-on={id in breakpoints} aria-hidden="true" />{" "}
+          {t`Pause before this action`}
         </Button>
       </div>
       {running && (
         <p role="status">
-          <span className="spinner" aria-hidden="true" /> It is being done…
+          <span className="spinner" aria-hidden="true" /> {t`Running…`}
         </p>
       )}
       {tried
@@ -64,7 +66,7 @@ const Doing: Section["Body"] = ({ selection: { id } }) => {
         .reverse()
         .map((each) => (
           <div key={each.time} className={`outcome ${each.error ? "bad" : "good"}`} role="status">
-            <strong>{each.error ? "Failed" : "Done"}</strong>{" "}
+            <strong>{each.error ? t`Failed` : t`Done`}</strong>{" "}
             <span className="quiet small">{ago(new Date(each.time).toISOString())}</span>
             {each.error && <p>{each.error}</p>}
             {each.results && each.results.length > 0 && (
@@ -77,13 +79,13 @@ const Doing: Section["Body"] = ({ selection: { id } }) => {
       ) : (
         <div className="row">
           <Button look="plain" why={why} onPress={() => setRenaming(true)}>
-            Rename
+            {t`Rename`}
           </Button>
           <Button look="plain" why={why} onPress={() => void duplicateAction(action)}>
-            Duplicate
+            {t`Duplicate`}
           </Button>
           <Button look="plain" why={why} onPress={() => void removeAction(id)}>
-            Remove
+            {t`Remove`}
           </Button>
         </div>
       )}
@@ -104,7 +106,7 @@ function Rename({ id, name, onClose }: { id: string; name: string; onClose: () =
   };
   return (
     <form onSubmit={(event) => void submit(event)} onKeyDown={(event) => event.key === "Escape" && onClose()}>
-      <Field label="New name" value={text} onChange={setText} autoFocus autoComplete="off" />
+      <Field label={t`New name`} value={text} onChange={setText} autoFocus autoComplete="off" />
       {problem && (
         <p className="error" role="alert">
           {problem}
@@ -112,9 +114,9 @@ function Rename({ id, name, onClose }: { id: string; name: string; onClose: () =
       )}
       <div className="row">
         <Button look="primary" type="submit" isDisabled={text.trim() === ""}>
-          Rename
+          {t`Rename`}
         </Button>
-        <Button onPress={onClose}>Cancel</Button>
+        <Button onPress={onClose}>{t`Cancel`}</Button>
       </div>
     </form>
   );

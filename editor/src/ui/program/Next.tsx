@@ -1,5 +1,6 @@
 /** The steps that lead on from an action, and the buttons that begin another one: then a tap says where it leads. */
 
+import { plural, t } from "@lingui/core/macro";
 import { beginStep, endStep, notEditable, removeStep } from "../../commands/program";
 import {
   cannotLead,
@@ -10,7 +11,6 @@ import {
   outgoing,
   placeOf,
   resultAt,
-  START,
 } from "../../program/logic";
 import { runsOf } from "../../program/runs";
 import type { ProjectLogicIf } from "../../protocol/types";
@@ -43,7 +43,7 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
   });
   return (
     <>
-      {ways.length === 0 && <p className="quiet small">Nothing yet.</p>}
+      {ways.length === 0 && <p className="quiet small">{t`Nothing yet.`}</p>}
       <ul className="ways">
         {ways.map((way) => (
           <li key={way.id}>
@@ -56,7 +56,7 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
             <Button
               look="plain"
               icon="close"
-              aria-label={`Remove the step to ${nameOf(state, placeOf(way.end))}`}
+              aria-label={t`Remove the step to ${nameOf(state, placeOf(way.end))}`}
               why={why}
               onPress={() => void removeStep(way.id)}
             />
@@ -66,26 +66,26 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
       <div className="row">
         {(ways.length === 0 || (result && result.type !== "boolean")) && (
           <Button icon="plus" why={why} onPress={() => beginStep(id)}>
-            Connect
+            {t`Connect`}
           </Button>
         )}
         {result?.type === "boolean" && ways.every((each) => each.condition) && (
           <>
             {free("true") && (
               <Button why={why} onPress={() => beginStep(id, on("true"))}>
-                <span className="branch true">yes</span> If {result.name}
+                <span className="branch true">{t`yes`}</span> {t`If ${result.name}`}
               </Button>
             )}
             {free("false") && (
               <Button why={why} onPress={() => beginStep(id, on("false"))}>
-                <span className="branch false">no</span> If not
+                <span className="branch false">{t`no`}</span> {t`If not`}
               </Button>
             )}
           </>
         )}
         {result?.type === "boolean" && ways.length === 1 && !ways[0]?.condition && (
           <Button icon="plus" why={why} onPress={() => beginStep(id)}>
-            Branch
+            {t`Branch`}
           </Button>
         )}
       </div>
@@ -98,7 +98,7 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
             select(null); // what is selected is seen
           }}
         >
-          Fold {run.length} actions in the graph
+          {plural(run.length, { one: "Fold # action in the graph", other: "Fold # actions in the graph" })}
         </Button>
       )}
     </>
@@ -119,9 +119,9 @@ function Targets({ from }: { from: string }) {
   return (
     <>
       <p className="small">
-        Tap what follows {from === START ? "Start" : doc.actions[from]?.name}, in the view or here. Escape gives up.
+        {t`Tap the step that follows ${nameOf(state, from)}, in the view or here. Press Escape to cancel.`}
       </p>
-      <ul className="ways targets" aria-label="What can follow">
+      <ul className="ways targets" aria-label={t`What can follow`}>
         {targets.map((id) => (
           <li key={id}>
             <Button look="plain" className="way" onPress={() => void endStep(id)}>

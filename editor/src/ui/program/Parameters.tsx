@@ -1,11 +1,12 @@
 /** Values of the whole program: its parameters, where they are used, and settings of devices that it replaces. */
 
+import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { Button as AriaButton } from "react-aria-components";
 import { addParameter, notEditable, override, removeParameter, updateParameter } from "../../commands/program";
 import { words } from "../../program/naming";
 import { usersOf } from "../../program/problems";
-import { extraOf, read, SIMPLE, type Simple, TYPE_WORDS, textOf } from "../../program/values";
+import { extraOf, read, SIMPLE, type Simple, textOf, typeName } from "../../program/values";
 import type { ParameterMeta } from "../../protocol/types";
 import { select, useEditor } from "../../store/store";
 import { Button, Field } from "../kit/kit";
@@ -15,7 +16,7 @@ export function Parameters() {
   const parameters = useEditor((state) => state.doc?.parameters);
   return (
     <>
-      <p className="quiet small">A value that several actions share, and that is changed in one place.</p>
+      <p className="quiet small">{t`A value that several actions share, and that is changed in one place.`}</p>
       {Object.values(parameters ?? {})
         .filter((each) => !OWN.has(each.name))
         .sort((a, b) => a.name.localeCompare(b.name))
@@ -41,7 +42,7 @@ function One({ id }: { id: string }) {
   const { range } = parameter;
   const cannotRemove =
     notEditable(state, "RemoveProjectParameter") ||
-    (users.length > 0 ? `It is used by ${users.map((each) => doc.actions[each]?.name).join(", ")}.` : "");
+    (users.length > 0 ? t`It is used by ${users.map((each) => doc.actions[each]?.name).join(", ")}.` : "");
   return (
     <section className="constant" aria-label={parameter.name}>
       <ValueField
@@ -50,20 +51,20 @@ function One({ id }: { id: string }) {
         type={parameter.type}
         json={parameter.value}
         extra={range && { minimum: range.min, maximum: range.max }}
-        hint={parameter.description || TYPE_WORDS[parameter.type]}
+        hint={parameter.description || typeName(parameter.type)}
         why={why}
         onSet={(value) => updateParameter(id, { value })}
       >
         <Button
           look="plain"
           icon="close"
-          aria-label={`Remove ${parameter.name}`}
+          aria-label={t`Remove ${parameter.name}`}
           why={cannotRemove}
           onPress={() => void removeParameter(id)}
         />
       </ValueField>
       <p className="small used">
-        {users.length === 0 ? <span className="quiet">not used yet</span> : "used by "}
+        {users.length === 0 ? <span className="quiet">{t`not used yet`}</span> : t`used by `}
         {users.map((each) => (
           <AriaButton key={each} className="chip" onPress={() => select({ kind: "action", id: each })}>
             {doc.actions[each]?.name}
@@ -84,7 +85,7 @@ function NewParameter() {
   if (!open) {
     return (
       <Button icon="plus" why={why} onPress={() => setOpen(true)}>
-        New value
+        {t`New value`}
       </Button>
     );
   }
@@ -101,8 +102,8 @@ function NewParameter() {
   };
   return (
     <form className="constant" onSubmit={(event) => void submit(event)}>
-      <Field label="Name" value={name} onChange={setName} autoFocus autoComplete="off" />
-      <div className="chips" role="radiogroup" aria-label="Kind of value">
+      <Field label={t`Name`} value={name} onChange={setName} autoFocus autoComplete="off" />
+      <div className="chips" role="radiogroup" aria-label={t`Kind of value`}>
         {SIMPLE.map((each) => (
           <label key={each} className="chip" data-selected={type === each}>
             <input
@@ -112,12 +113,12 @@ function NewParameter() {
               checked={type === each}
               onChange={() => setType(each)}
             />
-            {TYPE_WORDS[each]}
+            {typeName(each)}
           </label>
         ))}
       </div>
       <Field
-        label={type === "boolean" ? "Value (yes or no)" : "Value"}
+        label={type === "boolean" ? t`Value (yes or no)` : t`Value`}
         value={text}
         onChange={setText}
         autoComplete="off"
@@ -128,9 +129,9 @@ function NewParameter() {
         </p>
       )}
       <div className="actions">
-        <Button onPress={() => setOpen(false)}>Cancel</Button>
+        <Button onPress={() => setOpen(false)}>{t`Cancel`}</Button>
         <Button look="primary" type="submit" isDisabled={name.trim() === ""}>
-          Add
+          {t`Add`}
         </Button>
       </div>
     </form>
@@ -145,18 +146,18 @@ function Overrides() {
   const objects = Object.values(doc.objects).filter((each) => (types.byName[each.type]?.settings.length ?? 0) > 0);
   const object = doc.objects[shown];
   return (
-    <section className="offers" aria-label="Settings of devices in this project">
-      <h3>Settings of devices, in this project alone</h3>
+    <section className="offers" aria-label={t`Settings of devices in this project`}>
+      <h3>{t`Settings of devices, in this project alone`}</h3>
       <div className="field">
-        <label htmlFor="override-of">Device</label>
+        <label htmlFor="override-of">{t`Device`}</label>
         <select id="override-of" value={shown} onChange={(event) => setShown(event.target.value)}>
-          <option value="">choose…</option>
+          <option value="">{t`choose…`}</option>
           {objects.map((each) => {
             const count = Object.keys(doc.overrides[each.id] ?? {}).length;
             return (
               <option key={each.id} value={each.id}>
                 {each.name}
-                {count > 0 ? ` (${count} replaced)` : ""}
+                {count > 0 ? t` (${count} replaced)` : ""}
               </option>
             );
           })}
@@ -179,7 +180,7 @@ function Override({ objectId, setting }: { objectId: string; setting: ParameterM
   const given = object.parameters.find((each) => each.name === name)?.value ?? setting.default_value;
   const why =
     notEditable(state, "AddOverride") ||
-    (state.live.state === "stopped" ? "" : "Go offline first: it holds from the next start.");
+    (state.live.state === "stopped" ? "" : t`Go offline first: it holds from the next start.`);
   return (
     <ValueField
       label={words(name)}
@@ -188,16 +189,14 @@ function Override({ objectId, setting }: { objectId: string; setting: ParameterM
       json={replaced ?? given}
       extra={extraOf(setting)}
       why={why}
-      hint={
-        replaced === undefined ? setting.description : `instead of ${textOf(type, given) || "nothing"} in the scene`
-      }
+      hint={replaced === undefined ? setting.description : t`In the scene: ${textOf(type, given) || t`none`}`}
       onSet={(value) => override(objectId, { name, type }, value)}
     >
       {replaced !== undefined && (
         <Button
           look="plain"
           icon="undo"
-          aria-label={`${words(name)} as in the scene`}
+          aria-label={t`${words(name)} as in the scene`}
           why={why}
           onPress={() => void override(objectId, { name, type }, undefined)}
         />

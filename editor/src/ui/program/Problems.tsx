@@ -1,5 +1,6 @@
 /** What is wrong with the program; a tap leads to the fault. */
 
+import { t } from "@lingui/core/macro";
 import { Button as AriaButton } from "react-aria-components";
 import type { Problem } from "../../program/problems";
 import { theEngine } from "../../session/engine";
@@ -13,11 +14,11 @@ export function Problems({ problems }: { problems: Problem[] }) {
       (each) => each.type in state.types.actions || !(each.type in state.types.byName),
     ),
   );
-  if (!known) return <p className="quiet">Reading what the devices can do…</p>;
+  if (!known) return <p className="quiet">{t`Reading what the devices can do…`}</p>;
   if (problems.length === 0) {
     return (
       <p className="all-well">
-        <Icon name="check" /> Nothing is wrong: it can be run.
+        <Icon name="check" /> {t`Nothing is wrong: it can be run.`}
       </p>
     );
   }
@@ -37,7 +38,7 @@ export function Problems({ problems }: { problems: Problem[] }) {
             <Icon name={each.level === "error" ? "warn" : "info"} />
             <span>
               <span className="hidden-but-read">
-                {each.level === "error" ? "Must be cured: " : "Should be looked at: "}
+                {each.level === "error" ? t`Must be cured: ` : t`Should be looked at: `}
               </span>
               {withNames(now(), each.text)}
             </span>

@@ -1,5 +1,7 @@
 /** The panel of the program: one tab for each question that is asked of it. */
 
+import { i18n } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useMemo, useState } from "react";
 import { ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import { problemsOf } from "../../program/problems";
@@ -10,7 +12,7 @@ import { Problems } from "./Problems";
 import { Steps } from "./Steps";
 import "./program.css";
 
-const TABS = { add: "Add", steps: "Actions", problems: "Check", parameters: "Values" } as const;
+const TABS = { add: msg`Add`, steps: msg`Actions`, problems: msg`Check`, parameters: msg`Values` } as const;
 type Tab = keyof typeof TABS;
 
 /** The tab that was open last is open again. */
@@ -27,7 +29,7 @@ export default function ProgramPanel() {
     <>
       <ToggleButtonGroup
         className="tabs small-tabs"
-        aria-label="Of the program"
+        aria-label={t`Of the program`}
         selectionMode="single"
         disallowEmptySelection
         selectedKeys={[tab]}
@@ -38,7 +40,7 @@ export default function ProgramPanel() {
       >
         {(Object.keys(TABS) as Tab[]).map((each) => (
           <ToggleButton key={each} id={each} className="tab">
-            {TABS[each]}
+            {i18n._(TABS[each])}
             {each === "problems" && problems.length > 0 && (
               <span className={`tag ${errors ? "bad" : "warn"}`}>{problems.length}</span>
             )}

@@ -1,5 +1,6 @@
 /** Where the disc of an action, or Start and End, is drawn: with its point, or where somebody has put it for all. */
 
+import { t } from "@lingui/core/macro";
 import { aimedPlace } from "../../commands/aimed";
 import { notEditable, placePuck } from "../../commands/program";
 import { tell, useEditor } from "../../store/store";
@@ -13,20 +14,20 @@ const Puck: Section["Body"] = ({ selection: { id, kind } }) => {
   const move = () => {
     const place = aimedPlace();
     if (place) void placePuck(id, { ...place.position, z: place.position.z + 0.02 });
-    else tell("info", "The middle of the view points at nothing.");
+    else tell("info", t`The middle of the view points at nothing.`);
   };
   return (
     <>
       <p className="quiet small">
-        Drag it in the view while it is selected. All see it where it is put; the program stays the same.
+        {t`Drag it in the view while it is selected. All see it where it is put; the program stays the same.`}
       </p>
       <div className="row">
         <Button look="plain" why={why} onPress={move}>
-          To the middle of the view
+          {t`To the middle of the view`}
         </Button>
         {placed && (
           <Button look="plain" why={why} onPress={() => void placePuck(id, null)}>
-            {kind === "action" ? "Back to its point" : "Back to its place"}
+            {kind === "action" ? t`Back to its point` : t`Back to its place`}
           </Button>
         )}
       </div>

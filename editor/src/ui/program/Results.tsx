@@ -1,11 +1,12 @@
 /** What an action tells: names by which other actions and steps use it, and who does. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { nameResults, notEditable } from "../../commands/program";
 import { metaOf } from "../../program/logic";
 import { newOutputs } from "../../program/naming";
 import { usersOf } from "../../program/problems";
-import { TYPE_WORDS } from "../../program/values";
+import { typeName } from "../../program/values";
 import { select, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/sections";
@@ -21,11 +22,11 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
   const returns = metaOf(types, doc, action)?.returns ?? [];
   const outputs = action.flows[0]?.outputs ?? [];
   const why = notEditable(state);
-  if (returns.length === 0) return <p className="quiet small">Nothing.</p>;
+  if (returns.length === 0) return <p className="quiet small">{t`Nothing.`}</p>;
   if (outputs.length === 0) {
     return (
       <>
-        <p className="quiet small">Its results are not kept.</p>
+        <p className="quiet small">{t`Its results are not kept.`}</p>
         <Button
           why={why}
           onPress={() =>
@@ -34,7 +35,7 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
             )
           }
         >
-          Keep its results
+          {t`Keep its results`}
         </Button>
         {problem && (
           <p className="error" role="alert">
@@ -50,8 +51,8 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
       {returns.map((type, index) => (
         <ValueField
           key={`${id}/${index}`}
-          label={TYPE_WORDS[type] ?? type}
-          name={`Name of result ${index + 1}`}
+          label={typeName(type)}
+          name={t`Name of result ${index + 1}`}
           type="string"
           json={JSON.stringify(outputs[index] ?? "")}
           why={why}
@@ -65,7 +66,7 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
       ))}
       {users.length > 0 && (
         <p className="small">
-          used by{" "}
+          {t`Used by`}{" "}
           {users.map((each) => (
             <Button key={each} look="plain" onPress={() => select({ kind: "action", id: each })}>
               {doc.actions[each]?.name}

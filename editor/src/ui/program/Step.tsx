@@ -1,5 +1,6 @@
 /** One step: from where to where, and the result on which it depends. Changing it never takes it away meanwhile. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { beginStep, notEditable, removeStep, setCondition } from "../../commands/program";
 import { conditionsOf, linkTo, outgoing, placeOf, resultAt, START } from "../../program/logic";
@@ -44,17 +45,19 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
       </div>
       {results.length > 0 ? (
         <div className="field">
-          <label htmlFor="depends-on">It depends on</label>
+          <label htmlFor="depends-on">{t`It depends on`}</label>
           <select
             id="depends-on"
             value={step.condition?.what ?? ""}
             disabled={why !== ""}
             onChange={(event) => void choose(event.target.value)}
           >
-            <option value="">{alone ? "nothing: it is always taken" : "nothing: it is taken when no other is"}</option>
+            <option value="">
+              {alone ? t`nothing: it is always taken` : t`nothing: it is taken when no other is`}
+            </option>
             {results.map((each) => (
               <option key={linkTo(each)} value={linkTo(each)}>
-                {each.action.id === from ? each.name : `${each.name} of ${each.action.name}`}
+                {each.action.id === from ? each.name : t`${each.name} of ${each.action.name}`}
               </option>
             ))}
           </select>
@@ -62,13 +65,13 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
       ) : (
         <p className="quiet small">
           {from === START
-            ? "The program begins with it."
-            : `${nameOf(state, from)} has no result that could decide: yes or no, a whole number or a choice.`}
+            ? t`The program begins with it.`
+            : t`${nameOf(state, from)} has no result that could decide: yes or no, a whole number or a choice.`}
         </p>
       )}
       {step.condition && result && (
         <ValueField
-          label={`and is taken when ${result.name} is`}
+          label={t`and is taken when ${result.name} is`}
           name={result.name}
           type={result.type === "integer_enum" ? "integer" : result.type}
           json={step.condition.value}
@@ -83,10 +86,10 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
       )}
       <div className="row">
         <Button why={why} onPress={() => beginStep(from, undefined, id)}>
-          Lead elsewhere
+          {t`Lead elsewhere`}
         </Button>
         <Button look="plain" why={why} onPress={() => void removeStep(id)}>
-          Remove
+          {t`Remove`}
         </Button>
       </div>
     </>

@@ -1,5 +1,6 @@
 /** All actions in the order in which they are run, those that are never run last; with breakpoints. */
 
+import { t } from "@lingui/core/macro";
 import { useMemo } from "react";
 import { Button as AriaButton, ToggleButton } from "react-aria-components";
 import { barred } from "../../commands/asking";
@@ -20,7 +21,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
   const order = useMemo(() => (doc ? ordered(doc) : []), [doc]);
   const cannot = barred(state, "SetBreakpoints");
   if (!doc) return null;
-  if (order.length === 0) return <p className="quiet">No action yet. Add the first one under “Add”.</p>;
+  if (order.length === 0) return <p className="quiet">{t`No action yet. Add the first one under “Add”.`}</p>;
   return (
     <>
       <label className="check">
@@ -29,7 +30,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
           checked={state.view.user.hide_steps !== true}
           onChange={(event) => keepView("user", { hide_steps: event.target.checked ? null : true })}
         />
-        <span>Steps are drawn in the 3D view</span>
+        <span>{t`Steps are drawn in the 3D view`}</span>
       </label>
       <ol className="steps">
         {order.map((id) => {
@@ -44,7 +45,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
             <li key={id} data-running={running} data-selected={state.ui.selection?.id === id}>
               <ToggleButton
                 className="breakpoint"
-                aria-label={`Pause before ${action.name}`}
+                aria-label={t`Pause before ${action.name}`}
                 isSelected={id in breakpoints}
                 onChange={(on) => (cannot ? tell("info", cannot) : void breakAt(id, on))}
               >
@@ -63,10 +64,10 @@ export function Steps({ problems }: { problems: Problem[] }) {
                   <ReachBadge id={id} />
                 </span>
                 <span className="quiet small">
-                  {nameOf(state, action.type.split("/")[0] ?? "")} at {nameOf(state, action.pointId)}
-                  {after.length > 0 && ` · when ${after.join(", ")}`}
+                  {t`${nameOf(state, action.type.split("/")[0] ?? "")} at ${nameOf(state, action.pointId)}`}
+                  {after.length > 0 && t` · when ${after.join(", ")}`}
                 </span>
-                {running && <span className="tag good">runs now</span>}
+                {running && <span className="tag good">{t`runs now`}</span>}
                 {problem && (
                   <span className={`tag ${problem.level === "error" ? "bad" : "warn"}`}>
                     <Icon name="warn" size={14} /> {withNames(state, problem.text)}

@@ -3,6 +3,7 @@
  * chosen, at once. A value that cannot be, or that the server refuses, stays in the field with the reason below.
  */
 
+import { t } from "@lingui/core/macro";
 import type { ReactNode } from "react";
 import { useEffect, useId, useState } from "react";
 import { type Extra, rangeWords, read, textOf } from "../../program/values";
@@ -77,7 +78,7 @@ export function ValueField({
   const listed =
     choices ??
     (type === "boolean"
-      ? BOOLEAN
+      ? booleans()
       : extra.allowed_values?.map((each) => ({ json: JSON.stringify(each), label: String(each) })));
   return (
     <div className="field value-field">
@@ -104,7 +105,7 @@ export function ValueField({
       ) : listed ? (
         <select {...described} value={json ?? ""} onChange={(event) => void set(event.target.value)}>
           {!listed.some((each) => each.json === json) && (
-            <option value={json ?? ""}>{known ? `${known} (not in the list)` : "choose…"}</option>
+            <option value={json ?? ""}>{known ? t`${known} (not in the list)` : t`choose…`}</option>
           )}
           {listed.map((each) => (
             <option key={each.json} value={each.json}>
@@ -119,7 +120,7 @@ export function ValueField({
             value={text}
             inputMode={type === "integer" || type === "double" ? "decimal" : undefined}
             type={secret ? "password" : undefined}
-            placeholder={stored ? "Stored. Type to replace it." : undefined}
+            placeholder={stored ? t`Stored. Type to replace it.` : undefined}
             autoComplete={secret ? "new-password" : "off"}
             onChange={(event) => setText(event.target.value)}
             onBlur={leave}
@@ -148,7 +149,7 @@ export function ValueField({
   );
 }
 
-const BOOLEAN: Choice[] = [
-  { json: "true", label: "Yes" },
-  { json: "false", label: "No" },
+const booleans = (): Choice[] => [
+  { json: "true", label: t`Yes` },
+  { json: "false", label: t`No` },
 ];

@@ -1,5 +1,6 @@
 /** Values with their names, as an action got or gave them. */
 
+import { t } from "@lingui/core/macro";
 import { plain } from "../../viewmodel/items";
 
 /** Longer ones can be opened. */
@@ -10,7 +11,7 @@ export function Values({ names, values }: { names: string[]; values: string[] })
     <dl className="values">
       {values.map((value, index) => (
         <div key={index}>
-          <dt>{names[index] ?? `result ${index + 1}`}</dt>
+          <dt>{names[index] ?? t`result ${index + 1}`}</dt>
           <dd>
             <Value json={value} />
           </dd>
@@ -22,7 +23,7 @@ export function Values({ names, values }: { names: string[]; values: string[] })
 
 function Value({ json }: { json: string }) {
   const image = pictureOf(json);
-  if (image) return <img src={image} alt="What the camera saw" />;
+  if (image) return <img src={image} alt={t`What the camera saw`} />;
   const text = json === "true" ? "yes" : json === "false" ? "no" : plain(json);
   if (text.length <= SHORT) return text;
   return (

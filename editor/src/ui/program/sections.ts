@@ -1,36 +1,42 @@
 /** Sections of the panel about actions, steps, START and END. Their bodies are loaded when they are needed. */
 
+import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";
 import type { Section } from "../workplace/sections";
 
 const isAction: Section["applies"] = ({ kind }) => kind === "action";
 
 export const programSections: readonly Section[] = [
-  { id: "try", title: "Do", applies: isAction, Body: lazily(() => import("./Doing")) },
-  { id: "parameters", title: "What it is told", applies: isAction, Body: lazily(() => import("./ActionParameters")) },
+  { id: "try", title: msg`Do`, applies: isAction, Body: lazily(() => import("./Doing")) },
+  {
+    id: "parameters",
+    title: msg`What it is told`,
+    applies: isAction,
+    Body: lazily(() => import("./ActionParameters")),
+  },
   {
     id: "next",
-    title: "What follows",
+    title: msg`What follows`,
     applies: ({ kind, id }, state) =>
       state.doc?.project?.has_logic === true && (kind === "action" || (kind === "terminal" && id === "START")),
     Body: lazily(() => import("./Next")),
   },
-  { id: "results", title: "What it tells", applies: isAction, Body: lazily(() => import("./Results")) },
+  { id: "results", title: msg`What it tells`, applies: isAction, Body: lazily(() => import("./Results")) },
   {
     id: "step",
-    title: "When it is taken",
+    title: msg`When it is taken`,
     applies: ({ kind }) => kind === "logic",
     Body: lazily(() => import("./Step")),
   },
   {
     id: "breakpoint",
-    title: "Breakpoint",
+    title: msg`Breakpoint`,
     applies: ({ kind }, state) => kind === "point" && state.doc?.project != null,
     Body: lazily(() => import("./Breakpoint")),
   },
   {
     id: "puck",
-    title: "In the view",
+    title: msg`In the view`,
     applies: ({ kind }) => kind === "terminal" || kind === "action",
     Body: lazily(() => import("./Puck")),
   },

@@ -1,5 +1,7 @@
 /** A pose that is dragged in the view, typed, tapped or taken over, shown by a ghost before the robot goes there. */
 
+import { i18n } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useCallback, useEffect, useRef, useState } from "react";
 import { type Chosen, effectorPose, hideGhost, moveToPose, notReady } from "../../commands/robot";
 import type { WayState } from "../../engine/way";
@@ -19,7 +21,7 @@ import { usePlaceTap } from "./usePlaceTap";
 import { useTelemetry } from "./useTelemetry";
 
 const AXES = ["x", "y", "z"] as const;
-const ANGLES = ["Roll", "Pitch", "Yaw"] as const;
+const ANGLES = [msg`Roll`, msg`Pitch`, msg`Yaw`] as const;
 
 export function GoTab({ chosen }: { chosen: Chosen }) {
   const why = useEditor((state) => notReady(state, chosen));
@@ -72,30 +74,30 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
           )
         }
       >
-        Begin where the tool is
+        {t`Begin where the tool is`}
       </Button>
     );
   }
   const angles = rollPitchYaw(goal.orientation);
   const notYet =
     answer === null
-      ? "Set a goal first: it is shown before the robot goes there."
+      ? t`Set a goal first: it is shown before the robot goes there.`
       : answer.goal !== goal
-        ? "It is asked whether it can go there."
+        ? t`It is asked whether it can go there.`
         : safe
           ? answer.problem
           : "";
   return (
     <>
       <OnOff isSelected={tapping} onChange={setTapping}>
-        A tap in the view puts the ghost there
+        {t`A tap in the view puts the ghost there`}
       </OnOff>
       <OneOf
-        label="Drag the goal in the view"
+        label={t`Drag the goal in the view`}
         value={turning ? "turn" : "move"}
         choices={[
-          ["move", "Move it"],
-          ["turn", "Turn it"],
+          ["move", t`Move it`],
+          ["turn", t`Turn it`],
         ]}
         onChange={(next) => setTurning(next === "turn")}
       />
@@ -114,8 +116,8 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
         ))}
         {ANGLES.map((name, n) => (
           <Amount
-            key={name}
-            label={name}
+            key={n}
+            label={i18n._(name)}
             unit="°"
             value={angles[n] ?? 0}
             step={5}
@@ -134,9 +136,9 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
             why={why || notYet}
             onPress={() => void moveToPose(chosen, goal, mannerNow()).then(setRefused)}
           >
-            Move there
+            {t`Move there`}
           </Button>
-          <Button onPress={giveUp}>Back to the tool</Button>
+          <Button onPress={giveUp}>{t`Back to the tool`}</Button>
           {selected && (
             <Button
               onPress={() => {
@@ -149,7 +151,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
                   );
               }}
             >
-              At {selected}
+              {t`At ${selected}`}
             </Button>
           )}
         </div>
@@ -163,10 +165,14 @@ function WayWords({ answer }: { answer: GoalAnswer | null }) {
   const { linear } = useManner();
   const name = useEditor((state) => (answer?.met ? nameOf(state, answer.met) : ""));
   if (!answer || answer.problem) return null;
-  if (!linear) return <p className="quiet small">It will not go straight: how it goes is not shown.</p>;
-  if (answer.way === "unknown") return <p className="quiet small">The straight way there was not looked at.</p>;
-  if (answer.way === "free") return <p className="small good">Nothing is on the straight way of the tool.</p>;
-  return <p className="small warn">On the straight way of the tool is {name || "something"}, or it passes close by.</p>;
+  if (!linear) return <p className="quiet small">{t`It will not go straight: how it goes is not shown.`}</p>;
+  if (answer.way === "unknown") return <p className="quiet small">{t`The straight way there was not looked at.`}</p>;
+  if (answer.way === "free") return <p className="small good">{t`Nothing is on the straight way of the tool.`}</p>;
+  return (
+    <p className="small warn">
+      {name ? t`The straight path of the tool is blocked by ${name}.` : t`The straight path of the tool is blocked.`}
+    </p>
+  );
 }
 
 /** The straight way from where the tool is now, in the view. */
@@ -185,7 +191,7 @@ export function Answer({ answer }: { answer: string | null }) {
   if (answer === null) return null;
   return (
     <p className={`small ${answer ? "error" : "good"}`} role="status">
-      {answer || "It can go there: the ghost shows how."}
+      {answer || t`It can go there: the ghost shows how.`}
     </p>
   );
 }

@@ -1,5 +1,6 @@
 /** Hand teaching: the arm can be moved by hand as long as the button is held. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { holdHandTeaching } from "../../commands/holds";
 import { type Chosen, featuresOf, notReady } from "../../commands/robot";
@@ -12,18 +13,18 @@ export function HandTab({ chosen }: { chosen: Chosen }) {
   const ready = useEditor((state) => notReady(state, chosen, "HoldHandTeaching"));
   const free = useEditor((state) => state.live.handTeaching[chosen.robotId] ?? false);
   const [refused, setRefused] = useState("");
-  const cannot = ready || (can ? "" : "This robot does not support hand teaching.");
+  const cannot = ready || (can ? "" : t`This robot does not support hand teaching.`);
   return (
     <>
       <p className="quiet small">
-        Hold the button and move the arm by hand. The arm is stiff again as soon as you release it.
+        {t`Hold the button and move the arm by hand. The arm is stiff again as soon as you release it.`}
       </p>
       <p role="status">
-        <span className={`tag ${free ? "warn" : ""}`}>{free ? "The arm is free" : "The arm is stiff"}</span>
+        <span className={`tag ${free ? "warn" : ""}`}>{free ? t`The arm is free` : t`The arm is stiff`}</span>
       </p>
       <PadDock chosen={chosen} refused={refused} hint={cannot}>
         <HoldButton
-          label="Hold, and move the arm by hand"
+          label={t`Hold, and move the arm by hand`}
           className="primary large"
           why={cannot}
           onHold={() => {
@@ -32,7 +33,7 @@ export function HandTab({ chosen }: { chosen: Chosen }) {
           }}
           onOver={setRefused}
         >
-          Hold to teach by hand
+          {t`Hold to teach by hand`}
         </HoldButton>
       </PadDock>
     </>

@@ -3,6 +3,7 @@
  * what else ends a hold (the page hidden, the connection lost) is in holds.ts.
  */
 
+import { t } from "@lingui/core/macro";
 import { type ReactNode, useEffect, useRef, useState } from "react";
 import type { Held } from "../../commands/holds";
 import { tell } from "../../store/store";
@@ -68,7 +69,7 @@ export function HoldButton({ label, why = "", className = "", onHold, onOver, ch
       onContextMenu={(event) => event.preventDefault()}
     >
       {children}
-      {why && <span className="hidden-but-read">, not now: {why}</span>}
+      {why && <span className="hidden-but-read">{t`, not available: ${why}`}</span>}
     </button>
   );
 }

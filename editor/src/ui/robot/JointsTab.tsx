@@ -1,5 +1,7 @@
 /** Move single joints within their limits: one step per press, or as long as a button is held. */
 
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { holdJog } from "../../commands/holds";
 import { type Chosen, featuresOf, moveToJoints, notReady } from "../../commands/robot";
@@ -48,8 +50,8 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
   const joints = useTelemetry(robotId, () => telemetry.latest(robotId)?.joints);
   const [refused, setRefused] = useState("");
   const hold = way === "hold" && features?.jog === true;
-  const cannot = why || (hold || features?.move_to_joints ? "" : "This robot does not move to joints.");
-  if (!joints) return <p className="quiet">The robot reports no joint positions.</p>;
+  const cannot = why || (hold || features?.move_to_joints ? "" : t`This robot does not move to joints.`);
+  if (!joints) return <p className="quiet">{t`The robot reports no joint positions.`}</p>;
   const shown = shownJoints(
     robotId,
     [...joints].map(([name, value]) => ({ name, value })),
@@ -72,22 +74,22 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
   return (
     <>
       <OneOf
-        label="A press"
+        label={t`A press`}
         quiet
         value={hold ? "hold" : "step"}
         onChange={(next) => setManner({ way: next })}
         choices={
           features?.jog
             ? [
-                ["step", "Step"],
-                ["hold", "Hold to move"],
+                ["step", t`Step`],
+                ["hold", t`Hold to move`],
               ]
-            : [["step", "Step"]]
+            : [["step", t`Step`]]
         }
       />
       {!hold && (
         <Amount
-          label="Step"
+          label={t`Step`}
           unit="°"
           digits={2}
           value={angle * DEGREES}
@@ -99,7 +101,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
       <PadDock
         chosen={chosen}
         refused={refused}
-        hint={cannot || (hold ? HOLD_HINT : "Each press moves one joint by one step.")}
+        hint={cannot || (hold ? i18n._(HOLD_HINT) : t`Each press moves one joint by one step.`)}
       >
         <ul className="joints">
           {shown.map((joint) => {
@@ -112,7 +114,14 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
                   <Limits joint={joint} />
                 </div>
                 {([-1, 1] as const).map((sign) => {
-                  const words = `${joint.name.replaceAll("_", " ")} ${sign > 0 ? "up" : "down"}${hold ? ", as long as it is held" : ""}`;
+                  const shownName = joint.name.replaceAll("_", " ");
+                  const words = hold
+                    ? sign > 0
+                      ? t`Hold to move ${shownName} up`
+                      : t`Hold to move ${shownName} down`
+                    : sign > 0
+                      ? t`Move ${shownName} up`
+                      : t`Move ${shownName} down`;
                   return hold ? (
                     <HoldButton
                       key={sign}
@@ -137,7 +146,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
                   );
                 })}
                 <Amount
-                  label={`${joint.name.replaceAll("_", " ")} to`}
+                  label={t`${joint.name.replaceAll("_", " ")} to`}
                   unit={joint.unit}
                   value={joint.value * joint.scale}
                   least={joint.lower * joint.scale}
@@ -156,7 +165,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
 
 function beyond({ name, lower, upper, scale, unit }: ShownJoint, value: number): string {
   if (value >= lower && value <= upper) return "";
-  return `${name.replaceAll("_", " ")} goes from ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}.`;
+  return t`${name.replaceAll("_", " ")} goes from ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}.`;
 }
 
 /** Show the position of a joint between its limits. */
@@ -168,10 +177,10 @@ export function Limits({ joint: { value, lower, upper, scale, unit } }: { joint:
     <span
       className="joint-limits"
       data-near={near}
-      title={`from ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}`}
+      title={t`from ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}`}
     >
       <span style={{ left: `${part * 100}%` }} />
-      {near && <span className="hidden-but-read">near its limit</span>}
+      {near && <span className="hidden-but-read">{t`near its limit`}</span>}
     </span>
   );
 }

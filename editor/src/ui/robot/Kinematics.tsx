@@ -1,5 +1,6 @@
 /** Whether poses of a robot are computed with what its controller told of the very arm, or as its type is made. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { featuresOf } from "../../commands/robot";
 import { type RobotKinematics, readKinematics } from "../../session/kinematics";
@@ -23,7 +24,8 @@ export function Kinematics({ robotId }: { robotId: string }) {
 }
 
 function sentence({ in_force: force, read, refused }: RobotKinematics): string {
-  if (force === "measured") return `Computed with this arm's own calibration, read ${read ? ago(read) : "before"}.`;
-  if (refused) return `Computed as arms of this type are. The calibration in its controller is not used: ${refused}`;
-  return "Computed as arms of this type are, off by some millimetres: its own calibration is read when it is online.";
+  if (force === "measured")
+    return read ? t`Uses this robot's calibration, read ${ago(read)}.` : t`Uses this robot's calibration.`;
+  if (refused) return t`Computed as arms of this type are. The calibration in its controller is not used: ${refused}`;
+  return t`Computed as arms of this type are, off by some millimetres: its own calibration is read when it is online.`;
 }

@@ -1,5 +1,6 @@
 /** How fast, on a straight line or not, and whether collisions are looked for: of every motion asked for in panels. */
 
+import { t } from "@lingui/core/macro";
 import { MoreOrLess, OnOff } from "../kit/fields";
 import { setManner, useManner } from "./manner";
 
@@ -8,7 +9,7 @@ export function MannerFields() {
   return (
     <div className="manner">
       <MoreOrLess
-        label="Speed"
+        label={t`Speed`}
         value={speed}
         least={0.01}
         most={1}
@@ -17,10 +18,10 @@ export function MannerFields() {
         onChange={(next) => setManner({ speed: next })}
       />
       <OnOff isSelected={safe} onChange={(next) => setManner({ safe: next })}>
-        Look for collisions first
+        {t`Look for collisions first`}
       </OnOff>
       <OnOff isSelected={linear} onChange={(next) => setManner({ linear: next })}>
-        On a straight line
+        {t`On a straight line`}
       </OnOff>
     </div>
   );

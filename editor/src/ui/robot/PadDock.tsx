@@ -1,5 +1,6 @@
 /** The fixed lower part of the robot panel: the buttons that move the robot, below a message area of fixed height. */
 
+import { msg, t } from "@lingui/core/macro";
 import { createContext, type ReactNode, useContext } from "react";
 import { createPortal } from "react-dom";
 import type { Chosen } from "../../commands/robot";
@@ -7,7 +8,7 @@ import { useEditor } from "../../store/store";
 import { nameOf } from "../names";
 
 /** What to know before the first hold. */
-export const HOLD_HINT = "Motion stops as soon as you release the button.";
+export const HOLD_HINT = msg`Motion stops as soon as you release the button.`;
 
 /** The element of the panel in which the pad is shown. */
 export const PadPlace = createContext<HTMLElement | null>(null);
@@ -34,17 +35,25 @@ export function PadDock({ chosen, refused, hint, children }: PadDockProps) {
   );
 }
 
-const PHASES = { start: "Moving", end: "Reached", failed: "Not reached" };
+/** Return in words how a motion goes or ended. */
+function phaseWords(phase: "start" | "end" | "failed", goal: string): string {
+  switch (phase) {
+    case "start":
+      return goal ? t`Moving to ${goal}…` : t`Moving…`;
+    case "end":
+      return goal ? t`Reached ${goal}.` : t`Reached.`;
+    case "failed":
+      return goal ? t`Not reached: ${goal}.` : t`Not reached.`;
+  }
+}
 
 /** Report why a request was refused, who moves the robot, or how its last motion ended. */
 function MotionNote({ chosen: { robotId }, refused, hint }: Omit<PadDockProps, "children">) {
   const motion = useEditor((state) => state.live.motions[robotId]);
   const goal = useEditor((state) => (motion?.goal ? nameOf(state, motion.goal) : ""));
   const hold = useEditor((state) => state.live.holds[robotId]);
-  const moved =
-    motion &&
-    `${PHASES[motion.phase]}${goal && ` ${motion.phase === "start" ? "to " : ""}${goal}`}${motion.phase === "start" ? "…" : "."} ${motion.message}`;
-  const held = hold && `${hold.user} is ${hold.kind === "jog" ? "jogging" : "hand-teaching"}.`;
+  const moved = motion && `${phaseWords(motion.phase, goal)} ${motion.message}`;
+  const held = hold && (hold.kind === "jog" ? t`${hold.user} is jogging.` : t`${hold.user} is hand-teaching.`);
   const tone = refused ? "error" : held ? "warn" : motion ? motion.phase : "quiet";
   const words = refused || held || moved || hint;
   return (

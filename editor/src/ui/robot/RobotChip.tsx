@@ -1,5 +1,6 @@
 /** In the corner of the view: the active robot, and a button that adds a point at its pose. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { addPointFromRobot } from "../../commands/points";
 import { chosenRobot, notReady } from "../../commands/robot";
@@ -39,24 +40,24 @@ export default function RobotChip() {
         type="button"
         className="button"
         aria-pressed={open}
-        aria-label={`Active robot: ${words}`}
+        aria-label={t`Active robot: ${words}`}
         onClick={() => setUi({ tool: open ? "" : "robot" })}
       >
         <Icon name="robot" />
         <span className="chip-words">{words}</span>
-        {moving && <span className="tag warn">moving</span>}
+        {moving && <span className="tag warn">{t`moving`}</span>}
       </button>
       {online && project && (
         <button
           type="button"
           className="button primary"
           aria-disabled={why !== "" || asking || undefined}
-          aria-label="Keep the robot's place as a point"
+          aria-label={t`Keep the robot's place as a point`}
           onClick={keep}
           disabled={asking}
         >
           <Icon name="plus" />
-          Point
+          {t`Point`}
         </button>
       )}
     </div>

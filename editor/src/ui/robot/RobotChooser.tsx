@@ -1,5 +1,6 @@
 /** Which robot, arm and end effector the panels and buttons mean. */
 
+import { t } from "@lingui/core/macro";
 import { armOf, chooseRobot, chosenRobot } from "../../commands/robot";
 import { robotsOf } from "../../session/streams";
 import { useEditor } from "../../store/store";
@@ -23,7 +24,7 @@ export function RobotChooser() {
     <div className="robot-chooser">
       {ids.length > 1 && (
         <Pick
-          label="Robot"
+          label={t`Robot`}
           value={chosen.robotId}
           choices={ids.map((id, n) => [id, labels[n] ?? ""])}
           onChange={(robotId) => chooseRobot({ robotId, armId: "", effector: "" })}
@@ -31,7 +32,7 @@ export function RobotChooser() {
       )}
       {arms && arms.length > 1 && (
         <Pick
-          label="Arm"
+          label={t`Arm`}
           value={chosen.armId}
           choices={arms.map(({ id }) => [id, id])}
           onChange={(armId) => chooseRobot({ ...chosen, armId, effector: "" })}
@@ -39,7 +40,7 @@ export function RobotChooser() {
       )}
       {arm && arm.effectors.length > 1 && (
         <Pick
-          label="End effector"
+          label={t`End effector`}
           value={chosen.effector}
           choices={arm.effectors.map((id) => [id, id])}
           onChange={(effector) => chooseRobot({ ...chosen, effector })}

@@ -1,7 +1,9 @@
 /** The active robot: its state, and the ways to move it. */
 
+import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { chosenRobot, notReady } from "../../commands/robot";
+import { translated } from "../../i18n/choices";
 import { useEditor } from "../../store/store";
 import { OneOf } from "../kit/fields";
 import { nameOf } from "../names";
@@ -17,10 +19,10 @@ import { ToolTab } from "./ToolTab";
 import "./robot.css";
 
 const WAYS = [
-  ["tool", "Tool"],
-  ["joints", "Joints"],
-  ["hand", "By hand"],
-  ["go", "Go to"],
+  ["tool", msg`Tool`],
+  ["joints", msg`Joints`],
+  ["hand", msg`By hand`],
+  ["go", msg`Go to`],
 ] as const;
 
 /** The way that was selected last, while the page is open. */
@@ -32,7 +34,7 @@ export default function RobotPanel() {
   const why = useEditor((state) => notReady(state, chosen));
   const [way, setWay] = useState(last);
   const [place, setPlace] = useState<HTMLElement | null>(null);
-  if (!chosen) return <p className="quiet">There is no robot in this scene.</p>;
+  if (!chosen) return <p className="quiet">{t`There is no robot in this scene.`}</p>;
   return (
     <PadPlace value={place}>
       <div className="robot-scroll">
@@ -46,10 +48,10 @@ export default function RobotPanel() {
         <RobotChooser />
         {!why && <Status chosen={chosen} />}
         <OneOf
-          label="How to move it"
+          label={t`How to move it`}
           quiet
           value={way}
-          choices={WAYS}
+          choices={translated(WAYS)}
           onChange={(next) => {
             last = next;
             setWay(next);

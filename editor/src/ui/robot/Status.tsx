@@ -1,5 +1,6 @@
 /** State of the robot: the pose of its tool, its grippers, its alarms. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { acknowledgeStop, armOf, type Chosen, effectorPose, featuresOf, notReady } from "../../commands/robot";
 import { useEditor } from "../../store/store";
@@ -15,8 +16,8 @@ export function Status({ chosen }: { chosen: Chosen }) {
   const why = useEditor((state) => notReady(state, chosen, "AcknowledgeStop"));
   const [refused, setRefused] = useState("");
   const tools = [
-    ["Grippers", arm?.grippers ?? []],
-    ["Suction cups", arm?.suctions ?? []],
+    [t`Grippers`, arm?.grippers ?? []],
+    [t`Suction cups`, arm?.suctions ?? []],
   ] as const;
   return (
     <div className="robot-status">
@@ -32,7 +33,7 @@ export function Status({ chosen }: { chosen: Chosen }) {
       ))}
       {acknowledges && alarms && alarms.length > 0 && (
         <Button why={why} onPress={() => void acknowledgeStop(robotId).then(setRefused)}>
-          Acknowledge
+          {t`Acknowledge`}
         </Button>
       )}
       {refused && (
@@ -46,11 +47,11 @@ export function Status({ chosen }: { chosen: Chosen }) {
 
 function Pose({ chosen }: { chosen: Chosen }) {
   const pose = useTelemetry(chosen.robotId, () => effectorPose(chosen));
-  if (!pose) return <p className="quiet small">The pose of the tool is unknown.</p>;
+  if (!pose) return <p className="quiet small">{t`The pose of the tool is unknown.`}</p>;
   const { x, y, z } = pose.position;
   const angles = rollPitchYaw(pose.orientation);
   return (
-    <dl className="robot-pose" aria-label="Pose of the tool in the world">
+    <dl className="robot-pose" aria-label={t`Pose of the tool in the world`}>
       {(["x", "y", "z"] as const).map((axis, n) => (
         <div key={axis}>
           <dt>{axis}</dt>

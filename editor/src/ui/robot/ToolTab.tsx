@@ -1,5 +1,7 @@
 /** Move the tool along and about axes: one step per press, or as long as a button is held. */
 
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { holdJog } from "../../commands/holds";
 import {
@@ -41,7 +43,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
   const hold = way === "hold" && features?.jog === true;
   const used: FrameName = frame === "selected" && !selected ? "world" : frame;
   const turning = what === "orientation";
-  const cannot = why || (hold || features?.move_to_pose ? "" : "This robot does not move to poses.");
+  const cannot = why || (hold || features?.move_to_pose ? "" : t`This robot does not move to poses.`);
 
   const press = (axis: StepAxis, sign: number) => {
     setRefused("");
@@ -64,54 +66,61 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
       ...(chosen.armId ? { arm_id: chosen.armId } : {}),
     });
   };
-  const hint = hold ? HOLD_HINT : `Each press ${turning ? "turns" : "moves"} the tool one step.`;
-  const words = (axis: StepAxis, sign: number) =>
-    `${turning ? "Turn about" : "Move along"} ${sign > 0 ? "+" : "−"}${axis.toUpperCase()}${hold ? ", as long as it is held" : ""}`;
+  const hint = hold
+    ? i18n._(HOLD_HINT)
+    : turning
+      ? t`Each press turns the tool by one step.`
+      : t`Each press moves the tool by one step.`;
+  const words = (axis: StepAxis, sign: number) => {
+    const direction = `${sign > 0 ? "+" : "−"}${axis.toUpperCase()}`;
+    if (hold) return turning ? t`Hold to turn about ${direction}` : t`Hold to move along ${direction}`;
+    return turning ? t`Turn about ${direction}` : t`Move along ${direction}`;
+  };
 
   return (
     <>
       <OneOf
-        label="A press"
+        label={t`A press`}
         quiet
         value={hold ? "hold" : "step"}
         onChange={(next) => setManner({ way: next })}
         choices={
           features?.jog
             ? [
-                ["step", "Step"],
-                ["hold", "Hold to move"],
+                ["step", t`Step`],
+                ["hold", t`Hold to move`],
               ]
-            : [["step", "Step"]]
+            : [["step", t`Step`]]
         }
       />
       <OneOf
-        label="What"
+        label={t`What`}
         quiet
         value={what}
         onChange={(next) => setManner({ what: next })}
         choices={[
-          ["position", "Move"],
-          ["orientation", "Turn"],
+          ["position", t`Move`],
+          ["orientation", t`Turn`],
         ]}
       />
       <OneOf
-        label="Axes of"
+        label={t`Axes of`}
         value={used}
         onChange={(next) => setManner({ frame: next })}
         choices={[
-          ["world", "World"],
-          ["robot", "Robot"],
-          ["tool", "Tool"],
+          ["world", t`World`],
+          ["robot", t`Robot`],
+          ["tool", t`Tool`],
           ...(selected ? [["selected", selected] as const] : []),
         ]}
       />
       {!hold && (turning ? <Angles angle={angle} /> : <Distances distance={distance} />)}
       <div className="actions start">
         <Button
-          why={why || (features?.inverse_kinematics ? "" : "This robot computes no joints for a pose.")}
+          why={why || (features?.inverse_kinematics ? "" : t`This robot computes no joints for a pose.`)}
           onPress={() => void alignDown(chosen, mannerNow()).then(setRefused)}
         >
-          Tool straight down
+          {t`Tool straight down`}
         </Button>
         {selection?.kind === "orientation" && (
           <Button
@@ -124,7 +133,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
               ).then(setRefused)
             }
           >
-            Turn as {selected}
+            {t`Align with ${selected}`}
           </Button>
         )}
       </div>
@@ -177,13 +186,13 @@ function Distances({ distance }: { distance: number }) {
   return (
     <div className="step-size">
       <OneOf
-        label="Step, mm"
+        label={t`Step, mm`}
         value={String(distance)}
         onChange={(next) => setManner({ distance: Number(next) })}
         choices={DISTANCES.map((each) => [String(each), String(each * 1000)] as const)}
       />
       <Amount
-        label="Or"
+        label={t`Or`}
         unit="mm"
         digits={2}
         value={distance * 1000}
@@ -199,13 +208,13 @@ function Angles({ angle }: { angle: number }) {
   return (
     <div className="step-size">
       <OneOf
-        label="Step, °"
+        label={t`Step, °`}
         value={String(angle)}
         onChange={(next) => setManner({ angle: Number(next) })}
         choices={ANGLES.map((each) => [String(each), String(Math.round(each * DEGREES * 10) / 10)] as const)}
       />
       <Amount
-        label="Or"
+        label={t`Or`}
         unit="°"
         digits={2}
         value={angle * DEGREES}

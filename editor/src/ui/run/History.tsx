@@ -1,17 +1,21 @@
 /** The run history, newest first. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, plural, t } from "@lingui/core/macro";
 import type { Run, RunEnd } from "../../protocol/types";
 import { useEditor } from "../../store/store";
 import { ago, useTicking } from "../times";
 import { seconds } from "./Trace";
 
-export const WORDS: Record<RunEnd, string> = {
-  running: "running",
-  finished: "finished",
-  stopped: "stopped",
-  failed: "failed",
-  lost: "interrupted",
+const WORDS: Record<RunEnd, MessageDescriptor> = {
+  running: msg`running`,
+  finished: msg`finished`,
+  stopped: msg`stopped`,
+  failed: msg`failed`,
+  lost: msg`interrupted`,
 };
+/** Return in words how a run ended. */
+export const endName = (end: RunEnd): string => i18n._(WORDS[end]);
 const TONES: Record<RunEnd, string> = { running: "good", finished: "good", stopped: "", failed: "bad", lost: "warn" };
 const SHOWN = 10;
 
@@ -23,14 +27,14 @@ export function History() {
   const mine = runs.filter((each) => project === undefined || each.project_id === project).slice(0, SHOWN);
   if (mine.length === 0) return null;
   return (
-    <section className="run-part" aria-label="Run history">
-      <h3>Runs</h3>
+    <section className="run-part" aria-label={t`Run history`}>
+      <h3>{t`Runs`}</h3>
       <ul className="runs">
         {mine.map((each) => (
           <li key={each.number}>
             <span>
-              <span className={`tag ${TONES[each.end]}`}>{WORDS[each.end]}</span> {ago(each.started)}
-              {each.started_by && <span className="quiet"> by {each.started_by}</span>}
+              <span className={`tag ${TONES[each.end]}`}>{endName(each.end)}</span> {ago(each.started)}
+              {each.started_by && <span className="quiet"> {t`by ${each.started_by}`}</span>}
             </span>
             <span className="quiet small">{summary(each)}</span>
           </li>
@@ -42,10 +46,10 @@ export function History() {
 
 function summary(run: Run): string {
   const took = run.ended ? (Date.parse(run.ended) - Date.parse(run.started)) / 1000 : undefined;
-  if (run.end === "running") return run.start_paused ? "started paused" : "";
-  const parts = [`${run.actions} ${run.actions === 1 ? "action" : "actions"}`];
+  if (run.end === "running") return run.start_paused ? t`started paused` : "";
+  const parts = [plural(run.actions, { one: "# action", other: "# actions" })];
   if (took !== undefined) parts.push(seconds(took));
-  if (run.stopped_by) parts.push(`stopped by ${run.stopped_by}`);
-  if (run.error) parts.push(`in ${run.last_action?.name || "an action"}: ${run.error}`);
+  if (run.stopped_by) parts.push(t`stopped by ${run.stopped_by}`);
+  if (run.error) parts.push(run.last_action?.name ? `${run.last_action.name}: ${run.error}` : run.error);
   return parts.join(" · ");
 }

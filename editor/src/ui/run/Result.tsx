@@ -1,5 +1,6 @@
 /** The result of the last run of a project, with its error and a way to the action that failed. */
 
+import { t } from "@lingui/core/macro";
 import { lastRun, type Result, resultOf } from "../../program/results";
 import { theEngine } from "../../session/engine";
 import { now, select, setUi, useEditor } from "../../store/store";
@@ -14,9 +15,9 @@ export function LastResult({ projectId }: { projectId: string }) {
   const run = useEditor((state) => lastRun(state, projectId));
   const result = resultOf(run);
   useTicking();
-  if (!run || !result) return <p className="run-state">Not run yet</p>;
+  if (!run || !result) return <p className="run-state">{t`Not run yet`}</p>;
   return (
-    <section className={`last-result ${result.tone}`} aria-label="Last run">
+    <section className={`last-result ${result.tone}`} aria-label={t`Last run`}>
       <p>
         <Icon name={ICONS[result.tone]} /> <strong>{result.title}</strong>{" "}
         <span className="small">{ago(run.ended ?? run.started)}</span>
@@ -38,7 +39,7 @@ export function ShowAction({ id }: { id: string }) {
   };
   return (
     <Button icon="zoom" onPress={show}>
-      Show {name}
+      {t`Show ${name}`}
     </Button>
   );
 }

@@ -1,5 +1,6 @@
 /** The result of the last run, above every screen of the editor until the user dismisses it or starts another run. */
 
+import { t } from "@lingui/core/macro";
 import { keepGeneral } from "../../commands/viewstate";
 import { dismissal, resultOf, undismissedRun } from "../../program/results";
 import { now, useEditor } from "../../store/store";
@@ -23,7 +24,12 @@ export default function ResultBanner() {
         <span className="small">{`${result.name}, ${ago(run.ended ?? run.started)}. ${withNames(now(), result.detail)}`}</span>
       </p>
       {result.tone === "bad" && <ShowAction id={result.actionId} />}
-      <Button look="plain" icon="close" aria-label="Dismiss the result" onPress={() => keepGeneral(dismissal(run))} />
+      <Button
+        look="plain"
+        icon="close"
+        aria-label={t`Dismiss the result`}
+        onPress={() => keepGeneral(dismissal(run))}
+      />
     </div>
   );
 }

@@ -1,30 +1,38 @@
 /** State and controls of the running program, shown in the view whichever panel is open. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { barred } from "../../commands/asking";
 import * as commands from "../../commands/run";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { nameOf } from "../names";
 
-export const STATES: Record<string, string> = {
-  started: "Starting…",
-  running: "Running",
-  pausing: "Pausing…",
-  paused: "Paused",
-  resuming: "Resuming…",
-  stopping: "Stopping…",
+const STATES: Record<string, MessageDescriptor> = {
+  started: msg`Starting…`,
+  running: msg`Running`,
+  pausing: msg`Pausing…`,
+  paused: msg`Paused`,
+  resuming: msg`Resuming…`,
+  stopping: msg`Stopping…`,
 };
+
+/** Return the name of a state of the program as shown to users. */
+export function phaseName(phase: string): string | undefined {
+  const name = STATES[phase];
+  return name && i18n._(name);
+}
 
 export default function RunBar() {
   const state = useEditor((each) => each);
   const { state: phase, running } = state.program;
   const at = running.map((id) => nameOf(state, id)).filter(Boolean);
   return (
-    <div className="runbar" role="group" aria-label="The program">
+    <div className="runbar" role="group" aria-label={t`The program`}>
       <span className="runbar-state" role="status">
-        <strong>{STATES[phase]}</strong>
+        <strong>{phaseName(phase)}</strong>
         {at.length > 0 && (
-          <span className="small quiet">{phase === "paused" ? ` before ${at.join(", ")}` : ` ${at.join(", ")}`}</span>
+          <span className="small quiet">{phase === "paused" ? t` before ${at.join(", ")}` : ` ${at.join(", ")}`}</span>
         )}
       </span>
       <RunButtons />
@@ -40,22 +48,22 @@ export function RunButtons() {
     <>
       {phase === "running" && (
         <Button icon="pause" why={why} onPress={() => void commands.pause()}>
-          Pause
+          {t`Pause`}
         </Button>
       )}
       {phase === "paused" && (
         <>
           <Button icon="play" look="primary" why={why} onPress={() => void commands.resume()}>
-            Resume
+            {t`Resume`}
           </Button>
           <Button icon="step" why={why} onPress={() => void commands.step()}>
-            Step
+            {t`Step`}
           </Button>
         </>
       )}
       {(phase === "running" || phase === "paused" || phase === "pausing" || phase === "resuming") && (
         <Button icon="stop" why={why} onPress={() => void commands.stop()}>
-          Stop
+          {t`Stop`}
         </Button>
       )}
     </>

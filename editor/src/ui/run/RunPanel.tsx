@@ -1,5 +1,6 @@
 /** Run the open project and follow it: state, result, and each action with its parameters and results. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { barred } from "../../commands/asking";
 import { notEditable } from "../../commands/program";
@@ -10,7 +11,7 @@ import { AskName, Button } from "../kit/kit";
 import { nameOf } from "../names";
 import { History } from "./History";
 import { LastResult } from "./Result";
-import { RunButtons, STATES } from "./RunBar";
+import { phaseName, RunButtons } from "./RunBar";
 import { Trace } from "./Trace";
 import "./run.css";
 
@@ -33,7 +34,7 @@ export default function RunPanel() {
       {!runs && !busy && doc?.project && <LastResult projectId={doc.project.id} />}
       {(runs || busy) && (
         <p className="run-state" role="status">
-          <strong>{runs ? STATES[program.state] : "Building…"}</strong>
+          <strong>{runs ? phaseName(program.state) : t`Building…`}</strong>
           {program.running.length > 0 && (
             <span>
               {" "}
@@ -51,30 +52,31 @@ export default function RunPanel() {
         <>
           <div className="row">
             <Button look="primary" icon="play" why={why} isDisabled={busy} onPress={() => void begin(false)}>
-              {doc?.unsaved ? "Save and run" : "Run"}
+              {doc?.unsaved ? t`Save and run` : t`Run`}
             </Button>
             <Button icon="step" why={why} isDisabled={busy} onPress={() => void begin(true)}>
-              Start paused
+              {t`Start paused`}
             </Button>
             <Button icon="box" why={cannotBuild} isDisabled={busy} onPress={() => setAsking(true)}>
-              Build…
+              {t`Build…`}
             </Button>
           </div>
           <p className="quiet small">
-            {doc?.unsaved ? "Unsaved changes are saved first. " : ""}“Build” makes a package for the operator's screen.
+            {doc?.unsaved && `${t`Unsaved changes are saved first.`} `}
+            {t`“Build” creates a package for the operator screen.`}
           </p>
         </>
       )}
       {broken.length > 0 && (
-        <section className="run-part" aria-label="Breakpoints">
-          <h3>Pauses before</h3>
+        <section className="run-part" aria-label={t`Breakpoints`}>
+          <h3>{t`Pauses before`}</h3>
           <ul className="row">
             {broken.map((id) => (
               <li key={id}>
                 <Button
                   look="plain"
                   icon="close"
-                  aria-label={`Do not pause at ${nameOf(state, id)}`}
+                  aria-label={t`Do not pause at ${nameOf(state, id)}`}
                   why={barred(state, "SetBreakpoints")}
                   onPress={() => void breakAt(id, false)}
                 >
@@ -95,9 +97,9 @@ export default function RunPanel() {
       <History />
       {asking && doc?.project && (
         <AskName
-          title="Build a package"
+          title={t`Build a package`}
           initial={doc.project.name}
-          yes={doc.unsaved ? "Save and build" : "Build"}
+          yes={doc.unsaved ? t`Save and build` : t`Build`}
           onYes={(name) => void build(name)}
           onClose={() => setAsking(false)}
         />
@@ -112,7 +114,7 @@ function Follow() {
   return (
     <label className="check">
       <input type="checkbox" checked={on} onChange={(event) => setUi({ follow: event.target.checked })} />
-      <span>The view follows the running action</span>
+      <span>{t`The view follows the running action`}</span>
     </label>
   );
 }

@@ -1,5 +1,6 @@
 /** What the program has done, the newest first: each action with parameters, results and how long it took. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { Button as AriaButton } from "react-aria-components";
 import { metaOf } from "../../program/logic";
@@ -7,6 +8,7 @@ import type { TraceEntry } from "../../protocol/types";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { Values } from "../program/Values";
+import { clock } from "../times";
 import "../program/program.css";
 
 /** So many are drawn; the rest on request. */
@@ -21,8 +23,8 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
   const newest = [...trace].sort((a, b) => b.number - a.number);
   const shown = all ? newest : newest.slice(0, SHOWN);
   return (
-    <section className="run-part" aria-label="What it has done">
-      <h3>What it has done</h3>
+    <section className="run-part" aria-label={t`What it has done`}>
+      <h3>{t`What it has done`}</h3>
       <ol className="trace" reversed>
         {shown.map((entry) => (
           <li key={entry.number} data-failed={entry.error !== undefined} data-running={entry.duration === undefined}>
@@ -31,14 +33,14 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
               aria-expanded={open === entry.number}
               onPress={() => setOpen(open === entry.number ? 0 : entry.number)}
             >
-              <span className="trace-name">{entry.name || "an action"}</span>
+              <span className="trace-name">{entry.name || t`an action`}</span>
               <span className="quiet small">
                 {entry.error !== undefined
                   ? "failed"
                   : entry.duration === undefined
                     ? paused
-                      ? "waits"
-                      : "runs now"
+                      ? t`waiting`
+                      : t`runs now`
                     : seconds(entry.duration)}
               </span>
             </AriaButton>
@@ -46,7 +48,7 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
           </li>
         ))}
       </ol>
-      {!all && trace.length > SHOWN && <Button onPress={() => setAll(true)}>Show all {trace.length}</Button>}
+      {!all && trace.length > SHOWN && <Button onPress={() => setAll(true)}>{t`Show all ${trace.length}`}</Button>}
     </section>
   );
 }
@@ -61,20 +63,20 @@ function Detail({ entry, onChoose }: { entry: TraceEntry; onChoose: (actionId: s
       {entry.parameters && entry.parameters.length > 0 && <Values names={names} values={entry.parameters} />}
       {entry.results && entry.results.length > 0 && (
         <>
-          <p className="small quiet">Results</p>
+          <p className="small quiet">{t`Results`}</p>
           <Values names={action?.flows[0]?.outputs ?? []} values={entry.results} />
         </>
       )}
-      <p className="small quiet">at {new Date(entry.started).toLocaleTimeString("en-GB")}</p>
-      {action && <Button onPress={() => onChoose(entry.action_id)}>Show it</Button>}
+      <p className="small quiet">{t`at ${clock(entry.started, true)}`}</p>
+      {action && <Button onPress={() => onChoose(entry.action_id)}>{t`Show it`}</Button>}
     </div>
   );
 }
 
 export function seconds(duration: number): string {
   return duration < 0.995
-    ? `${Math.round(duration * 1000)} ms`
+    ? t`${Math.round(duration * 1000)} ms`
     : duration < 59.5
-      ? `${duration.toFixed(1)} s`
-      : `${Math.floor(duration / 60)} min ${Math.round(duration % 60)} s`;
+      ? t`${duration.toFixed(1)} s`
+      : t`${Math.floor(duration / 60)} min ${Math.round(duration % 60)} s`;
 }

@@ -1,11 +1,12 @@
 /** Running the program: start, follow, what it has done, how earlier runs ended. */
 
+import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";
 import type { Tool } from "../workplace/tools";
 
 export const run: Tool = {
   id: "run",
-  label: "Run",
+  label: msg`Run`,
   icon: "play",
   shown: (state) => state.doc?.project != null,
   Panel: lazily(() => import("./RunPanel")),

@@ -1,5 +1,6 @@
 /** Uploads a mesh as an object: how large it is stands there before, since many files do not say in which unit they are. */
 
+import { plural, t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { addMesh, freeObjectName } from "../../commands/scene";
 import type { MeshFile } from "../../scene/meshes";
@@ -41,11 +42,11 @@ export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
   return (
     <form className="add-form" onSubmit={submit}>
       <Button look="plain" onPress={onBack}>
-        ← All kinds
+        {t`← All kinds`}
       </Button>
-      <h3>Mesh</h3>
+      <h3>{t`Mesh`}</h3>
       <div className="field">
-        <label htmlFor="mesh-file">File: STL, GLB, OBJ, PLY or DAE</label>
+        <label htmlFor="mesh-file">{t`File: STL, GLB, OBJ, PLY or DAE`}</label>
         <input
           id="mesh-file"
           type="file"
@@ -58,19 +59,19 @@ export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
         <>
           <MeshPreview geometry={mesh.geometry} />
           <OneOf
-            label="One unit of the file is"
+            label={t`One unit of the file is`}
             value={unit}
             choices={LENGTH_UNITS.map((each) => [each, `1 ${each}`] as const)}
             onChange={setUnit}
           />
           <p className="small">
-            So it is {mesh.size.map((each) => show(each * WORTH[unit], "mm")).join(" × ")} mm.{" "}
-            <span className="quiet">{mesh.triangles} triangles.</span>
+            {t`Size: ${mesh.size.map((each) => show(each * WORTH[unit], "mm")).join(" × ")} mm.`}{" "}
+            <span className="quiet">{plural(mesh.triangles, { one: "# triangle", other: "# triangles" })}</span>
           </p>
-          <Field label="Name" value={name} onChange={setName} autoComplete="off" />
+          <Field label={t`Name`} value={name} onChange={setName} autoComplete="off" />
           <RefusedText>{refused}</RefusedText>
           <Button look="primary" icon="plus" type="submit" why={why} isDisabled={busy || !name.trim()}>
-            {busy ? "Uploading…" : "Upload and add"}
+            {busy ? t`Uploading…` : t`Upload and add`}
           </Button>
         </>
       )}

@@ -1,5 +1,6 @@
 /** A form made from the settings of a type. What is wrong is told where it is, before and after the server has seen it. */
 
+import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { addObject, freeObjectName } from "../../commands/scene";
 import { words } from "../../program/naming";
@@ -24,21 +25,21 @@ export function AddObject({ type, why, onBack }: { type: ObjectTypeMeta; why: st
   return (
     <form className="add-form" onSubmit={submit}>
       <Button look="plain" onPress={onBack}>
-        ← All kinds
+        {t`← All kinds`}
       </Button>
       <h3>{type.type}</h3>
       <p className="quiet small description">{type.description}</p>
       {type.has_pose && (
-        <p className="quiet small">It is put where the middle of the view points, and can be moved then.</p>
+        <p className="quiet small">{t`It is put where the middle of the view points, and can be moved then.`}</p>
       )}
-      <Field label="Name" value={name} onChange={setName} autoComplete="off" />
+      <Field label={t`Name`} value={name} onChange={setName} autoComplete="off" />
       <SettingsFields settings={type.settings} values={values} why="" onChange={setValues} />
       <Button look="primary" icon="plus" type="submit" why={why} isDisabled={busy}>
-        {busy ? "Adding…" : "Add"}
+        {busy ? t`Adding…` : t`Add`}
       </Button>
       {/* Below the button: what goes when a field is left must not move it from under the finger. */}
       {tried && lacking.length > 0 && (
-        <RefusedText>{`Still to be said: ${lacking.map(words).join(", ")}.`}</RefusedText>
+        <RefusedText>{t`Still to be said: ${lacking.map(words).join(", ")}.`}</RefusedText>
       )}
       <RefusedText>{refused}</RefusedText>
       <TypeUse type={type} onDeleted={onBack} />

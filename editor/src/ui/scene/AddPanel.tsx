@@ -1,5 +1,7 @@
 /** What can be added to the scene: shapes and meshes by one tap, devices by a form of their settings. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { Input, Label, SearchField } from "react-aria-components";
 import { addShape, notBuildable, type ShapeKind } from "../../commands/scene";
@@ -12,10 +14,10 @@ import { AddMesh } from "./AddMesh";
 import { AddObject } from "./AddObject";
 import "./scene.css";
 
-const SHAPES: readonly (readonly [ShapeKind, string])[] = [
-  ["box", "Box"],
-  ["cylinder", "Cylinder"],
-  ["sphere", "Sphere"],
+const SHAPES: readonly (readonly [ShapeKind, MessageDescriptor])[] = [
+  ["box", msg`Box`],
+  ["cylinder", msg`Cylinder`],
+  ["sphere", msg`Sphere`],
 ];
 
 export default function AddPanel() {
@@ -33,25 +35,25 @@ export default function AddPanel() {
   );
   const groups = new Map<string, ObjectTypeMeta[]>();
   for (const each of found.sort((a, b) => a.type.localeCompare(b.type))) {
-    const group = each.category ?? "Other";
+    const group = each.category ?? t`Other`;
     groups.set(group, [...(groups.get(group) ?? []), each]);
   }
   return (
     <>
       {why && <p className="small">{why}</p>}
-      <div className="shapes" role="group" aria-label="Shapes">
+      <div className="shapes" role="group" aria-label={t`Shapes`}>
         {SHAPES.map(([kind, label]) => (
           <Button key={kind} icon="box" why={why} onPress={() => void addShape(kind)}>
-            {label}
+            {i18n._(label)}
           </Button>
         ))}
         <Button icon="box" why={why} onPress={() => setChosen("mesh")}>
-          Mesh…
+          {t`Mesh…`}
         </Button>
       </div>
       <SearchField className="field" value={search} onChange={setSearch}>
-        <Label className="hidden-but-read">Search</Label>
-        <Input placeholder="Search devices" />
+        <Label className="hidden-but-read">{t`Search`}</Label>
+        <Input placeholder={t`Search devices`} />
       </SearchField>
       {[...groups]
         .sort(([a], [b]) => a.localeCompare(b))
@@ -67,7 +69,12 @@ export default function AddPanel() {
                     aria-disabled={each.disabled || undefined}
                     onClick={() =>
                       each.disabled
-                        ? tell("info", `${each.type} cannot be used: ${each.problem ?? "nobody knows why"}`)
+                        ? tell(
+                            "info",
+                            each.problem
+                              ? t`${each.type} cannot be used: ${each.problem}`
+                              : t`${each.type} cannot be used.`,
+                          )
                         : setChosen(each.type)
                     }
                   >
@@ -89,7 +96,7 @@ export default function AddPanel() {
             </ul>
           </section>
         ))}
-      {found.length === 0 && <p className="quiet">No kind of device is called “{search.trim()}”.</p>}
+      {found.length === 0 && <p className="quiet">{t`No device type matches “${search.trim()}”.`}</p>}
     </>
   );
 }

@@ -1,5 +1,6 @@
 /** How a mesh looks before it is uploaded: seen from above and the side, drawn once. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect, useRef } from "react";
 import type { BufferGeometry } from "three";
 
@@ -19,7 +20,7 @@ export function MeshPreview({ geometry }: { geometry: BufferGeometry }) {
       height={320}
       className="mesh-preview"
       role="img"
-      aria-label="The mesh, seen from the front, right and above"
+      aria-label={t`The mesh, seen from the front, right and above`}
     />
   );
 }

@@ -1,5 +1,6 @@
 /** The selected object as a thing of the scene: its name, copies, what needs it, and how it is seen. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { duplicateObject, notBuildable, projectsUsing, removeObject, renameObject } from "../../commands/scene";
 import { keepView } from "../../commands/viewstate";
@@ -16,13 +17,13 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   const object = useEditor((state) => state.doc?.objects[id]);
   const holder = useEditor((state) => heldBy(state, id));
   const why = useEditor((state) =>
-    heldBy(state, id) ? `${heldBy(state, id)} works on it.` : notBuildable(state, "RemoveFromScene"),
+    heldBy(state, id) ? t`${heldBy(state, id)} works on it.` : notBuildable(state, "RemoveFromScene"),
   );
   const cannotRename = useEditor((state) =>
     holder
-      ? `${holder} works on it.`
+      ? t`${holder} works on it.`
       : state.doc?.project
-        ? "Objects belong to the scene: close the project, and open the scene."
+        ? t`Objects belong to the scene: close the project, and open the scene.`
         : "",
   );
   const [needing, setNeeding] = useState<string[] | null>(null);
@@ -36,28 +37,28 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   return (
     <>
       <NameField
-        label="Name of the object"
+        label={t`Name of the object`}
         name={object.name}
         why={cannotRename}
         onRename={(name) => renameObject(id, name)}
       />
       <div className="tool-actions">
         <Button icon="plus" why={why} onPress={() => void duplicateObject(object)}>
-          Duplicate
+          {t`Duplicate`}
         </Button>
         <Button icon="close" why={why} onPress={() => void remove()}>
-          Remove
+          {t`Remove`}
         </Button>
       </div>
       <Seeing id={id} />
       {needing && (
         <Confirm
-          title={`Remove ${object.name}?`}
-          yes="Remove"
+          title={t`Remove ${object.name}?`}
+          yes={t`Remove`}
           onClose={() => setNeeding(null)}
           onYes={() => void removeObject(id, true)}
         >
-          <p>These projects use it, and lose its actions and points when the scene is saved:</p>
+          <p>{t`These projects use it, and lose its actions and points when the scene is saved:`}</p>
           <ul>
             {needing.map((each) => (
               <li key={each}>{each}</li>
@@ -87,11 +88,11 @@ function Seeing({ id }: { id: string }) {
   return (
     <>
       <OnOff isSelected={aside} onChange={(on) => putAside(id, on)}>
-        Hide it, and aim through it
+        {t`Hide it, and aim through it`}
       </OnOff>
       {!aside && (
         <MoreOrLess
-          label="Seen through"
+          label={t`Seen through`}
           value={1 - (now_ ?? opacity)}
           least={0}
           most={0.95}

@@ -1,5 +1,6 @@
 /** Fields for the settings of an object: what has no default comes first, the rest below. */
 
+import { t } from "@lingui/core/macro";
 import { words } from "../../program/naming";
 import { extraOf } from "../../program/values";
 import type { Parameter, ParameterMeta } from "../../protocol/types";
@@ -62,7 +63,7 @@ export function SettingsFields({
       {others.length > 0 && (
         <details className="more-settings" open={needed.length === 0 && others.length <= 6}>
           <summary>
-            {needed.length > 0 ? "Further settings" : "Settings"} <span className="tag">{others.length}</span>
+            {needed.length > 0 ? t`Further settings` : t`Settings`} <span className="tag">{others.length}</span>
           </summary>
           {others.map(field)}
         </details>

@@ -1,5 +1,6 @@
 /** The settings of the selected object: changed together, checked, and saved by one request. */
 
+import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { notBuildable, setParameters } from "../../commands/scene";
 import { heldBy } from "../../store/selectors";
@@ -20,18 +21,20 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   if (!object || !settings) return null;
   const known: Values = Object.fromEntries(object.parameters.map((each) => [each.name, each.value]));
   const values = draft ?? known;
-  const why = holder ? `${holder} works on it.` : cannot;
+  const why = holder ? t`${holder} works on it.` : cannot;
   const lacking = missing(settings, values);
   return (
     <>
       {why && <p className="quiet small">{why}</p>}
-      {overlaid && overlaid.length > 0 && <p className="small">From the server’s cell file: {overlaid.join(", ")}.</p>}
+      {overlaid && overlaid.length > 0 && (
+        <p className="small">{t`Set by the cell file of the server: ${overlaid.join(", ")}.`}</p>
+      )}
       <SettingsFields key={id} settings={settings} values={values} why={why} onChange={setDraft} />
-      {lacking.length > 0 && <RefusedText>{`Still to be said: ${lacking.join(", ")}.`}</RefusedText>}
+      {lacking.length > 0 && <RefusedText>{t`Still to be said: ${lacking.join(", ")}.`}</RefusedText>}
       <RefusedText>{refused}</RefusedText>
       {draft && (
         <div className="actions">
-          <Button onPress={() => setDraft(null)}>Revert</Button>
+          <Button onPress={() => setDraft(null)}>{t`Revert`}</Button>
           <Button
             look="primary"
             why={why}
@@ -40,7 +43,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
               void ask(setParameters(id, parametersOf(settings, draft))).then((done) => done && setDraft(null))
             }
           >
-            Save the settings
+            {t`Save the settings`}
           </Button>
         </div>
       )}

@@ -1,5 +1,6 @@
 /** Where a kind of object is used; one that was uploaded and is used nowhere can be deleted. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { barred, whyNot } from "../../commands/asking";
 import { deleteType, scenesUsing } from "../../commands/scene";
@@ -31,22 +32,22 @@ export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: 
   return (
     <div className="type-use">
       <p className="quiet small">
-        {scenes.length > 0 ? `Used in ${scenes.join(", ")}.` : "Not used in any saved scene."}
+        {scenes.length > 0 ? t`Used in ${scenes.join(", ")}.` : t`Not used in any saved scene.`}
       </p>
       {!installed && (
         <Button why={cannot || why} onPress={() => setSure(true)}>
-          Delete this kind…
+          {t`Delete this kind…`}
         </Button>
       )}
       <RefusedText>{refused}</RefusedText>
       {sure && (
         <Confirm
-          title={`Delete ${type.type}?`}
-          yes="Delete"
+          title={t`Delete ${type.type}?`}
+          yes={t`Delete`}
           onClose={() => setSure(false)}
           onYes={() => void ask(deleteType(type.type)).then((done) => done && onDeleted())}
         >
-          <p>The kind goes, with its code. No scene uses it. This cannot be undone.</p>
+          <p>{t`The kind goes, with its code. No scene uses it. This cannot be undone.`}</p>
         </Confirm>
       )}
     </div>

@@ -1,12 +1,13 @@
 /** Sections about objects of the scene; each is loaded when an object is selected first. */
 
+import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";
 import type { Section } from "../workplace/sections";
 
 export const objectSections: readonly Section[] = [
   {
     id: "object",
-    title: "Object",
+    title: msg`Object`,
     applies: ({ kind }) => kind === "object",
     Body: lazily(() => import("./ObjectSection")),
   },
@@ -15,7 +16,7 @@ export const objectSections: readonly Section[] = [
 export const settingsSections: readonly Section[] = [
   {
     id: "settings",
-    title: "Settings",
+    title: msg`Settings`,
     applies: ({ kind, id }, state) =>
       kind === "object" && (state.types.byName[state.doc?.objects[id]?.type ?? ""]?.settings.length ?? 0) > 0,
     Body: lazily(() => import("./SettingsSection")),

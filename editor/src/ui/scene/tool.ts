@@ -1,11 +1,12 @@
 /** Adds devices, shapes and meshes to the scene. */
 
+import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";
 import type { Tool } from "../workplace/tools";
 
 export const add: Tool = {
   id: "add",
-  label: "Add",
+  label: msg`Add`,
   icon: "plus",
   shown: (state) => state.doc !== null && state.doc.project === null,
   Panel: lazily(() => import("./AddPanel")),

@@ -1,5 +1,6 @@
 /** What this is, how others join, and which keys there are; a chunk of its own. */
 
+import { t } from "@lingui/core/macro";
 import { version } from "../../../package.json";
 import { useEditor } from "../../store/store";
 import { Invitation } from "../join/Invitation";
@@ -8,33 +9,33 @@ import { Button } from "../kit/kit";
 import { SaveDiagnosis } from "./SaveDiagnosis";
 import "./search.css";
 
-const KEYS: readonly (readonly [string, string])[] = [
-  ["/", "find a command or a thing"],
-  ["?", "this page"],
-  ["Esc, twice", "stop motion, while a robot is live"],
-  ["Tab, arrows", "through tools, lists and fields; Enter does it"],
-  ["X", "the cross in the middle of the view comes and goes; N: the next thing there, Enter: select it"],
-  ["W A S D Q E", "fly, when the view has the focus"],
-  ["arrow keys at a number", "one step more or less"],
+const keys = (): readonly (readonly [string, string])[] => [
+  ["/", t`find a command or a thing`],
+  ["?", t`this page`],
+  [t`Esc, twice`, t`stop motion, while a robot is live`],
+  [t`Tab, arrows`, t`through tools, lists and fields; Enter does it`],
+  ["X", t`the cross in the middle of the view comes and goes; N: the next thing there, Enter: select it`],
+  ["W A S D Q E", t`fly, when the view has the focus`],
+  [t`arrow keys at a number`, t`one step more or less`],
 ];
 
 export default function About({ onClose }: { onClose: () => void }) {
   const { server, user } = useEditor((state) => state.connection);
   return (
-    <Window title="About" onClose={onClose}>
+    <Window title={t`About`} onClose={onClose}>
       <dl className="facts">
-        <dt>Editor</dt>
+        <dt>{t`Editor`}</dt>
         <dd>ARCOR2-HW {version}</dd>
-        <dt>Server</dt>
-        <dd>{server ? `${server.version}, protocol ${server.api_version}` : "no connection"}</dd>
-        <dt>You are</dt>
+        <dt>{t`Server`}</dt>
+        <dd>{server ? t`${server.version}, protocol ${server.api_version}` : t`no connection`}</dd>
+        <dt>{t`You are`}</dt>
         <dd>{user}</dd>
       </dl>
       <Invitation />
       <SaveDiagnosis />
-      <h3>Keys</h3>
+      <h3>{t`Keys`}</h3>
       <dl className="facts">
-        {KEYS.map(([key, does]) => (
+        {keys().map(([key, does]) => (
           <div key={key} className="fact">
             <dt>
               <kbd>{key}</kbd>
@@ -45,7 +46,7 @@ export default function About({ onClose }: { onClose: () => void }) {
       </dl>
       <div className="actions">
         <Button look="primary" onPress={onClose}>
-          Close
+          {t`Close`}
         </Button>
       </div>
     </Window>

@@ -1,5 +1,6 @@
 /** One field that finds every command and every thing by its name; a chunk of its own. */
 
+import { t } from "@lingui/core/macro";
 import { useMemo, useState } from "react";
 import { Autocomplete, Input, Label, ListBox, ListBoxItem, SearchField } from "react-aria-components";
 import { tell, useEditor } from "../../store/store";
@@ -29,19 +30,19 @@ export default function Palette({ onClose }: { onClose: () => void }) {
     entry.act();
   };
   return (
-    <Window title="Find a command or a thing" onClose={onClose}>
+    <Window title={t`Find a command or a thing`} onClose={onClose}>
       <Autocomplete inputValue={search} onInputChange={setSearch}>
-        <SearchField className="field" autoFocus aria-label="Find">
-          <Label className="hidden-but-read">Find</Label>
-          <Input placeholder="Type a part of its name" />
+        <SearchField className="field" autoFocus aria-label={t`Find`}>
+          <Label className="hidden-but-read">{t`Find`}</Label>
+          <Input placeholder={t`Type a part of its name`} />
         </SearchField>
-        <div className="found" tabIndex={0} role="group" aria-label="What was found">
+        <div className="found" tabIndex={0} role="group" aria-label={t`What was found`}>
           <ListBox
-            aria-label="Found"
+            aria-label={t`Found`}
             items={shown}
             selectionMode="none"
             onAction={(key) => choose(String(key))}
-            renderEmptyState={() => <p className="quiet">Nothing is called that.</p>}
+            renderEmptyState={() => <p className="quiet">{t`Nothing is called that.`}</p>}
           >
             {(entry) => (
               <ListBoxItem id={entry.id} textValue={entry.words} className="found-entry">

@@ -1,5 +1,6 @@
 /** One press: a file for whoever helps. */
 
+import { t } from "@lingui/core/macro";
 import { barred } from "../../commands/asking";
 import { saveDiagnosis } from "../../commands/diagnosis";
 import { useEditor } from "../../store/store";
@@ -11,14 +12,13 @@ export function SaveDiagnosis() {
   const why = useEditor((state) => barred(state, "SaveScene"));
   const { refused, busy, ask } = useAsking();
   return (
-    <section aria-label="Diagnosis">
-      <h3>Something went wrong?</h3>
+    <section aria-label={t`Diagnosis`}>
+      <h3>{t`Something went wrong?`}</h3>
       <p className="quiet small">
-        A file with what is open, devices, versions and the last lines of the log, without secrets, for whoever helps
-        you. It is saved here and sent to nobody.
+        {t`A file with what is open, devices, versions and the last lines of the log, without secrets, for whoever helps you. It is saved here and sent to nobody.`}
       </p>
       <Button icon="save" why={why} isDisabled={busy} onPress={() => void ask(saveDiagnosis())}>
-        {busy ? "Gathering…" : "Save a file for diagnosis"}
+        {busy ? t`Gathering…` : t`Save a file for diagnosis`}
       </Button>
       <RefusedText>{refused}</RefusedText>
     </section>

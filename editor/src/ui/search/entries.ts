@@ -1,5 +1,7 @@
 /** All that the search finds: commands of the screen, tools, things, and what can be opened, each as words. */
 
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
 import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { goOffline, goOnline, stopMotion } from "../../commands/operation";
@@ -12,7 +14,7 @@ import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { now, select, setUi } from "../../store/store";
 import { allOf, thingsOf } from "../../viewmodel/things";
-import { KINDS, selectionOf } from "../names";
+import { kindName, selectionOf } from "../names";
 import { TOOLS } from "../workplace/tools";
 import type { Entry } from "./found";
 import { openOverlay } from "./Overlays";
@@ -23,7 +25,7 @@ export function entriesOf(state: State): Entry[] {
 
 function ofWorkplace(state: State): Entry[] {
   const { history, live } = state;
-  const entry = (id: string, words: string, why: string, act: () => unknown, detail = "command"): Entry => ({
+  const entry = (id: string, words: string, why: string, act: () => unknown, detail = t`command`): Entry => ({
     id,
     words,
     detail,
@@ -32,37 +34,37 @@ function ofWorkplace(state: State): Entry[] {
   });
   const cannotSave =
     barred(state, state.doc?.project ? "SaveProject" : "SaveScene") ||
-    (state.doc?.unsaved ? "" : "Nothing has changed.");
+    (state.doc?.unsaved ? "" : t`Nothing has changed.`);
   const cannotUndo = barred(state, "Undo");
-  const cannotSwitch = barred(state, "StartScene") || (isRunning(state) ? "A program runs." : "");
+  const cannotSwitch = barred(state, "StartScene") || (isRunning(state) ? t`A program runs.` : "");
   const online = live.state === "started";
   return [
-    ...(online ? [entry("stop", "Stop motion", "", stopMotion, "command, no emergency stop")] : []),
+    ...(online ? [entry("stop", t`Stop motion`, "", stopMotion, t`command, no emergency stop`)] : []),
     ...TOOLS.filter((tool) => tool.shown?.(state) ?? true).map((tool) =>
-      entry(`tool/${tool.id}`, tool.label, tool.barred?.(state) ?? "", () => setUi({ tool: tool.id }), "tool"),
+      entry(`tool/${tool.id}`, i18n._(tool.label), tool.barred?.(state) ?? "", () => setUi({ tool: tool.id }), "tool"),
     ),
-    entry("save", "Save", cannotSave, documents.save),
+    entry("save", t`Save`, cannotSave, documents.save),
     entry(
       "undo",
-      history?.undo ? `Undo ${history.undo.text}` : "Undo",
-      cannotUndo || (history?.undo ? "" : "There is nothing to undo."),
+      history?.undo ? t`Undo ${history.undo.text}` : t`Undo`,
+      cannotUndo || (history?.undo ? "" : t`There is nothing to undo.`),
       documents.undo,
     ),
     entry(
       "redo",
-      history?.redo ? `Redo ${history.redo.text}` : "Redo",
-      cannotUndo || (history?.redo ? "" : "There is nothing to redo."),
+      history?.redo ? t`Redo ${history.redo.text}` : t`Redo`,
+      cannotUndo || (history?.redo ? "" : t`There is nothing to redo.`),
       documents.redo,
     ),
     online
-      ? entry("offline", "Go offline", cannotSwitch, goOffline)
-      : entry("online", "Go online", cannotSwitch || (live.state === "stopped" ? "" : "It is on its way."), goOnline),
-    entry("cross", aimsAlways(state) ? "No more picking by the cross" : "Pick by the cross", "", () =>
+      ? entry("offline", t`Go offline`, cannotSwitch, goOffline)
+      : entry("online", t`Go online`, cannotSwitch || (live.state === "stopped" ? "" : t`It is on its way.`), goOnline),
+    entry("cross", aimsAlways(state) ? t`No more picking by the cross` : t`Pick by the cross`, "", () =>
       keepGeneral({ aiming: !aimsAlways(state) || null }),
     ),
-    entry("all", "Show all in the view", "", () => theEngine()?.focus()),
+    entry("all", t`Show all in the view`, "", () => theEngine()?.focus()),
     ...(state.ui.selection
-      ? [entry("zoom", "Zoom to what is selected", "", () => theEngine()?.focus(now().ui.selection?.id))]
+      ? [entry("zoom", t`Zoom to what is selected`, "", () => theEngine()?.focus(now().ui.selection?.id))]
       : []),
   ];
 }
@@ -72,7 +74,7 @@ function things(state: State): Entry[] {
   return rows.map(({ id, name, kind, detail }) => ({
     id,
     words: name,
-    detail: kind === "object" ? detail : KINDS[kind].toLowerCase(),
+    detail: kind === "object" ? detail : kindName(kind).toLowerCase(),
     why: "",
     act: () => {
       select(selectionOf(now(), id));
@@ -85,8 +87,8 @@ function things(state: State): Entry[] {
 function ofHome(state: State): Entry[] {
   const open = (kind: "project" | "scene", id: string, name: string): Entry => ({
     id,
-    words: `Open ${name}`,
-    detail: kind,
+    words: t`Open ${name}`,
+    detail: kind === "scene" ? t`scene` : t`project`,
     why: barred(state, kind === "scene" ? "OpenScene" : "OpenProject"),
     act: () => void (kind === "scene" ? documents.openScene(id) : documents.openProject(id)),
   });
@@ -98,14 +100,14 @@ function ofHome(state: State): Entry[] {
 
 function everywhere(state: State): Entry[] {
   const { theme, leftHanded } = state.ui;
-  const themes = { system: "Colours as the device has them", light: "Light colours", dark: "Dark colours" } as const;
+  const themes = { system: t`Colours as the device has them`, light: t`Light colours`, dark: t`Dark colours` } as const;
   return [
     ...(["system", "light", "dark"] as const)
       .filter((each) => each !== theme)
       .map((each) => ({
         id: `theme/${each}`,
         words: themes[each],
-        detail: "setting",
+        detail: t`setting`,
         why: "",
         act: () => {
           setUi({ theme: each });
@@ -114,8 +116,8 @@ function everywhere(state: State): Entry[] {
       })),
     {
       id: "hand",
-      words: leftHanded ? "Controls for the right hand" : "Controls for the left hand",
-      detail: "setting",
+      words: leftHanded ? t`Controls for the right hand` : t`Controls for the left hand`,
+      detail: t`setting`,
       why: "",
       act: () => {
         setUi({ leftHanded: !leftHanded });
@@ -124,18 +126,18 @@ function everywhere(state: State): Entry[] {
     },
     {
       id: "messages",
-      words: "Messages: what was told, with times",
-      detail: "help",
+      words: t`Messages: what was told, with times`,
+      detail: t`help`,
       why: "",
       act: () => openOverlay("messages"),
     },
     {
       id: "about",
-      words: "About, keys, invite others, diagnosis",
-      detail: "help",
+      words: t`About, keys, invite others, diagnosis`,
+      detail: t`help`,
       why: "",
       act: () => openOverlay("about"),
     },
-    { id: "leave", words: "Leave", detail: "command", why: "", act: leave },
+    { id: "leave", words: t`Leave`, detail: t`command`, why: "", act: leave },
   ];
 }

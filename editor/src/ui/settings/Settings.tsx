@@ -1,5 +1,7 @@
 /** How the screen looks, on this device only; and the way out. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { remember, remembered } from "../../session/memory";
 import { leave } from "../../session/session";
@@ -8,7 +10,11 @@ import { setUi, useEditor } from "../../store/store";
 import { type Choice, More } from "../kit/kit";
 import { openOverlay } from "../search/Overlays";
 
-const THEMES: Record<Ui["theme"], string> = { system: "Colours as the device has them", light: "Light", dark: "Dark" };
+const THEMES: Record<Ui["theme"], MessageDescriptor> = {
+  system: msg`Colours as the device has them`,
+  light: msg`Light`,
+  dark: msg`Dark`,
+};
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
 
 export function useTheme(): "light" | "dark" {
@@ -41,10 +47,10 @@ export function Settings() {
   const { theme, leftHanded } = useEditor((state) => state.ui);
   const user = useEditor((state) => state.connection.user);
   const choices: Choice[] = [
-    { id: "find", label: "Find a command or a thing ( / )", icon: "search", act: () => openOverlay("search") },
+    { id: "find", label: t`Find a command or a thing ( / )`, icon: "search", act: () => openOverlay("search") },
     ...(Object.keys(THEMES) as Ui["theme"][]).map((each) => ({
       id: each,
-      label: THEMES[each],
+      label: i18n._(THEMES[each]),
       icon: each === theme ? ("check" as const) : undefined,
       act: () => {
         setUi({ theme: each });
@@ -53,15 +59,15 @@ export function Settings() {
     })),
     {
       id: "hand",
-      label: leftHanded ? "Controls for the right hand" : "Controls for the left hand",
+      label: leftHanded ? t`Controls for the right hand` : t`Controls for the left hand`,
       act: () => {
         setUi({ leftHanded: !leftHanded });
         remember("hand", leftHanded ? "" : "left");
       },
     },
-    { id: "messages", label: "Messages, with times", icon: "list", act: () => openOverlay("messages") },
-    { id: "about", label: "Invite others, about, keys ( ? )", icon: "info", act: () => openOverlay("about") },
-    { id: "leave", label: `Leave (you are ${user})`, icon: "close", act: leave },
+    { id: "messages", label: t`Messages, with times`, icon: "list", act: () => openOverlay("messages") },
+    { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
+    { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: leave },
   ];
-  return <More label="Settings" icon="settings" choices={choices} />;
+  return <More label={t`Settings`} icon="settings" choices={choices} />;
 }

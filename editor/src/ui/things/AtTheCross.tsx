@@ -1,5 +1,6 @@
 /** What the cross in the middle of the view may mean, the likeliest first: exact where things stand close together. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { ListBox, ListBoxItem } from "react-aria-components";
 import { keepGeneral } from "../../commands/viewstate";
@@ -8,7 +9,7 @@ import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
 import { OnOff } from "../kit/fields";
 import { Icon } from "../kit/icons";
-import { KINDS, nameOf, selectionOf } from "../names";
+import { kindName, nameOf, selectionOf } from "../names";
 import { pick } from "../workplace/pick";
 import { ICONS } from "./ThingTree";
 
@@ -19,13 +20,13 @@ export function AtTheCross() {
   return (
     <>
       <ListBox
-        aria-label="At the cross"
+        aria-label={t`At the cross`}
         className="things"
         items={candidates.map((id) => ({ id }))}
         dependencies={[chosen]}
         onAction={(key) => pick([String(key)])}
         renderEmptyState={() => (
-          <p className="quiet">Nothing is near the cross: turn the view until it is at what you look for.</p>
+          <p className="quiet">{t`Nothing is near the cross: turn the view until it is at what you look for.`}</p>
         )}
       >
         {({ id }) => {
@@ -42,15 +43,15 @@ export function AtTheCross() {
               <Icon name={ICONS[kind]} />
               <span className="thing-name">{nameOf(state, id)}</span>
               <span className="quiet small">
-                {KINDS[kind]}
-                {parentOf(state, id) && ` on ${parentOf(state, id)}`}
+                {kindName(kind)}
+                {parentOf(state, id) && t` on ${parentOf(state, id)}`}
               </span>
             </ListBoxItem>
           );
         }}
       </ListBox>
       <OnOff isSelected={always} onChange={(on) => keepGeneral({ aiming: on || null })}>
-        Keep the cross when this is closed
+        {t`Keep the cross when this is closed`}
       </OnOff>
     </>
   );

@@ -1,5 +1,7 @@
 /** How all things together are seen, for this user: seen through, faded beside what is looked for, with lines to parents. */
 
+import { i18n } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { keepGeneral, keepView } from "../../commands/viewstate";
 import { useEditor } from "../../store/store";
@@ -9,9 +11,9 @@ import { MoreOrLess, OnOff } from "../kit/fields";
 
 /** What is drawn unless the user hides it, by the key under which the server keeps that. */
 const SIGHTS = [
-  ["hide_orientations", "Arrows of orientations"],
-  ["hide_axes", "Axes at end effectors"],
-  ["hide_steps", "Steps of the program"],
+  ["hide_orientations", msg`Arrows of orientations`],
+  ["hide_axes", msg`Axes at end effectors`],
+  ["hide_steps", msg`Steps of the program`],
 ] as const;
 
 export function InTheView({ narrowed }: { narrowed: boolean }) {
@@ -21,14 +23,14 @@ export function InTheView({ narrowed }: { narrowed: boolean }) {
   const view = useEditor((state) => state.view.user);
   const [moved, setMoved] = useState<number | null>(null);
   return (
-    <section className="section" aria-label="In the view">
-      <h3>In the view</h3>
+    <section className="section" aria-label={t`In the view`}>
+      <h3>{t`In the view`}</h3>
       <OnOff isSelected={fades} onChange={(on) => keepView("user", { fade_others: on || null })}>
-        Fade what is not of the chosen kinds
+        {t`Fade what is not of the chosen kinds`}
       </OnOff>
-      {fades && !narrowed && <p className="quiet small">Nothing fades until kinds are chosen above.</p>}
+      {fades && !narrowed && <p className="quiet small">{t`Nothing fades until kinds are chosen above.`}</p>}
       <MoreOrLess
-        label="All objects but robots seen through"
+        label={t`All objects but robots seen through`}
         value={1 - (moved ?? opacity)}
         least={0}
         most={0.95}
@@ -46,11 +48,11 @@ export function InTheView({ narrowed }: { narrowed: boolean }) {
           isSelected={view[key] !== true}
           onChange={(on) => keepView("user", { [key]: on ? null : true })}
         >
-          {words}
+          {i18n._(words)}
         </OnOff>
       ))}
       <OnOff isSelected={lines} onChange={(on) => keepGeneral({ parent_lines: on || null })}>
-        Lines from points to what they hang on
+        {t`Lines from points to what they hang on`}
       </OnOff>
     </section>
   );

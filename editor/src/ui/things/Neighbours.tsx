@@ -1,5 +1,6 @@
 /** From the selected thing to the one before and after it in the list of things, as that is narrowed. */
 
+import { t } from "@lingui/core/macro";
 import { useMemo } from "react";
 import { select, useEditor } from "../../store/store";
 import { groupsOf } from "../../viewmodel/seeing";
@@ -16,20 +17,20 @@ export default function Neighbours({ id }: { id: string }) {
     return { before: neighbour(all, id, -1), after: neighbour(all, id, 1) };
   }, [doc, types, groups, id]);
   const to = (row: typeof rows.before) => row && select({ kind: row.kind, id: row.id });
-  const alone = "There is nothing else in the list of things.";
+  const alone = t`There is nothing else in the list of things.`;
   return (
     <span className="neighbours">
       <Button
         look="plain"
         icon="left"
-        aria-label={`To the thing before, ${rows.before?.name ?? ""}`}
+        aria-label={t`To the thing before, ${rows.before?.name ?? ""}`}
         why={rows.before ? "" : alone}
         onPress={() => to(rows.before)}
       />
       <Button
         look="plain"
         icon="right"
-        aria-label={`To the thing after, ${rows.after?.name ?? ""}`}
+        aria-label={t`To the thing after, ${rows.after?.name ?? ""}`}
         why={rows.after ? "" : alone}
         onPress={() => to(rows.after)}
       />

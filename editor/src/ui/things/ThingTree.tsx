@@ -1,5 +1,6 @@
 /** Things with what hangs on them below; each can be folded, which the user finds so on every tablet. */
 
+import { t } from "@lingui/core/macro";
 import { Button, Collection, Tree, TreeItem, TreeItemContent } from "react-aria-components";
 import { keepView } from "../../commands/viewstate";
 import { theEngine } from "../../session/engine";
@@ -57,7 +58,7 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
   };
   const item = (row: Row) => {
     const holder = heldBy(now(), row.id);
-    const detail = holder ? `${holder} works on it` : aside.includes(row.id) ? "hidden" : row.detail;
+    const detail = holder ? t`${holder} works on it` : aside.includes(row.id) ? "hidden" : row.detail;
     return (
       <TreeItem
         id={row.id}

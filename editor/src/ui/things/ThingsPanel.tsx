@@ -1,5 +1,7 @@
 /** All that is in the workplace, to find something: by kind and name, by what hangs on what, or at the cross. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useMemo, useState } from "react";
 import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import { keepView } from "../../commands/viewstate";
@@ -13,13 +15,13 @@ import { InTheView } from "./InTheView";
 import { ThingTree } from "./ThingTree";
 import "./things.css";
 
-const WORDS: Record<Group, string> = {
-  robots: "Robots",
-  objects: "Objects",
-  points: "Points",
-  actions: "Actions",
-  program: "Program",
-  others: "Others",
+const WORDS: Record<Group, MessageDescriptor> = {
+  robots: msg`Robots`,
+  objects: msg`Objects`,
+  points: msg`Points`,
+  actions: msg`Actions`,
+  program: msg`Program`,
+  others: msg`Others`,
 };
 const HIDDEN = "hidden";
 
@@ -29,11 +31,11 @@ export default function ThingsPanel() {
     <>
       <OneOf
         quiet
-        label="Found by"
+        label={t`Found by`}
         value={by}
         choices={[
-          ["list", "All"],
-          ["cross", "At the cross"],
+          ["list", t`All`],
+          ["cross", t`At the cross`],
         ]}
         onChange={setBy}
       />
@@ -63,32 +65,32 @@ function All() {
   const fits = (row: Row) => ofKind(row) && (!groups.has(HIDDEN) || aside.includes(row.id));
   const narrow = search.trim() !== "" || groups.size > 0;
   const parts: [string, string, Row[]][] = [
-    ["Things", "", narrowed(things.placed, fits)],
-    ["Without a place", "Without a place", narrowed(things.unplaced, fits)],
-    ["Program", "Program", narrowed(things.program, fits)],
+    [t`Things`, "", narrowed(things.placed, fits)],
+    [t`Without a place`, t`Without a place`, narrowed(things.unplaced, fits)],
+    [t`Program`, t`Program`, narrowed(things.program, fits)],
   ];
   const found = parts.filter(([, , part]) => part.length > 0);
   return (
     <>
       <SearchField className="field" value={search} onChange={setSearch}>
-        <Label className="hidden-but-read">Search</Label>
-        <Input placeholder={`Search ${rows.length} things`} />
+        <Label className="hidden-but-read">{t`Search`}</Label>
+        <Input placeholder={t`Search ${rows.length} things`} />
       </SearchField>
       <ToggleButtonGroup
         className="chips"
-        aria-label="Only these kinds"
+        aria-label={t`Only these kinds`}
         selectionMode="multiple"
         selectedKeys={groups}
         onSelectionChange={(keys) => keepView("user", { filters: keys.size > 0 ? [...keys] : null })}
       >
         {GROUPS.filter((group) => number[group] > 0).map((group) => (
           <ToggleButton key={group} id={group} className="button chip">
-            {WORDS[group]} <small>{number[group]}</small>
+            {i18n._(WORDS[group])} <small>{number[group]}</small>
           </ToggleButton>
         ))}
         {hidden > 0 && (
           <ToggleButton id={HIDDEN} className="button chip">
-            Hidden <small>{hidden}</small>
+            {t`Hidden`} <small>{hidden}</small>
           </ToggleButton>
         )}
       </ToggleButtonGroup>
@@ -101,10 +103,10 @@ function All() {
       {found.length === 0 && (
         <p className="quiet">
           {rows.length === 0
-            ? "Nothing is in the workplace yet."
+            ? t`Nothing is in the workplace yet.`
             : groups.size > 0
-              ? "Nothing of these kinds is called that."
-              : "Nothing is called that."}
+              ? t`Nothing of these kinds is called that.`
+              : t`Nothing is called that.`}
         </p>
       )}
       <InTheView narrowed={groupsOfAny(groups)} />

@@ -1,5 +1,6 @@
 /** Keys for a number, large enough for fingers, with units and changes; the keyboard writes into the same field. */
 
+import { t } from "@lingui/core/macro";
 import { type FormEvent, useId, useState } from "react";
 import { ANGLE_UNITS, amount, isAngle, LENGTH_UNITS, show, type Unit } from "../../transform/amounts";
 import { Button } from "../kit/kit";
@@ -34,13 +35,11 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
     onClose();
   };
   return (
-    <form className="pad" onSubmit={submit} aria-label={`Type ${label}`}>
+    <form className="pad" onSubmit={submit} aria-label={t`Type ${label}`}>
       <div className="pad-head">
-        <label htmlFor={id}>
-          {label} {change ? "by" : "to"}
-        </label>
+        <label htmlFor={id}>{change ? t`${label} by` : t`${label} to`}</label>
         <output className="quiet small" aria-live="polite">
-          {wrong ? "This is no amount." : `${show(value, unit)} → ${next === null ? "…" : show(next, unit)} ${unit}`}
+          {wrong ? t`This is no amount.` : `${show(value, unit)} → ${next === null ? "…" : show(next, unit)} ${unit}`}
         </output>
       </div>
       <div className="pad-field">
@@ -58,7 +57,7 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
             if (event.key === "Escape") onClose();
           }}
         />
-        <Button aria-label="Take the last sign away" onPress={() => setText(text.slice(0, -1))}>
+        <Button aria-label={t`Take the last sign away`} onPress={() => setText(text.slice(0, -1))}>
           ⌫
         </Button>
       </div>
@@ -74,7 +73,7 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
             {key}
           </Button>
         ))}
-        <Button className="pad-key" excludeFromTabOrder aria-label="plus" onPress={() => setText(`${text}+`)}>
+        <Button className="pad-key" excludeFromTabOrder aria-label={t`plus`} onPress={() => setText(`${text}+`)}>
           +
         </Button>
         {(isAngle(unit) ? ANGLE_UNITS : LENGTH_UNITS).map((each) => (
@@ -83,7 +82,7 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
             className="pad-key"
             excludeFromTabOrder
             aria-pressed={each === unit}
-            aria-label={`in ${each}`}
+            aria-label={t`in ${each}`}
             onPress={() => onUnit(each)}
           >
             {each}
@@ -93,12 +92,12 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
       <div className="actions">
         {!onlyBy && (
           <Button aria-pressed={change} onPress={() => onBy(!by)}>
-            Change by
+            {t`Change by`}
           </Button>
         )}
-        <Button onPress={onClose}>Cancel</Button>
+        <Button onPress={onClose}>{t`Cancel`}</Button>
         <Button look="primary" type="submit" isDisabled={next === null}>
-          Set
+          {t`Set`}
         </Button>
       </div>
     </form>

@@ -1,9 +1,12 @@
 /** Where the selected thing stands, and all ways to put it elsewhere: by hand in the view, by steps, by numbers. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { moving, place, step } from "../../commands/moving";
 import { keepGeneral } from "../../commands/viewstate";
 import type { GizmoMode } from "../../engine/gizmo/handles";
+import { translated } from "../../i18n/choices";
 import type { ObjectModel, Pose } from "../../protocol/types";
 import type { Selection, State } from "../../store/state";
 import { now, tell, useEditor } from "../../store/store";
@@ -41,11 +44,11 @@ import { Row } from "./Row";
 import { toolFrame, useGizmo } from "./useGizmo";
 import "./transform.css";
 
-const SNAPS: readonly (readonly [Snap, string])[] = [
-  ["none", "nothing"],
-  ["grid", "steps"],
-  ["surface", "surfaces"],
-  ["point", "other things"],
+const SNAPS: readonly (readonly [Snap, MessageDescriptor])[] = [
+  ["none", msg`nothing`],
+  ["grid", msg`steps`],
+  ["surface", msg`surfaces`],
+  ["point", msg`other things`],
 ];
 const keep = (change: Partial<ToolSettings>) => keepGeneral({ [TOOL]: { ...toolSettings(now()), ...change } });
 /** A step that is none of the table's. */
@@ -53,7 +56,7 @@ const FREE = "free";
 
 export default function Place({ selection }: { selection: Selection }) {
   const target = useTarget(selection);
-  if (!target) return <p className="quiet">It has no place of its own.</p>;
+  if (!target) return <p className="quiet">{t`It has no place of its own.`}</p>;
   return <Placing key={selection.id} selection={selection} target={target} />;
 }
 
@@ -79,16 +82,16 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
   const why = mode === "size" ? whySize : whyNot;
   const relative = settings.frame === "own" || settings.frame === "view";
   const modes: [GizmoMode, string][] = [];
-  if (target.moves) modes.push(["move", "Move"]);
-  if (target.turns) modes.push(["turn", "Turn"]);
-  if (target.model) modes.push(["size", "Size"]);
+  if (target.moves) modes.push(["move", t`Move`]);
+  if (target.turns) modes.push(["turn", t`Turn`]);
+  if (target.model) modes.push(["size", t`Size`]);
   const changed = !same(before.pose, target.pose) || JSON.stringify(before.model) !== JSON.stringify(target.model);
   const settle = (pose: Pose, model?: ObjectModel) => void place(targetOf(now(), selection) ?? target, pose, model);
   return (
     <>
       {modes.length > 1 && (
         <OneOf
-          label="What to do"
+          label={t`What to do`}
           quiet
           value={mode}
           choices={modes}
@@ -114,16 +117,16 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
         <Steps settings={settings} turn={mode === "turn"} />
         {mode !== "size" && (
           <Pick
-            label="Axes of"
+            label={t`Axes of`}
             value={settings.frame}
             choices={framesOf(state, target)}
             onChange={(value) => keep({ frame: value as FrameName })}
           />
         )}
         <Pick
-          label="Snap to"
+          label={t`Snap to`}
           value={settings.snap}
-          choices={SNAPS}
+          choices={translated(SNAPS)}
           onChange={(value) => keep({ snap: value as Snap })}
         />
       </div>
@@ -135,23 +138,23 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
             settle(before.pose, before.model !== target.model ? before.model : undefined);
           }}
         >
-          Put back
+          {t`Put back`}
         </Button>
         {target.turns && (
           <Button
             isDisabled={why !== ""}
             onPress={() => settle({ ...target.pose, orientation: squared(target.pose.orientation, frame.orientation) })}
           >
-            Square up
+            {t`Square up`}
           </Button>
         )}
-        <Button onPress={() => void copy(target.pose)}>Copy</Button>
+        <Button onPress={() => void copy(target.pose)}>{t`Copy`}</Button>
         <Button isDisabled={why !== ""} onPress={() => void paste(target, settle)}>
-          Paste
+          {t`Paste`}
         </Button>
         {changed && (
           <Button look="plain" onPress={() => setBefore({ pose: target.pose, model: target.model })}>
-            Keep as start
+            {t`Keep as start`}
           </Button>
         )}
       </div>
@@ -173,7 +176,7 @@ interface CoordinateProps {
   onOpen: (on: boolean) => void;
 }
 
-const ANGLES: Record<Axis, string> = { x: "Roll", y: "Pitch", z: "Yaw" };
+const ANGLES: Record<Axis, MessageDescriptor> = { x: msg`Roll`, y: msg`Pitch`, z: msg`Yaw` };
 
 function Coordinate({ axis, mode, target, settings, frame, relative, why, selection, open, onOpen }: CoordinateProps) {
   const turn = mode === "turn";
@@ -181,7 +184,7 @@ function Coordinate({ axis, mode, target, settings, frame, relative, why, select
   const value = relative ? 0 : turn ? (angles(seen.orientation)[AXES.indexOf(axis)] ?? 0) : seen.position[axis];
   const unit: Unit = turn ? settings.angle : settings.length;
   const size = turn ? settings.angleStep : settings.lengthStep;
-  const label = turn && !relative ? ANGLES[axis] : axis.toUpperCase();
+  const label = turn && !relative ? i18n._(ANGLES[axis]) : axis.toUpperCase();
   const by = (pose: Pose, amount: number) =>
     turn ? turned(pose, frame, axis, amount) : moved(pose, frame, axis, amount);
   return (
@@ -284,19 +287,19 @@ function Steps({ settings, turn }: { settings: ToolSettings; turn: boolean }) {
   const put = (next: number) => keep(turn ? { angleStep: next } : { lengthStep: next });
   const known = steps.find(([each]) => Math.abs(each - value) < 1e-12);
   const choices: [string, string][] = steps.map(([each, words]) => [String(each), words]);
-  choices.push([FREE, known ? "other…" : stepWords(value, turn ? "angle" : "length")]);
+  choices.push([FREE, known ? t`other…` : stepWords(value, turn ? "angle" : "length")]);
   const worth = turn ? Math.PI / 180 : 0.001;
   return (
     <>
       <Pick
-        label="Step"
+        label={t`Step`}
         value={known && !free ? String(known[0]) : FREE}
         choices={choices}
         onChange={(next) => (setFree(next === FREE), next === FREE || put(Number(next)))}
       />
       {(free || !known) && (
         <Amount
-          label="Own step"
+          label={t`Own step`}
           unit={turn ? "°" : "mm"}
           digits={3}
           value={value / worth}
@@ -313,13 +316,13 @@ function framesOf(state: State, target: Target): [FrameName, string][] {
   const parent =
     target.kind === "point" ? state.doc?.points[target.id]?.parent : state.doc?.orientations[target.id]?.pointId;
   const robots = Object.values(state.doc?.objects ?? {}).some((each) => each.type in state.types.robots);
-  const choices: [FrameName, string][] = [["world", "the world"]];
+  const choices: [FrameName, string][] = [["world", t`the world`]];
   if (parent) choices.push(["parent", nameOf(state, parent)]);
-  if (robots) choices.push(["robot", "the robot's base"]);
-  choices.push(["own", "the thing itself"], ["view", "the view"]);
+  if (robots) choices.push(["robot", t`the robot's base`]);
+  choices.push(["own", t`the thing itself`], ["view", t`the view`]);
   // A frame that was chosen elsewhere and is none here: it counts as the world's.
   const { frame } = toolSettings(state);
-  if (!choices.some(([each]) => each === frame)) choices.push([frame, "the world (no parent)"]);
+  if (!choices.some(([each]) => each === frame)) choices.push([frame, t`the world (no parent)`]);
   return choices;
 }
 
@@ -327,7 +330,7 @@ async function copy(pose: Pose): Promise<void> {
   const text = poseText(pose);
   try {
     await navigator.clipboard.writeText(text);
-    tell("info", "The pose is copied: position in m, and quaternion, in the world.");
+    tell("info", t`The pose is copied: position in m, and quaternion, in the world.`);
   } catch {
     tell("info", text); // without https there is no clipboard: it can be marked and copied by hand
   }
@@ -335,8 +338,8 @@ async function copy(pose: Pose): Promise<void> {
 
 async function paste(target: Target, settle: (pose: Pose) => void): Promise<void> {
   const text = await navigator.clipboard.readText().catch(() => null);
-  if (text === null) return tell("info", "This page may not read the clipboard: type the numbers instead.");
+  if (text === null) return tell("info", t`This page may not read the clipboard: type the numbers instead.`);
   const pose = poseFrom(text, target.pose);
   if (pose) settle(pose);
-  else tell("info", "What was copied is no pose: 3 numbers are a position in m, 4 a quaternion, 6 or 7 both.");
+  else tell("info", t`What was copied is no pose: 3 numbers are a position in m, 4 a quaternion, 6 or 7 both.`);
 }

@@ -1,5 +1,6 @@
 /** One coordinate: a step less, the value, a step more. The value is a wheel: it is rolled or dragged by steps, a tap opens the keys. */
 
+import { t } from "@lingui/core/macro";
 import { type KeyboardEvent, type PointerEvent, useEffect, useRef } from "react";
 import { isAngle, show, stepWords, type Unit } from "../../transform/amounts";
 import { Button } from "../kit/kit";
@@ -57,7 +58,7 @@ export function Row({ label, value, unit, step, why, open, onSteps, onOpen }: Ro
       <span className="axis-name" data-axis={label} aria-hidden="true">
         {label}
       </span>
-      <Button className="axis-step" aria-label={`${label} ${words} less`} why={why} onPress={() => onSteps(-1)}>
+      <Button className="axis-step" aria-label={t`${label} ${words} less`} why={why} onPress={() => onSteps(-1)}>
         −
       </Button>
       <button
@@ -66,7 +67,7 @@ export function Row({ label, value, unit, step, why, open, onSteps, onOpen }: Ro
         className="axis-wheel"
         aria-expanded={open}
         aria-disabled={why !== "" || undefined}
-        aria-label={`${label} ${show(value, unit)} ${unit}: type it. Arrow keys: steps of ${words}`}
+        aria-label={t`${label} ${show(value, unit)} ${unit}: type it. Arrow keys: steps of ${words}`}
         onKeyDown={key}
         onPointerDown={(event) => {
           if (why) return;
@@ -84,7 +85,7 @@ export function Row({ label, value, unit, step, why, open, onSteps, onOpen }: Ro
       >
         {show(value, unit)} <span className="quiet">{unit}</span>
       </button>
-      <Button className="axis-step" aria-label={`${label} ${words} more`} why={why} onPress={() => onSteps(1)}>
+      <Button className="axis-step" aria-label={t`${label} ${words} more`} why={why} onPress={() => onSteps(1)}>
         +
       </Button>
     </div>

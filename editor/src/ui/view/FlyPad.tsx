@@ -1,16 +1,18 @@
 /** Buttons that move a camera that flies, for who has no keyboard: as long as they are held. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import type { PointerEvent } from "react";
 import type { View } from "../../engine/camera";
 import { Button } from "../kit/kit";
 
-const KEYS: [string, string, string][] = [
-  ["KeyQ", "▽", "Down"],
-  ["KeyW", "↑", "Ahead"],
-  ["KeyE", "△", "Up"],
-  ["KeyA", "←", "To the left"],
-  ["KeyS", "↓", "Back"],
-  ["KeyD", "→", "To the right"],
+const KEYS: [string, string, MessageDescriptor][] = [
+  ["KeyQ", "▽", msg`Down`],
+  ["KeyW", "↑", msg`Ahead`],
+  ["KeyE", "△", msg`Up`],
+  ["KeyA", "←", msg`To the left`],
+  ["KeyS", "↓", msg`Back`],
+  ["KeyD", "→", msg`To the right`],
 ];
 
 export function FlyPad({ view, onDone }: { view: View; onDone: () => void }) {
@@ -19,13 +21,13 @@ export function FlyPad({ view, onDone }: { view: View; onDone: () => void }) {
     view.hold(key, down);
   };
   return (
-    <div className="fly-pad" role="group" aria-label="Fly">
+    <div className="fly-pad" role="group" aria-label={t`Fly`}>
       {KEYS.map(([key, sign, words]) => (
         <button
           key={key}
           type="button"
           className="button"
-          aria-label={words}
+          aria-label={i18n._(words)}
           onPointerDown={hold(key, true)}
           onPointerUp={hold(key, false)}
           onPointerCancel={hold(key, false)}
@@ -39,7 +41,7 @@ export function FlyPad({ view, onDone }: { view: View; onDone: () => void }) {
         </button>
       ))}
       <Button className="fly-done" onPress={onDone}>
-        Done
+        {t`Done`}
       </Button>
     </div>
   );

@@ -1,5 +1,7 @@
 /** At the edge of the view: all of it, a cube to look from its sides, to fly or to turn, and views that were kept. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { useEffect, useRef, useState } from "react";
 import { followWishes } from "../../commands/handover";
 import { keepGeneral, keepView } from "../../commands/viewstate";
@@ -18,12 +20,12 @@ import "./view.css";
 type Direction = [number, number, number];
 
 /** The sides of the cube: what is written there, where it faces, and where its words run and their upper edge points. */
-const SIDES: [ViewName, string, Direction, Direction, Direction][] = [
-  ["top", "Top", [0, 0, 1], [1, 0, 0], [0, 1, 0]],
-  ["front", "Front", [0, -1, 0], [1, 0, 0], [0, 0, 1]],
-  ["back", "Back", [0, 1, 0], [-1, 0, 0], [0, 0, 1]],
-  ["side", "Right", [1, 0, 0], [0, 1, 0], [0, 0, 1]],
-  ["left", "Left", [-1, 0, 0], [0, -1, 0], [0, 0, 1]],
+const SIDES: [ViewName, MessageDescriptor, Direction, Direction, Direction][] = [
+  ["top", msg`Top`, [0, 0, 1], [1, 0, 0], [0, 1, 0]],
+  ["front", msg`Front`, [0, -1, 0], [1, 0, 0], [0, 0, 1]],
+  ["back", msg`Back`, [0, 1, 0], [-1, 0, 0], [0, 0, 1]],
+  ["side", msg`Right`, [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+  ["left", msg`Left`, [-1, 0, 0], [0, -1, 0], [0, 0, 1]],
 ];
 /** Half of its edge, pixels. */
 const HALF = 30;
@@ -64,22 +66,18 @@ export default function ViewControls({ engine }: { engine: Engine }) {
     setMode("orbit");
   };
   const choices: Choice[] = [
-    { id: "home", label: "From the corner", act: () => look("home") },
-    ...SIDES.map(([id, words]) => ({
-      id,
-      label: `From ${words === "Top" ? "above" : `the ${words.toLowerCase()}`}`,
-      act: () => look(id),
-    })),
+    { id: "home", label: t`View: corner`, act: () => look("home") },
+    ...SIDES.map(([id, words]) => ({ id, label: t`View: ${i18n._(words)}`, act: () => look(id) })),
     mode === "orbit"
-      ? { id: "fly", label: "Fly through it", icon: "play" as const, act: () => change("fly") }
-      : { id: "orbit", label: "Turn around it", icon: "redo" as const, act: () => change("orbit") },
+      ? { id: "fly", label: t`Fly through it`, icon: "play" as const, act: () => change("fly") }
+      : { id: "orbit", label: t`Turn around it`, icon: "redo" as const, act: () => change("orbit") },
     {
       id: "cross",
-      label: always ? "No more picking by the cross" : "Pick by the cross ( X )",
+      label: always ? t`No more picking by the cross` : t`Pick by the cross ( X )`,
       icon: "point",
       act: switchCross,
     },
-    { id: "keep", label: "Keep this view…", icon: "plus", act: () => setNaming(true) },
+    { id: "keep", label: t`Keep this view…`, icon: "plus", act: () => setNaming(true) },
     ...bookmarks.map((each, n) => ({
       id: `go ${n}`,
       label: each.name,
@@ -90,7 +88,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
     })),
     ...bookmarks.map((each, n) => ({
       id: `drop ${n}`,
-      label: `Forget ${each.name}`,
+      label: t`Forget ${each.name}`,
       icon: "close" as const,
       act: () => keepView("user", { [KEY]: bookmarks.filter((_, other) => other !== n) }),
     })),
@@ -98,18 +96,18 @@ export default function ViewControls({ engine }: { engine: Engine }) {
   return (
     <>
       <div className="view-controls">
-        <Button icon="zoom" aria-label="Show all" onPress={() => engine.focus()} />
+        <Button icon="zoom" aria-label={t`Show all`} onPress={() => engine.focus()} />
         <Cube engine={engine} onLook={look} />
-        <More label="Views" icon="eye" look="" choices={choices} />
+        <More label={t`Views`} icon="eye" look="" choices={choices} />
       </div>
       {(always || listed) && <Aim engine={engine} />}
       <OffScreen engine={engine} />
       {mode === "fly" && <FlyPad view={engine.view} onDone={() => change("orbit")} />}
       {naming && (
         <AskName
-          title="Keep this view"
-          yes="Keep"
-          initial={`View ${bookmarks.length + 1}`}
+          title={t`Keep this view`}
+          yes={t`Keep`}
+          initial={t`View ${bookmarks.length + 1}`}
           taken={bookmarks.map((each) => each.name)}
           onClose={() => setNaming(false)}
           onYes={(name) => keepView("user", { [KEY]: [...bookmarks, { name, ...engine.view.viewpoint }] })}
@@ -174,7 +172,7 @@ function Cube({ engine, onLook }: { engine: Engine; onLook: (from: ViewName) => 
       <div ref={cube} className="view-cube-body">
         {SIDES.map(([id, words]) => (
           <div key={id} className="view-cube-face" onClick={() => onLook(id)}>
-            {words}
+            {i18n._(words)}
           </div>
         ))}
       </div>

@@ -1,5 +1,7 @@
 /** The middle: the 3D view, the program as a graph, both, or its code. The 3D view stays behind what covers it. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { Suspense } from "react";
 import { ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import { isRunning } from "../../store/selectors";
@@ -16,7 +18,7 @@ const FlowView = lazily(() => import("../flow/FlowView"));
 const ConnectingBanner = lazily(() => import("../program/ConnectingBanner"));
 const RunBar = lazily(() => import("../run/RunBar"));
 const CodeView = lazily(() => import("../code/CodeView"));
-const WORDS: Record<Mode, string> = { "3d": "3D", flow: "Flow", split: "Both", code: "Code" };
+const WORDS: Record<Mode, MessageDescriptor> = { "3d": msg`3D`, flow: msg`Flow`, split: msg`Both`, code: msg`Code` };
 
 export function Centre() {
   const project = useEditor((state) => state.doc?.project);
@@ -29,12 +31,12 @@ export function Centre() {
     <div className="centre" data-mode={mode}>
       <View3D />
       {(mode === "flow" || mode === "split") && (
-        <Suspense fallback={<Waiting>Drawing the program…</Waiting>}>
+        <Suspense fallback={<Waiting>{t`Drawing the program…`}</Waiting>}>
           <FlowView />
         </Suspense>
       )}
       {mode === "code" && (
-        <Suspense fallback={<Waiting>Reading the program…</Waiting>}>
+        <Suspense fallback={<Waiting>{t`Reading the program…`}</Waiting>}>
           <CodeView />
         </Suspense>
       )}
@@ -42,7 +44,7 @@ export function Centre() {
         {project && (
           <ToggleButtonGroup
             className="modes"
-            aria-label="How it is shown"
+            aria-label={t`How it is shown`}
             selectionMode="single"
             disallowEmptySelection
             selectedKeys={[mode]}
@@ -50,7 +52,7 @@ export function Centre() {
           >
             {modes.map((each) => (
               <ToggleButton key={each} id={each} className="button mode">
-                {WORDS[each]}
+                {i18n._(WORDS[each])}
               </ToggleButton>
             ))}
           </ToggleButtonGroup>

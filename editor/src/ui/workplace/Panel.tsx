@@ -1,5 +1,7 @@
 /** The right side: the open tool, or the selected thing in sections. On a narrow screen it is a sheet from below. */
 
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
 import { Suspense, useState } from "react";
 import { select, setUi, useEditor } from "../../store/store";
 import { Button, Waiting } from "../kit/kit";
@@ -16,23 +18,26 @@ export default function Panel() {
   const title = useEditor((state) => (selection ? nameOf(state, selection.id) : ""));
   const [tall, setTall] = useState(false);
   const tool = TOOLS.find((each) => each.id === toolId);
+  const heading = tool ? i18n._(tool.label) : title;
   const close = () => (tool ? setUi({ tool: "" }) : select(null));
   return (
-    <aside className="panel" data-tall={tall} aria-label={tool?.label ?? title}>
+    <aside className="panel" data-tall={tall} aria-label={heading}>
       <button type="button" className="panel-grip" aria-expanded={tall} onClick={() => setTall(!tall)}>
-        <span className="hidden-but-read">{tall ? "Make the panel smaller" : "Make the panel larger"}</span>
+        <span className="hidden-but-read">{tall ? t`Make the panel smaller` : t`Make the panel larger`}</span>
       </button>
       <header>
-        <h2>{tool?.label ?? title}</h2>
+        <h2>{heading}</h2>
         {!tool && selection && (
           <Suspense fallback={null}>
             <Neighbours id={selection.id} />
           </Suspense>
         )}
-        <Button look="plain" icon="close" aria-label="Close the panel" onPress={close} />
+        <Button look="plain" icon="close" aria-label={t`Close the panel`} onPress={close} />
       </header>
       <div className="panel-body">
-        <Suspense fallback={<Waiting>Loading…</Waiting>}>{tool ? <tool.Panel /> : selection && <Sections />}</Suspense>
+        <Suspense fallback={<Waiting>{t`Loading…`}</Waiting>}>
+          {tool ? <tool.Panel /> : selection && <Sections />}
+        </Suspense>
       </div>
     </aside>
   );
@@ -43,8 +48,8 @@ function Sections() {
   const { selection } = state.ui;
   if (!selection) return null;
   return SECTIONS.filter((each) => each.applies(selection, state)).map(({ id, title, Body }) => (
-    <section key={id} className="section" aria-label={title}>
-      <h3>{title}</h3>
+    <section key={id} className="section" aria-label={i18n._(title)}>
+      <h3>{i18n._(title)}</h3>
       <Body selection={selection} />
     </section>
   ));

@@ -1,5 +1,7 @@
 /** The tools: icon and word. One that cannot be used says why when it is tapped. */
 
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
 import { ToggleButton } from "react-aria-components";
 import { setUi, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
@@ -9,7 +11,7 @@ export function Rail() {
   const state = useEditor((each) => each);
   const open = state.ui.tool;
   return (
-    <nav className="rail" aria-label="Tools">
+    <nav className="rail" aria-label={t`Tools`}>
       {TOOLS.filter((tool) => tool.shown?.(state) ?? true).map((tool) => {
         const why = tool.barred?.(state) ?? "";
         return (
@@ -19,12 +21,12 @@ export function Rail() {
             isSelected={open === tool.id}
             aria-disabled={why !== "" || undefined}
             onChange={(on) => {
-              if (why) tell("info", `${tool.label}: ${why}`);
+              if (why) tell("info", `${i18n._(tool.label)}: ${why}`);
               else setUi({ tool: on ? tool.id : "" });
             }}
           >
             <Icon name={tool.icon} size={24} />
-            {tool.label}
+            {i18n._(tool.label)}
           </ToggleButton>
         );
       })}

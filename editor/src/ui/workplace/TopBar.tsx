@@ -1,5 +1,7 @@
 /** Above the view: what is open and whether it is saved, undo, online or offline, who is here. */
 
+import { i18n } from "@lingui/core";
+import { msg, plural, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
@@ -27,12 +29,12 @@ export function TopBar() {
       <Button
         look="plain"
         icon="home"
-        aria-label="Close, and go to the lists"
+        aria-label={t`Close, and go to the lists`}
         onPress={() => {
           const why = running
-            ? "A program runs: stop it first."
+            ? t`A program runs: stop it first.`
             : live !== "stopped"
-              ? "Go offline first: the devices would be left."
+              ? t`Go offline first: the devices would be left.`
               : cannotSave;
           if (why) tell("info", why);
           else if (unsaved) setAsking(true);
@@ -42,8 +44,9 @@ export function TopBar() {
       <div className="document">
         <h1>{doc.project?.name ?? doc.scene.name}</h1>
         <p className="quiet small">
-          {doc.project ? `on ${doc.scene.name} · ` : "scene · "}
-          <span className={unsaved ? "tag warn" : ""}>{running ? "running" : unsaved ? "not saved" : "saved"}</span>
+          {doc.project ? t`on ${doc.scene.name}` : t`scene`}
+          {" · "}
+          <span className={unsaved ? "tag warn" : ""}>{running ? t`running` : unsaved ? t`not saved` : t`saved`}</span>
         </p>
       </div>
       <Button
@@ -51,22 +54,22 @@ export function TopBar() {
         className="word-on-wide"
         isDisabled={!unsaved || running || cannotSave !== ""}
         onPress={() => void documents.save()}
-        aria-label="Save"
+        aria-label={t`Save`}
       >
-        <span>Save</span>
+        <span>{t`Save`}</span>
       </Button>
       <Button
         look="plain"
         icon="undo"
-        aria-label={history?.undo ? `Undo ${history.undo.text}` : "Undo"}
-        why={cannotUndo || (history?.undo ? "" : "There is nothing to undo.")}
+        aria-label={history?.undo ? t`Undo ${history.undo.text}` : t`Undo`}
+        why={cannotUndo || (history?.undo ? "" : t`There is nothing to undo.`)}
         onPress={() => void documents.undo()}
       />
       <Button
         look="plain"
         icon="redo"
-        aria-label={history?.redo ? `Redo ${history.redo.text}` : "Redo"}
-        why={cannotUndo || (history?.redo ? "" : "There is nothing to redo.")}
+        aria-label={history?.redo ? t`Redo ${history.redo.text}` : t`Redo`}
+        why={cannotUndo || (history?.redo ? "" : t`There is nothing to redo.`)}
         onPress={() => void documents.redo()}
       />
       <LiveSwitch />
@@ -74,19 +77,24 @@ export function TopBar() {
       <Settings />
       {asking && (
         <Confirm
-          title="Close without saving?"
-          yes="Throw the changes away"
+          title={t`Close without saving?`}
+          yes={t`Throw the changes away`}
           onClose={() => setAsking(false)}
           onYes={() => void documents.close(true)}
         >
-          <p>What was changed since it was saved would be lost, also what others have changed.</p>
+          <p>{t`What was changed since it was saved would be lost, also what others have changed.`}</p>
         </Confirm>
       )}
     </header>
   );
 }
 
-const WORDS = { stopped: "Go online", starting: "Going online…", started: "Online", stopping: "Going offline…" };
+const WORDS = {
+  stopped: msg`Go online`,
+  starting: msg`Going online…`,
+  started: msg`Online`,
+  stopping: msg`Going offline…`,
+};
 
 function LiveSwitch() {
   const live = useEditor((state) => state.live.state);
@@ -96,6 +104,7 @@ function LiveSwitch() {
   const wrong = Object.values(objects).filter(
     (each) => each.state === "failed" || each.state === "lost" || each.answering === false,
   ).length;
+  const inTrouble = plural(wrong, { one: "# device fault", other: "# device faults" });
   const busy = live === "starting" || live === "stopping";
   return (
     <Button
@@ -104,10 +113,16 @@ function LiveSwitch() {
       aria-pressed={live === "started"}
       isDisabled={busy || running || cannot !== ""}
       onPress={() => void (live === "stopped" ? goOnline() : goOffline())}
-      aria-label={`${running ? "Program runs" : WORDS[live]}${wrong > 0 ? ` ${wrong} in trouble` : ""}${live === "started" && !running ? ". Press to go offline" : ""}`}
+      aria-label={[
+        running ? t`Program is running` : i18n._(WORDS[live]),
+        wrong > 0 && inTrouble,
+        live === "started" && !running && t`Press to go offline`,
+      ]
+        .filter(Boolean)
+        .join(". ")}
     >
-      <span>{running ? "Program runs" : WORDS[live]}</span>{" "}
-      {wrong > 0 && <span className="tag bad">{wrong} in trouble</span>}
+      <span>{running ? t`Program is running` : i18n._(WORDS[live])}</span>{" "}
+      {wrong > 0 && <span className="tag bad">{inTrouble}</span>}
     </Button>
   );
 }

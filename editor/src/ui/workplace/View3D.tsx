@@ -1,5 +1,6 @@
 /** The view in the middle: gives the engine what to show, and takes its taps. The engine is loaded when it is needed. */
 
+import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useRef, useState } from "react";
 import type { Engine, Quality } from "../../engine/engine";
 import { readShown } from "../../session/assets";
@@ -92,13 +93,13 @@ export function View3D() {
         key={quality}
         tabIndex={0}
         role="application"
-        aria-label="3D view of the workplace. Keys W, A, S, D, Q and E fly; the list of things has the same for the keyboard."
+        aria-label={t`3D view of the workplace. Keys W, A, S, D, Q and E fly; the list of things has the same for the keyboard.`}
       />
       <div ref={labels} className="view-labels" aria-hidden="true" />
-      {!engine && !failed && <Waiting>Preparing the view…</Waiting>}
+      {!engine && !failed && <Waiting>{t`Preparing the view…`}</Waiting>}
       {failed && (
         <p className="view-failed" role="alert">
-          The 3D view cannot be shown on this device: {failed} Lists and panels work without it.
+          {t`The 3D view does not work on this device: ${failed} You can still use the lists and panels.`}
         </p>
       )}
       {engine && (

@@ -3,6 +3,7 @@
  * section is a file in the folder beside this one.
  */
 
+import type { MessageDescriptor } from "@lingui/core";
 import type { ComponentType } from "react";
 import type { Selection, State } from "../../store/state";
 import { calibrateSections } from "../calibrate/sections";
@@ -14,7 +15,7 @@ import { place } from "./sections/place";
 
 export interface Section {
   id: string;
-  title: string;
+  title: MessageDescriptor;
   applies: (selection: Selection, state: State) => boolean;
   Body: ComponentType<{ selection: Selection }>;
 }

@@ -3,6 +3,7 @@
  * one of these; its panel stands at the right while it is open.
  */
 
+import type { MessageDescriptor } from "@lingui/core";
 import type { ComponentType } from "react";
 import type { State } from "../../store/state";
 import type { IconName } from "../kit/icons";
@@ -16,7 +17,7 @@ import { things } from "./tools/things";
 
 export interface Tool {
   id: string;
-  label: string;
+  label: MessageDescriptor;
   icon: IconName;
   /** Absent from the rail while this is false: what makes no sense in a scene, say. */
   shown?: (state: State) => boolean;

@@ -1,5 +1,6 @@
 /** Ctrl+Z and Shift+Ctrl+Z (Ctrl+Y): the server's undo and redo. In a field they undo what is typed there. */
 
+import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
@@ -19,7 +20,11 @@ export function useUndoKeys(): void {
       const step = state.history?.[wanted];
       const why =
         barred(state, wanted === "undo" ? "Undo" : "Redo") ||
-        (step || event.timeStamp - last < NEWS ? "" : `There is nothing to ${wanted}.`);
+        (step || event.timeStamp - last < NEWS
+          ? ""
+          : wanted === "undo"
+            ? t`There is nothing to undo.`
+            : t`There is nothing to redo.`);
       if (why) return tell("info", why);
       last = event.timeStamp;
       void (wanted === "undo" ? documents.undo() : documents.redo());

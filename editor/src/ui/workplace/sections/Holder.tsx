@@ -1,5 +1,6 @@
 /** Who else holds the selected thing, since when, and what can be done about it. */
 
+import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useState } from "react";
 import { askFor, noLongerAsk } from "../../../commands/handover";
 import { serves } from "../../../session/session";
@@ -9,7 +10,7 @@ import { useEditor } from "../../../store/store";
 import { Icon } from "../../kit/icons";
 import { Button } from "../../kit/kit";
 import { lazily } from "../../kit/lazily";
-import { ago } from "../../times";
+import { ago, clock } from "../../times";
 
 const TakeOver = lazily(() => import("../../people/TakeOver"));
 
@@ -26,32 +27,31 @@ export default function Holder({ id }: { id: string }) {
   }, []);
   if (!holder) return null;
   const how = here
-    ? `It is free when ${holder} is done with it, or a few minutes after ${holder} loses the connection.`
-    : `${holder} lost the connection. It is free in a few minutes, or when somebody takes over.`;
+    ? t`It is free when ${holder} is done with it, or a few minutes after ${holder} loses the connection.`
+    : t`${holder} lost the connection. It is free in a few minutes, or when somebody takes over.`;
   return (
     <div className="holder" role="status">
       <p className="tag warn">
-        <Icon name="lock" size={16} /> {here ? `${holder} works on it` : `Locked by ${holder}, who left`}
+        <Icon name="lock" size={16} /> {here ? t`${holder} works on it` : t`Locked by ${holder}, who left`}
       </p>
       <p className="quiet small">
-        {since > 0 &&
-          `Since ${new Date(since).toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" })}, ${ago(new Date(since).toISOString())}. `}
+        {since > 0 && `${t`Since ${clock(since)}, ${ago(new Date(since).toISOString())}.`} `}
         {how}
       </p>
       {here &&
         (asked ? (
           <p className="small">
-            {holder} is asked for it, and you are told when it is free.{" "}
-            <Button onPress={() => noLongerAsk(id)}>No more</Button>
+            {t`Request sent to ${holder}. You are notified when it is free.`}{" "}
+            <Button onPress={() => noLongerAsk(id)}>{t`No more`}</Button>
           </p>
         ) : (
           <Button icon="people" onPress={() => askFor(id)}>
-            Ask {holder} for it
+            {t`Ask ${holder} for it`}
           </Button>
         ))}
       {!here && serves("TakeOverLocks") && (
         <Button icon="lock" onPress={() => setTaking(true)}>
-          Take over…
+          {t`Take over…`}
         </Button>
       )}
       {taking && (

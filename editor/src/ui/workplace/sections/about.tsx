@@ -1,12 +1,13 @@
 /** What the selected thing is, who holds it, how it is. */
 
+import { msg, t } from "@lingui/core/macro";
 import { Suspense } from "react";
 import { theEngine } from "../../../session/engine";
 import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { Button } from "../../kit/kit";
 import { lazily } from "../../kit/lazily";
-import { KINDS, nameOf } from "../../names";
+import { kindName, nameOf } from "../../names";
 import type { Section } from "../sections";
 
 const Holder = lazily(() => import("./Holder"));
@@ -21,7 +22,7 @@ const Body: Section["Body"] = ({ selection: { kind, id } }) => {
   return (
     <>
       <p>
-        {action ? `${by}: ${words(action.type.split("/")[1] ?? "")}` : type || KINDS[kind]}
+        {action ? `${by}: ${words(action.type.split("/")[1] ?? "")}` : type || kindName(kind)}
         {state && <span className={`tag ${TONE[state.state] ?? ""}`}>{state.state}</span>}
       </p>
       {state?.reason && <p className="small">{state.reason}</p>}
@@ -32,7 +33,7 @@ const Body: Section["Body"] = ({ selection: { kind, id } }) => {
         </Suspense>
       )}
       <Button icon="zoom" onPress={() => theEngine()?.focus(id)}>
-        Zoom to it
+        {t`Zoom to it`}
       </Button>
     </>
   );
@@ -51,4 +52,4 @@ function words(name: string): string {
   return name.replaceAll("_", " ");
 }
 
-export const about: Section = { id: "about", title: "About", applies: () => true, Body };
+export const about: Section = { id: "about", title: msg`About`, applies: () => true, Body };

@@ -1,11 +1,12 @@
 /** Where the selected thing stands, and all ways to put it elsewhere. */
 
+import { msg } from "@lingui/core/macro";
 import { lazily } from "../../kit/lazily";
 import type { Section } from "../sections";
 
 export const place: Section = {
   id: "place",
-  title: "Place",
+  title: msg`Place`,
   applies: ({ kind, id }, state) =>
     kind === "point" || kind === "orientation" || state.doc?.objects[id]?.pose !== undefined,
   Body: lazily(() => import("../../transform/Place")),

@@ -1,5 +1,7 @@
 /** Each device's connection and condition, in words; one that failed can be tried again by itself. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
 import { barred } from "../../../commands/asking";
 import { retryObject } from "../../../commands/operation";
 import { serves } from "../../../session/session";
@@ -8,14 +10,19 @@ import { useEditor } from "../../../store/store";
 import { Button } from "../../kit/kit";
 import { TONE } from "../sections/about";
 
-const STATES: Record<string, string> = {
-  offline: "offline",
-  connecting: "connecting…",
-  online: "online",
-  lost: "connection lost",
-  back: "online again",
-  failed: "not reached",
+const STATES: Record<string, MessageDescriptor> = {
+  offline: msg`offline`,
+  connecting: msg`connecting…`,
+  online: msg`online`,
+  lost: msg`connection lost`,
+  back: msg`online again`,
+  failed: msg`not reached`,
 };
+
+function stateName(state: string): string {
+  const name = STATES[state];
+  return name ? i18n._(name) : state;
+}
 
 export default function Panel() {
   const live = useEditor((state) => state.live);
@@ -38,7 +45,11 @@ export default function Panel() {
   );
   return (
     <>
-      {live.state === "stopped" && <p className="quiet">The workplace is offline. {live.message}</p>}
+      {live.state === "stopped" && (
+        <p className="quiet">
+          {t`The workplace is offline.`} {live.message}
+        </p>
+      )}
       <ul className="devices">
         {objects.map((object) => {
           const state = live.objects[object.id];
@@ -49,9 +60,11 @@ export default function Panel() {
               <div className="device-head">
                 <strong>{object.name}</strong>
                 {state?.answering === false ? (
-                  <span className="tag bad">no answer</span>
+                  <span className="tag bad">{t`no answer`}</span>
                 ) : (
-                  <span className={`tag ${TONE[state?.state ?? ""] ?? ""}`}>{STATES[state?.state ?? "offline"]}</span>
+                  <span className={`tag ${TONE[state?.state ?? ""] ?? ""}`}>
+                    {stateName(state?.state ?? "offline")}
+                  </span>
                 )}
               </div>
               {state?.reason && <p className="small">{state.reason}</p>}
@@ -65,9 +78,9 @@ export default function Panel() {
                 <Button
                   isDisabled={cannot !== ""}
                   onPress={() => void retryObject(object.id)}
-                  aria-label={`Try ${object.name} again`}
+                  aria-label={t`Try ${object.name} again`}
                 >
-                  Try again
+                  {t`Try again`}
                 </Button>
               )}
             </li>

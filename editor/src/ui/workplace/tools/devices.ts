@@ -1,11 +1,12 @@
 /** Each device's connection and condition. */
 
+import { msg } from "@lingui/core/macro";
 import { lazily } from "../../kit/lazily";
 import type { Tool } from "../tools";
 
 export const devices: Tool = {
   id: "devices",
-  label: "Devices",
+  label: msg`Devices`,
   icon: "plug",
   Panel: lazily(() => import("./DevicesPanel")),
 };

@@ -1,13 +1,14 @@
 /** The robot in hand. */
 
+import { msg, t } from "@lingui/core/macro";
 import { robotsOf } from "../../../session/streams";
 import { lazily } from "../../kit/lazily";
 import type { Tool } from "../tools";
 
 export const robot: Tool = {
   id: "robot",
-  label: "Robot",
+  label: msg`Robot`,
   icon: "robot",
-  barred: (state) => (robotsOf(state).length > 0 ? "" : "there is no robot in this scene."),
+  barred: (state) => (robotsOf(state).length > 0 ? "" : t`there is no robot in this scene.`),
   Panel: lazily(() => import("../../robot/RobotPanel")),
 };

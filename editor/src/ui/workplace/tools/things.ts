@@ -1,11 +1,12 @@
 /** The list of all that is in the workplace. */
 
+import { msg } from "@lingui/core/macro";
 import { lazily } from "../../kit/lazily";
 import type { Tool } from "../tools";
 
 export const things: Tool = {
   id: "things",
-  label: "Things",
+  label: msg`Things`,
   icon: "tree",
   Panel: lazily(() => import("../../things/ThingsPanel")),
 };

@@ -1,0 +1,19 @@
+import { defineConfig } from "@lingui/conf";
+import { formatter } from "@lingui/format-po";
+import { createSwcExtractor } from "@lingui/native-tools";
+
+/** English is written in the source code. A translation is one more locale here, and its file after `npm run extract`. */
+export default defineConfig({
+  sourceLocale: "en",
+  locales: ["en"],
+  catalogs: [
+    {
+      path: "<rootDir>/src/i18n/{locale}",
+      include: ["<rootDir>/src"],
+      exclude: ["**/*.test.*", "**/protocol/types.ts"],
+    },
+  ],
+  format: formatter({ lineNumbers: false, printPlaceholdersInComments: true }),
+  orderBy: "message",
+  extractors: [createSwcExtractor()],
+});

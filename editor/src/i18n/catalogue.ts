@@ -1,0 +1,28 @@
+/**
+ * The texts of the interface in the user's language: one catalogue per language, loaded before the page is shown.
+ *
+ * A text that is a constant of a module is a descriptor (`msg`), since modules are evaluated before the catalogue is
+ * there; it becomes a text by `i18n._()` where it is shown.
+ */
+
+import { i18n, type Messages } from "@lingui/core";
+
+const CATALOGUES: Readonly<Record<string, () => Promise<{ messages: Messages }>>> = {
+  en: () => import("./en.po"),
+};
+const FALLBACK = "en";
+
+/** Return the first language of the browser that has a catalogue, else English. */
+export function preferredLanguage(languages: readonly string[] = navigator.languages): string {
+  const short = languages.map((each) => each.split("-")[0] ?? "");
+  return short.find((each) => each in CATALOGUES) ?? FALLBACK;
+}
+
+/** Load the texts of a language and use them. Another language needs a reload of the page. */
+export async function loadCatalogue(language: string): Promise<void> {
+  const load = CATALOGUES[language] ?? CATALOGUES[FALLBACK];
+  if (!load) return;
+  const { messages } = await load();
+  i18n.loadAndActivate({ locale: language, messages });
+  document.documentElement.lang = language;
+}
