@@ -153,7 +153,7 @@ async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, pro
         await two.page.add_init_script(_INSIDE)
         await two.join("looks on")
         await two.item(point.id)
-        await one.press("Things")
+        await one.press("Objects")
         await one.page.get_by_role("row", name=f"{point.name} Action point").click()
 
         async def heard(what: str, acts: str, act: Callable[[int], Awaitable[None]]) -> list[float]:
@@ -168,7 +168,7 @@ async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, pro
             return took
 
         async def type_it(number: int) -> None:
-            await one.page.get_by_role("button", name=re.compile("^Z .*type it")).click()
+            await one.page.get_by_role("button", name=re.compile("^Z .*enter a value")).click()
             await one.page.get_by_label("Z to").fill(f"{100 + number % 7 * 10}mm")
             await one.page.keyboard.press("Enter")
 

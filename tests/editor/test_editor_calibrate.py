@@ -69,8 +69,8 @@ async def test_object_is_placed_at_the_tool(cell: Cell, colleague: Client, brows
         await screen.until("id => window.__engine?.item(id)?.endEffectors?.length > 0", robot)
         await page.get_by_role("navigation").get_by_role("button").filter(has_text=texts.OBJECTS).click()
         await page.get_by_role("complementary").get_by_text("tester", exact=True).first.click()
-        await page.get_by_role("radio", name="Its middle").click()
-        await page.get_by_role("button", name="It stands where the tool is", exact=True).click()
+        await page.get_by_role("radio", name="Middle").click()
+        await page.get_by_role("button", name="Set pose from tool", exact=True).click()
         touched = await _tool(screen, robot)
         tester = next(each for each in scene.objects if each.name == "tester")
 
@@ -186,14 +186,14 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
 
         await _choose(screen, "eye")
         await screen.press("Take a picture")
-        picture = page.get_by_role("img", name="What the camera sees")
+        picture = page.get_by_role("img", name="Camera picture")
         await picture.wait_for()
         assert await picture.evaluate("image => image.decode().then(() => image.naturalWidth)") == 1280
         await screen.press(texts.FIND_BY_MARKERS)
         # The tray and the panel show the server's reason.
         failed = tray.locator(".task[data-state=failed]")
         await failed.filter(has_text="No markers are configured").wait_for()
-        await panel.get_by_text("It failed: No markers are configured").wait_for()
+        await panel.get_by_text("Failed: No markers are configured").wait_for()
         assert await tray.get_by_text("No markers are configured").count() == 1
         markers = [{"marker_id": n, "pose": {"position": {"x": x, "y": y}}} for n, (x, y) in MARKERS.items()]
         configured = {"marker_size": SIZE, "markers": markers}
@@ -223,7 +223,7 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         await _choose(screen, "arm")
         before = await _stands(screen, ids["arm"])
         assert off(before, ROBOT)[0] > 20.0
-        await screen.press("Find where it stands by eye")
+        await screen.press("Calibrate with eye")
         await tray.locator(".task").filter(has_text="Calibration of arm · Eva").wait_for()
         await change.wait_for()
         millimetres, degrees = off(await _stands(screen, ids["arm"]), ROBOT)
@@ -233,10 +233,10 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         assert (await screen.item(ids["arm"]))["ghost"]
         await screen.picture("calibrated robot")
         await _on_a_phone_in_the_dark(screen, "calibrated robot phone")
-        back = change.get_by_role("button", name="Put it back")
+        back = change.get_by_role("button", name="Restore the old pose")
         await expect(back).to_have_attribute("aria-disabled", "true")
         assert await screen.faults() == []
-        await change.get_by_role("button", name="Keep the new place").click()
+        await change.get_by_role("button", name="Keep the new pose").click()
         await screen.until("id => !window.__engine.item(id).ghost", ids["arm"])
         await client.stop_scene()
         await scene_state(client, SceneStateEnum.STOPPED, 30)
@@ -285,7 +285,7 @@ async def test_aiming_wizard_shows_how_well_the_points_fit(
         await place.get_by_text(texts.SHOW_ON_TOOL).click()
         await until(lambda: _near(screen, part, Position(), 1e-3), "where it stands", 15)
 
-        await screen.press("Begin to aim")
+        await screen.press("Start")
         for number, (q, at) in enumerate(zip(TOUCHES, touched, strict=True), 1):
             await cell.tell("robot", "place", q=q)
             await until(functools.partial(_tool_at, screen, ids["arm"], at), "the tool is seen there", 15)

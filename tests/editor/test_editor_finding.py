@@ -79,7 +79,7 @@ async def test_crosshair_selects_near_and_hidden_objects(place: Place, browser: 
 
         # Two keys select the next best target; taps do the same.
         await page.keyboard.press("n")
-        await bar.get_by_role("button", name=re.compile(r"^Next 2.[3-8], of what is at the cross$")).wait_for()
+        await bar.get_by_role("button", name=re.compile(r"^Next 2.[3-8] at the crosshair$")).wait_for()
         select = bar.get_by_role("button", name=re.compile("^Select "))
         second = (await select.get_attribute("aria-label") or "").removeprefix("Select ")
         assert second != "feeder"
@@ -184,14 +184,14 @@ async def test_object_list_is_filtered_folded_and_stepped_through(place: Place, 
         # Step to the next and the previous object; with a filter, to the next of that kind.
         await tree.get_by_role("row", name="robot UR5e").click()
         await _headed(screen, "robot")
-        await screen.press("To the thing after, table")
+        await screen.press("Next: table")
         await _headed(screen, "table")
-        await screen.press("To the thing before, robot")
+        await screen.press("Previous: robot")
         await _headed(screen, "robot")
         await _tool(screen, texts.OBJECTS)
         await chips.get_by_role("button", name="Points").click()
         await tree.get_by_role("row", name="fixture Action point").click()
-        await screen.press("To the thing after, feeder")
+        await screen.press("Next: feeder")
         await _headed(screen, "feeder")
 
 
@@ -225,30 +225,30 @@ async def test_selection_out_of_view_is_found_and_objects_are_faded(place: Place
         # Other kinds fade and objects become transparent, in the drawn picture, too.
         await _tool(screen, texts.OBJECTS)
         assert await page.evaluate("__engine.ties.count") == 0
-        await page.get_by_text("Lines from points to what they hang on").click()
+        await page.get_by_text("Lines from points to their parents").click()
         hanging = sum(1 for each in place.project.action_points if each.parent)
         await screen.until("count => __engine.ties.count === count", hanging)
         await page.evaluate("__engine.view.look('top')")
         opaque = await _colour_of(screen, table)
-        await page.get_by_role("slider", name="All objects but robots seen through").press("End")
+        await page.get_by_role("slider", name="Transparency of objects").press("End")
         await screen.until("id => __engine.item(id).faint === 0.95", table)
         assert await page.evaluate("id => __engine.item(id).faint", place.object("robot")) == 0
         through = await _colour_of(screen, table)
         assert max(abs(a - b) for a, b in zip(opaque, through, strict=True)) > 20, (opaque, through)
         await page.get_by_role("toolbar", name="Only these kinds").get_by_role("button", name="Points").click()
-        await page.get_by_text("Fade what is not of the chosen kinds").click()
+        await page.get_by_text("Fade other kinds").click()
         await screen.until("id => __engine.item(id).faint === 0.85", place.object("robot"))
         action = place.project.action_points[0].actions[0].id
         assert not (await screen.item(action))["visible"] or (await screen.item(action))["faint"] == 1
         assert (await screen.item(point.id))["faint"] == 0
         await screen.picture("points alone")
-        await page.get_by_text("Fade what is not of the chosen kinds").click()
+        await page.get_by_text("Fade other kinds").click()
         steps = [item.id for item in place.project.logic]
         await screen.until("id => __engine.ids().includes(id)", steps[0])
-        await page.get_by_text("Steps of the program").click()
+        await page.get_by_text("Program steps").click()
         await screen.until("ids => !__engine.ids().some((id) => ids.includes(id))", steps)
         assert (await screen.item(point.orientations[0].id))["faint"] == 0
-        await page.get_by_text("Arrows of orientations").click()
+        await page.get_by_text("Orientation arrows").click()
         await screen.until("id => __engine.item(id).faint === 1", point.orientations[0].id)
         kept = await place.client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.USER, place.project.id, "Olga"))
         assert (kept.values["hide_steps"], kept.values["hide_orientations"]) == (True, True)

@@ -68,7 +68,7 @@ async def test_scenes_are_created_renamed_described_copied_and_deleted(
         await more(screen, "Second cell", "Rename…")
         field = screen.page.get_by_label("New name of Second cell")
         await field.fill(scene.name)
-        await screen.sees("There is one of that name.")
+        await screen.sees("This name is already in use.")
         await field.fill("Cell 2")
         await field.press("Enter")
         await screen.page.get_by_role("heading", name="Cell 2").wait_for()
@@ -92,8 +92,8 @@ async def test_scenes_are_created_renamed_described_copied_and_deleted(
         await screen.page.get_by_label("Search").fill("tries")
         await until(lambda: _are(screen, ["Cell 2", "Cell 10"]), "found by description")
         await screen.page.get_by_label("Search").fill("")
-        await screen.press("Give Cell 2 a star")
-        await screen.press("Only what has a star")
+        await screen.press("Add Cell 2 to favorites")
+        await screen.press("Favorites only")
         await until(lambda: _are(screen, ["Cell 2"]), "the star alone")
         # The server stores it: the reloaded page has no memory.
         await screen.page.reload()
@@ -163,8 +163,8 @@ async def test_projects_of_a_scene_pictures_and_templates(
         kept = await client.call("GetViewState", rpc.GetViewStateArgs(ViewScope.SHARED, project.id))
         assert await screen.page.evaluate(_COLOUR, kept.values["picture"]) == pytest.approx([200, 30, 30], abs=6)
         await own.set_input_files({"name": "letter.png", "mimeType": "image/png", "buffer": b"no picture"})
-        await screen.sees("This file is no picture that the browser can read.")
-        await more(screen, project.name, "Its picture from the view again")
+        await screen.sees("The browser cannot read this picture file.")
+        await more(screen, project.name, "Use the 3D view as picture")
         await screen.until(f"([id, taken]) => ({shown})(id) === taken", [project.id, kept.values["thumbnail"]])
 
         # Templates are offered for new projects.
@@ -243,7 +243,7 @@ async def test_packages_are_listed_live_downloaded_uploaded_and_run(
             {"name": "brought.zip", "mimeType": "application/zip", "buffer": content}
         )
         await tray.locator(".task").filter(has_text="Taking in the package brought").wait_for()
-        await screen.sees("brought.zip is taken in.")
+        await screen.sees("Uploaded brought.zip.")
         await until(lambda: _packages(client, 2), "the package is there twice")
         await expect(screen.page.locator(".card")).to_have_count(2)
         brought = next(each for each in await client.call("ListPackages") if each.id == "brought")
@@ -310,7 +310,7 @@ async def test_problems_are_shown_on_tiles_and_fixed_from_there(
             await screen.sees("Used in lamps.")
             delete = panel.get_by_role("button", name="Delete this kind")
             await expect(delete).to_have_attribute("aria-disabled", "true")
-            await screen.press("← All kinds")
+            await screen.press("← All types")
             await panel.get_by_role("button", name="Spare").click()
             await screen.sees("Not used in any saved scene.")
             await delete.click()
@@ -341,15 +341,15 @@ async def test_problems_are_shown_on_tiles_and_fixed_from_there(
             assert await screen.faults() == []
             assert await screen.barriers() == []
             await screen.picture("home problems phone")
-            await screen.press("Show the scene of lighting to mend it")
+            await screen.press("Show the scene of lighting")
             card = screen.page.locator(".card").filter(has=screen.page.get_by_role("heading", name="lamps"))
             await card.get_by_text("2 problems").click()
-            await screen.press("Mend lamps")
+            await screen.press("Repair lamps")
             await screen.sees("goes out of the scene: lamp, torch.")
             await screen.picture("home mending")
-            await screen.press("Take them out")
+            await screen.press("Remove objects")
             await screen.sees("lamps can be opened again.")
-            await screen.page.get_by_role("heading", name="lamps as it was").wait_for()
+            await screen.page.get_by_role("heading", name="lamps backup").wait_for()
             stored = {each.name: each for each in await client.call("ListScenes")}
             assert not stored["lamps"].problems
             assert len(stored["lamps as it was"].problems) == 2

@@ -104,9 +104,9 @@ async def test_diagnosis_file_is_saved(server: ServerProcess, browser: Browser) 
         await home(screen)
         await screen.page.get_by_role("radio", name=texts.SCENES).click()
         await screen.page.keyboard.press("?")
-        await screen.sees("Only this machine reaches the server")
+        await screen.sees("accepts connections from this computer only")
         async with screen.page.expect_download() as downloading:
-            await screen.press("Save a file for diagnosis")
+            await screen.press("Save diagnosis file")
         saved = await downloading.value
         assert re.fullmatch(r"diagnosis-[\dT-]+\.zip", saved.suggested_filename)
         with zipfile.ZipFile(await saved.path()) as files:
@@ -140,7 +140,7 @@ async def test_invitation_shows_the_fingerprint_of_the_tls_certificate(
             await home(screen)
             await screen.page.keyboard.press("?")
             about = screen.page.get_by_role("dialog", name="About")
-            invitation = about.get_by_role("region", name="How others join")
+            invitation = about.get_by_role("region", name="Invite others")
             shown = (await invitation.locator(".fingerprint code").inner_text()).replace(":", "")
             invited = await _joining(screen)
             code = invitation.get_by_role("img")
@@ -151,7 +151,7 @@ async def test_invitation_shows_the_fingerprint_of_the_tls_certificate(
                 assert read == invited["addresses"][0]
                 assert read.startswith("https://")
             else:
-                await invitation.get_by_text("Only this machine reaches the server").wait_for()
+                await invitation.get_by_text("accepts connections from this computer only").wait_for()
             assert await screen.faults() == []
             assert await screen.barriers() == []
             for name in ("tablet", "phone"):

@@ -131,7 +131,7 @@ async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> 
         await screen.press(texts.CLOSE_PANEL)
         # Search by name.
         await page.keyboard.press("/")
-        search = page.get_by_role("dialog", name="Find a command or a thing")
+        search = page.get_by_role("dialog", name="Find a command or an object")
         await search.get_by_role("option", name="Show all in the view").wait_for()
         await looks.at("search", FEW)
         await page.keyboard.type(f"{action} act")

@@ -156,6 +156,6 @@ async def test_broken_meshes_are_replaced_with_the_reason(browser: Browser, plac
             assert words in item["problem"]
             assert item["badge"] == badge
             assert item["triangles"] > 0, "something stands for it"
-        await screen.sees("broken is shown without its shape. The mesh broken.stl has no triangles")
-        await screen.sees("ruin is shown without its shape.")
-        await screen.sees("turner is shown in part. ")
+        await screen.sees("The model of broken cannot be shown. The mesh broken.stl has no triangles")
+        await screen.sees("The model of ruin cannot be shown.")
+        await screen.sees("Part of turner cannot be shown.")

@@ -196,7 +196,7 @@ async def test_orientations_are_added_rotated_and_checked_for_reachability(place
     orientation = added.orientations[0]
     await page.get_by_role("button", name=re.compile("^down")).first.click()
     answer = page.locator(".reaches li", has_text="robot · tcp")
-    await expect(answer).to_contain_text("reaches it", timeout=30_000)
+    await expect(answer).to_contain_text("reachable", timeout=30_000)
     assert await page.evaluate("id => __engine.item(id).kind", orientation.id) == "orientation"
     yaw = page.get_by_label("Yaw °")
     await yaw.fill("90")
@@ -253,7 +253,7 @@ async def test_point_is_moved_to_the_robot_by_a_tap_and_by_hand_guiding(place: P
     joints = await place.client.call("GetRobotJoints", rpc.GetRobotJointsArgs(place.robot))
     goal = [each.value for each in joints]
     goal[1] += 0.1
-    button = page.get_by_role("button", name=re.compile("^Hold: by hand"))
+    button = page.get_by_role("button", name=re.compile("^Hold to teach"))
 
     async def free() -> bool:
         return bool((await place.cell.tell("robot", "truth"))["freedrive"])
@@ -308,7 +308,7 @@ async def test_robot_is_previewed_and_moved_to_a_taught_orientation(place: Place
     await place.select("taught")
     await page.get_by_role("button", name=re.compile("^down")).first.click()
     before = (await screen.item(place.robot))["joints"]
-    await page.get_by_text("At 25 % of its speed").click()
+    await page.get_by_text("Speed: 25 %").click()
     await page.get_by_role("slider", name="Speed").fill("1")
     await place.button("Show robot there").click()
     await screen.sees(texts.CAN_GO_THERE)
@@ -317,7 +317,7 @@ async def test_robot_is_previewed_and_moved_to_a_taught_orientation(place: Place
     assert max(abs(real[name] - before[name]) for name in real) < 1e-3, "it is only shown"
     assert max(abs(ghost[name] - real[name]) for name in real) > 0.05
     await screen.picture("points ghost at an orientation")
-    await place.button("Move it there").click()
+    await place.button("Move there").click()
     as_taught = """([robot, orientation]) => {
         const tool = window.__engine.item(robot).endEffectors[0], wanted = window.__engine.item(orientation).pose;
         const [p, q] = [tool.orientation, wanted.orientation];
@@ -364,7 +364,7 @@ async def test_joints_of_a_moved_point_are_invalid_until_recomputed(place: Place
     await place.select("moved")
     await expect(page.get_by_label("Name of the point")).to_have_value("moved")
     await page.get_by_role("button", name=re.compile("^default · robot")).click()
-    await place.screen.sees("The point has moved since: these joints no longer lead to it.")
+    await place.screen.sees("The point has moved. These joints no longer reach it.")
     before = point.robot_joints[0].joints
     await place.button("Compute anew").click()
     # The saved point is older than the move until the editor has released its lock.
@@ -397,7 +397,7 @@ async def test_copies_in_a_row_and_locked_points(place: Place) -> None:
         return False
 
     await until(locked, "the colleague has the point in hand")
-    why = page.get_by_role("button", name=re.compile("^Put it where the robot is.*colleague works on it"))
+    why = page.get_by_role("button", name=re.compile("^Move to the robot.*In use by colleague"))
     await expect(why).to_have_attribute("aria-disabled", "true")
     await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(source.id))
     await expect(place.button(texts.MOVE_POINT_TO_ROBOT)).to_be_visible()

@@ -83,7 +83,7 @@ async def test_values_are_validated_by_field_and_server(work: Work) -> None:
     field = work.panel.get_by_label("number", exact=True)
     await field.fill("1.5")
     await field.press("Enter")
-    await expect(work.panel.get_by_role("alert")).to_have_text("Type a whole number.")
+    await expect(work.panel.get_by_role("alert")).to_have_text("Enter a whole number.")
     await field.fill("3")
     await field.press("Enter")
     await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
@@ -111,7 +111,7 @@ async def test_values_are_validated_by_field_and_server(work: Work) -> None:
     await constant.get_by_role("button", name="probe", exact=True).wait_for()
     # A parameter in use cannot be removed; the message names its user.
     await constant.get_by_role("button", name="Remove number").click(force=True)
-    await work.screen.sees("It is used by probe.")
+    await work.screen.sees("Used by probe.")
 
 
 async def test_only_results_of_earlier_actions_can_be_used(work: Work) -> None:
@@ -120,10 +120,10 @@ async def test_only_results_of_earlier_actions_can_be_used(work: Work) -> None:
     await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(first, second))
     await work.told("LogicItemChanged")
     await work.select("count_up")
-    await work.panel.get_by_role("radiogroup", name="Where by comes from").get_by_text("Project").wait_for()
+    await work.panel.get_by_role("radiogroup", name="Source of by").get_by_text("Project").wait_for()
     assert await work.panel.get_by_text("Result", exact=True).count() == 0
     await work.select("take_off")
-    await work.panel.get_by_role("radiogroup", name="Where by comes from").get_by_text("Result").click()
+    await work.panel.get_by_role("radiogroup", name="Source of by").get_by_text("Result").click()
     await work.panel.get_by_label("by", exact=True).select_option(label="so_many of count_up")
     await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
     linked = (await work.parameters(second))["by"]
@@ -146,7 +146,7 @@ async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
 
     work.taps = 0
     await work.tap_button("check_input: yes", graph)
-    await page.get_by_role("status").filter(has_text="Tap what follows check_input").wait_for()
+    await page.get_by_role("status").filter(has_text="Tap the step that follows check_input").wait_for()
     await node("on_yes")
     step = (await work.told("LogicItemChanged")).data
     await work.tap_button("check_input: no", graph)
@@ -178,7 +178,7 @@ async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
     )
     # Redirecting a step keeps its id.
     await graph.locator(f"[data-id='{joined.id}'] .react-flow__edge-interaction").click(force=True)
-    await work.tap_button("Lead elsewhere", work.panel)
+    await work.tap_button("Change target", work.panel)
     await graph.locator('.react-flow__node[data-id="END"] .flow-name').click()
     moved = await work.told("LogicItemChanged")
     assert (moved.change_type, moved.data.id, moved.data.end) == (ChangeType.UPDATE, joined.id, "END")
@@ -202,7 +202,7 @@ async def test_graph_does_not_move_under_a_tap(work: Work) -> None:
     await screen.settle()
     assert await way.bounding_box() == at
     await page.mouse.up()
-    await page.get_by_role("status").filter(has_text="Tap what follows surely").wait_for()
+    await page.get_by_role("status").filter(has_text="Tap the step that follows surely").wait_for()
     await graph.locator('.react-flow__node[aria-label^="meanwhile,"]').wait_for()
     await page.keyboard.press("Escape")
 
@@ -310,7 +310,7 @@ async def test_steps_in_the_view_can_be_hidden(work: Work) -> None:
     await work.screen.item(step)
     await work.tool(texts.PROGRAM)
     await work.mode("Actions")
-    drawn = work.panel.get_by_label("Steps are drawn in the 3D view")
+    drawn = work.panel.get_by_label("Show steps in the 3D view")
     await drawn.click()
     await work.screen.until("id => window.__engine.item(id) === undefined", step)
     await work.screen.item(work.action("scan").id)
@@ -340,7 +340,7 @@ async def test_step_in_the_view_and_integer_condition_with_else(work: Work) -> N
     await work.tap_button("at_three", work.panel)
     asked = (await work.told("LogicItemChanged")).data
     assert (asked.end, asked.condition.value) == (three, "0")
-    value = work.panel.get_by_label("and is taken when many is")
+    value = work.panel.get_by_label("Value of many")
     await value.fill("3")
     await value.press("Enter")
     changed = await work.told("LogicItemChanged")
@@ -355,7 +355,7 @@ async def test_program_fault_is_listed_and_leads_to_its_action(work: Work) -> No
     lonely = await work.add("lonely", "flow/wait", "bad")
     await work.tool(texts.PROGRAM)
     await work.mode("Check")
-    fault = work.panel.get_by_role("button", name="lonely is never run: nothing leads to it.")
+    fault = work.panel.get_by_role("button", name="lonely is never run: no step leads to it.")
     await fault.click()
     await work.panel.get_by_role("heading", name="lonely", exact=True).wait_for()
     assert (await work.screen.page.evaluate("id => __engine.item(id).visible", lonely)) is True
@@ -379,7 +379,7 @@ async def test_device_setting_is_overridden_in_one_project(work: Work) -> None:
     assert (replaced.change_type, replaced.parent_id) == (ChangeType.ADD, work.object("tester"))
     assert (replaced.data.name, replaced.data.value) == ("port", "1502")
     await settings.get_by_text(f"instead of {scenes} in the scene").wait_for()
-    await settings.get_by_role("button", name="port as in the scene").click()
+    await settings.get_by_role("button", name="Reset port to the scene").click()
     assert (await work.told("OverrideUpdated")).change_type is ChangeType.REMOVE
     await expect(field).to_have_value(scenes)
 
@@ -411,8 +411,8 @@ async def test_code_view_shows_the_saved_program_and_selects_actions(work: Work)
     await work.add("newer", "flow/wait", "bad")
     await work.screen.close_panels()
     await work.mode("Code")
-    code = page.get_by_role("region", name="The program as Python")
-    await code.get_by_text("This is the program as it was saved.").wait_for()
+    code = page.get_by_role("region", name="Python program")
+    await code.get_by_text("This is the last saved program.").wait_for()
     await code.get_by_text("def main(res: Resources)").wait_for()
     line = code.locator("li", has_text="reader.scan(")
     await line.click()
@@ -451,7 +451,7 @@ async def test_project_without_logic_has_no_program(work: Work) -> None:
     alone = (await work.told("ActionChanged")).data.id
     await work.screen.item(alone)
     assert await page.evaluate("['START', 'END'].map((id) => __engine.item(id) ?? null)") == [None, None]
-    modes = page.get_by_role("radiogroup", name="How it is shown").get_by_role("radio")
+    modes = page.get_by_role("radiogroup", name="View mode").get_by_role("radio")
     assert await modes.all_inner_texts() == ["3D", "Code"]
     await work.select("alone")
     assert await work.panel.get_by_text(texts.NEXT_STEP, exact=True).count() == 0

@@ -136,7 +136,7 @@ async def test_step_moves_the_tool_and_shows_the_outcome(place: Place) -> None:
     await place.choose("Axes of", "Tool")
     await place.button("Move along +Z").click()
     await until(_lower(place, after.z - 0.009), "the tool went down")
-    await place.choose("Axes of", "World")
+    await place.choose("Frame", "World")
 
 
 def _lower(place: Place, z: float) -> Any:
@@ -224,7 +224,7 @@ async def test_hold_ends_on_blur_hidden_page_and_key_up(place: Place, taken: str
 async def test_joint_is_moved_within_its_limits(place: Place) -> None:
     await place.stands()
     await place.robot_panel("Joints")
-    await place.choose("A press", "Step")
+    await place.choose("Mode", "Step")
     page = place.screen.page
     field = page.get_by_label(re.compile("^wrist 3 joint to"))
     await field.fill("+9000")
@@ -235,7 +235,7 @@ async def test_joint_is_moved_within_its_limits(place: Place) -> None:
     before = {
         each.name: each.value for each in await place.client.call("GetRobotJoints", rpc.GetRobotJointsArgs(place.robot))
     }
-    await place.button("wrist 3 joint up").click()
+    await place.button("Move wrist 3 joint up").click()
 
     async def turned() -> bool:
         joints = await place.client.call("GetRobotJoints", rpc.GetRobotJointsArgs(place.robot))
@@ -275,7 +275,7 @@ async def test_goal_is_dragged_and_the_ghost_follows(place: Place) -> None:
     page, screen = place.screen.page, place.screen
     before = await place.stands()
     await place.robot_panel("Go to")
-    await place.button("Back to the tool").click()
+    await place.button("Reset to tool").click()
     await page.evaluate("id => __engine.focus(id)", place.robot)
     await page.evaluate(
         """() => {
@@ -325,7 +325,7 @@ async def test_goal_is_dragged_and_the_ghost_follows(place: Place) -> None:
     await expect(page.locator("p.error[role=status]")).to_be_visible()
     assert (await page.evaluate("__engine.way"))["state"] == "blocked"
     await screen.picture("robot goal out of reach")
-    await place.button("Back to the tool").click()
+    await place.button("Reset to tool").click()
     await screen.until("id => window.__engine.item(id).ghost === null && window.__engine.way === null", place.robot)
     await expect(page.locator("p.error[role=status]")).to_have_count(0)
     await place.robot_panel("Tool")
@@ -394,9 +394,9 @@ async def test_hand_guiding_is_active_while_held(place: Place) -> None:
     page = place.screen.page
     await place.stands()
     await place.robot_panel("By hand")
-    await place.screen.sees("The arm is stiff")
-    await place.button("Hold, and move the arm by hand").hover()
+    await place.screen.sees("Hand teaching is off")
+    await place.button("Hold to teach: move the arm by hand").hover()
     await page.mouse.down()
-    await place.screen.sees("The arm is free")
+    await place.screen.sees("Hand teaching is on")
     await page.mouse.up()
-    await place.screen.sees("The arm is stiff")
+    await place.screen.sees("Hand teaching is off")

@@ -105,7 +105,7 @@ async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: B
     # Parameters and results.
     await expect(trace).to_contain_text("times")
     await expect(trace).to_contain_text("boards_left")
-    await expect(trace.get_by_role("button", name="scan")).to_contain_text("waits")
+    await expect(trace.get_by_role("button", name="scan")).to_contain_text("waiting")
     for _ in ("the tool", "what is selected"):
         await page.get_by_role("button", name=texts.CLOSE_PANEL).click()
     here = graph.locator('.react-flow__node[aria-label^="scan,"]')
@@ -120,10 +120,10 @@ async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: B
         await other.page.get_by_role("navigation").get_by_role("button", name=texts.RUN, exact=True).click()
         seen = other.page.get_by_role("complementary")
         await seen.get_by_role("button", name="more_boards").wait_for()
-        await seen.get_by_role("button", name="Do not pause at scan").wait_for()
-        await seen.get_by_role("button", name="Do not pause at scan").click()
+        await seen.get_by_role("button", name="Remove breakpoint at scan").wait_for()
+        await seen.get_by_role("button", name="Remove breakpoint at scan").click()
         await until(lambda: is_broken_at(work), "it is gone for everybody")
-    await expect(work.panel.get_by_role("button", name="Do not pause at scan")).to_have_count(0)
+    await expect(work.panel.get_by_role("button", name="Remove breakpoint at scan")).to_have_count(0)
 
     await work.tap_button(texts.STEP, bar)
     fault = work.panel.get_by_role("region", name="Last run").filter(has_text="Run failed in scan")
@@ -162,7 +162,7 @@ async def test_single_action_is_executed_and_another_cancelled(work: Work) -> No
     await go_online(work)
     present = await work.add("look_for_board", "tester/board_present", "fixture", "is_there")
     await work.select("look_for_board")
-    await work.tap_button("Try it", work.panel)
+    await work.tap_button("Try", work.panel)
     result: Any = (await work.told("ActionResult")).data
     assert (result.action_id, result.results) == (present, ["false"])
     outcome = work.panel.get_by_role("status").filter(has_text="Done")
@@ -200,7 +200,7 @@ async def test_choices_come_from_the_device_and_stay_when_it_is_offline(work: Wo
     assert await board.locator("option").all_inner_texts() == [f"lower board {number}" for number in range(4)]
     # Nothing is known of another shelf.
     await shelf.get_by_text("cellar").click()
-    await work.panel.get_by_text("go online to choose from what the device has").wait_for()
+    await work.panel.get_by_text("Go online to load the choices.").wait_for()
 
 
 async def test_package_is_built_under_the_proposed_name(work: Work) -> None:
@@ -211,6 +211,6 @@ async def test_package_is_built_under_the_proposed_name(work: Work) -> None:
     dialog = work.screen.page.get_by_role("dialog")
     await expect(dialog.get_by_label("Name")).to_have_value(work.project.name)
     await dialog.get_by_role("button", name="Save and build").click()
-    await work.screen.sees(f"The package {work.project.name} is built.")
+    await work.screen.sees(f"Package {work.project.name} created.")
     (package,) = await work.client.call("ListPackages")
     assert package.package_meta.name == work.project.name

@@ -158,7 +158,7 @@ async def test_object_is_dragged_previewed_to_others_and_undone(opened: Open, br
 
         # An edit of another user in between blocks Undo; the message names the user.
         await client.call("WriteLock", rpc.WriteLockArgs(tester.id))
-        await screen.sees("colleague works on it")
+        await screen.sees("In use by colleague")
         assert await screen.page.evaluate("window.__engine.gizmo.shown") is False
         await client.call("UpdateObjectPose", rpc.UpdateObjectPoseArgs(tester.id, before))
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(tester.id))
@@ -196,7 +196,7 @@ async def test_steps_and_typed_numbers_place_an_object_exactly(opened: Open, bro
             ("-=3mm", "x", start.position.x + 0.0095),
             ("1in/2", "y", 0.0127),
         ):
-            await place.get_by_role("button", name=re.compile(f"^{axis.upper()} .*type it")).click()
+            await place.get_by_role("button", name=re.compile(f"^{axis.upper()} .*enter a value")).click()
             await place.get_by_role("textbox").fill(typed)
             await screen.page.keyboard.press("Enter")
             await until(lambda axis=axis, value=value: _at(opened, axis, value), typed)  # type: ignore[misc]
@@ -211,13 +211,13 @@ async def test_steps_and_typed_numbers_place_an_object_exactly(opened: Open, bro
 
         # Rotated by a typed angle, then squared up.
         await place.get_by_role("radio", name="Turn").click()
-        await place.get_by_role("button", name=re.compile("^Yaw .*type it")).click()
+        await place.get_by_role("button", name=re.compile("^Yaw .*enter a value")).click()
         await place.get_by_role("textbox").fill("80")
         await screen.page.keyboard.press("Enter")
         await until(lambda: _yaw(opened, math.radians(80)), "turned by 80°")
-        await place.get_by_role("button", name="Square up").click()
+        await place.get_by_role("button", name="Align to axes").click()
         await until(lambda: _yaw(opened, math.pi / 2), "squared")
-        await place.get_by_role("button", name="Put back").click()
+        await place.get_by_role("button", name="Reset").click()
         await until(lambda: _same(opened, start), "as it was at first")
 
 
@@ -253,7 +253,7 @@ async def test_shapes_are_added_resized_copied_and_removed(opened: Open, browser
         assert added.pose
         place = screen.page.get_by_role("region", name=texts.PLACE, exact=True)
         await place.get_by_role("radio", name="Size").click()
-        await place.get_by_role("button", name=re.compile("^Height .*type it")).click()
+        await place.get_by_role("button", name=re.compile("^Height .*enter a value")).click()
         await place.get_by_role("textbox").fill("25cm")
         await screen.page.keyboard.press("Enter")
         await until(lambda: _measures(client, "cylinder", 0.05, 0.25), "25 cm high")
@@ -341,7 +341,7 @@ async def test_devices_are_added_by_a_form_and_meshes_with_their_unit(opened: Op
         await panel.get_by_role("button", name="MtSicsScale").click()
         submit = panel.locator("form button[type=submit]")
         await submit.click()
-        await expect(panel.get_by_role("alert")).to_contain_text("Still to be said")
+        await expect(panel.get_by_role("alert")).to_contain_text("Required: ")
         needed = await panel.locator(".add-form > .value-field > .value-head > label").all_inner_texts()
         for label in needed:
             await panel.get_by_label(label, exact=True).fill("127.0.0.9")

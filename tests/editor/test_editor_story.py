@@ -145,7 +145,7 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
 
         # Run with a breakpoint; stop the arm in mid-move.
         await graph.locator(f'.react-flow__node[aria-label^="{move}"] .flow-name').click()
-        await user.panel.get_by_role("button", name="Pause before it").click()
+        await user.panel.get_by_role("button", name="Pause before this action").click()
         await user.mode("3D")
         await user.tool(texts.RUN)
         await screen.press("Save and run")

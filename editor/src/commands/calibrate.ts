@@ -21,7 +21,7 @@ export function showAtTool(id: string, tool: Pose, pivot: Pivot): string {
   const state = now();
   const of = state.doc?.objects[id];
   const offset = pivotOffset(state.types.byName[of?.type ?? ""]?.object_model, pivot);
-  if (!of || typeof offset === "string") return typeof offset === "string" ? offset : t`It is gone.`;
+  if (!of || typeof offset === "string") return typeof offset === "string" ? offset : t`It no longer exists.`;
   const pose = composed(tool, { position: { x: 0, y: 0, z: -offset }, orientation: FLIPPED });
   setUi({ draft: { id, of, pose } });
   return "";
@@ -123,7 +123,7 @@ async function rest<T>(path: string, options: RequestInit = {}): Promise<T> {
     ...(token ? { Authorization: `Bearer ${token}` } : {}),
   };
   const response = await fetch(path, { ...options, headers });
-  if (!response.ok) throw new Error(await refusedWith(response, t`The server refuses it`));
+  if (!response.ok) throw new Error(await refusedWith(response, t`The server refused the request`));
   return (await response.json()) as T;
 }
 

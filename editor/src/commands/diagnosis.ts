@@ -19,7 +19,7 @@ export function saveDiagnosis(): Promise<string> {
       headers,
       body: JSON.stringify({ client: seen() }),
     });
-    if (!response.ok) throw new Error(await refusedWith(response, t`The server gives no diagnosis`));
+    if (!response.ok) throw new Error(await refusedWith(response, t`The diagnosis file is not available`));
     saveAs(await response.blob(), `diagnosis-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.zip`);
   });
 }

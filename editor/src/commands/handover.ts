@@ -19,7 +19,7 @@ export function followWishes(): () => void {
   return store.subscribe((state, before) => {
     const { wanted, free } = handOver(state, before);
     for (const { id, by } of wanted)
-      tell("warn", t`${by} asks for ${nameOf(state, id)}, which you hold: it is free as soon as you are done with it.`);
+      tell("warn", t`${by} asks for ${nameOf(state, id)}, which you are using. Finish your change to release it.`);
     for (const id of free) {
       tell("info", t`${nameOf(state, id)} is free now.`);
       noLongerAsk(id);

@@ -19,7 +19,7 @@ async function stored(path: string, options: RequestInit = {}): Promise<unknown>
   const token = remembered("token");
   const headers = { "Content-Type": "application/json", ...(token ? { Authorization: `Bearer ${token}` } : {}) };
   const response = await fetch(path, { ...options, headers });
-  if (!response.ok) throw new Error(await refusedWith(response, t`The server refuses it`));
+  if (!response.ok) throw new Error(await refusedWith(response, t`The server refused the request`));
   return response.json();
 }
 
@@ -37,8 +37,8 @@ export async function faultyObjects(id: string, problems: readonly string[]): Pr
 export function takeOut(id: string, name: string, objects: readonly string[]): Promise<string> {
   return refusal(async () => {
     const taken = new Set(now().lists.scenes?.map((each) => each.name));
-    let copy = t`${name} as it was`;
-    for (let number = 2; taken.has(copy); number++) copy = t`${name} as it was ${number}`;
+    let copy = t`${name} backup`;
+    for (let number = 2; taken.has(copy); number++) copy = t`${name} backup ${number}`;
     const scene = await read(id);
     await call("CopyScene", { source_id: id, target_name: copy });
     const kept = { ...scene, objects: scene.objects.filter((each) => !objects.includes(each.name)) };

@@ -22,7 +22,7 @@ export function uploadPackage(file: File): Promise<string> {
     const body = new FormData();
     body.append("executionPackage", file);
     const response = await fetch(`/packages/${encodeURIComponent(id)}`, { method: "POST", body, headers: headers() });
-    if (!response.ok) throw new Error(await refusedWith(response, t`The server does not take ${file.name}`));
+    if (!response.ok) throw new Error(await refusedWith(response, t`The server refused ${file.name}`));
   });
 }
 
@@ -30,7 +30,7 @@ export function uploadPackage(file: File): Promise<string> {
 export function downloadPackage(id: string, name: string): Promise<string> {
   return refusal(async () => {
     const response = await fetch(`/packages/${encodeURIComponent(id)}`, { headers: headers() });
-    if (!response.ok) throw new Error(await refusedWith(response, t`The server does not give ${name}`));
+    if (!response.ok) throw new Error(await refusedWith(response, t`${name} cannot be downloaded`));
     saveAs(await response.blob(), `${name.replace(/[^\w-]+/g, "_")}.zip`);
   });
 }

@@ -193,7 +193,7 @@ export function solveJoints(id: string, orientationId: string): Promise<string> 
     if (!doc || !kept) return;
     const effector =
       kept.end_effector_id ?? live.arms[kept.robot_id]?.find((each) => each.id === (kept.arm_id ?? ""))?.effectors[0];
-    if (effector === undefined) throw new Error(t`Go online first: which end effector is meant is not known.`);
+    if (effector === undefined) throw new Error(t`Go online first. The end effectors are unknown offline.`);
     const joints = await call("InverseKinematics", {
       robot_id: kept.robot_id,
       end_effector_id: effector,

@@ -25,8 +25,8 @@ const TOLD_WITHIN = 5;
 
 /** Give why the program cannot be edited by this request now; empty when it can. */
 export function notEditable(state: State, request: keyof Requests = "UpdateAction"): string {
-  if (!state.doc?.project) return t`Open a project: a scene has no program.`;
-  return barred(state, request) || (isRunning(state) ? t`The program runs: stop it first.` : "");
+  if (!state.doc?.project) return t`Open a project first. A scene has no program.`;
+  return barred(state, request) || (isRunning(state) ? t`Stop the program first.` : "");
 }
 
 /** Wait for something that an event brings. Rejects when it does not come. */
@@ -36,7 +36,7 @@ export function awaited<T>(find: (state: State) => T | undefined): Promise<T> {
     if (known !== undefined) return resolve(known);
     const timer = setTimeout(() => {
       stop();
-      reject(new Error(t`The server has not told what became of it.`));
+      reject(new Error(t`The server did not confirm the change.`));
     }, TOLD_WITHIN * 1000);
     const stop = store.subscribe((state) => {
       const found = find(state);
@@ -132,7 +132,7 @@ async function startingParameters(
             : await startingValue(objectId, wanted);
     if (value === undefined) {
       const other = imageFor(type);
-      if (!other) throw new Error(t`${name} has to be the result of an earlier action: add that one first.`);
+      if (!other) throw new Error(t`${name} is the result of another action. Add that action first.`);
       parameters.push({ name, type: "link", value: JSON.stringify(other) });
     } else parameters.push({ name, type, value });
   }
@@ -195,7 +195,7 @@ export const setParameter = (actionId: string, parameter: ActionParameter): Prom
   refusal(() =>
     held(actionId, () => {
       const action = now().doc?.actions[actionId];
-      if (!action) throw new Error(t`The action is gone.`);
+      if (!action) throw new Error(t`The action no longer exists.`);
       const rest = action.parameters.filter((each) => each.name !== parameter.name);
       return call("UpdateAction", { action_id: actionId, parameters: [...rest, parameter] });
     }),
@@ -302,7 +302,7 @@ export const updateStep = (logic_item_id: string, start: string, end: string, co
 export const setCondition = (id: string, condition: ProjectLogicIf | undefined): Promise<string> =>
   refusal(() => {
     const step = now().doc?.logic[id];
-    if (!step) throw new Error(t`The step is gone.`);
+    if (!step) throw new Error(t`The connection no longer exists.`);
     return call("UpdateLogicItem", { logic_item_id: id, start: step.start, end: step.end, condition });
   });
 

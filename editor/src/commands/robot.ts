@@ -79,16 +79,16 @@ export function notReady(
   chosen: Chosen | null,
   request: Parameters<typeof barred>[1] = "MoveToPose",
 ): string {
-  if (!chosen) return t`There is no robot in this scene.`;
+  if (!chosen) return t`The scene has no robot.`;
   const name = state.doc?.objects[chosen.robotId]?.name ?? t`The robot`;
   if (state.live.state !== "started") return t`Go online first.`;
   const connection = state.live.objects[chosen.robotId];
   if (connection && connection.state !== "online" && connection.state !== "back")
-    return t`${name} is not there: ${connection.reason || connection.state}.`;
+    return t`${name} is not connected: ${connection.reason || connection.state}.`;
   const hold = state.live.holds[chosen.robotId];
-  if (hold && hold.user !== state.connection.user) return t`${hold.user} holds ${name}.`;
+  if (hold && hold.user !== state.connection.user) return t`${hold.user} is moving ${name}.`;
   const owner = state.locks[chosen.robotId];
-  if (owner && owner !== state.connection.user) return t`${owner} works with ${name}.`;
+  if (owner && owner !== state.connection.user) return t`${name} is in use by ${owner}.`;
   return barred(state, request);
 }
 

@@ -12,11 +12,11 @@ const BUILT_WITHIN = 120;
 
 /** Give why the open project cannot be run now; empty when it can. */
 export function notRunnable(state: State): string {
-  if (!state.doc?.project) return t`Open a project: a scene alone cannot be run.`;
-  if (isRunning(state)) return t`It runs already.`;
+  if (!state.doc?.project) return t`Open a project first. A scene cannot be run.`;
+  if (isRunning(state)) return t`The program is already running.`;
   if (state.live.state === "starting" || state.live.state === "stopping")
     return t`Wait until the devices are online or offline.`;
-  if (state.live.executing) return t`An action is being tried. Wait for it, or press Stop motion.`;
+  if (state.live.executing) return t`An action is running. Wait until it ends, or press Stop motion.`;
   return barred(state, "TemporaryPackage");
 }
 
@@ -30,7 +30,7 @@ export async function run({ paused = false } = {}): Promise<boolean> {
     await call("TemporaryPackage", { start_paused: paused, ...shared }, { deadline: BUILT_WITHIN });
     return true;
   } catch (error) {
-    tell("error", t`Not run. ${sentence(error)}`);
+    tell("error", t`Not started. ${sentence(error)}`);
     return false;
   }
 }
@@ -57,7 +57,7 @@ export async function build(name: string): Promise<boolean> {
     { project_id: doc.project.id, package_name: name },
     { deadline: BUILT_WITHIN },
   );
-  if (built) tell("info", t`The package ${name} is built.`);
+  if (built) tell("info", t`Package ${name} created.`);
   return built !== undefined;
 }
 

@@ -16,10 +16,10 @@ import { awaited } from "./program";
 
 /** Why objects cannot be added, removed or set up now; empty when they can. */
 export function notBuildable(state: State, request: Parameters<typeof barred>[1] = "AddObjectToScene"): string {
-  if (!state.doc) return t`Nothing is open.`;
-  if (state.doc.project) return t`Objects belong to the scene: close the project, and open the scene.`;
-  if (isRunning(state)) return t`A program runs: stop it first.`;
-  if (state.live.state !== "stopped") return t`Go offline first: devices are set up while they are not in use.`;
+  if (!state.doc) return t`No scene or project is open.`;
+  if (state.doc.project) return t`Objects belong to the scene. Close the project and open the scene.`;
+  if (isRunning(state)) return t`Stop the program first.`;
+  if (state.live.state !== "stopped") return t`Go offline first. Devices can only be changed offline.`;
   return barred(state, request);
 }
 

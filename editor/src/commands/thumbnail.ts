@@ -38,7 +38,7 @@ export const useOwn = create<Record<string, boolean>>(() => ({}));
 export function keepOwnPicture(document: string, file: Blob | null): Promise<string> {
   return refusal(async () => {
     const picture = file && (await smaller(file, 1));
-    if (picture === "") throw new Error(t`The picture cannot be made small enough.`);
+    if (picture === "") throw new Error(t`The picture is too large.`);
     await call("SetViewState", { scope: "shared", document, values: { picture } });
     await readThumbnail(document);
   });
@@ -59,7 +59,7 @@ export async function readThumbnail(document: string): Promise<void> {
 /** The middle of a picture, as wide as a tile; empty when it stays too large. Rejects when it is none. */
 async function smaller(blob: Blob, closer = CLOSER): Promise<string> {
   const picture = await createImageBitmap(blob).catch(() => {
-    throw new Error(t`This file is no picture that the browser can read.`);
+    throw new Error(t`The browser cannot read this picture file.`);
   });
   const canvas = globalThis.document.createElement("canvas");
   canvas.width = WIDTH;

@@ -31,7 +31,7 @@ describe("the lists of the home screen", () => {
     expect(entriesOf(LISTS, "scene")?.map((each) => each.projects)).toEqual([1, 0]);
     expect(entriesOf(LISTS, "project")?.map((each) => each.from)).toEqual([
       { id: "s1", name: "cell 10", gone: false },
-      { id: "gone", name: "a scene that is gone", gone: true },
+      { id: "gone", name: "a deleted scene", gone: true },
     ]);
     expect(entriesOf(LISTS, "package")?.[0]).toMatchObject({ executed: "", from: { name: "old", gone: true } });
     expect(entriesOf({ ...LISTS, scenes: null }, "scene")).toBeNull();

@@ -23,12 +23,12 @@ export interface Entry {
 
 export type Sort = "changed" | "recent" | "created" | "name" | "name down" | "oldest";
 export const SORTS: readonly (readonly [Sort, MessageDescriptor])[] = [
-  ["changed", msg`changed last`],
-  ["recent", msg`opened by you last`],
-  ["oldest", msg`changed first`],
-  ["created", msg`made last`],
-  ["name", msg`name, A to Z`],
-  ["name down", msg`name, Z to A`],
+  ["changed", msg`last changed`],
+  ["recent", msg`last opened by you`],
+  ["oldest", msg`oldest change`],
+  ["created", msg`newest`],
+  ["name", msg`name A–Z`],
+  ["name down", msg`name Z–A`],
 ];
 
 export function entriesOf(lists: Lists, kind: Entry["kind"]): Entry[] | null {
@@ -81,7 +81,7 @@ export function entriesOf(lists: Lists, kind: Entry["kind"]): Entry[] | null {
 
 function from(id: string, of: { id: string; name: string }[] | null): Entry["from"] {
   const found = of?.find((each) => each.id === id);
-  return { id, name: found?.name ?? t`a scene that is gone`, gone: found === undefined };
+  return { id, name: found?.name ?? t`a deleted scene`, gone: found === undefined };
 }
 
 /** Those that are looked for, sorted; starred ones are not before others unless asked for alone. */

@@ -105,16 +105,16 @@ export interface NewStep {
 export function freeStep(doc: OpenDocument, types: State["types"], from: string): NewStep | string {
   const siblings = outgoing(doc, from);
   if (siblings.length === 0) return {};
-  if (from === START) return t`The program can begin in one place alone. Move the step from Start instead.`;
+  if (from === START) return t`A program has one first action. Move the connection from Start instead.`;
   const asked = siblings.find((each) => each.condition)?.condition;
   const plain = siblings.find((each) => !each.condition);
   const own = asked ? resultAt(doc, types, asked.what) : conditionsOf(doc, types, from)[0];
   const name = doc.actions[from]?.name ?? t`This action`;
-  if (!own) return t`${name} leads on already, and has no result that could decide between two ways.`;
+  if (!own) return t`${name} already has a next step, and no result to branch on.`;
   const what = asked?.what ?? linkTo(own);
   const taken = siblings.flatMap((each) => (each.condition?.what === what ? [each.condition.value] : []));
   const free = firstFree(own.type, taken);
-  if (free === undefined) return t`All ways on from ${name} are taken.`;
+  if (free === undefined) return t`${name} has no free branch.`;
   if (own.type !== "boolean" || !plain) return { condition: { what, value: free } };
   return { condition: { what, value: "false" }, first: { item: plain, condition: { what, value: "true" } } };
 }
@@ -129,13 +129,13 @@ function firstFree(type: string, taken: string[]): string | undefined {
 
 /** Why a step cannot lead there; empty when it can. The server has the last word. */
 export function cannotLead(doc: OpenDocument, from: string, to: string, item = ""): string {
-  if (to === START) return t`A step cannot lead to Start.`;
-  if (from === END) return t`Nothing follows the end.`;
-  if (from === to) return t`An action cannot lead to itself.`;
+  if (to === START) return t`Start cannot follow a step.`;
+  if (from === END) return t`Nothing can follow End.`;
+  if (from === to) return t`An action cannot follow itself.`;
   if (from === START && to === END) return t`Put an action between Start and End.`;
   const others = outgoing(doc, from).filter((each) => each.id !== item);
-  if (others.some((each) => placeOf(each.end) === to)) return t`It leads there already.`;
-  if (after(doc, to).has(from)) return t`It would close a loop.`;
+  if (others.some((each) => placeOf(each.end) === to)) return t`These steps are already connected.`;
+  if (after(doc, to).has(from)) return t`This connection would create a loop.`;
   return "";
 }
 

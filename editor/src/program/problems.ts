@@ -43,7 +43,7 @@ type Tell = (id: string, text: string) => void;
 
 function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Tell): void {
   const used = after(doc, START);
-  if (outgoing(doc, START).length === 0) error(START, t`Nothing follows Start: connect it to the first action.`);
+  if (outgoing(doc, START).length === 0) error(START, t`Start has no next step. Connect it to the first action.`);
   for (const action of Object.values(doc.actions)) {
     const ways = outgoing(doc, action.id);
     if (!used.has(action.id)) {
@@ -51,13 +51,13 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
       warn(
         action.id,
         loose
-          ? t`${action.name} is never run: nothing leads to it.`
-          : t`${action.name} is never run: no way from Start leads there.`,
+          ? t`${action.name} is never run: no step leads to it.`
+          : t`${action.name} is never run: it cannot be reached from Start.`,
       );
       continue;
     }
     if (ways.length === 0) {
-      error(action.id, t`Nothing follows ${action.name}: connect it to the next action, or to End.`);
+      error(action.id, t`${action.name} has no next step. Connect it to an action or to End.`);
       continue;
     }
     const conditions = ways.flatMap((way) => (way.condition ? [way.condition] : []));
@@ -93,7 +93,7 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
     Object.keys(doc.actions).length > 0 &&
     outgoing(doc, START).length > 0
   ) {
-    error(END, t`No way leads to End.`);
+    error(END, t`No step leads to End.`);
   }
 }
 
@@ -110,10 +110,10 @@ function ofAction(
 ): void {
   const [objectId = ""] = action.type.split("/");
   const object = doc.objects[objectId];
-  if (!object) return error(action.id, t`${action.name}: its device is not in the scene any more.`);
+  if (!object) return error(action.id, t`${action.name}: its device is no longer in the scene.`);
   if (!(object.type in types.actions)) return;
   const meta = metaOf(types, doc, action);
-  if (!meta) return error(action.id, t`${action.name}: ${object.name} cannot do this any more.`);
+  if (!meta) return error(action.id, t`${action.name}: ${object.name} no longer has this action.`);
   if (meta.disabled)
     error(
       action.id,
@@ -126,20 +126,20 @@ function ofAction(
       if (wanted.default_value === undefined) error(action.id, t`${action.name}: ${wanted.name} is missing.`);
     } else if (parameter.type === "project_parameter") {
       if (!(String(value) in doc.parameters))
-        error(action.id, t`${action.name}: the parameter for ${wanted.name} is gone.`);
+        error(action.id, t`${action.name}: the variable used for ${wanted.name} no longer exists.`);
     } else if (parameter.type === "link") {
       const result = resultAt(doc, types, String(value));
-      if (!result) error(action.id, t`${action.name}: the result for ${wanted.name} is gone.`);
+      if (!result) error(action.id, t`${action.name}: the result used for ${wanted.name} no longer exists.`);
       else if (doc.project?.has_logic && !after(doc, result.action.id).has(action.id)) {
         warn(
           action.id,
-          t`${action.name}: ${wanted.name} uses a result of ${result.action.name}, which does not come before it.`,
+          t`${action.name}: ${wanted.name} uses a result of ${result.action.name}, which does not run before it.`,
         );
       }
     } else if (wanted.type === "joints" && doc.joints[String(value)]?.is_valid === false) {
       warn(
         action.id,
-        t`${action.name}: the joints ${doc.joints[String(value)]?.name ?? ""} were taken before their point was moved.`,
+        t`${action.name}: the point of ${doc.joints[String(value)]?.name ?? ""} has moved. Update the joints.`,
       );
     }
   }

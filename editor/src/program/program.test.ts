@@ -87,8 +87,8 @@ describe("steps", () => {
       ["a", "b", "true"],
       ["a", "c", "false"],
     ]);
-    expect(freeStep(both, TYPES, "a")).toBe("All ways on from a are taken.");
-    expect(freeStep(doc, TYPES, "START")).toMatch("begin in one place");
+    expect(freeStep(both, TYPES, "a")).toBe("a has no free branch.");
+    expect(freeStep(doc, TYPES, "START")).toMatch("one first action");
   });
 
   test("numbers that are not asked for yet are offered, and the way without a condition stays the rest", () => {
@@ -100,7 +100,7 @@ describe("steps", () => {
     expect(conditionWords(doc, TYPES, doc.logic.s0 as LogicItem)).toBe("else");
     expect(conditionWords(doc, TYPES, doc.logic.s1 as LogicItem)).toBe("a_result = 0");
     const plain = program({ a: "act", b: "act", c: "act" }, [["a", "b"]]);
-    expect(freeStep(plain, TYPES, "a")).toMatch("no result that could decide");
+    expect(freeStep(plain, TYPES, "a")).toMatch("no result to branch on");
   });
 
   test("what would be refused is told before", () => {
@@ -108,8 +108,8 @@ describe("steps", () => {
       ["a", "b"],
       ["b", "c"],
     ]);
-    expect(cannotLead(doc, "c", "a")).toBe("It would close a loop.");
-    expect(cannotLead(doc, "a", "b")).toBe("It leads there already.");
+    expect(cannotLead(doc, "c", "a")).toBe("This connection would create a loop.");
+    expect(cannotLead(doc, "a", "b")).toBe("These steps are already connected.");
     expect(cannotLead(doc, "a", "b", "s0")).toBe("");
     expect(cannotLead(doc, "START", "END")).not.toBe("");
     expect(cannotLead(doc, "a", "START")).not.toBe("");
@@ -159,11 +159,11 @@ describe("faults", () => {
 
   test("dead ends, halves of branches and what is never run are named where they are", () => {
     expect(texts(program({ a: "act" }))).toEqual([
-      "error START: Nothing follows Start: connect it to the first action.",
-      "warn a: a is never run: nothing leads to it.",
+      "error START: Start has no next step. Connect it to the first action.",
+      "warn a: a is never run: no step leads to it.",
     ]);
     expect(texts(program({ a: "act" }, [["START", "a"]]))).toContain(
-      "error a: Nothing follows a: connect it to the next action, or to End.",
+      "error a: a has no next step. Connect it to an action or to End.",
     );
     expect(
       texts(
@@ -172,7 +172,7 @@ describe("faults", () => {
           ["a", "END", "true"],
         ]),
       ),
-    ).toEqual(["error a: Nothing follows a when a_result is no."]);
+    ).toEqual(["error a: a: no next step if a_result is no."]);
     expect(
       texts(
         program({ a: "count" }, [
@@ -180,7 +180,7 @@ describe("faults", () => {
           ["a", "END", "3"],
         ]),
       ),
-    ).toEqual(["error a: Nothing follows a when no condition holds."]);
+    ).toEqual(["error a: a: no next step if none of the conditions is met."]);
   });
 
   test("values that are gone, and results of what comes later", () => {
@@ -192,7 +192,7 @@ describe("faults", () => {
       ],
       { a: { type: "project_parameter", value: '"away"' } },
     );
-    expect(texts(gone)).toEqual(["error a: a: the parameter for by is gone."]);
+    expect(texts(gone)).toEqual(["error a: a: the variable used for by no longer exists."]);
     const later = program(
       { a: "count", b: "count" },
       [
@@ -202,7 +202,7 @@ describe("faults", () => {
       ],
       { a: { type: "link", value: '"b/default/0"' } },
     );
-    expect(texts(later)).toEqual(["warn a: a: by uses a result of b, which does not come before it."]);
+    expect(texts(later)).toEqual(["warn a: a: by uses a result of b, which does not run before it."]);
     expect(usersOf(later, TYPES, { action: "b" })).toEqual(["a"]);
     expect(usersOf(gone, TYPES, { parameter: "away" })).toEqual(["a"]);
   });
@@ -284,9 +284,9 @@ describe("values", () => {
     expect(read("double", "1")).toEqual({ json: "1.0" });
     expect(read("double", "0,5")).toEqual({ json: "0.5" });
     expect(double(1e21)).toBe("1e+21");
-    expect(read("integer", "1.5")).toEqual({ problem: "Type a whole number." });
+    expect(read("integer", "1.5")).toEqual({ problem: "Enter a whole number." });
     expect(read("integer", "9", { maximum: 8 })).toEqual({ problem: "At most 8." });
-    expect(read("integer", "")).toEqual({ problem: "Type a number." });
+    expect(read("integer", "")).toEqual({ problem: "Enter a number." });
     expect(read("string", ' "x" ')).toEqual({ json: JSON.stringify(' "x" ') });
     expect(textOf("string", JSON.stringify(' "x" '))).toBe(' "x" ');
     expect(rangeWords(extraOf({ extra: '{"minimum":0,"maximum":2,"unit":"m/s"}' }))).toBe("0 to 2 m/s");
@@ -359,7 +359,7 @@ test("a file is read out of a zip, packed or not", async () => {
   expect(await textOfZip(zip, "script.py")).toBe(files[1]?.[1]);
   expect(await textOfZip(zip, "a.txt")).toBe("first");
   expect(await textOfZip(zip, "none")).toBeUndefined();
-  await expect(textOfZip(new ArrayBuffer(40), "a.txt")).rejects.toThrow("did not give a package");
+  await expect(textOfZip(new ArrayBuffer(40), "a.txt")).rejects.toThrow("cannot be downloaded");
 });
 
 test("Python in pieces keeps every character, and texts over lines stay texts", () => {

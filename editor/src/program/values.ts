@@ -66,7 +66,7 @@ export function textOf(type: string, json: string | undefined): string {
   const value = decoded(json);
   if (value === undefined || value === null) return "";
   if (typeof value === "string") return value;
-  if (typeof value === "boolean") return value ? "yes" : "no";
+  if (typeof value === "boolean") return value ? t`yes` : t`no`;
   return type.endsWith("pose") || typeof value === "object" ? JSON.stringify(value) : String(value);
 }
 
@@ -86,16 +86,16 @@ export function read(type: string, text: string, extra: Extra = {}): Read {
     case "integer_enum":
       return { json: String(Number(clean)) };
     case "relative_pose":
-      return decoded(clean) === undefined ? { problem: t`This is no pose.` } : { json: clean };
+      return decoded(clean) === undefined ? { problem: t`Enter a pose.` } : { json: clean };
     default:
-      return clean ? { json: JSON.stringify(clean) } : { problem: t`Choose one.` };
+      return clean ? { json: JSON.stringify(clean) } : { problem: t`Choose a value.` };
   }
 }
 
 function readNumber(type: "integer" | "double", text: string, { minimum, maximum }: Extra): Read {
   const value = Number(text.replace(",", "."));
-  if (text === "" || !Number.isFinite(value)) return { problem: t`Type a number.` };
-  if (type === "integer" && !Number.isInteger(value)) return { problem: t`Type a whole number.` };
+  if (text === "" || !Number.isFinite(value)) return { problem: t`Enter a number.` };
+  if (type === "integer" && !Number.isInteger(value)) return { problem: t`Enter a whole number.` };
   if (minimum !== undefined && value < minimum) return { problem: t`At least ${minimum}.` };
   if (maximum !== undefined && value > maximum) return { problem: t`At most ${maximum}.` };
   return { json: type === "double" ? double(value) : String(value) };

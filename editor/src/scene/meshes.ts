@@ -29,7 +29,7 @@ export async function readMesh(file: File): Promise<MeshFile> {
     ? [box.max.x - box.min.x, box.max.y - box.min.y, box.max.z - box.min.z]
     : [0, 0, 0];
   if (count < 1 || !size.every(Number.isFinite) || Math.max(...size) <= 0)
-    throw new Error(t`There is no surface in ${file.name}.`);
+    throw new Error(t`${file.name} contains no surface.`);
   return { file, geometry, triangles: Math.floor(count), size };
 }
 

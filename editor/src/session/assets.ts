@@ -8,7 +8,7 @@ export async function readShown(id: string): Promise<ArrayBuffer> {
   const token = remembered("token");
   const headers: HeadersInit = token ? { Authorization: `Bearer ${token}` } : {};
   const response = await fetch(`/api/assets/${encodeURIComponent(id)}/shown`, { headers });
-  if (!response.ok) throw new Error(await refusedWith(response, t`The server does not give the mesh ${id}`));
+  if (!response.ok) throw new Error(await refusedWith(response, t`The mesh ${id} cannot be loaded`));
   return response.arrayBuffer();
 }
 
@@ -22,7 +22,7 @@ export async function uploadAsset(file: File): Promise<string> {
     body,
     headers: token ? { Authorization: `Bearer ${token}` } : {},
   });
-  if (!response.ok) throw new Error(await refusedWith(response, t`The server does not take ${file.name}`));
+  if (!response.ok) throw new Error(await refusedWith(response, t`The server refused ${file.name}`));
   return ((await response.json()) as { id: string }).id;
 }
 

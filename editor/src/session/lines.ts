@@ -17,7 +17,7 @@ export async function metBy(from: Position, to: Position): Promise<string | null
     headers,
     body: JSON.stringify({ pt1: from, pt2: to }),
   });
-  if (!response.ok) throw new Error(await refusedWith(response, t`The server does not look at the way`));
+  if (!response.ok) throw new Error(await refusedWith(response, t`The path cannot be checked`));
   const { safe, object_id } = (await response.json()) as { safe: boolean; object_id?: string };
   return safe ? null : (object_id ?? "");
 }

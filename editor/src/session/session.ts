@@ -53,7 +53,7 @@ function address(): string {
 export function join(user: string, withToken: string): void {
   token = withToken;
   setConnection({ status: "connecting", user, reason: "", role: ROLES.programmer });
-  client.stop(t`joining anew`);
+  client.stop(t`Joining again.`);
   client.start();
 }
 
@@ -106,7 +106,7 @@ client.onState = (state, reason, code) => {
 };
 
 client.onOddity = (text) => {
-  note("fault", t`not understood: ${text}`);
+  note("fault", t`Invalid message: ${text}`);
   console.warn(t`not understood:`, text);
 };
 
@@ -129,7 +129,7 @@ async function enter(mine: number): Promise<void> {
   } catch (error) {
     if (!current()) return; // the connection is lost again: it will be tried anew
     if (error instanceof Refused) {
-      client.stop(t`not let in`);
+      client.stop(t`The server refused the user.`);
       setConnection({ status: "refused", reason: error.message });
     } else {
       tell("error", error instanceof Error ? error.message : String(error));

@@ -205,12 +205,12 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
           ...notice(
             state,
             "error",
-            t`The devices do not answer: the process that controls them is frozen or overloaded. If something moves, use the emergency stop.`,
+            t`The devices do not answer: the process that controls them is frozen or overloaded. If a robot is moving, use the emergency stop.`,
           ),
         };
       return {
         ...become({ objects }),
-        ...(event.data.state === "offline" ? {} : notice(state, "info", t`The devices answer again.`)),
+        ...(event.data.state === "offline" ? {} : notice(state, "info", t`The devices are answering again.`)),
       };
     }
     case "ObjectHealth":

@@ -20,6 +20,6 @@ it.each([
 });
 
 it("says that a mesh has neither top nor bottom", () => {
-  expect(pivotOffset({ type: "Mesh" }, "top")).toContain("use the middle");
+  expect(pivotOffset({ type: "Mesh" }, "top")).toContain("Use the middle");
   expect(pivotOffset(undefined, "middle")).toBe(0);
 });

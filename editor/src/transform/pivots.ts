@@ -11,6 +11,6 @@ export function pivotOffset(model: ObjectModel | undefined, pivot: Pivot): numbe
   if (pivot === "middle") return 0;
   // Of a sphere the protocol takes half the radius.
   const height = model?.box?.size_z ?? model?.cylinder?.height ?? model?.sphere?.radius;
-  if (height === undefined) return t`Only a box, a cylinder or a sphere has a top and a bottom: use the middle.`;
+  if (height === undefined) return t`Only boxes, cylinders and spheres have a top and a bottom. Use the middle.`;
   return ((pivot === "top" ? -1 : 1) * height) / 2;
 }

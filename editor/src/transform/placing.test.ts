@@ -43,7 +43,7 @@ describe("moving", () => {
 });
 
 describe("turning", () => {
-  it("is about the frame's axis, around the thing itself", () => {
+  it("is about the frame's axis, around Object", () => {
     const to = turned(POSE, FRAME, "y", 0.3);
     expect(to.position).toEqual(POSE.position);
     expect(

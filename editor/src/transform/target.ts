@@ -79,14 +79,13 @@ const REQUESTS = {
 /** Why it cannot be moved now, as a sentence; empty when it can. */
 export function notMovable(state: State, { kind, id }: Pick<Target, "kind" | "id">): string {
   const { doc } = state;
-  if (isRunning(state)) return t`A program runs: stop it first.`;
-  if (kind === "object" && doc?.project)
-    return t`Objects are moved in the scene: close the project, and open the scene.`;
+  if (isRunning(state)) return t`Stop the program first.`;
+  if (kind === "object" && doc?.project) return t`Objects belong to the scene. Close the project and open the scene.`;
   const type = doc?.objects[id]?.type ?? "";
   if (kind === "object" && type in state.types.robots && isOnline(state))
     return t`A robot cannot be moved in the scene while it is online.`;
   const holder = heldBy(state, id);
-  if (holder) return t`${holder} works on it.`;
+  if (holder) return t`In use by ${holder}.`;
   return barred(state, REQUESTS[kind]);
 }
 

@@ -68,13 +68,13 @@ export function App() {
       )}
       <div className="screen">
         {operator ? (
-          <Suspense fallback={<Waiting>{t`Preparing the screen…`}</Waiting>}>
+          <Suspense fallback={<Waiting>{t`Loading…`}</Waiting>}>
             <Operator kiosk={hash.includes("kiosk")} />
           </Suspense>
         ) : open ? (
           <Workplace />
         ) : (
-          <Suspense fallback={<Waiting>{t`Reading the lists…`}</Waiting>}>
+          <Suspense fallback={<Waiting>{t`Loading…`}</Waiting>}>
             <Home />
           </Suspense>
         )}

@@ -65,7 +65,9 @@ describe("what the server makes of meshes", () => {
   });
 
   it("says what it is not", () => {
-    expect(() => readGlb(new TextEncoder().encode("solid something that is no glTF").buffer)).toThrow("no binary glTF");
+    expect(() => readGlb(new TextEncoder().encode("solid something that is no glTF").buffer)).toThrow(
+      "not a binary glTF",
+    );
     expect(() => readMesh(file([], {}))).toThrow("no surface");
   });
 });

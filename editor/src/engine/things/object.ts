@@ -69,8 +69,8 @@ export class ObjectThing extends Thing<ObjectItem> {
   }
 
   override badge(): string {
-    if (this.item.lockedBy) return t`locked by ${this.item.lockedBy}`;
-    return this.reason && t`its mesh cannot be shown`;
+    if (this.item.lockedBy) return t`in use by ${this.item.lockedBy}`;
+    return this.reason && t`model cannot be shown`;
   }
 
   override get problem(): string {
@@ -120,7 +120,7 @@ export class ObjectThing extends Thing<ObjectItem> {
     } catch (error) {
       if (mine !== this.loading) return;
       this.reason = error instanceof Error ? error.message : String(error);
-      this.context.trouble(t`${this.item.name} is shown without its shape. ${this.reason}`);
+      this.context.trouble(t`The model of ${this.item.name} cannot be shown. ${this.reason}`);
       this.show(new OctahedronGeometry(0.06));
     }
   }

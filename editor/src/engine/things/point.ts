@@ -66,7 +66,7 @@ export class PointThing extends Thing<PointItem> {
   }
 
   override badge(): string {
-    return this.item.lockedBy ? t`locked by ${this.item.lockedBy}` : "";
+    return this.item.lockedBy ? t`in use by ${this.item.lockedBy}` : "";
   }
 
   override dispose(): void {

@@ -155,7 +155,7 @@ export class PuckThing extends Thing<PuckItem> {
   }
 
   override badge(): string {
-    if (this.item.lockedBy) return t`locked by ${this.item.lockedBy}`;
+    if (this.item.lockedBy) return t`in use by ${this.item.lockedBy}`;
     const reason = REASONS[this.item.reach];
     return reason && this.item.selected ? i18n._(reason) : "";
   }

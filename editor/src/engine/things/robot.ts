@@ -123,9 +123,9 @@ export class RobotThing extends Thing<RobotItem> {
   }
 
   override badge(): string {
-    if (this.item.lockedBy) return t`locked by ${this.item.lockedBy}`;
-    if (this.stale) return t`not heard of: shown where it was`;
-    return this.reason && (this.robot ? t`shown in part` : t`cannot be shown as it looks`);
+    if (this.item.lockedBy) return t`in use by ${this.item.lockedBy}`;
+    if (this.stale) return t`no signal: last known pose`;
+    return this.reason && (this.robot ? t`partly shown` : t`model cannot be shown`);
   }
 
   override get problem(): string {

@@ -13,7 +13,7 @@ import { kindName, nameOf, selectionOf } from "../names";
 import { writing } from "../search/Overlays";
 import { pick } from "../workplace/pick";
 
-const NOTHING = msg`Nothing is near the cross: turn the view.`;
+const NOTHING = msg`Nothing at the crosshair. Turn the view.`;
 
 export function takeCandidate(): void {
   const { chosen } = useAiming.getState();
@@ -58,14 +58,14 @@ export function Aim({ engine }: { engine: Engine }) {
     <>
       <span className="view-cross" aria-hidden="true" />
       <span ref={mark} className="aim-mark" aria-hidden="true" />
-      <div className="aim-bar" role="group" aria-label={t`At the cross`}>
+      <div className="aim-bar" role="group" aria-label={t`At the crosshair`}>
         <span className="aim-name" role="status">
           {kind ? (
             <>
               {name} <small className="quiet">{kindName(kind)}</small>
             </>
           ) : (
-            <small className="quiet">{t`Nothing near`}</small>
+            <small className="quiet">{t`Nothing here`}</small>
           )}
         </span>
         <Button
@@ -77,9 +77,9 @@ export function Aim({ engine }: { engine: Engine }) {
           {t`Select`}
         </Button>
         <Button
-          aria-label={t`Next ${at}/${candidates.length}, of what is at the cross`}
+          aria-label={t`Next ${at}/${candidates.length} at the crosshair`}
           aria-keyshortcuts="N"
-          why={candidates.length > 1 ? "" : chosen ? t`Nothing else is near the cross.` : i18n._(NOTHING)}
+          why={candidates.length > 1 ? "" : chosen ? t`Nothing else is at the crosshair.` : i18n._(NOTHING)}
           onPress={() => nextCandidate()}
         >
           {t`Next`}{" "}
@@ -91,7 +91,7 @@ export function Aim({ engine }: { engine: Engine }) {
           <Button
             look="plain"
             icon="close"
-            aria-label={t`No more picking by the cross`}
+            aria-label={t`Close the crosshair`}
             onPress={() => keepGeneral({ aiming: null })}
           />
         )}

@@ -77,10 +77,10 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
   if (!aiming) {
     return (
       <>
-        <p className="quiet small">{t`Touch its ${points} focus points with the robot's tool: then it is known where it stands.`}</p>
+        <p className="quiet small">{t`Touch its ${points} focus points with the robot tool to measure its pose.`}</p>
         <Button
           icon="robot"
-          why={why || noRobot || (current ? t`Something else is aimed at: finish that first.` : "")}
+          why={why || noRobot || (current ? t`Another object is being measured. Finish that first.` : "")}
           onPress={() =>
             chosen &&
             void trying(async () => {
@@ -88,7 +88,7 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
             })
           }
         >
-          {t`Begin to aim`}
+          {t`Start`}
         </Button>
         {told && (
           <p className="small good" role="status">
@@ -114,7 +114,7 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
   return (
     <>
       <p role="status">
-        {next < 0 ? t`All points are taken.` : t`Point ${next + 1} of ${points}: put the tool's tip on it.`}
+        {next < 0 ? t`All points are recorded.` : t`Point ${next + 1} of ${points}: move the tool tip onto it.`}
       </p>
       <ol className="focus-points">
         {Array.from({ length: points }, (_, n) => (
@@ -124,7 +124,7 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
               icon={done.includes(n) ? "check" : "point"}
               onPress={() => void trying(() => take(n))}
             >
-              {done.includes(n) ? t`Take point ${n + 1} again` : t`The tool is on point ${n + 1}`}
+              {done.includes(n) ? t`Record point ${n + 1} again` : t`Record point ${n + 1}`}
             </Button>
           </li>
         ))}
@@ -133,14 +133,12 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
       <div className="actions start">
         <Button
           look="primary"
-          why={next < 0 ? "" : t`Point ${next + 1} is missing.`}
-          onPress={() =>
-            void trying(async () => aiming.done().then(() => end(t`It stands where its points were found.`)))
-          }
+          why={next < 0 ? "" : t`Record point ${next + 1} first.`}
+          onPress={() => void trying(async () => aiming.done().then(() => end(t`Pose updated.`)))}
         >
-          {t`Put it there`}
+          {t`Update the pose`}
         </Button>
-        <Button onPress={() => void aiming.cancel().then(() => end(""))}>{t`Give up`}</Button>
+        <Button onPress={() => void aiming.cancel().then(() => end(""))}>{t`Cancel`}</Button>
       </div>
       <RefusedText>{refused}</RefusedText>
       {chosen && (
@@ -161,8 +159,8 @@ function FitSoFar({ of, found }: Fit) {
   return (
     <p className="small" role="status">
       {checked
-        ? t`The points fit within ${millimetres(residual)} (root mean square); point ${number} is ${millimetres(residuals[worst] ?? 0)} off.`
-        : t`Three points give its place; the next shows how well they fit.`}
+        ? t`RMS error ${millimetres(residual)}; point ${number} is off by ${millimetres(residuals[worst] ?? 0)}.`
+        : t`Three points define the pose. Record a fourth to see the error.`}
     </p>
   );
 }

@@ -33,19 +33,19 @@ export function BeforeAfter({ id }: { id: string }) {
   return (
     <div className="before-after" role="group" aria-label={t`Before and after`}>
       <p role="status">
-        {t`It stands ${(moved.distance * 1000).toFixed(1)} mm and ${moved.degrees.toFixed(2)}° from where it stood.`}
-        {isRobot && <span className="quiet small"> {t`Seen through: where it stood before.`}</span>}
+        {t`Moved by ${(moved.distance * 1000).toFixed(1)} mm and ${moved.degrees.toFixed(2)}°.`}
+        {isRobot && <span className="quiet small"> {t`Transparent: previous pose.`}</span>}
       </p>
       <div className="actions start">
         <Button look="primary" onPress={keepPlace}>
-          {t`Keep the new place`}
+          {t`Keep the new pose`}
         </Button>
         <Button
           why={why}
           isDisabled={busy}
           onPress={() => void ask(placeAt(id, was)).then((done) => done && keepPlace())}
         >
-          {t`Put it back`}
+          {t`Restore the old pose`}
         </Button>
       </div>
       <RefusedText>{refused}</RefusedText>

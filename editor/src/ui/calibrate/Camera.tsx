@@ -57,13 +57,13 @@ const Camera: Section["Body"] = ({ selection: { id } }) => {
   }, [follow, offline, id]);
   return (
     <>
-      {picture && <img className="camera-picture" src={picture} alt={t`What the camera sees`} />}
+      {picture && <img className="camera-picture" src={picture} alt={t`Camera picture`} />}
       <div className="actions start">
         <Button why={offline} onPress={() => void take()}>
           {t`Take a picture`}
         </Button>
         <OnOff isSelected={follow} onChange={(on) => (offline ? setFailed(offline) : setFollow(on))}>
-          {t`Keep taking`}
+          {t`Live picture`}
         </OnOff>
       </div>
       <RefusedText>{failed}</RefusedText>
@@ -74,7 +74,7 @@ const Camera: Section["Body"] = ({ selection: { id } }) => {
         isDisabled={busy}
         onPress={() => void ask(calibrateCamera(id))}
       >
-        {t`Find where it stands by markers`}
+        {t`Calibrate with markers`}
       </Button>
       <RefusedText>{refused}</RefusedText>
       <Records id={id} />

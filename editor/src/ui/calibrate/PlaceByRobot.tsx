@@ -22,9 +22,9 @@ import "../robot/robot.css";
 import type { Section } from "../workplace/sections";
 
 const PIVOTS: readonly (readonly [Pivot, MessageDescriptor])[] = [
-  ["top", msg`Its top`],
-  ["middle", msg`Its middle`],
-  ["bottom", msg`Its bottom`],
+  ["top", msg`Top`],
+  ["middle", msg`Middle`],
+  ["bottom", msg`Bottom`],
 ];
 
 const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
@@ -36,7 +36,7 @@ const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
   return (
     <>
       <RobotChooser />
-      <OneOf label={t`The tool touches`} value={pivot} choices={translated(PIVOTS)} onChange={setPivot} />
+      <OneOf label={t`Touched part`} value={pivot} choices={translated(PIVOTS)} onChange={setPivot} />
       <Preview key={id} id={id} pivot={pivot} why={why || noRobot} />
       <Button
         icon="robot"
@@ -44,7 +44,7 @@ const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
         isDisabled={busy}
         onPress={() => chosen && void ask(placeByRobot(id, chosen, pivot))}
       >
-        {t`It stands where the tool is`}
+        {t`Set pose from tool`}
       </Button>
       <RefusedText>{refused}</RefusedText>
       <ThreePoints key={id} id={id} why={why || noRobot} />
@@ -67,14 +67,14 @@ function Preview({ id, pivot, why }: { id: string; pivot: Pivot; why: string }) 
   return (
     <>
       <OnOff isSelected={shown} onChange={(to) => (why ? setCannot(why) : setOn(to))}>
-        {t`Show it on the tool first`}
+        {t`Preview on the tool`}
       </OnOff>
       <RefusedText>{cannot}</RefusedText>
     </>
   );
 }
 
-const STEPS = [msg`Origin`, msg`On its x axis`, msg`In its xy plane`] as const;
+const STEPS = [msg`Origin`, msg`On the x axis`, msg`In the xy plane`] as const;
 
 function ThreePoints({ id, why }: { id: string; why: string }) {
   const chosen = useEditor(chosenRobot);
@@ -99,7 +99,7 @@ function ThreePoints({ id, why }: { id: string; why: string }) {
     });
   return (
     <details className="by-numbers">
-      <summary>{t`By three points of its frame`}</summary>
+      <summary>{t`With three points`}</summary>
       <div className="actions start">
         {STEPS.map((words, n) => (
           <Button key={n} why={why} onPress={() => touch(n)}>
@@ -114,7 +114,7 @@ function ThreePoints({ id, why }: { id: string; why: string }) {
         isDisabled={busy}
         onPress={() => void ask(place())}
       >
-        {t`Put it there`}
+        {t`Update the pose`}
       </Button>
       {verdict && (
         <p className="small" role="status">

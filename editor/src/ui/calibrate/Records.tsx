@@ -39,7 +39,7 @@ export function Records({ id }: { id: string }) {
       )}
       <BeforeAfter id={id} />
       {records.length > 0 && (
-        <ul className="records" aria-label={t`How it was calibrated`}>
+        <ul className="records" aria-label={t`Calibration history`}>
           {records.map((each) => (
             <li key={each.id}>
               <span>{each.verdict}</span>

@@ -45,12 +45,12 @@ const RobotByCamera: Section["Body"] = ({ selection: { id } }) => {
         />
       )}
       <OnOff isSelected={moves} onChange={setMoves}>
-        {t`Let it move to where it is seen well`}
+        {t`Move the robot into view`}
       </OnOff>
       <Button
         icon="robot"
         className="wraps"
-        why={why || offline || (camera ? "" : t`There is no camera in this scene.`)}
+        why={why || offline || (camera ? "" : t`The scene has no camera.`)}
         isDisabled={busy}
         onPress={() => void ask(calibrateRobot(id, camera, moves))}
       >

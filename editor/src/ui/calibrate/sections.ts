@@ -35,7 +35,7 @@ export const calibrateSections: readonly Section[] = [
   },
   {
     id: "aim",
-    title: msg`Aim at it`,
+    title: msg`Measure with tool`,
     applies: inScene(
       (state, { type, pose }) =>
         pose !== undefined &&
@@ -46,7 +46,7 @@ export const calibrateSections: readonly Section[] = [
   },
   {
     id: "place-by-robot",
-    title: msg`Place by the robot`,
+    title: msg`Set pose with robot`,
     applies: inScene((state, object) => object.pose !== undefined && hasRobots(state) && !isRobot(state, object)),
     Body: lazily(() => import("./PlaceByRobot")),
   },

@@ -20,7 +20,7 @@ async function scriptOf(projectId: string): Promise<Code> {
   const response = await fetch(`/project/publish?projectId=${encodeURIComponent(projectId)}`, { headers });
   if (!response.ok) {
     const said = (await response.json().catch(() => null)) as { message?: string } | null;
-    return { problem: said?.message ?? t`The server does not give it (${response.status}).` };
+    return { problem: said?.message ?? t`The program cannot be loaded (${response.status}).` };
   }
   const source = await textOfZip(await response.arrayBuffer(), "script.py");
   return source === undefined ? { problem: t`The package has no script.` } : { source };
@@ -36,7 +36,7 @@ export default function CodeView() {
     state.program.running.map((each) => state.doc?.actions[each]?.name ?? "").join("\n"),
   );
   const cannotSave = useEditor(
-    (state) => barred(state, "SaveProject") || (isRunning(state) ? t`The program runs.` : ""),
+    (state) => barred(state, "SaveProject") || (isRunning(state) ? t`The program is running.` : ""),
   );
   const [code, setCode] = useState<Code | null>(null);
   const load = useCallback(() => {
@@ -55,15 +55,15 @@ export default function CodeView() {
   const lines = useMemo(() => (code && "source" in code ? pieces(code.source) : []), [code]);
   const byName = useMemo(() => new Map(Object.values(actions ?? {}).map((each) => [each.name, each.id])), [actions]);
 
-  if (!code) return <Waiting>{t`Reading the program…`}</Waiting>;
+  if (!code) return <Waiting>{t`Loading the program…`}</Waiting>;
   const lit = new Set(runningNames.split("\n").filter(Boolean));
   return (
-    <section className="code" aria-label={t`The program as Python`}>
+    <section className="code" aria-label={t`Python program`}>
       {unsaved && !running && (
         <p className="code-note">
           {t`This is the last saved program.`}{" "}
           <Button why={cannotSave} onPress={() => void documents.save()}>
-            {t`Save and read anew`}
+            {t`Save and reload`}
           </Button>
         </p>
       )}
@@ -78,7 +78,7 @@ export default function CodeView() {
               onPress={() => {
                 navigator.clipboard?.writeText(code.source).then(
                   () => tell("info", t`Copied.`),
-                  () => tell("warn", t`This browser does not let the page copy.`),
+                  () => tell("warn", t`The browser blocks copying.`),
                 );
               }}
             >

@@ -10,7 +10,7 @@ export async function textOfZip(content: ArrayBuffer, name: string): Promise<str
   const view = new DataView(content);
   let end = content.byteLength - 22;
   while (end >= 0 && view.getUint32(end, true) !== END_OF_DIRECTORY) end--;
-  if (end < 0) throw new Error(t`The server did not give a package.`);
+  if (end < 0) throw new Error(t`The package cannot be downloaded.`);
   let at = view.getUint32(end + 16, true);
   for (let left = view.getUint16(end + 10, true); left > 0 && view.getUint32(at, true) === ENTRY; left--) {
     const [nameSize, extra, comment] = [28, 30, 32].map((offset) => view.getUint16(at + offset, true)) as [

@@ -13,17 +13,16 @@ export function LostConnection() {
   const unsaved = useEditor((state) => state.doc?.unsaved ?? false);
   useEffect(() => {
     // What is open is told before anybody is let in.
-    if (status === "ready" && now().doc?.unsaved)
-      tell("info", t`What was changed and not saved is still here: the server has kept it.`);
+    if (status === "ready" && now().doc?.unsaved) tell("info", t`Your unsaved changes are still available.`);
   }, [status]);
   if (status === "ready") return null;
   return (
     <div className="lost" role="alert">
       <Icon name="warn" />
       <p>
-        <strong>{status === "joining" ? t`The server is back.` : t`No connection to the server.`}</strong>{" "}
+        <strong>{status === "joining" ? t`Connected again.` : t`No connection to the server.`}</strong>{" "}
         {status === "joining"
-          ? t`Reading what has changed…`
+          ? t`Loading changes…`
           : [
               t`The screen shows the last known state.`,
               reason,

@@ -22,7 +22,7 @@ export function FlowNode({ data }: NodeProps<FlowNodeType>) {
       )}
       <div className="flow-name">
         {box.kind === "fold" && <Icon name="list" size={18} />}
-        {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label={t`pauses before it`} />}
+        {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label={t`pauses here`} />}
         {box.name}
         {box.kind === "action" && <ReachBadge id={box.id} />}
         {running && <span className="tag good">{paused ? "next" : "runs"}</span>}

@@ -119,7 +119,7 @@ function Flow() {
     graph.boxes.find((each) => each.id === id) ?? { id, kind: "action", run: [], ways: [] };
 
   return (
-    <div className="flow" role="region" aria-label={t`The program as a graph`} ref={host}>
+    <div className="flow" role="region" aria-label={t`Program graph`} ref={host}>
       <ReactFlow
         nodes={nodes}
         edges={edges}
@@ -163,7 +163,7 @@ function Flow() {
           {folds.runs > 0 && (
             <ControlButton
               className="flow-fold-all"
-              aria-label={folds.wished ? t`Unfold all` : t`Fold straight runs`}
+              aria-label={folds.wished ? t`Unfold all` : t`Fold sequences`}
               onClick={() => foldAll(!folds.wished)}
             >
               {folds.wished ? t`Unfold` : t`Fold`}

@@ -62,15 +62,11 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   const running = useEditor(isRunning);
   const why = (what: Doing) => {
     const request = DO[kind][what];
-    if (owner && owner !== connection.user && what !== "open" && what !== "copy") return t`${owner} works on it.`;
+    if (owner && owner !== connection.user && what !== "open" && what !== "copy") return t`In use by ${owner}.`;
     return request ? barred({ ...now(), connection }, request) : "";
   };
-  const whyOpen = why("open") || (running ? t`A program runs: stop it first.` : "");
-  const whyThis =
-    whyOpen ||
-    (problems.length > 0
-      ? t`Something is wrong with it, see its problems: it can be opened once they are mended.`
-      : "");
+  const whyOpen = why("open") || (running ? t`Stop the program first.` : "");
+  const whyThis = whyOpen || (problems.length > 0 ? t`Fix its problems first, then open it.` : "");
   const run = useEditor((state) =>
     kind === "package" ? state.program.runs.find((each) => each.package_id === id) : undefined,
   );
@@ -97,7 +93,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
       ? [
           {
             id: "project",
-            label: t`New project on it…`,
+            label: t`New project…`,
             not: barred({ ...now(), connection }, "NewProject"),
             act: () => onProject(id),
           },
@@ -117,7 +113,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           { id: "describe", label: t`Describe…`, not: why("describe"), act: () => setDoing("describe") },
           {
             id: "picture",
-            label: t`A picture of your own…`,
+            label: t`Choose picture…`,
             not: why("describe"),
             act: () => picture.current?.click(),
           },
@@ -125,7 +121,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
             ? [
                 {
                   id: "view",
-                  label: t`Its picture from the view again`,
+                  label: t`Use the 3D view as picture`,
                   not: why("describe"),
                   act: () => keepPicture(null),
                 },
@@ -133,7 +129,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
             : []),
           {
             id: "template",
-            label: template ? t`No template any more` : t`Use as a template`,
+            label: template ? t`Remove from templates` : t`Use as a template`,
             not: why("describe"),
             act: () => keepTemplate(id, !template),
           },
@@ -177,7 +173,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
             look="plain"
             className="star"
             aria-pressed={starred}
-            aria-label={starred ? t`Take the star of ${name} away` : t`Give ${name} a star`}
+            aria-label={starred ? t`Remove ${name} from favorites` : t`Add ${name} to favorites`}
             onPress={star}
           >
             <span aria-hidden="true">{starred ? "★" : "☆"}</span>

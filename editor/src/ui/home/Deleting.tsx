@@ -17,13 +17,13 @@ export function Deleting({ entry: { kind, id, name }, onClose }: { entry: Entry;
     <Confirm
       title={t`Delete ${name}?`}
       yes={t`Delete`}
-      not={needing.length > 0 ? t`Its projects have to be deleted first.` : ""}
+      not={needing.length > 0 ? t`Delete its projects first.` : ""}
       onClose={onClose}
       onYes={() => void DELETE[kind](id)}
     >
       {needing.length > 0 ? (
         <>
-          <p>{t`These projects are on this scene, and have to be deleted first:`}</p>
+          <p>{t`Delete the projects of this scene first:`}</p>
           <ul className="needing">
             {needing.map((each) => (
               <li key={each.id}>
@@ -42,7 +42,7 @@ export function Deleting({ entry: { kind, id, name }, onClose }: { entry: Entry;
           </ul>
         </>
       ) : (
-        <p>{kind === "package" ? t`The project that it was built from stays.` : t`This cannot be undone.`}</p>
+        <p>{kind === "package" ? t`The project is not deleted.` : t`This cannot be undone.`}</p>
       )}
     </Confirm>
   );

@@ -29,9 +29,9 @@ const TITLES: Record<TabName, MessageDescriptor> = {
   packages: msg`Packages`,
 };
 const EMPTY: Record<TabName, MessageDescriptor> = {
-  projects: msg`No project yet. A project is a program for a scene: make a scene first, then a project on it.`,
-  scenes: msg`No scene yet. A scene says which devices stand in the workplace, and where.`,
-  packages: msg`No package yet. A package is a project that was built, ready to be run.`,
+  projects: msg`No projects yet. A project is a program for a scene. Create a scene first.`,
+  scenes: msg`No scenes yet. A scene contains the devices of a workplace and their poses.`,
+  packages: msg`No packages yet. A package is a built project, ready to run.`,
 };
 const KINDS: Record<TabName, Entry["kind"]> = { projects: "project", scenes: "scene", packages: "package" };
 const TAB_OF: Record<Entry["kind"], TabName> = { project: "projects", scene: "scenes", package: "packages" };
@@ -58,7 +58,7 @@ export function Home() {
     Entry[] | null
   >;
   const here = entries[tab];
-  const noProject = noRight || (lists.scenes?.length ? "" : t`Make a scene first: a project is a program for a scene.`);
+  const noProject = noRight || (lists.scenes?.length ? "" : t`Create a scene first.`);
   return (
     <div className="home">
       <header className="bar">
@@ -79,7 +79,7 @@ export function Home() {
         <div className="home-tools">
           <ToggleButtonGroup
             className="tabs"
-            aria-label={t`What is listed`}
+            aria-label={t`Lists`}
             selectionMode="single"
             disallowEmptySelection
             selectedKeys={[tab]}
@@ -105,11 +105,7 @@ export function Home() {
               ))}
             </select>
           </div>
-          <Button
-            aria-pressed={onlyStars}
-            aria-label={t`Only what has a star`}
-            onPress={() => setOnlyStars(!onlyStars)}
-          >
+          <Button aria-pressed={onlyStars} aria-label={t`Favorites only`} onPress={() => setOnlyStars(!onlyStars)}>
             <span aria-hidden="true">{onlyStars ? "★" : "☆"}</span>
           </Button>
           {tab === "scenes" && (
@@ -175,14 +171,12 @@ interface ListProps {
 }
 
 function Cards({ entries, found, search, empty, highlight, onRelated, onProject }: ListProps) {
-  if (entries === null) return <Waiting>{t`Reading the list…`}</Waiting>;
+  if (entries === null) return <Waiting>{t`Loading…`}</Waiting>;
   if (entries.length === 0) return <p className="empty quiet">{empty}</p>;
   if (found.length === 0)
     return (
       <p className="empty quiet">
-        {search.trim()
-          ? t`Nothing is called “${search.trim()}”.`
-          : t`Nothing has a star. Tap the star of a tile to find it here.`}
+        {search.trim() ? t`No match for “${search.trim()}”.` : t`No favorites yet. Tap the star of an item to add it.`}
       </p>
     );
   const taken = entries.map((each) => each.name);

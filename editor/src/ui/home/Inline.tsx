@@ -19,7 +19,7 @@ export function Inline({ label, value, taken = [], many = false, onSave, onClose
   const [text, setText] = useState(value);
   const { refused, busy, ask } = useAsking();
   const clean = text.trim();
-  const problem = clean !== value && taken.includes(clean) ? t`There is one of that name.` : "";
+  const problem = clean !== value && taken.includes(clean) ? t`This name is already in use.` : "";
   const save = (event?: FormEvent) => {
     event?.preventDefault();
     if (clean === value) return onClose();

@@ -19,7 +19,7 @@ export function NewProject({ initial = "", onClose }: { initial?: string; onClos
   return (
     <AskName
       title={t`New project`}
-      yes={t`Make and open`}
+      yes={t`Create`}
       taken={projects.map((each) => each.name)}
       onYes={make}
       onClose={onClose}

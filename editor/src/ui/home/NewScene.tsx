@@ -14,7 +14,7 @@ export function NewScene({ onClose }: { onClose: () => void }) {
   return (
     <AskName
       title={t`New scene`}
-      yes={t`Make and open`}
+      yes={t`Create`}
       taken={scenes.map((each) => each.name)}
       onYes={make}
       onClose={onClose}

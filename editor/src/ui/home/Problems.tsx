@@ -37,13 +37,13 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
         from &&
         !from.gone &&
         (ofScene ? (
-          <Button aria-label={t`Show the scene of ${name} to mend it`} onPress={onScene}>
+          <Button aria-label={t`Show the scene of ${name}`} onPress={onScene}>
             {t`Show the scene`}
           </Button>
         ) : (
           <Button
             why={whyOpen}
-            aria-label={t`Open the scene of ${name} to mend it`}
+            aria-label={t`Open the scene of ${name}`}
             onPress={() => void documents.openScene(from.id)}
           >
             {t`Open the scene`}
@@ -52,7 +52,7 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
       {kind === "scene" && (
         <Button
           why={noScene}
-          aria-label={t`Mend ${name}`}
+          aria-label={t`Repair ${name}`}
           onPress={() => void faultyObjects(id, problems).then(setFaulty, (error) => tell("error", sentence(error)))}
         >
           {t`Mend`}
@@ -60,9 +60,9 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
       )}
       {faulty && (
         <Confirm
-          title={t`Mend ${name}?`}
-          yes={t`Take them out`}
-          not={faulty.length > 0 ? "" : t`None of its objects is at fault by itself: import the scene anew.`}
+          title={t`Repair ${name}?`}
+          yes={t`Remove objects`}
+          not={faulty.length > 0 ? "" : t`No single object causes the problem. Import the scene again.`}
           onClose={() => setFaulty(null)}
           onYes={() =>
             void takeOut(id, name, faulty).then((wrong) =>
@@ -72,12 +72,10 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
         >
           <p>
             {faulty.length > 0
-              ? t`What is wrong goes out of the scene: ${faulty.join(", ")}. The scene as it is now stays as a copy.`
-              : t`The names of its objects do not stand in the problems.`}
+              ? t`These objects are removed from the scene: ${faulty.join(", ")}. A backup of the scene is kept.`
+              : t`The problems name no object.`}
           </p>
-          <p className="quiet small">
-            {t`Is a kind of device missing? Once its driver is installed again, the problem goes by itself.`}
-          </p>
+          <p className="quiet small">{t`If a device type is missing, install its driver.`}</p>
         </Confirm>
       )}
     </details>

@@ -18,7 +18,7 @@ export function StartFrom({ of, value, onChange }: StartFromProps) {
     <div className="field">
       <label htmlFor="start-from">{t`Start from`}</label>
       <select id="start-from" value={value} onChange={(event) => onChange(event.target.value)}>
-        <option value="">{t`nothing`}</option>
+        <option value="">{t`none`}</option>
         {templates.map(({ id, name }) => (
           <option key={id} value={id}>
             {t`a copy of ${name}`}

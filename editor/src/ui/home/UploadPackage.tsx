@@ -16,7 +16,7 @@ export function UploadPackage() {
     setBusy(true);
     const wrong = await uploadPackage(file);
     setBusy(false);
-    tell(wrong ? "error" : "info", wrong || t`${file.name} is taken in.`);
+    tell(wrong ? "error" : "info", wrong || t`Uploaded ${file.name}.`);
   };
   return (
     <>

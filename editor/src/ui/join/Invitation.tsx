@@ -19,11 +19,11 @@ export function Invitation() {
       over = true;
     };
   }, []);
-  if (!joining) return <Waiting>{t`Asking how others join…`}</Waiting>;
+  if (!joining) return <Waiting>{t`Loading…`}</Waiting>;
   const { addresses, fingerprint } = joining;
   const [best, ...others] = addresses;
   return (
-    <section className="invitation" aria-label={t`How others join`}>
+    <section className="invitation" aria-label={t`Invite others`}>
       <h3>{t`Others join at`}</h3>
       {best === undefined ? (
         <p className="small">
@@ -41,7 +41,7 @@ export function Invitation() {
             </p>
             {others.length > 0 && <p className="quiet small">{t`or at ${others.join(", ")}`}</p>}
             <p className="quiet small">
-              {t`Point a tablet’s camera at the code. Where the server asks for a token, each has one of his own.`}
+              {t`Scan the code with a tablet. If the server asks for a token, every user needs their own.`}
             </p>
           </div>
         </>
@@ -65,7 +65,7 @@ function Code({ text }: { text: string }) {
       className="join-code"
       viewBox={`0 0 ${rows.length} ${rows.length}`}
       role="img"
-      aria-label={t`A code with the address ${text}`}
+      aria-label={t`QR code of ${text}`}
       shapeRendering="crispEdges"
     >
       <path className="paper" d={`M0 0h${rows.length}v${rows.length}h-${rows.length}z`} />

@@ -31,7 +31,7 @@ export function Join() {
     <main className="join">
       <form onSubmit={submit}>
         <h1>ARCOR2-HW</h1>
-        <p className="quiet">{t`Set up, program and run this workplace, together with everyone who is here.`}</p>
+        <p className="quiet">{t`Set up, program and run this workplace.`}</p>
         <Field
           label={t`Your name`}
           value={name}
@@ -39,10 +39,10 @@ export function Join() {
           autoFocus
           autoComplete="nickname"
           maxLength={60}
-          hint={t`Others see it beside what you work on.`}
+          hint={t`Shown to other users.`}
         />
         {people.length > 0 && (
-          <div className="people-here" role="group" aria-label={t`Who was here with this device`}>
+          <div className="people-here" role="group" aria-label={t`Recent users`}>
             {people.map((each) => (
               <Button
                 key={each}
@@ -62,7 +62,7 @@ export function Join() {
             value={token}
             onChange={setToken}
             autoComplete="off"
-            hint={t`Who looks after the server makes it: arcor2-hw token add`}
+            hint={t`The administrator creates it: arcor2-hw token add`}
           />
         )}
         {status === "refused" && (
@@ -70,7 +70,7 @@ export function Join() {
             {reason}
           </p>
         )}
-        {trying && <Waiting>{reason ? t`${reason} Trying again…` : t`Connecting…`}</Waiting>}
+        {trying && <Waiting>{reason ? t`${reason} Reconnecting…` : t`Connecting…`}</Waiting>}
         <Button look="primary" type="submit" isDisabled={!name.trim() || status === "joining"}>
           {t`Join`}
         </Button>

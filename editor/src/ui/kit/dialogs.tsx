@@ -88,7 +88,7 @@ export function AskName({
 }: AskNameProps) {
   const [name, setName] = useState(initial);
   const clean = name.trim();
-  const problem = clean !== initial && taken.includes(clean) ? t`There is one of that name.` : "";
+  const problem = clean !== initial && taken.includes(clean) ? t`This name is already in use.` : "";
   const submit = (event: FormEvent) => {
     event.preventDefault();
     if (!clean || problem) return;

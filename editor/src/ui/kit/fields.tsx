@@ -110,7 +110,7 @@ export function Amount({
   const commit = () => {
     if (text === null) return;
     const next = parsed(text, value);
-    if (next === null) setWrong(t`That is no number.`);
+    if (next === null) setWrong(t`Enter a number.`);
     else give(next);
   };
   const key = (event: KeyboardEvent) => {

@@ -15,8 +15,8 @@ export default function Messages({ onClose }: { onClose: () => void }) {
   const said = useEditor((state) => state.said);
   return (
     <Window title={t`Messages`} onClose={onClose}>
-      {said.length === 0 && <p className="quiet">{t`Nothing has been told since the page is open.`}</p>}
-      <ol className="messages" tabIndex={0} aria-label={t`Messages, the newest first`}>
+      {said.length === 0 && <p className="quiet">{t`No messages yet.`}</p>}
+      <ol className="messages" tabIndex={0} aria-label={t`Messages, newest first`}>
         {[...said].reverse().map(({ id, level, text, time }) => (
           <li key={id} className={level}>
             <Icon name={level === "info" ? "info" : "warn"} size={18} />

@@ -73,7 +73,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
   const opened = doc && !runs ? (doc.project?.name ?? doc.scene.name) : "";
   const users = usersOfDocument(state);
   const why = !known
-    ? t`There is no package yet: build one in the editor.`
+    ? t`No packages yet. Build one in the editor.`
     : opened && users.length > 0
       ? t`${opened} is open in the editor (${users.join(", ")}). Ask them to close it.`
       : barred(state, "RunPackage");
@@ -91,9 +91,9 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
     <div className="operator" data-tone={tone}>
       <header className="bar">
         {!kiosk && (
-          <Button look="plain" icon="home" aria-label={t`To the editor`} onPress={() => (location.hash = "")} />
+          <Button look="plain" icon="home" aria-label={t`Open the editor`} onPress={() => (location.hash = "")} />
         )}
-        <h1>{runs ? program.packageName || t`A program` : t`Operator`}</h1>
+        <h1>{runs ? program.packageName || t`Program` : t`Operator`}</h1>
         <People />
         <Settings />
       </header>
@@ -132,7 +132,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
           </div>
         ) : (
           <section className="operator-start" aria-label={t`Start`}>
-            <ul className="operator-packages" role="radiogroup" aria-label={t`What is run`}>
+            <ul className="operator-packages" role="radiogroup" aria-label={t`Packages`}>
               {packages.map((each) => (
                 <li key={each.id}>
                   <label className="operator-package" data-selected={each.id === known?.id}>
@@ -149,7 +149,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
                 </li>
               ))}
               {packages.length === 0 && (
-                <p className="quiet">{t`There is no package yet. Build one in the editor, under Run.`}</p>
+                <p className="quiet">{t`No packages yet. Build one in the editor, under Run.`}</p>
               )}
             </ul>
             <Button

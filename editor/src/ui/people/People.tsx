@@ -37,7 +37,7 @@ export function People() {
       role="group"
       aria-label={
         names.length === 1
-          ? t`Only you are here`
+          ? t`Only you are connected`
           : plural(names.length, { one: "# user is here", other: "# users are here" })
       }
     >

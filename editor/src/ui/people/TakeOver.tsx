@@ -30,7 +30,7 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
     (present
       ? t`${user} is connected again.`
       : missing
-        ? t`${user} holds no locks any more.`
+        ? t`${user} holds no locks.`
         : holder
           ? ""
           : t`Wait until the locks are listed.`);
@@ -49,7 +49,7 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
       {missing || present ? (
         <p>{not}</p>
       ) : !holder ? (
-        <p role="status">{t`Reading the locks…`}</p>
+        <p role="status">{t`Loading…`}</p>
       ) : (
         <>
           <p>

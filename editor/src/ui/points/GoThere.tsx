@@ -26,7 +26,7 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
     state.connection.status === "ready"
       ? chosen?.effector || joints
         ? ""
-        : t`Go online first: its end effectors are not known.`
+        : t`Go online first. The end effectors are unknown offline.`
       : t`There is no connection to the server.`,
   );
   const why = useEditor((state) => notReady(state, chosen && { ...chosen, robotId }, "MoveToActionPoint"));
@@ -37,7 +37,7 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
     setAnswer(null);
     return hideGhost;
   }, [id]);
-  if (!chosen) return <p className="quiet">{t`There is no robot in this scene.`}</p>;
+  if (!chosen) return <p className="quiet">{t`The scene has no robot.`}</p>;
   const show = () => {
     const { doc } = now();
     // A ghost that nobody sees would tell nothing.
@@ -72,13 +72,13 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
             )
           }
         >
-          {t`Move it there`}
+          {t`Move there`}
         </Button>
       </div>
       <Answer answer={answer} />
       <RefusedText>{refused}</RefusedText>
       <details className="by-numbers">
-        <summary>{t`At ${Math.round(speed * 100)} % of its speed`}</summary>
+        <summary>{t`Speed: ${Math.round(speed * 100)} %`}</summary>
         <MannerFields />
       </details>
     </>

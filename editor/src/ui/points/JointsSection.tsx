@@ -39,7 +39,7 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
     <>
       <NameField
         key={id}
-        label={t`Name of the joints`}
+        label={t`Joints name`}
         name={kept.name}
         why={why}
         onRename={(name) => renameJoints(id, name)}
@@ -47,7 +47,7 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
       <Button look="plain" icon="point" onPress={() => select({ kind: "point", id: kept.pointId })}>
         {t`${robot} at ${point}`}
       </Button>
-      {!kept.is_valid && <p className="tag warn">{t`The point has moved since: these joints no longer lead to it.`}</p>}
+      {!kept.is_valid && <p className="tag warn">{t`The point has moved. These joints no longer reach it.`}</p>}
       <ul className="joints">
         {shown.map((joint) => (
           <li key={joint.name} className="kept">
@@ -78,11 +78,11 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
       </ul>
       <div className="actions start">
         <Button icon="robot" why={why || noRobot} isDisabled={busy} onPress={() => void ask(setJointsToRobot(id))}>
-          {t`As the robot is`}
+          {t`Update from robot`}
         </Button>
         {orientations.length > 1 ? (
           <More
-            label={t`Compute them anew`}
+            label={t`Recompute`}
             look=""
             icon="redo"
             choices={orientations.map((each) => ({
@@ -92,16 +92,16 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
               act: () => void ask(solveJoints(id, each.id)),
             }))}
           >
-            {t`Compute anew`}
+            {t`Recompute`}
           </More>
         ) : (
           <Button
             icon="redo"
-            why={why || (only ? "" : t`The point has no orientation to compute them for.`)}
+            why={why || (only ? "" : t`The point has no orientation.`)}
             isDisabled={busy}
             onPress={() => only && void ask(solveJoints(id, only.id))}
           >
-            {t`Compute anew`}
+            {t`Recompute`}
           </Button>
         )}
       </div>

@@ -30,7 +30,7 @@ const OrientationSection: Section["Body"] = ({ selection: { id } }) => {
     <>
       <NameField
         key={id}
-        label={t`Name of the orientation`}
+        label={t`Orientation name`}
         name={one.name}
         why={why}
         onRename={(name) => renameOrientation(id, name)}
@@ -61,7 +61,7 @@ const OrientationSection: Section["Body"] = ({ selection: { id } }) => {
         isDisabled={busy}
         onPress={() => chosen && void ask(turnOrientationToRobot(id, chosen))}
       >
-        {t`Turn it as the robot is`}
+        {t`Update from robot`}
       </Button>
       <RefusedText>{refused}</RefusedText>
       <ReachAnswers id={id} />

@@ -30,25 +30,25 @@ const PointSection: Section["Body"] = ({ selection: { id } }) => {
   const why = useWhyNot(id, "UpdateActionPointPosition");
   const noRobot = useEditor((state) => notReady(state, chosen, "UpdateActionPointUsingRobot"));
   const byHand = useEditor((state) =>
-    chosen && featuresOf(state, chosen.robotId)?.hand_teaching ? "" : t`This robot cannot be moved by hand.`,
+    chosen && featuresOf(state, chosen.robotId)?.hand_teaching ? "" : t`This robot does not support hand teaching.`,
   );
   const { refused, busy, ask } = useAsking();
   if (!point) return null;
   const labels = names.split("\n");
-  const choices = parents ? parents.split("\n").map((each, n) => [each, t`on ${labels[n] ?? ""}`] as const) : [];
+  const choices = parents ? parents.split("\n").map((each, n) => [each, labels[n] ?? ""] as const) : [];
   return (
     <>
       <NameField
         key={id}
-        label={t`Name of the point`}
+        label={t`Point name`}
         name={point.name}
         why={why}
         onRename={(name) => renamePoint(id, name)}
       />
       <Pick
-        label={t`Hangs`}
+        label={t`Parent`}
         value={point.parent ?? ""}
-        choices={[["", t`in the world`], ...choices]}
+        choices={[["", t`World`], ...choices]}
         isDisabled={why !== "" || busy}
         onChange={(parent) => void ask(setParent(id, parent))}
       />
@@ -59,15 +59,15 @@ const PointSection: Section["Body"] = ({ selection: { id } }) => {
           isDisabled={busy}
           onPress={() => chosen && void ask(movePointToRobot(id, chosen))}
         >
-          {t`Put it where the robot is`}
+          {t`Move to the robot`}
         </Button>
         <HoldButton
-          label={t`Hold: by hand. Move the arm, and let go: the point is put there`}
+          label={t`Hold to teach: move the arm by hand, release to set the point`}
           why={why || noRobot || byHand}
           onHold={() => holdHandTeaching(chosen?.robotId ?? "", chosen?.armId || undefined)}
           onOver={(reason) => void ask(reason || !chosen ? Promise.resolve(reason) : movePointToRobot(id, chosen))}
         >
-          {t`Hold: by hand`}
+          {t`Hold to teach`}
         </HoldButton>
       </div>
       <RefusedText>{refused}</RefusedText>

@@ -45,7 +45,7 @@ function rowsOf(doc: OpenDocument): Row[] {
       { id: object.id, name: object.name, kind: "object" as const, depth: 0, orientations: [] },
       ...below(object.id, 1),
     ]),
-    { id: WORLD, name: t`In the world`, kind: "world", depth: 0, orientations: [] },
+    { id: WORLD, name: t`World`, kind: "world", depth: 0, orientations: [] },
     ...below(undefined, 1),
   ];
 }
@@ -65,7 +65,7 @@ export function PointTree() {
   });
   return (
     <ListBox
-      aria-label={t`Points. Drag one onto what it shall hang on.`}
+      aria-label={t`Points. Drag a point onto its new parent.`}
       className="things"
       items={rows}
       dependencies={[reach]}
@@ -108,7 +108,7 @@ async function hang(id: string, target: string): Promise<void> {
   const state = now();
   if ((state.doc?.points[id]?.parent ?? "") === parent) return;
   if (parent && !possibleParents(state, id).includes(parent)) {
-    tell("info", t`${nameOf(state, id)} cannot hang on ${nameOf(state, parent)}: that hangs on it.`);
+    tell("info", t`${nameOf(state, parent)} is a child of ${nameOf(state, id)} and cannot be its parent.`);
     return;
   }
   const refused = await setParent(id, parent);

@@ -36,7 +36,7 @@ export default function PointsPanel() {
   const selected = useEditor((state) => state.ui.selection?.id);
   const candidate = selected === undefined ? "" : parentOfSelection();
   const parentName = useEditor((state) => (candidate ? nameOf(state, candidate) : ""));
-  const why = useEditor((state) => (isRunning(state) ? t`A program runs.` : barred(state, "AddActionPoint")));
+  const why = useEditor((state) => (isRunning(state) ? t`A program is running.` : barred(state, "AddActionPoint")));
   const noRobot = useEditor((state) => notReady(state, chosen, "AddApUsingRobot"));
   const [on, setOn] = useState<"parent" | "world">("parent");
   const [tapping, setTapping] = useState(false);
@@ -59,19 +59,19 @@ export default function PointsPanel() {
   const atCross = () => {
     const place = aimedPlace();
     if (place) added(addPoint(place.position, parent, standing ? place.orientation : undefined));
-    else tell("info", t`The cross points at nothing: turn the view so that it is on the table or a thing.`);
+    else tell("info", t`Nothing at the crosshair. Aim at the table or an object.`);
   };
   return (
     <>
       <Cross />
       {parentName && (
         <OneOf
-          label={t`A new point hangs`}
+          label={t`Parent`}
           value={on}
           onChange={setOn}
           choices={[
-            ["parent", t`on ${parentName}`],
-            ["world", t`in the world`],
+            ["parent", parentName],
+            ["world", t`World`],
           ]}
         />
       )}
@@ -83,21 +83,21 @@ export default function PointsPanel() {
           isDisabled={busy}
           onPress={() => chosen && added(addPointFromRobot(chosen))}
         >
-          {t`Where the robot is`}
+          {t`At the robot`}
         </Button>
         <Button icon="point" why={why} isDisabled={busy} aria-pressed={tapping} onPress={() => setTapping(!tapping)}>
-          {tapping ? t`Tap a place…` : t`Where I tap`}
+          {tapping ? t`Tap in the view…` : t`Where I tap`}
         </Button>
         <Button icon="plus" why={why} isDisabled={busy} onPress={atCross}>
-          {t`At the cross`}
+          {t`At the crosshair`}
         </Button>
       </div>
       <OnOff isSelected={standing} onChange={setStanding}>
-        {t`With an orientation: tool onto the surface`}
+        {t`Add an orientation facing the surface`}
       </OnOff>
       <details className="by-numbers">
         <summary>{t`By numbers`}</summary>
-        <p className="quiet small">{parent ? t`In the frame of ${parentName}.` : t`In the world.`}</p>
+        <p className="quiet small">{parent ? t`Relative to ${parentName}.` : t`Relative to the world.`}</p>
         <div className="amounts">
           {(["x", "y", "z"] as const).map((axis) => (
             <Amount
@@ -118,13 +118,13 @@ export default function PointsPanel() {
             if (doc) added(addPoint(composed(worldOf(doc, parent), { ...ORIGIN, position: typed }).position, parent));
           }}
         >
-          {t`Add the point`}
+          {t`Add point`}
         </Button>
       </details>
       <RefusedText>{refused}</RefusedText>
       <PointTree />
       <MoreOrLess
-        label={t`Size of points in the view`}
+        label={t`Point size`}
         value={size}
         least={0.5}
         most={4}

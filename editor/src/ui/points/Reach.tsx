@@ -17,11 +17,11 @@ const SIGNS: Record<Reach, string> = {
   unknown: "?",
 };
 const WORDS: Record<Reach, MessageDescriptor> = {
-  reachable: msg`reaches it`,
+  reachable: msg`reachable`,
   near_limit: msg`near a limit`,
   in_collision: msg`in collision`,
   out_of_reach: msg`out of reach`,
-  unknown: msg`not known`,
+  unknown: msg`unknown`,
 };
 const TONES: Record<Reach, string> = {
   reachable: "good",
@@ -69,7 +69,7 @@ export function ReachAnswers({ id }: { id: string }) {
   const reach = useEditor((state) => state.reach);
   const doc = useEditor((state) => state.doc);
   const found = reach && doc ? answers({ reach, doc } as State, id) : [];
-  if (found.length === 0) return <p className="quiet small">{t`Whether a robot gets there is not known.`}</p>;
+  if (found.length === 0) return <p className="quiet small">{t`Reachability unknown.`}</p>;
   return (
     <ul className="reaches">
       {found.map((one) => (

@@ -38,7 +38,7 @@ export function Remove({
       >
         {t`Remove ${name}`}
       </Button>
-      {along && <p className="quiet small">{t`With it: ${along}.`}</p>}
+      {along && <p className="quiet small">{t`Also removed: ${along}.`}</p>}
       <RefusedText>{refused}</RefusedText>
     </div>
   );

@@ -45,7 +45,7 @@ export const Orientations: Section["Body"] = ({ selection: { id } }) => {
             <Button
               look="plain"
               icon="close"
-              aria-label={t`Remove the orientation ${each.name}`}
+              aria-label={t`Remove orientation ${each.name}`}
               why={why}
               isDisabled={busy}
               onPress={() => void ask(removeOrientation(each.id))}
@@ -63,14 +63,14 @@ export const Orientations: Section["Body"] = ({ selection: { id } }) => {
           {t`From the robot`}
         </Button>
         <More
-          label={t`Add an orientation`}
+          label={t`Add orientation`}
           icon="plus"
           look=""
           choices={[
             { id: "down", label: t`Tool straight down`, not: why, act: down },
             {
               id: "parent",
-              label: t`As what the point hangs on`,
+              label: t`Same as the parent`,
               not: why,
               act: () => void ask(addOrientation(id, { x: 0, y: 0, z: 0, w: 1 })),
             },
@@ -108,7 +108,7 @@ export const JointsList: Section["Body"] = ({ selection: { id } }) => {
             <Button
               look="plain"
               icon="close"
-              aria-label={t`Remove the joints ${each.name}`}
+              aria-label={t`Remove joints ${each.name}`}
               why={why}
               isDisabled={busy}
               onPress={() => void ask(removeJoints(each.id))}

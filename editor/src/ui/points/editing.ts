@@ -8,9 +8,9 @@ import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
 
 export function whyNotNow(state: State, id: string, request: keyof Requests): string {
-  if (isRunning(state)) return t`A program runs.`;
+  if (isRunning(state)) return t`A program is running.`;
   const holder = heldBy(state, id);
-  if (holder) return t`${holder} works on it.`;
+  if (holder) return t`In use by ${holder}.`;
   return barred(state, request);
 }
 

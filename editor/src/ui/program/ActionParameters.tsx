@@ -35,11 +35,8 @@ const ActionParameters: Section["Body"] = ({ selection: { id } }) => {
   const action = doc?.actions[id];
   if (!doc || !action) return null;
   const meta = metaOf(types, doc, action);
-  if (!meta)
-    return (
-      <p className="quiet small">{t`What it can be told is not known: its device is gone, or cannot do this any more.`}</p>
-    );
-  if (meta.parameters.length === 0) return <p className="quiet small">{t`It needs nothing.`}</p>;
+  if (!meta) return <p className="quiet small">{t`Parameters unknown: the device or its action no longer exists.`}</p>;
+  if (meta.parameters.length === 0) return <p className="quiet small">{t`No parameters`}</p>;
   return (
     <>
       <ReachOfAction id={id} />
@@ -110,7 +107,7 @@ function One({
             json: JSON.stringify(linkTo(each)),
             label: t`${each.name} of ${each.action.name}`,
           }))}
-          hint={t`what an earlier action found out`}
+          hint={t`result of an earlier action`}
           onSet={(json) => set("link", json)}
         />
       ) : (
@@ -123,9 +120,9 @@ function One({
               json: JSON.stringify(each.id),
               label: `${each.name} = ${String(decoded(each.value))}`,
             })),
-            { json: NEW, label: t`New, with the present value…` },
+            { json: NEW, label: t`New variable…` },
           ]}
-          hint={t`one value for the whole program`}
+          hint={t`shared by all actions`}
           onSet={async (json) => {
             if (json !== NEW) return set("project_parameter", json);
             const made = await sharedFrom(
@@ -138,7 +135,7 @@ function One({
         />
       )}
       {sources.length > 1 && (
-        <div className="chips sources" role="radiogroup" aria-label={t`Where ${label} comes from`}>
+        <div className="chips sources" role="radiogroup" aria-label={t`Source of ${label}`}>
           {sources.map((each) => (
             <label key={each} className="chip" data-selected={source === each}>
               <input
@@ -219,7 +216,7 @@ function placesFor(state: State, actionId: string, type: string): Choice[] | und
     if (robot_id !== robot) continue;
     for (const { id, reach } of items)
       if (reach === "out_of_reach" || reach === "in_collision")
-        best[id] = reach === "out_of_reach" ? t` – out of reach` : t` – would collide`;
+        best[id] = reach === "out_of_reach" ? ` – ${t`out of reach`}` : ` – ${t`in collision`}`;
   }
   switch (type) {
     case "pose":
@@ -232,7 +229,7 @@ function placesFor(state: State, actionId: string, type: string): Choice[] | und
     case "joints":
       return first(Object.values(doc.joints).filter((each) => each.robot_id === robot)).map((each) => ({
         json: JSON.stringify(each.id),
-        label: on(each) + (each.is_valid ? (best[each.id] ?? "") : t` – point has moved`),
+        label: on(each) + (each.is_valid ? (best[each.id] ?? "") : ` – ${t`point has moved`}`),
       }));
     default:
       return undefined;
@@ -278,14 +275,13 @@ function useDynamic(state: State, actionId: string, wanted: ParameterMeta): { ch
     };
   }, [key, online, wanted.dynamic_value]);
   if (!wanted.dynamic_value) return {};
-  if (missing.length > 0)
-    return { note: t`what there is depends on ${missing.join(" and ")}, which is found out when it runs` };
+  if (missing.length > 0) return { note: t`Choices depend on ${missing.join(", ")}, which is known at run time.` };
   const fresh = asked?.key === key && online;
   const values = fresh ? asked.values : lastDynamicValues(objectId, wanted.name, parents as Known[]);
-  if (!values) return { note: online ? t`asking the device…` : t`go online to choose from what the device has` };
+  if (!values) return { note: online ? t`Loading…` : t`Go online to load the choices.` };
   const choices = values.map((each) => ({
     json: wanted.type.startsWith("integer") ? each : JSON.stringify(each),
     label: each,
   }));
-  return { choices, note: fresh ? undefined : t`as the device told last` };
+  return { choices, note: fresh ? undefined : t`Last known choices.` };
 }

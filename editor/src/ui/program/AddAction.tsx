@@ -61,8 +61,7 @@ export function AddAction() {
     const why = cannot || offer.why;
     if (why) return tell("info", `${words(offer.meta.name)}: ${why}`);
     const where = placeFor(onPoint);
-    if (!where)
-      return tell("info", t`The cross points at nothing: turn the view so that it is on the table or a thing.`);
+    if (!where) return tell("info", t`Nothing at the crosshair. Aim at the table or an object.`);
     setBusy(offer.key);
     recent = [offer.key, ...recent.filter((each) => each !== offer.key)].slice(0, RECENT);
     await addAction(offer.objectId, offer.meta, where);
@@ -89,21 +88,21 @@ export function AddAction() {
       <div className="where">
         <ToggleButtonGroup
           className="tabs small-tabs"
-          aria-label={t`Where the action is put`}
+          aria-label={t`Position of the action`}
           selectionMode="single"
           disallowEmptySelection
           selectedKeys={[onPoint ? "point" : "here"]}
           onSelectionChange={(keys) => setAnew([...keys][0] === "here")}
         >
           <ToggleButton id="here" className="tab">
-            {t`At the cross`}
+            {t`At the crosshair`}
           </ToggleButton>
           <ToggleButton id="point" className="tab" isDisabled={!selected}>
             {selected ? t`On ${pointName}` : t`On a point`}
           </ToggleButton>
         </ToggleButtonGroup>
         <p className="quiet small">
-          {onPoint ? t`It goes on the point that is selected.` : t`A new point is made where the cross in the view is.`}
+          {onPoint ? t`The action is added to the selected point.` : t`A new point is added at the crosshair.`}
         </p>
       </div>
       {!onPoint && <Cross />}
@@ -112,8 +111,8 @@ export function AddAction() {
         <Input placeholder={t`Search ${offers.length} actions`} />
       </SearchField>
       {used.length > 0 && (
-        <section className="offers" aria-label={t`Used before`}>
-          <h3>{t`Used before`}</h3>
+        <section className="offers" aria-label={t`Recent`}>
+          <h3>{t`Recent`}</h3>
           <ul>{used.map((offer) => row(offer, "recent/"))}</ul>
         </section>
       )}
@@ -127,9 +126,7 @@ export function AddAction() {
         </section>
       ))}
       {found.length === 0 && (
-        <p className="quiet">
-          {offers.length ? t`No action is called that.` : t`No device of this scene has actions.`}
-        </p>
+        <p className="quiet">{offers.length ? t`No action matches.` : t`No device in this scene has actions.`}</p>
       )}
     </>
   );
@@ -184,13 +181,13 @@ function offersOf(state: State, pointId: string): Offer[] {
 
 /** Why an action cannot be added just now; empty when it can. */
 function whyNot(state: State, objectId: string, meta: ObjectAction, pointId: string): string {
-  if (meta.disabled) return meta.problem ?? t`It cannot be used.`;
+  if (meta.disabled) return meta.problem ?? t`Not available.`;
   const needsJoints = meta.parameters.some((each) => each.type === "joints");
   if (needsJoints && state.live.state !== "started") {
     const there = Object.values(state.doc?.joints ?? {}).some(
       (each) => each.pointId === pointId && each.robot_id === objectId,
     );
-    if (!there) return t`It needs joints: go online, and they are taken from the robot.`;
+    if (!there) return t`Needs joints. Go online to read them from the robot.`;
   }
   const needsImage = meta.parameters.some((each) => each.type === "image");
   if (needsImage) {
@@ -201,7 +198,7 @@ function whyNot(state: State, objectId: string, meta: ObjectAction, pointId: str
         ?.find((each) => each.name === method)
         ?.returns.includes("image");
     });
-    if (!given) return t`It needs a picture: add the action that takes one first.`;
+    if (!given) return t`Needs a picture. Add an action that takes one first.`;
   }
   return "";
 }

@@ -22,7 +22,7 @@ export default function ConnectingBanner() {
     <div className="banner" role="status">
       <span>{t`Tap the step that follows ${nameOf(now(), connecting.from)}.`}</span>
       <Button look="plain" onPress={cancelStep}>
-        {t`Give up`}
+        {t`Cancel`}
       </Button>
     </div>
   );

@@ -26,9 +26,9 @@ const Doing: Section["Body"] = ({ selection: { id } }) => {
   const notNow =
     notEditable(state, "ExecuteAction") ||
     (live.state !== "started"
-      ? t`Go online first: it moves the real devices.`
+      ? t`Go online first. The action runs on the devices.`
       : live.executing
-        ? t`Another action is being tried.`
+        ? t`Another action is running.`
         : "");
   const stays = doc.project?.has_logic ? notRunnable(state) : t`The project has no program.`;
   return (
@@ -36,11 +36,11 @@ const Doing: Section["Body"] = ({ selection: { id } }) => {
       <div className="row">
         {running ? (
           <Button icon="close" onPress={() => void (meta?.meta.cancellable ? cancel() : stopMotion())}>
-            {meta?.meta.cancellable ? t`Cancel` : t`Stop everything`}
+            {meta?.meta.cancellable ? t`Cancel` : t`Stop all`}
           </Button>
         ) : (
           <Button icon="play" why={notNow} onPress={() => void execute(id)}>
-            {t`Try it`}
+            {t`Try`}
           </Button>
         )}
         <Button icon="play" why={stays} onPress={() => void runTo(id)}>

@@ -43,7 +43,7 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
   });
   return (
     <>
-      {ways.length === 0 && <p className="quiet small">{t`Nothing yet.`}</p>}
+      {ways.length === 0 && <p className="quiet small">{t`None`}</p>}
       <ul className="ways">
         {ways.map((way) => (
           <li key={way.id}>
@@ -56,7 +56,7 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
             <Button
               look="plain"
               icon="close"
-              aria-label={t`Remove the step to ${nameOf(state, placeOf(way.end))}`}
+              aria-label={t`Remove the connection to ${nameOf(state, placeOf(way.end))}`}
               why={why}
               onPress={() => void removeStep(way.id)}
             />
@@ -121,7 +121,7 @@ function Targets({ from }: { from: string }) {
       <p className="small">
         {t`Tap the step that follows ${nameOf(state, from)}, in the view or here. Press Escape to cancel.`}
       </p>
-      <ul className="ways targets" aria-label={t`What can follow`}>
+      <ul className="ways targets" aria-label={t`Possible next steps`}>
         {targets.map((id) => (
           <li key={id}>
             <Button look="plain" className="way" onPress={() => void endStep(id)}>

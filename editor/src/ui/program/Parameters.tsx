@@ -16,7 +16,7 @@ export function Parameters() {
   const parameters = useEditor((state) => state.doc?.parameters);
   return (
     <>
-      <p className="quiet small">{t`A value that several actions share, and that is changed in one place.`}</p>
+      <p className="quiet small">{t`Variables are shared by all actions of the project.`}</p>
       {Object.values(parameters ?? {})
         .filter((each) => !OWN.has(each.name))
         .sort((a, b) => a.name.localeCompare(b.name))
@@ -42,7 +42,7 @@ function One({ id }: { id: string }) {
   const { range } = parameter;
   const cannotRemove =
     notEditable(state, "RemoveProjectParameter") ||
-    (users.length > 0 ? t`It is used by ${users.map((each) => doc.actions[each]?.name).join(", ")}.` : "");
+    (users.length > 0 ? t`Used by ${users.map((each) => doc.actions[each]?.name).join(", ")}.` : "");
   return (
     <section className="constant" aria-label={parameter.name}>
       <ValueField
@@ -64,7 +64,7 @@ function One({ id }: { id: string }) {
         />
       </ValueField>
       <p className="small used">
-        {users.length === 0 ? <span className="quiet">{t`not used yet`}</span> : t`used by `}
+        {users.length === 0 ? <span className="quiet">{t`not used`}</span> : `${t`Used by`} `}
         {users.map((each) => (
           <AriaButton key={each} className="chip" onPress={() => select({ kind: "action", id: each })}>
             {doc.actions[each]?.name}
@@ -85,7 +85,7 @@ function NewParameter() {
   if (!open) {
     return (
       <Button icon="plus" why={why} onPress={() => setOpen(true)}>
-        {t`New value`}
+        {t`New variable`}
       </Button>
     );
   }
@@ -103,7 +103,7 @@ function NewParameter() {
   return (
     <form className="constant" onSubmit={(event) => void submit(event)}>
       <Field label={t`Name`} value={name} onChange={setName} autoFocus autoComplete="off" />
-      <div className="chips" role="radiogroup" aria-label={t`Kind of value`}>
+      <div className="chips" role="radiogroup" aria-label={t`Type`}>
         {SIMPLE.map((each) => (
           <label key={each} className="chip" data-selected={type === each}>
             <input
@@ -146,8 +146,8 @@ function Overrides() {
   const objects = Object.values(doc.objects).filter((each) => (types.byName[each.type]?.settings.length ?? 0) > 0);
   const object = doc.objects[shown];
   return (
-    <section className="offers" aria-label={t`Settings of devices in this project`}>
-      <h3>{t`Settings of devices, in this project alone`}</h3>
+    <section className="offers" aria-label={t`Device settings`}>
+      <h3>{t`Device settings for this project`}</h3>
       <div className="field">
         <label htmlFor="override-of">{t`Device`}</label>
         <select id="override-of" value={shown} onChange={(event) => setShown(event.target.value)}>
@@ -157,7 +157,7 @@ function Overrides() {
             return (
               <option key={each.id} value={each.id}>
                 {each.name}
-                {count > 0 ? t` (${count} replaced)` : ""}
+                {count > 0 ? ` ${t`(${count} changed)`}` : ""}
               </option>
             );
           })}
@@ -178,9 +178,7 @@ function Override({ objectId, setting }: { objectId: string; setting: ParameterM
   const { name, type } = setting;
   const replaced = state.doc?.overrides[objectId]?.[name]?.value;
   const given = object.parameters.find((each) => each.name === name)?.value ?? setting.default_value;
-  const why =
-    notEditable(state, "AddOverride") ||
-    (state.live.state === "stopped" ? "" : t`Go offline first: it holds from the next start.`);
+  const why = notEditable(state, "AddOverride") || (state.live.state === "stopped" ? "" : t`Go offline first.`);
   return (
     <ValueField
       label={words(name)}
@@ -196,7 +194,7 @@ function Override({ objectId, setting }: { objectId: string; setting: ParameterM
         <Button
           look="plain"
           icon="undo"
-          aria-label={t`${words(name)} as in the scene`}
+          aria-label={t`Reset ${words(name)} to the scene`}
           why={why}
           onPress={() => void override(objectId, { name, type }, undefined)}
         />

@@ -14,11 +14,11 @@ export function Problems({ problems }: { problems: Problem[] }) {
       (each) => each.type in state.types.actions || !(each.type in state.types.byName),
     ),
   );
-  if (!known) return <p className="quiet">{t`Reading what the devices can do…`}</p>;
+  if (!known) return <p className="quiet">{t`Loading actions…`}</p>;
   if (problems.length === 0) {
     return (
       <p className="all-well">
-        <Icon name="check" /> {t`Nothing is wrong: it can be run.`}
+        <Icon name="check" /> {t`No problems. Ready to run.`}
       </p>
     );
   }
@@ -37,9 +37,7 @@ export function Problems({ problems }: { problems: Problem[] }) {
           >
             <Icon name={each.level === "error" ? "warn" : "info"} />
             <span>
-              <span className="hidden-but-read">
-                {each.level === "error" ? t`Must be cured: ` : t`Should be looked at: `}
-              </span>
+              <span className="hidden-but-read">{each.level === "error" ? t`Error:` : t`Warning:`} </span>
               {withNames(now(), each.text)}
             </span>
           </AriaButton>

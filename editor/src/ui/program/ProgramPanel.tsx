@@ -12,7 +12,7 @@ import { Problems } from "./Problems";
 import { Steps } from "./Steps";
 import "./program.css";
 
-const TABS = { add: msg`Add`, steps: msg`Actions`, problems: msg`Check`, parameters: msg`Values` } as const;
+const TABS = { add: msg`Add`, steps: msg`Actions`, problems: msg`Check`, parameters: msg`Variables` } as const;
 type Tab = keyof typeof TABS;
 
 /** The tab that was open last is open again. */
@@ -29,7 +29,7 @@ export default function ProgramPanel() {
     <>
       <ToggleButtonGroup
         className="tabs small-tabs"
-        aria-label={t`Of the program`}
+        aria-label={t`Program`}
         selectionMode="single"
         disallowEmptySelection
         selectedKeys={[tab]}

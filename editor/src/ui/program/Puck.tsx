@@ -14,20 +14,18 @@ const Puck: Section["Body"] = ({ selection: { id, kind } }) => {
   const move = () => {
     const place = aimedPlace();
     if (place) void placePuck(id, { ...place.position, z: place.position.z + 0.02 });
-    else tell("info", t`The middle of the view points at nothing.`);
+    else tell("info", t`Nothing at the crosshair.`);
   };
   return (
     <>
-      <p className="quiet small">
-        {t`Drag it in the view while it is selected. All see it where it is put; the program stays the same.`}
-      </p>
+      <p className="quiet small">{t`Drag the puck in the view. The program does not change.`}</p>
       <div className="row">
         <Button look="plain" why={why} onPress={move}>
-          {t`To the middle of the view`}
+          {t`Move to the view center`}
         </Button>
         {placed && (
           <Button look="plain" why={why} onPress={() => void placePuck(id, null)}>
-            {kind === "action" ? t`Back to its point` : t`Back to its place`}
+            {kind === "action" ? t`Reset position` : t`Reset position`}
           </Button>
         )}
       </div>

@@ -26,7 +26,7 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
   if (outputs.length === 0) {
     return (
       <>
-        <p className="quiet small">{t`Its results are not kept.`}</p>
+        <p className="quiet small">{t`Results are not stored.`}</p>
         <Button
           why={why}
           onPress={() =>
@@ -35,7 +35,7 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
             )
           }
         >
-          {t`Keep its results`}
+          {t`Store results`}
         </Button>
         {problem && (
           <p className="error" role="alert">

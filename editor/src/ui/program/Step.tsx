@@ -45,16 +45,14 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
       </div>
       {results.length > 0 ? (
         <div className="field">
-          <label htmlFor="depends-on">{t`It depends on`}</label>
+          <label htmlFor="depends-on">{t`Condition`}</label>
           <select
             id="depends-on"
             value={step.condition?.what ?? ""}
             disabled={why !== ""}
             onChange={(event) => void choose(event.target.value)}
           >
-            <option value="">
-              {alone ? t`nothing: it is always taken` : t`nothing: it is taken when no other is`}
-            </option>
+            <option value="">{alone ? t`none: always` : t`none: otherwise`}</option>
             {results.map((each) => (
               <option key={linkTo(each)} value={linkTo(each)}>
                 {each.action.id === from ? each.name : t`${each.name} of ${each.action.name}`}
@@ -65,13 +63,13 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
       ) : (
         <p className="quiet small">
           {from === START
-            ? t`The program begins with it.`
-            : t`${nameOf(state, from)} has no result that could decide: yes or no, a whole number or a choice.`}
+            ? t`First step of the program.`
+            : t`${nameOf(state, from)} has no result to branch on (yes or no, whole number, choice).`}
         </p>
       )}
       {step.condition && result && (
         <ValueField
-          label={t`and is taken when ${result.name} is`}
+          label={t`Value of ${result.name}`}
           name={result.name}
           type={result.type === "integer_enum" ? "integer" : result.type}
           json={step.condition.value}
@@ -86,7 +84,7 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
       )}
       <div className="row">
         <Button why={why} onPress={() => beginStep(from, undefined, id)}>
-          {t`Lead elsewhere`}
+          {t`Change target`}
         </Button>
         <Button look="plain" why={why} onPress={() => void removeStep(id)}>
           {t`Remove`}

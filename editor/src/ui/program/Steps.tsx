@@ -21,7 +21,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
   const order = useMemo(() => (doc ? ordered(doc) : []), [doc]);
   const cannot = barred(state, "SetBreakpoints");
   if (!doc) return null;
-  if (order.length === 0) return <p className="quiet">{t`No action yet. Add the first one under “Add”.`}</p>;
+  if (order.length === 0) return <p className="quiet">{t`No actions yet. Add one under “Add”.`}</p>;
   return (
     <>
       <label className="check">
@@ -30,7 +30,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
           checked={state.view.user.hide_steps !== true}
           onChange={(event) => keepView("user", { hide_steps: event.target.checked ? null : true })}
         />
-        <span>{t`Steps are drawn in the 3D view`}</span>
+        <span>{t`Show steps in the 3D view`}</span>
       </label>
       <ol className="steps">
         {order.map((id) => {
@@ -65,9 +65,9 @@ export function Steps({ problems }: { problems: Problem[] }) {
                 </span>
                 <span className="quiet small">
                   {t`${nameOf(state, action.type.split("/")[0] ?? "")} at ${nameOf(state, action.pointId)}`}
-                  {after.length > 0 && t` · when ${after.join(", ")}`}
+                  {after.length > 0 && ` · ${t`if ${after.join(", ")}`}`}
                 </span>
-                {running && <span className="tag good">{t`runs now`}</span>}
+                {running && <span className="tag good">{t`running`}</span>}
                 {problem && (
                   <span className={`tag ${problem.level === "error" ? "bad" : "warn"}`}>
                     <Icon name="warn" size={14} /> {withNames(state, problem.text)}

@@ -10,21 +10,21 @@ export const programSections: readonly Section[] = [
   { id: "try", title: msg`Do`, applies: isAction, Body: lazily(() => import("./Doing")) },
   {
     id: "parameters",
-    title: msg`What it is told`,
+    title: msg`Parameters`,
     applies: isAction,
     Body: lazily(() => import("./ActionParameters")),
   },
   {
     id: "next",
-    title: msg`What follows`,
+    title: msg`Next step`,
     applies: ({ kind, id }, state) =>
       state.doc?.project?.has_logic === true && (kind === "action" || (kind === "terminal" && id === "START")),
     Body: lazily(() => import("./Next")),
   },
-  { id: "results", title: msg`What it tells`, applies: isAction, Body: lazily(() => import("./Results")) },
+  { id: "results", title: msg`Results`, applies: isAction, Body: lazily(() => import("./Results")) },
   {
     id: "step",
-    title: msg`When it is taken`,
+    title: msg`Condition`,
     applies: ({ kind }) => kind === "logic",
     Body: lazily(() => import("./Step")),
   },

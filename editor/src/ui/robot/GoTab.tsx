@@ -74,30 +74,30 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
           )
         }
       >
-        {t`Begin where the tool is`}
+        {t`Start at the tool`}
       </Button>
     );
   }
   const angles = rollPitchYaw(goal.orientation);
   const notYet =
     answer === null
-      ? t`Set a goal first: it is shown before the robot goes there.`
+      ? t`Set a target first.`
       : answer.goal !== goal
-        ? t`It is asked whether it can go there.`
+        ? t`Checking the target…`
         : safe
           ? answer.problem
           : "";
   return (
     <>
       <OnOff isSelected={tapping} onChange={setTapping}>
-        {t`A tap in the view puts the ghost there`}
+        {t`Tap in the view to set the target`}
       </OnOff>
       <OneOf
-        label={t`Drag the goal in the view`}
+        label={t`Drag the target`}
         value={turning ? "turn" : "move"}
         choices={[
-          ["move", t`Move it`],
-          ["turn", t`Turn it`],
+          ["move", t`Move`],
+          ["turn", t`Turn`],
         ]}
         onChange={(next) => setTurning(next === "turn")}
       />
@@ -138,7 +138,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
           >
             {t`Move there`}
           </Button>
-          <Button onPress={giveUp}>{t`Back to the tool`}</Button>
+          <Button onPress={giveUp}>{t`Reset to tool`}</Button>
           {selected && (
             <Button
               onPress={() => {
@@ -165,9 +165,10 @@ function WayWords({ answer }: { answer: GoalAnswer | null }) {
   const { linear } = useManner();
   const name = useEditor((state) => (answer?.met ? nameOf(state, answer.met) : ""));
   if (!answer || answer.problem) return null;
-  if (!linear) return <p className="quiet small">{t`It will not go straight: how it goes is not shown.`}</p>;
-  if (answer.way === "unknown") return <p className="quiet small">{t`The straight way there was not looked at.`}</p>;
-  if (answer.way === "free") return <p className="small good">{t`Nothing is on the straight way of the tool.`}</p>;
+  if (!linear)
+    return <p className="quiet small">{t`The robot does not move in a straight line. The path is not shown.`}</p>;
+  if (answer.way === "unknown") return <p className="quiet small">{t`The straight path was not checked.`}</p>;
+  if (answer.way === "free") return <p className="small good">{t`The straight path of the tool is free.`}</p>;
   return (
     <p className="small warn">
       {name ? t`The straight path of the tool is blocked by ${name}.` : t`The straight path of the tool is blocked.`}
@@ -191,7 +192,7 @@ export function Answer({ answer }: { answer: string | null }) {
   if (answer === null) return null;
   return (
     <p className={`small ${answer ? "error" : "good"}`} role="status">
-      {answer || t`It can go there: the ghost shows how.`}
+      {answer || t`Reachable. The ghost shows the pose.`}
     </p>
   );
 }

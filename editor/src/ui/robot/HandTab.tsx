@@ -17,14 +17,14 @@ export function HandTab({ chosen }: { chosen: Chosen }) {
   return (
     <>
       <p className="quiet small">
-        {t`Hold the button and move the arm by hand. The arm is stiff again as soon as you release it.`}
+        {t`Hold the button and move the arm by hand. The arm locks when you release the button.`}
       </p>
       <p role="status">
-        <span className={`tag ${free ? "warn" : ""}`}>{free ? t`The arm is free` : t`The arm is stiff`}</span>
+        <span className={`tag ${free ? "warn" : ""}`}>{free ? t`Hand teaching is on` : t`Hand teaching is off`}</span>
       </p>
       <PadDock chosen={chosen} refused={refused} hint={cannot}>
         <HoldButton
-          label={t`Hold, and move the arm by hand`}
+          label={t`Hold to teach: move the arm by hand`}
           className="primary large"
           why={cannot}
           onHold={() => {
@@ -33,7 +33,7 @@ export function HandTab({ chosen }: { chosen: Chosen }) {
           }}
           onOver={setRefused}
         >
-          {t`Hold to teach by hand`}
+          {t`Hold to teach`}
         </HoldButton>
       </PadDock>
     </>

@@ -50,7 +50,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
   const joints = useTelemetry(robotId, () => telemetry.latest(robotId)?.joints);
   const [refused, setRefused] = useState("");
   const hold = way === "hold" && features?.jog === true;
-  const cannot = why || (hold || features?.move_to_joints ? "" : t`This robot does not move to joints.`);
+  const cannot = why || (hold || features?.move_to_joints ? "" : t`This robot cannot move to joint positions.`);
   if (!joints) return <p className="quiet">{t`The robot reports no joint positions.`}</p>;
   const shown = shownJoints(
     robotId,
@@ -74,7 +74,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
   return (
     <>
       <OneOf
-        label={t`A press`}
+        label={t`Mode`}
         quiet
         value={hold ? "hold" : "step"}
         onChange={(next) => setManner({ way: next })}
@@ -165,7 +165,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
 
 function beyond({ name, lower, upper, scale, unit }: ShownJoint, value: number): string {
   if (value >= lower && value <= upper) return "";
-  return t`${name.replaceAll("_", " ")} goes from ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}.`;
+  return t`Limits of ${name.replaceAll("_", " ")}: ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}.`;
 }
 
 /** Show the position of a joint between its limits. */

@@ -26,6 +26,6 @@ export function Kinematics({ robotId }: { robotId: string }) {
 function sentence({ in_force: force, read, refused }: RobotKinematics): string {
   if (force === "measured")
     return read ? t`Uses this robot's calibration, read ${ago(read)}.` : t`Uses this robot's calibration.`;
-  if (refused) return t`Computed as arms of this type are. The calibration in its controller is not used: ${refused}`;
-  return t`Computed as arms of this type are, off by some millimetres: its own calibration is read when it is online.`;
+  if (refused) return t`Uses the nominal kinematics. The calibration of the controller is not used: ${refused}`;
+  return t`Uses the nominal kinematics. Go online to read the calibration of this robot.`;
 }

@@ -18,10 +18,10 @@ export function MannerFields() {
         onChange={(next) => setManner({ speed: next })}
       />
       <OnOff isSelected={safe} onChange={(next) => setManner({ safe: next })}>
-        {t`Look for collisions first`}
+        {t`Check for collisions`}
       </OnOff>
       <OnOff isSelected={linear} onChange={(next) => setManner({ linear: next })}>
-        {t`On a straight line`}
+        {t`Straight line`}
       </OnOff>
     </div>
   );

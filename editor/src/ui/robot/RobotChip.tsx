@@ -52,7 +52,7 @@ export default function RobotChip() {
           type="button"
           className="button primary"
           aria-disabled={why !== "" || asking || undefined}
-          aria-label={t`Keep the robot's place as a point`}
+          aria-label={t`Save the robot pose as a point`}
           onClick={keep}
           disabled={asking}
         >

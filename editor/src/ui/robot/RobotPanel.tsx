@@ -34,7 +34,7 @@ export default function RobotPanel() {
   const why = useEditor((state) => notReady(state, chosen));
   const [way, setWay] = useState(last);
   const [place, setPlace] = useState<HTMLElement | null>(null);
-  if (!chosen) return <p className="quiet">{t`There is no robot in this scene.`}</p>;
+  if (!chosen) return <p className="quiet">{t`The scene has no robot.`}</p>;
   return (
     <PadPlace value={place}>
       <div className="robot-scroll">
@@ -48,7 +48,7 @@ export default function RobotPanel() {
         <RobotChooser />
         {!why && <Status chosen={chosen} />}
         <OneOf
-          label={t`How to move it`}
+          label={t`Control`}
           quiet
           value={way}
           choices={translated(WAYS)}

@@ -47,11 +47,11 @@ export function Status({ chosen }: { chosen: Chosen }) {
 
 function Pose({ chosen }: { chosen: Chosen }) {
   const pose = useTelemetry(chosen.robotId, () => effectorPose(chosen));
-  if (!pose) return <p className="quiet small">{t`The pose of the tool is unknown.`}</p>;
+  if (!pose) return <p className="quiet small">{t`Tool pose unknown.`}</p>;
   const { x, y, z } = pose.position;
   const angles = rollPitchYaw(pose.orientation);
   return (
-    <dl className="robot-pose" aria-label={t`Pose of the tool in the world`}>
+    <dl className="robot-pose" aria-label={t`Tool pose in the world`}>
       {(["x", "y", "z"] as const).map((axis, n) => (
         <div key={axis}>
           <dt>{axis}</dt>

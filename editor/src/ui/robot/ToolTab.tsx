@@ -43,7 +43,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
   const hold = way === "hold" && features?.jog === true;
   const used: FrameName = frame === "selected" && !selected ? "world" : frame;
   const turning = what === "orientation";
-  const cannot = why || (hold || features?.move_to_pose ? "" : t`This robot does not move to poses.`);
+  const cannot = why || (hold || features?.move_to_pose ? "" : t`This robot cannot move to poses.`);
 
   const press = (axis: StepAxis, sign: number) => {
     setRefused("");
@@ -80,7 +80,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
   return (
     <>
       <OneOf
-        label={t`A press`}
+        label={t`Mode`}
         quiet
         value={hold ? "hold" : "step"}
         onChange={(next) => setManner({ way: next })}
@@ -104,7 +104,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
         ]}
       />
       <OneOf
-        label={t`Axes of`}
+        label={t`Frame`}
         value={used}
         onChange={(next) => setManner({ frame: next })}
         choices={[
@@ -117,7 +117,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
       {!hold && (turning ? <Angles angle={angle} /> : <Distances distance={distance} />)}
       <div className="actions start">
         <Button
-          why={why || (features?.inverse_kinematics ? "" : t`This robot computes no joints for a pose.`)}
+          why={why || (features?.inverse_kinematics ? "" : t`This robot has no inverse kinematics.`)}
           onPress={() => void alignDown(chosen, mannerNow()).then(setRefused)}
         >
           {t`Tool straight down`}

@@ -32,7 +32,9 @@ export default function RunBar() {
       <span className="runbar-state" role="status">
         <strong>{phaseName(phase)}</strong>
         {at.length > 0 && (
-          <span className="small quiet">{phase === "paused" ? t` before ${at.join(", ")}` : ` ${at.join(", ")}`}</span>
+          <span className="small quiet">
+            {phase === "paused" ? ` ${t`before ${at.join(", ")}`}` : ` ${at.join(", ")}`}
+          </span>
         )}
       </span>
       <RunButtons />

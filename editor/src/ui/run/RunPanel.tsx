@@ -76,7 +76,7 @@ export default function RunPanel() {
                 <Button
                   look="plain"
                   icon="close"
-                  aria-label={t`Do not pause at ${nameOf(state, id)}`}
+                  aria-label={t`Remove breakpoint at ${nameOf(state, id)}`}
                   why={barred(state, "SetBreakpoints")}
                   onPress={() => void breakAt(id, false)}
                 >
@@ -114,7 +114,7 @@ function Follow() {
   return (
     <label className="check">
       <input type="checkbox" checked={on} onChange={(event) => setUi({ follow: event.target.checked })} />
-      <span>{t`The view follows the running action`}</span>
+      <span>{t`Follow the running action`}</span>
     </label>
   );
 }

@@ -23,8 +23,8 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
   const newest = [...trace].sort((a, b) => b.number - a.number);
   const shown = all ? newest : newest.slice(0, SHOWN);
   return (
-    <section className="run-part" aria-label={t`What it has done`}>
-      <h3>{t`What it has done`}</h3>
+    <section className="run-part" aria-label={t`Trace`}>
+      <h3>{t`Trace`}</h3>
       <ol className="trace" reversed>
         {shown.map((entry) => (
           <li key={entry.number} data-failed={entry.error !== undefined} data-running={entry.duration === undefined}>
@@ -40,7 +40,7 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
                   : entry.duration === undefined
                     ? paused
                       ? t`waiting`
-                      : t`runs now`
+                      : t`running`
                     : seconds(entry.duration)}
               </span>
             </AriaButton>

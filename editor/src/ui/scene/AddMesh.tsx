@@ -42,7 +42,7 @@ export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
   return (
     <form className="add-form" onSubmit={submit}>
       <Button look="plain" onPress={onBack}>
-        {t`← All kinds`}
+        {t`← All types`}
       </Button>
       <h3>{t`Mesh`}</h3>
       <div className="field">
@@ -59,7 +59,7 @@ export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
         <>
           <MeshPreview geometry={mesh.geometry} />
           <OneOf
-            label={t`One unit of the file is`}
+            label={t`Unit of the file`}
             value={unit}
             choices={LENGTH_UNITS.map((each) => [each, `1 ${each}`] as const)}
             onChange={setUnit}

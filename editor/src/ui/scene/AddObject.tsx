@@ -25,22 +25,18 @@ export function AddObject({ type, why, onBack }: { type: ObjectTypeMeta; why: st
   return (
     <form className="add-form" onSubmit={submit}>
       <Button look="plain" onPress={onBack}>
-        {t`← All kinds`}
+        {t`← All types`}
       </Button>
       <h3>{type.type}</h3>
       <p className="quiet small description">{type.description}</p>
-      {type.has_pose && (
-        <p className="quiet small">{t`It is put where the middle of the view points, and can be moved then.`}</p>
-      )}
+      {type.has_pose && <p className="quiet small">{t`The object is added at the view center.`}</p>}
       <Field label={t`Name`} value={name} onChange={setName} autoComplete="off" />
       <SettingsFields settings={type.settings} values={values} why="" onChange={setValues} />
       <Button look="primary" icon="plus" type="submit" why={why} isDisabled={busy}>
         {busy ? t`Adding…` : t`Add`}
       </Button>
       {/* Below the button: what goes when a field is left must not move it from under the finger. */}
-      {tried && lacking.length > 0 && (
-        <RefusedText>{t`Still to be said: ${lacking.map(words).join(", ")}.`}</RefusedText>
-      )}
+      {tried && lacking.length > 0 && <RefusedText>{t`Required: ${lacking.map(words).join(", ")}.`}</RefusedText>}
       <RefusedText>{refused}</RefusedText>
       <TypeUse type={type} onDeleted={onBack} />
     </form>

@@ -20,7 +20,7 @@ export function MeshPreview({ geometry }: { geometry: BufferGeometry }) {
       height={320}
       className="mesh-preview"
       role="img"
-      aria-label={t`The mesh, seen from the front, right and above`}
+      aria-label={t`Preview of the mesh`}
     />
   );
 }

@@ -17,13 +17,13 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   const object = useEditor((state) => state.doc?.objects[id]);
   const holder = useEditor((state) => heldBy(state, id));
   const why = useEditor((state) =>
-    heldBy(state, id) ? t`${heldBy(state, id)} works on it.` : notBuildable(state, "RemoveFromScene"),
+    heldBy(state, id) ? t`In use by ${heldBy(state, id)}.` : notBuildable(state, "RemoveFromScene"),
   );
   const cannotRename = useEditor((state) =>
     holder
-      ? t`${holder} works on it.`
+      ? t`In use by ${holder}.`
       : state.doc?.project
-        ? t`Objects belong to the scene: close the project, and open the scene.`
+        ? t`Objects belong to the scene. Close the project and open the scene.`
         : "",
   );
   const [needing, setNeeding] = useState<string[] | null>(null);
@@ -37,7 +37,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   return (
     <>
       <NameField
-        label={t`Name of the object`}
+        label={t`Object name`}
         name={object.name}
         why={cannotRename}
         onRename={(name) => renameObject(id, name)}
@@ -58,7 +58,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
           onClose={() => setNeeding(null)}
           onYes={() => void removeObject(id, true)}
         >
-          <p>{t`These projects use it, and lose its actions and points when the scene is saved:`}</p>
+          <p>{t`These projects lose the actions and points of this object when you save the scene:`}</p>
           <ul>
             {needing.map((each) => (
               <li key={each}>{each}</li>
@@ -88,11 +88,11 @@ function Seeing({ id }: { id: string }) {
   return (
     <>
       <OnOff isSelected={aside} onChange={(on) => putAside(id, on)}>
-        {t`Hide it, and aim through it`}
+        {t`Hide`}
       </OnOff>
       {!aside && (
         <MoreOrLess
-          label={t`Seen through`}
+          label={t`Transparency`}
           value={1 - (now_ ?? opacity)}
           least={0}
           most={0.95}

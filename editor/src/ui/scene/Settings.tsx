@@ -63,7 +63,7 @@ export function SettingsFields({
       {others.length > 0 && (
         <details className="more-settings" open={needed.length === 0 && others.length <= 6}>
           <summary>
-            {needed.length > 0 ? t`Further settings` : t`Settings`} <span className="tag">{others.length}</span>
+            {needed.length > 0 ? t`Advanced` : t`Settings`} <span className="tag">{others.length}</span>
           </summary>
           {others.map(field)}
         </details>

@@ -21,7 +21,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   if (!object || !settings) return null;
   const known: Values = Object.fromEntries(object.parameters.map((each) => [each.name, each.value]));
   const values = draft ?? known;
-  const why = holder ? t`${holder} works on it.` : cannot;
+  const why = holder ? t`In use by ${holder}.` : cannot;
   const lacking = missing(settings, values);
   return (
     <>
@@ -30,7 +30,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
         <p className="small">{t`Set by the cell file of the server: ${overlaid.join(", ")}.`}</p>
       )}
       <SettingsFields key={id} settings={settings} values={values} why={why} onChange={setDraft} />
-      {lacking.length > 0 && <RefusedText>{t`Still to be said: ${lacking.join(", ")}.`}</RefusedText>}
+      {lacking.length > 0 && <RefusedText>{t`Required: ${lacking.join(", ")}.`}</RefusedText>}
       <RefusedText>{refused}</RefusedText>
       {draft && (
         <div className="actions">
@@ -43,7 +43,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
               void ask(setParameters(id, parametersOf(settings, draft))).then((done) => done && setDraft(null))
             }
           >
-            {t`Save the settings`}
+            {t`Save settings`}
           </Button>
         </div>
       )}

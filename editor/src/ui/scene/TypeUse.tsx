@@ -36,7 +36,7 @@ export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: 
       </p>
       {!installed && (
         <Button why={cannot || why} onPress={() => setSure(true)}>
-          {t`Delete this kind…`}
+          {t`Delete type…`}
         </Button>
       )}
       <RefusedText>{refused}</RefusedText>
@@ -47,7 +47,7 @@ export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: 
           onClose={() => setSure(false)}
           onYes={() => void ask(deleteType(type.type)).then((done) => done && onDeleted())}
         >
-          <p>{t`The kind goes, with its code. No scene uses it. This cannot be undone.`}</p>
+          <p>{t`The type and its code are deleted. No scene uses it. This cannot be undone.`}</p>
         </Confirm>
       )}
     </div>

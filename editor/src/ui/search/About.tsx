@@ -10,13 +10,13 @@ import { SaveDiagnosis } from "./SaveDiagnosis";
 import "./search.css";
 
 const keys = (): readonly (readonly [string, string])[] => [
-  ["/", t`find a command or a thing`],
+  ["/", t`find a command or an object`],
   ["?", t`this page`],
-  [t`Esc, twice`, t`stop motion, while a robot is live`],
-  [t`Tab, arrows`, t`through tools, lists and fields; Enter does it`],
-  ["X", t`the cross in the middle of the view comes and goes; N: the next thing there, Enter: select it`],
-  ["W A S D Q E", t`fly, when the view has the focus`],
-  [t`arrow keys at a number`, t`one step more or less`],
+  [t`Esc twice`, t`stop motion while a robot is online`],
+  [t`Tab, arrows`, t`move between tools, lists and fields; Enter selects`],
+  ["X", t`show or hide the crosshair; N: next object, Enter: select`],
+  ["W A S D Q E", t`fly when the view has the focus`],
+  [t`Arrow keys in a number`, t`one step up or down`],
 ];
 
 export default function About({ onClose }: { onClose: () => void }) {

@@ -30,19 +30,19 @@ export default function Palette({ onClose }: { onClose: () => void }) {
     entry.act();
   };
   return (
-    <Window title={t`Find a command or a thing`} onClose={onClose}>
+    <Window title={t`Find a command or an object`} onClose={onClose}>
       <Autocomplete inputValue={search} onInputChange={setSearch}>
         <SearchField className="field" autoFocus aria-label={t`Find`}>
           <Label className="hidden-but-read">{t`Find`}</Label>
-          <Input placeholder={t`Type a part of its name`} />
+          <Input placeholder={t`Part of the name`} />
         </SearchField>
-        <div className="found" tabIndex={0} role="group" aria-label={t`What was found`}>
+        <div className="found" tabIndex={0} role="group" aria-label={t`Results`}>
           <ListBox
             aria-label={t`Found`}
             items={shown}
             selectionMode="none"
             onAction={(key) => choose(String(key))}
-            renderEmptyState={() => <p className="quiet">{t`Nothing is called that.`}</p>}
+            renderEmptyState={() => <p className="quiet">{t`No match.`}</p>}
           >
             {(entry) => (
               <ListBoxItem id={entry.id} textValue={entry.words} className="found-entry">

@@ -15,10 +15,10 @@ export function SaveDiagnosis() {
     <section aria-label={t`Diagnosis`}>
       <h3>{t`Something went wrong?`}</h3>
       <p className="quiet small">
-        {t`A file with what is open, devices, versions and the last lines of the log, without secrets, for whoever helps you. It is saved here and sent to nobody.`}
+        {t`A file with the open document, devices, versions and the end of the log, without secrets. It is saved on this computer only.`}
       </p>
       <Button icon="save" why={why} isDisabled={busy} onPress={() => void ask(saveDiagnosis())}>
-        {busy ? t`Gathering…` : t`Save a file for diagnosis`}
+        {busy ? t`Collecting…` : t`Save diagnosis file`}
       </Button>
       <RefusedText>{refused}</RefusedText>
     </section>

@@ -34,12 +34,12 @@ function ofWorkplace(state: State): Entry[] {
   });
   const cannotSave =
     barred(state, state.doc?.project ? "SaveProject" : "SaveScene") ||
-    (state.doc?.unsaved ? "" : t`Nothing has changed.`);
+    (state.doc?.unsaved ? "" : t`No unsaved changes.`);
   const cannotUndo = barred(state, "Undo");
-  const cannotSwitch = barred(state, "StartScene") || (isRunning(state) ? t`A program runs.` : "");
+  const cannotSwitch = barred(state, "StartScene") || (isRunning(state) ? t`A program is running.` : "");
   const online = live.state === "started";
   return [
-    ...(online ? [entry("stop", t`Stop motion`, "", stopMotion, t`command, no emergency stop`)] : []),
+    ...(online ? [entry("stop", t`Stop motion`, "", stopMotion, t`command, not an emergency stop`)] : []),
     ...TOOLS.filter((tool) => tool.shown?.(state) ?? true).map((tool) =>
       entry(`tool/${tool.id}`, i18n._(tool.label), tool.barred?.(state) ?? "", () => setUi({ tool: tool.id }), "tool"),
     ),
@@ -58,13 +58,18 @@ function ofWorkplace(state: State): Entry[] {
     ),
     online
       ? entry("offline", t`Go offline`, cannotSwitch, goOffline)
-      : entry("online", t`Go online`, cannotSwitch || (live.state === "stopped" ? "" : t`It is on its way.`), goOnline),
-    entry("cross", aimsAlways(state) ? t`No more picking by the cross` : t`Pick by the cross`, "", () =>
+      : entry(
+          "online",
+          t`Go online`,
+          cannotSwitch || (live.state === "stopped" ? "" : t`Wait until the change of state is complete.`),
+          goOnline,
+        ),
+    entry("cross", aimsAlways(state) ? t`Close the crosshair` : t`Select with crosshair`, "", () =>
       keepGeneral({ aiming: !aimsAlways(state) || null }),
     ),
     entry("all", t`Show all in the view`, "", () => theEngine()?.focus()),
     ...(state.ui.selection
-      ? [entry("zoom", t`Zoom to what is selected`, "", () => theEngine()?.focus(now().ui.selection?.id))]
+      ? [entry("zoom", t`Zoom to selection`, "", () => theEngine()?.focus(now().ui.selection?.id))]
       : []),
   ];
 }
@@ -100,7 +105,7 @@ function ofHome(state: State): Entry[] {
 
 function everywhere(state: State): Entry[] {
   const { theme, leftHanded } = state.ui;
-  const themes = { system: t`Colours as the device has them`, light: t`Light colours`, dark: t`Dark colours` } as const;
+  const themes = { system: t`System theme`, light: t`Light theme`, dark: t`Dark theme` } as const;
   return [
     ...(["system", "light", "dark"] as const)
       .filter((each) => each !== theme)
@@ -116,7 +121,7 @@ function everywhere(state: State): Entry[] {
       })),
     {
       id: "hand",
-      words: leftHanded ? t`Controls for the right hand` : t`Controls for the left hand`,
+      words: leftHanded ? t`Right-handed controls` : t`Left-handed controls`,
       detail: t`setting`,
       why: "",
       act: () => {
@@ -126,7 +131,7 @@ function everywhere(state: State): Entry[] {
     },
     {
       id: "messages",
-      words: t`Messages: what was told, with times`,
+      words: t`Messages`,
       detail: t`help`,
       why: "",
       act: () => openOverlay("messages"),

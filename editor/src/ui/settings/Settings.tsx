@@ -11,7 +11,7 @@ import { type Choice, More } from "../kit/kit";
 import { openOverlay } from "../search/Overlays";
 
 const THEMES: Record<Ui["theme"], MessageDescriptor> = {
-  system: msg`Colours as the device has them`,
+  system: msg`System theme`,
   light: msg`Light`,
   dark: msg`Dark`,
 };
@@ -47,7 +47,7 @@ export function Settings() {
   const { theme, leftHanded } = useEditor((state) => state.ui);
   const user = useEditor((state) => state.connection.user);
   const choices: Choice[] = [
-    { id: "find", label: t`Find a command or a thing ( / )`, icon: "search", act: () => openOverlay("search") },
+    { id: "find", label: t`Find a command or an object ( / )`, icon: "search", act: () => openOverlay("search") },
     ...(Object.keys(THEMES) as Ui["theme"][]).map((each) => ({
       id: each,
       label: i18n._(THEMES[each]),
@@ -59,13 +59,13 @@ export function Settings() {
     })),
     {
       id: "hand",
-      label: leftHanded ? t`Controls for the right hand` : t`Controls for the left hand`,
+      label: leftHanded ? t`Right-handed controls` : t`Left-handed controls`,
       act: () => {
         setUi({ leftHanded: !leftHanded });
         remember("hand", leftHanded ? "" : "left");
       },
     },
-    { id: "messages", label: t`Messages, with times`, icon: "list", act: () => openOverlay("messages") },
+    { id: "messages", label: t`Messages`, icon: "list", act: () => openOverlay("messages") },
     { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
     { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: leave },
   ];

@@ -20,14 +20,12 @@ export function AtTheCross() {
   return (
     <>
       <ListBox
-        aria-label={t`At the cross`}
+        aria-label={t`At the crosshair`}
         className="things"
         items={candidates.map((id) => ({ id }))}
         dependencies={[chosen]}
         onAction={(key) => pick([String(key)])}
-        renderEmptyState={() => (
-          <p className="quiet">{t`Nothing is near the cross: turn the view until it is at what you look for.`}</p>
-        )}
+        renderEmptyState={() => <p className="quiet">{t`Nothing at the crosshair. Turn the view.`}</p>}
       >
         {({ id }) => {
           const state = now();
@@ -44,14 +42,14 @@ export function AtTheCross() {
               <span className="thing-name">{nameOf(state, id)}</span>
               <span className="quiet small">
                 {kindName(kind)}
-                {parentOf(state, id) && t` on ${parentOf(state, id)}`}
+                {parentOf(state, id) && ` ${t`on ${parentOf(state, id)}`}`}
               </span>
             </ListBoxItem>
           );
         }}
       </ListBox>
       <OnOff isSelected={always} onChange={(on) => keepGeneral({ aiming: on || null })}>
-        {t`Keep the cross when this is closed`}
+        {t`Keep the crosshair when this is closed`}
       </OnOff>
     </>
   );

@@ -11,9 +11,9 @@ import { MoreOrLess, OnOff } from "../kit/fields";
 
 /** What is drawn unless the user hides it, by the key under which the server keeps that. */
 const SIGHTS = [
-  ["hide_orientations", msg`Arrows of orientations`],
-  ["hide_axes", msg`Axes at end effectors`],
-  ["hide_steps", msg`Steps of the program`],
+  ["hide_orientations", msg`Orientation arrows`],
+  ["hide_axes", msg`End effector axes`],
+  ["hide_steps", msg`Program steps`],
 ] as const;
 
 export function InTheView({ narrowed }: { narrowed: boolean }) {
@@ -26,11 +26,11 @@ export function InTheView({ narrowed }: { narrowed: boolean }) {
     <section className="section" aria-label={t`In the view`}>
       <h3>{t`In the view`}</h3>
       <OnOff isSelected={fades} onChange={(on) => keepView("user", { fade_others: on || null })}>
-        {t`Fade what is not of the chosen kinds`}
+        {t`Fade other kinds`}
       </OnOff>
-      {fades && !narrowed && <p className="quiet small">{t`Nothing fades until kinds are chosen above.`}</p>}
+      {fades && !narrowed && <p className="quiet small">{t`Choose kinds above first.`}</p>}
       <MoreOrLess
-        label={t`All objects but robots seen through`}
+        label={t`Transparency of objects`}
         value={1 - (moved ?? opacity)}
         least={0}
         most={0.95}
@@ -52,7 +52,7 @@ export function InTheView({ narrowed }: { narrowed: boolean }) {
         </OnOff>
       ))}
       <OnOff isSelected={lines} onChange={(on) => keepGeneral({ parent_lines: on || null })}>
-        {t`Lines from points to what they hang on`}
+        {t`Lines from points to their parents`}
       </OnOff>
     </section>
   );

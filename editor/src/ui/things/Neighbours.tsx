@@ -17,20 +17,20 @@ export default function Neighbours({ id }: { id: string }) {
     return { before: neighbour(all, id, -1), after: neighbour(all, id, 1) };
   }, [doc, types, groups, id]);
   const to = (row: typeof rows.before) => row && select({ kind: row.kind, id: row.id });
-  const alone = t`There is nothing else in the list of things.`;
+  const alone = t`The list has no other objects.`;
   return (
     <span className="neighbours">
       <Button
         look="plain"
         icon="left"
-        aria-label={t`To the thing before, ${rows.before?.name ?? ""}`}
+        aria-label={t`Previous: ${rows.before?.name ?? ""}`}
         why={rows.before ? "" : alone}
         onPress={() => to(rows.before)}
       />
       <Button
         look="plain"
         icon="right"
-        aria-label={t`To the thing after, ${rows.after?.name ?? ""}`}
+        aria-label={t`Next: ${rows.after?.name ?? ""}`}
         why={rows.after ? "" : alone}
         onPress={() => to(rows.after)}
       />

@@ -58,7 +58,7 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
   };
   const item = (row: Row) => {
     const holder = heldBy(now(), row.id);
-    const detail = holder ? t`${holder} works on it` : aside.includes(row.id) ? "hidden" : row.detail;
+    const detail = holder ? t`In use by ${holder}` : aside.includes(row.id) ? "hidden" : row.detail;
     return (
       <TreeItem
         id={row.id}

@@ -31,11 +31,11 @@ export default function ThingsPanel() {
     <>
       <OneOf
         quiet
-        label={t`Found by`}
+        label={t`Show`}
         value={by}
         choices={[
           ["list", t`All`],
-          ["cross", t`At the cross`],
+          ["cross", t`At the crosshair`],
         ]}
         onChange={setBy}
       />
@@ -65,8 +65,8 @@ function All() {
   const fits = (row: Row) => ofKind(row) && (!groups.has(HIDDEN) || aside.includes(row.id));
   const narrow = search.trim() !== "" || groups.size > 0;
   const parts: [string, string, Row[]][] = [
-    [t`Things`, "", narrowed(things.placed, fits)],
-    [t`Without a place`, t`Without a place`, narrowed(things.unplaced, fits)],
+    [t`Objects`, "", narrowed(things.placed, fits)],
+    [t`Without a pose`, t`Without a pose`, narrowed(things.unplaced, fits)],
     [t`Program`, t`Program`, narrowed(things.program, fits)],
   ];
   const found = parts.filter(([, , part]) => part.length > 0);
@@ -74,7 +74,7 @@ function All() {
     <>
       <SearchField className="field" value={search} onChange={setSearch}>
         <Label className="hidden-but-read">{t`Search`}</Label>
-        <Input placeholder={t`Search ${rows.length} things`} />
+        <Input placeholder={t`Search ${rows.length} objects`} />
       </SearchField>
       <ToggleButtonGroup
         className="chips"
@@ -103,10 +103,10 @@ function All() {
       {found.length === 0 && (
         <p className="quiet">
           {rows.length === 0
-            ? t`Nothing is in the workplace yet.`
+            ? t`The workplace is empty.`
             : groups.size > 0
-              ? t`Nothing of these kinds is called that.`
-              : t`Nothing is called that.`}
+              ? t`No match among these kinds.`
+              : t`No match.`}
         </p>
       )}
       <InTheView narrowed={groupsOfAny(groups)} />

@@ -39,7 +39,7 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
       <div className="pad-head">
         <label htmlFor={id}>{change ? t`${label} by` : t`${label} to`}</label>
         <output className="quiet small" aria-live="polite">
-          {wrong ? t`This is no amount.` : `${show(value, unit)} → ${next === null ? "…" : show(next, unit)} ${unit}`}
+          {wrong ? t`Enter a number.` : `${show(value, unit)} → ${next === null ? "…" : show(next, unit)} ${unit}`}
         </output>
       </div>
       <div className="pad-field">
@@ -57,7 +57,7 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
             if (event.key === "Escape") onClose();
           }}
         />
-        <Button aria-label={t`Take the last sign away`} onPress={() => setText(text.slice(0, -1))}>
+        <Button aria-label={t`Delete the last character`} onPress={() => setText(text.slice(0, -1))}>
           ⌫
         </Button>
       </div>

@@ -45,10 +45,10 @@ import { toolFrame, useGizmo } from "./useGizmo";
 import "./transform.css";
 
 const SNAPS: readonly (readonly [Snap, MessageDescriptor])[] = [
-  ["none", msg`nothing`],
+  ["none", msg`none`],
   ["grid", msg`steps`],
   ["surface", msg`surfaces`],
-  ["point", msg`other things`],
+  ["point", msg`other objects`],
 ];
 const keep = (change: Partial<ToolSettings>) => keepGeneral({ [TOOL]: { ...toolSettings(now()), ...change } });
 /** A step that is none of the table's. */
@@ -56,7 +56,7 @@ const FREE = "free";
 
 export default function Place({ selection }: { selection: Selection }) {
   const target = useTarget(selection);
-  if (!target) return <p className="quiet">{t`It has no place of its own.`}</p>;
+  if (!target) return <p className="quiet">{t`This has no pose of its own.`}</p>;
   return <Placing key={selection.id} selection={selection} target={target} />;
 }
 
@@ -90,13 +90,7 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
   return (
     <>
       {modes.length > 1 && (
-        <OneOf
-          label={t`What to do`}
-          quiet
-          value={mode}
-          choices={modes}
-          onChange={(next) => (setMode(next), setOpen(""))}
-        />
+        <OneOf label={t`Change`} quiet value={mode} choices={modes} onChange={(next) => (setMode(next), setOpen(""))} />
       )}
       {why && <p className="small quiet">{why}</p>}
       <div className="axis-rows">
@@ -117,7 +111,7 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
         <Steps settings={settings} turn={mode === "turn"} />
         {mode !== "size" && (
           <Pick
-            label={t`Axes of`}
+            label={t`Frame`}
             value={settings.frame}
             choices={framesOf(state, target)}
             onChange={(value) => keep({ frame: value as FrameName })}
@@ -138,14 +132,14 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
             settle(before.pose, before.model !== target.model ? before.model : undefined);
           }}
         >
-          {t`Put back`}
+          {t`Reset`}
         </Button>
         {target.turns && (
           <Button
             isDisabled={why !== ""}
             onPress={() => settle({ ...target.pose, orientation: squared(target.pose.orientation, frame.orientation) })}
           >
-            {t`Square up`}
+            {t`Align to axes`}
           </Button>
         )}
         <Button onPress={() => void copy(target.pose)}>{t`Copy`}</Button>
@@ -154,7 +148,7 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
         </Button>
         {changed && (
           <Button look="plain" onPress={() => setBefore({ pose: target.pose, model: target.model })}>
-            {t`Keep as start`}
+            {t`Set as start`}
           </Button>
         )}
       </div>
@@ -299,7 +293,7 @@ function Steps({ settings, turn }: { settings: ToolSettings; turn: boolean }) {
       />
       {(free || !known) && (
         <Amount
-          label={t`Own step`}
+          label={t`Custom step`}
           unit={turn ? "°" : "mm"}
           digits={3}
           value={value / worth}
@@ -316,13 +310,13 @@ function framesOf(state: State, target: Target): [FrameName, string][] {
   const parent =
     target.kind === "point" ? state.doc?.points[target.id]?.parent : state.doc?.orientations[target.id]?.pointId;
   const robots = Object.values(state.doc?.objects ?? {}).some((each) => each.type in state.types.robots);
-  const choices: [FrameName, string][] = [["world", t`the world`]];
+  const choices: [FrameName, string][] = [["world", t`World`]];
   if (parent) choices.push(["parent", nameOf(state, parent)]);
-  if (robots) choices.push(["robot", t`the robot's base`]);
-  choices.push(["own", t`the thing itself`], ["view", t`the view`]);
+  if (robots) choices.push(["robot", t`Robot base`]);
+  choices.push(["own", t`Object`], ["view", t`View`]);
   // A frame that was chosen elsewhere and is none here: it counts as the world's.
   const { frame } = toolSettings(state);
-  if (!choices.some(([each]) => each === frame)) choices.push([frame, t`the world (no parent)`]);
+  if (!choices.some(([each]) => each === frame)) choices.push([frame, t`World (no parent)`]);
   return choices;
 }
 
@@ -330,7 +324,7 @@ async function copy(pose: Pose): Promise<void> {
   const text = poseText(pose);
   try {
     await navigator.clipboard.writeText(text);
-    tell("info", t`The pose is copied: position in m, and quaternion, in the world.`);
+    tell("info", t`Copied the pose in the world: position in m and quaternion.`);
   } catch {
     tell("info", text); // without https there is no clipboard: it can be marked and copied by hand
   }
@@ -338,8 +332,9 @@ async function copy(pose: Pose): Promise<void> {
 
 async function paste(target: Target, settle: (pose: Pose) => void): Promise<void> {
   const text = await navigator.clipboard.readText().catch(() => null);
-  if (text === null) return tell("info", t`This page may not read the clipboard: type the numbers instead.`);
+  if (text === null) return tell("info", t`The browser blocks the clipboard. Enter the numbers instead.`);
   const pose = poseFrom(text, target.pose);
   if (pose) settle(pose);
-  else tell("info", t`What was copied is no pose: 3 numbers are a position in m, 4 a quaternion, 6 or 7 both.`);
+  else
+    tell("info", t`The clipboard contains no pose. Copy 3 numbers (position in m), 4 (quaternion), or 6 or 7 (both).`);
 }

@@ -58,7 +58,7 @@ export function Row({ label, value, unit, step, why, open, onSteps, onOpen }: Ro
       <span className="axis-name" data-axis={label} aria-hidden="true">
         {label}
       </span>
-      <Button className="axis-step" aria-label={t`${label} ${words} less`} why={why} onPress={() => onSteps(-1)}>
+      <Button className="axis-step" aria-label={t`Decrease ${label} by ${words}`} why={why} onPress={() => onSteps(-1)}>
         −
       </Button>
       <button
@@ -67,7 +67,7 @@ export function Row({ label, value, unit, step, why, open, onSteps, onOpen }: Ro
         className="axis-wheel"
         aria-expanded={open}
         aria-disabled={why !== "" || undefined}
-        aria-label={t`${label} ${show(value, unit)} ${unit}: type it. Arrow keys: steps of ${words}`}
+        aria-label={t`${label} ${show(value, unit)} ${unit}. Press to enter a value; arrow keys change it by ${words}.`}
         onKeyDown={key}
         onPointerDown={(event) => {
           if (why) return;
@@ -85,7 +85,7 @@ export function Row({ label, value, unit, step, why, open, onSteps, onOpen }: Ro
       >
         {show(value, unit)} <span className="quiet">{unit}</span>
       </button>
-      <Button className="axis-step" aria-label={t`${label} ${words} more`} why={why} onPress={() => onSteps(1)}>
+      <Button className="axis-step" aria-label={t`Increase ${label} by ${words}`} why={why} onPress={() => onSteps(1)}>
         +
       </Button>
     </div>

@@ -8,11 +8,11 @@ import { Button } from "../kit/kit";
 
 const KEYS: [string, string, MessageDescriptor][] = [
   ["KeyQ", "▽", msg`Down`],
-  ["KeyW", "↑", msg`Ahead`],
+  ["KeyW", "↑", msg`Forward`],
   ["KeyE", "△", msg`Up`],
-  ["KeyA", "←", msg`To the left`],
+  ["KeyA", "←", msg`Left`],
   ["KeyS", "↓", msg`Back`],
-  ["KeyD", "→", msg`To the right`],
+  ["KeyD", "→", msg`Right`],
 ];
 
 export function FlyPad({ view, onDone }: { view: View; onDone: () => void }) {

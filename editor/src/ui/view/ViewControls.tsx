@@ -69,15 +69,15 @@ export default function ViewControls({ engine }: { engine: Engine }) {
     { id: "home", label: t`View: corner`, act: () => look("home") },
     ...SIDES.map(([id, words]) => ({ id, label: t`View: ${i18n._(words)}`, act: () => look(id) })),
     mode === "orbit"
-      ? { id: "fly", label: t`Fly through it`, icon: "play" as const, act: () => change("fly") }
-      : { id: "orbit", label: t`Turn around it`, icon: "redo" as const, act: () => change("orbit") },
+      ? { id: "fly", label: t`Fly mode`, icon: "play" as const, act: () => change("fly") }
+      : { id: "orbit", label: t`Orbit mode`, icon: "redo" as const, act: () => change("orbit") },
     {
       id: "cross",
-      label: always ? t`No more picking by the cross` : t`Pick by the cross ( X )`,
+      label: always ? t`Close the crosshair` : t`Select with crosshair ( X )`,
       icon: "point",
       act: switchCross,
     },
-    { id: "keep", label: t`Keep this view…`, icon: "plus", act: () => setNaming(true) },
+    { id: "keep", label: t`Save view…`, icon: "plus", act: () => setNaming(true) },
     ...bookmarks.map((each, n) => ({
       id: `go ${n}`,
       label: each.name,
@@ -88,7 +88,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
     })),
     ...bookmarks.map((each, n) => ({
       id: `drop ${n}`,
-      label: t`Forget ${each.name}`,
+      label: t`Delete ${each.name}`,
       icon: "close" as const,
       act: () => keepView("user", { [KEY]: bookmarks.filter((_, other) => other !== n) }),
     })),
@@ -105,7 +105,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
       {mode === "fly" && <FlyPad view={engine.view} onDone={() => change("orbit")} />}
       {naming && (
         <AskName
-          title={t`Keep this view`}
+          title={t`Save view`}
           yes={t`Keep`}
           initial={t`View ${bookmarks.length + 1}`}
           taken={bookmarks.map((each) => each.name)}

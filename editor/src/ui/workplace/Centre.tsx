@@ -18,7 +18,7 @@ const FlowView = lazily(() => import("../flow/FlowView"));
 const ConnectingBanner = lazily(() => import("../program/ConnectingBanner"));
 const RunBar = lazily(() => import("../run/RunBar"));
 const CodeView = lazily(() => import("../code/CodeView"));
-const WORDS: Record<Mode, MessageDescriptor> = { "3d": msg`3D`, flow: msg`Flow`, split: msg`Both`, code: msg`Code` };
+const WORDS: Record<Mode, MessageDescriptor> = { "3d": msg`3D`, flow: msg`Flow`, split: msg`Split`, code: msg`Code` };
 
 export function Centre() {
   const project = useEditor((state) => state.doc?.project);
@@ -31,12 +31,12 @@ export function Centre() {
     <div className="centre" data-mode={mode}>
       <View3D />
       {(mode === "flow" || mode === "split") && (
-        <Suspense fallback={<Waiting>{t`Drawing the program…`}</Waiting>}>
+        <Suspense fallback={<Waiting>{t`Loading the program…`}</Waiting>}>
           <FlowView />
         </Suspense>
       )}
       {mode === "code" && (
-        <Suspense fallback={<Waiting>{t`Reading the program…`}</Waiting>}>
+        <Suspense fallback={<Waiting>{t`Loading the program…`}</Waiting>}>
           <CodeView />
         </Suspense>
       )}
@@ -44,7 +44,7 @@ export function Centre() {
         {project && (
           <ToggleButtonGroup
             className="modes"
-            aria-label={t`How it is shown`}
+            aria-label={t`View mode`}
             selectionMode="single"
             disallowEmptySelection
             selectedKeys={[mode]}

@@ -23,7 +23,7 @@ export default function Panel() {
   return (
     <aside className="panel" data-tall={tall} aria-label={heading}>
       <button type="button" className="panel-grip" aria-expanded={tall} onClick={() => setTall(!tall)}>
-        <span className="hidden-but-read">{tall ? t`Make the panel smaller` : t`Make the panel larger`}</span>
+        <span className="hidden-but-read">{tall ? t`Shrink the panel` : t`Enlarge the panel`}</span>
       </button>
       <header>
         <h2>{heading}</h2>

@@ -29,13 +29,9 @@ export function TopBar() {
       <Button
         look="plain"
         icon="home"
-        aria-label={t`Close, and go to the lists`}
+        aria-label={t`Close`}
         onPress={() => {
-          const why = running
-            ? t`A program runs: stop it first.`
-            : live !== "stopped"
-              ? t`Go offline first: the devices would be left.`
-              : cannotSave;
+          const why = running ? t`Stop the program first.` : live !== "stopped" ? t`Go offline first.` : cannotSave;
           if (why) tell("info", why);
           else if (unsaved) setAsking(true);
           else void documents.close(false);
@@ -78,11 +74,11 @@ export function TopBar() {
       {asking && (
         <Confirm
           title={t`Close without saving?`}
-          yes={t`Throw the changes away`}
+          yes={t`Discard changes`}
           onClose={() => setAsking(false)}
           onYes={() => void documents.close(true)}
         >
-          <p>{t`What was changed since it was saved would be lost, also what others have changed.`}</p>
+          <p>{t`All unsaved changes are lost, including those of other users.`}</p>
         </Confirm>
       )}
     </header>

@@ -93,10 +93,10 @@ export function View3D() {
         key={quality}
         tabIndex={0}
         role="application"
-        aria-label={t`3D view of the workplace. Keys W, A, S, D, Q and E fly; the list of things has the same for the keyboard.`}
+        aria-label={t`3D view of the workplace. Keys W, A, S, D, Q and E fly. The object list offers the same by keyboard.`}
       />
       <div ref={labels} className="view-labels" aria-hidden="true" />
-      {!engine && !failed && <Waiting>{t`Preparing the view…`}</Waiting>}
+      {!engine && !failed && <Waiting>{t`Loading the view…`}</Waiting>}
       {failed && (
         <p className="view-failed" role="alert">
           {t`The 3D view does not work on this device: ${failed} You can still use the lists and panels.`}

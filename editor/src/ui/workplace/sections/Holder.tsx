@@ -27,12 +27,12 @@ export default function Holder({ id }: { id: string }) {
   }, []);
   if (!holder) return null;
   const how = here
-    ? t`It is free when ${holder} is done with it, or a few minutes after ${holder} loses the connection.`
-    : t`${holder} lost the connection. It is free in a few minutes, or when somebody takes over.`;
+    ? t`Available when ${holder} has finished, or a few minutes after ${holder} disconnects.`
+    : t`${holder} is disconnected. Available in a few minutes, or when a user takes over.`;
   return (
     <div className="holder" role="status">
       <p className="tag warn">
-        <Icon name="lock" size={16} /> {here ? t`${holder} works on it` : t`Locked by ${holder}, who left`}
+        <Icon name="lock" size={16} /> {here ? t`In use by ${holder}` : t`Locked by ${holder} (left)`}
       </p>
       <p className="quiet small">
         {since > 0 && `${t`Since ${clock(since)}, ${ago(new Date(since).toISOString())}.`} `}
@@ -41,8 +41,8 @@ export default function Holder({ id }: { id: string }) {
       {here &&
         (asked ? (
           <p className="small">
-            {t`Request sent to ${holder}. You are notified when it is free.`}{" "}
-            <Button onPress={() => noLongerAsk(id)}>{t`No more`}</Button>
+            {t`Request sent to ${holder}. You are notified when it is available.`}{" "}
+            <Button onPress={() => noLongerAsk(id)}>{t`Cancel request`}</Button>
           </p>
         ) : (
           <Button icon="people" onPress={() => askFor(id)}>

@@ -33,7 +33,7 @@ const Body: Section["Body"] = ({ selection: { kind, id } }) => {
         </Suspense>
       )}
       <Button icon="zoom" onPress={() => theEngine()?.focus(id)}>
-        {t`Zoom to it`}
+        {t`Zoom`}
       </Button>
     </>
   );

@@ -16,7 +16,7 @@ const STATES: Record<string, MessageDescriptor> = {
   online: msg`online`,
   lost: msg`connection lost`,
   back: msg`online again`,
-  failed: msg`not reached`,
+  failed: msg`not reachable`,
 };
 
 function stateName(state: string): string {
@@ -60,7 +60,7 @@ export default function Panel() {
               <div className="device-head">
                 <strong>{object.name}</strong>
                 {state?.answering === false ? (
-                  <span className="tag bad">{t`no answer`}</span>
+                  <span className="tag bad">{t`not answering`}</span>
                 ) : (
                   <span className={`tag ${TONE[state?.state ?? ""] ?? ""}`}>
                     {stateName(state?.state ?? "offline")}
@@ -78,9 +78,9 @@ export default function Panel() {
                 <Button
                   isDisabled={cannot !== ""}
                   onPress={() => void retryObject(object.id)}
-                  aria-label={t`Try ${object.name} again`}
+                  aria-label={t`Retry ${object.name}`}
                 >
-                  {t`Try again`}
+                  {t`Retry`}
                 </Button>
               )}
             </li>

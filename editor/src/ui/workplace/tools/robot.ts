@@ -9,6 +9,6 @@ export const robot: Tool = {
   id: "robot",
   label: msg`Robot`,
   icon: "robot",
-  barred: (state) => (robotsOf(state).length > 0 ? "" : t`there is no robot in this scene.`),
+  barred: (state) => (robotsOf(state).length > 0 ? "" : t`The scene has no robot.`),
   Panel: lazily(() => import("../../robot/RobotPanel")),
 };

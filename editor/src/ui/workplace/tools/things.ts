@@ -6,7 +6,7 @@ import type { Tool } from "../tools";
 
 export const things: Tool = {
   id: "things",
-  label: msg`Things`,
+  label: msg`Objects`,
   icon: "tree",
   Panel: lazily(() => import("../../things/ThingsPanel")),
 };
