@@ -4,7 +4,7 @@ import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { loadCatalogue, preferredLanguage } from "./i18n/catalogue";
 import { remembered, takeTokenFromAddress } from "./session/memory";
-import { join } from "./session/session";
+import { session } from "./session/session";
 import { App } from "./ui/App";
 import { persistently } from "./ui/kit/lazily";
 import "./ui/tokens.css";
@@ -16,7 +16,7 @@ async function start(): Promise<void> {
   // A document is probably open: load the view while the server is asked.
   if (name) import("./engine/engine").catch(() => {});
   await persistently(() => loadCatalogue(preferredLanguage()));
-  if (name) join(name, remembered("token"));
+  if (name) session.join(name, remembered("token"));
   const root = document.getElementById("root");
   if (!root) return;
   createRoot(root).render(

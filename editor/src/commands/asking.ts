@@ -1,11 +1,9 @@
 /** How commands ask: a refusal becomes a notice with the server's sentence, and the caller learns that it failed. */
 
-import { t } from "@lingui/core/macro";
 import type { CallOptions } from "../protocol/client";
 import { ConnectionLost, Refused } from "../protocol/errors";
-import { LEAST_ROLE, type Requests } from "../protocol/types";
-import { call } from "../session/session";
-import type { State } from "../store/state";
+import type { Requests } from "../protocol/types";
+import { call } from "../session/connection";
 import { tell } from "../store/store";
 
 /** Ask; gives undefined after telling the user when it was refused, lost or too late. */
@@ -98,11 +96,4 @@ export async function held<T>(id: string, work: () => Promise<T>, tree = false):
 
 export function sentence(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
-}
-
-/** Give why the user cannot ask this now, empty when he can: no connection, or a role that is too low. */
-export function barred(state: State, request: keyof Requests): string {
-  if (state.connection.status !== "ready") return t`There is no connection to the server.`;
-  if (state.connection.role < LEAST_ROLE[request]) return t`Your role does not allow this.`;
-  return "";
 }

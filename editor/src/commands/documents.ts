@@ -1,6 +1,6 @@
 /** Scenes, projects and packages as wholes: open, make, save, close, copy, rename, delete. */
 
-import { call } from "../session/session";
+import { call } from "../session/connection";
 import { now, store } from "../store/store";
 import { ask, held, refusal } from "./asking";
 import { keepThumbnail } from "./thumbnail";

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { handOver, keyOf } from "../store/handover";
 import { now, store, tell } from "../store/store";
-import { nameOf } from "../ui/names";
+import { nameOf } from "../viewmodel/names";
 import { keepView } from "./viewstate";
 
 export function askFor(id: string): void {

@@ -4,7 +4,7 @@
  */
 
 import type { JogRobotArgs } from "../protocol/types";
-import { call } from "../session/session";
+import { call } from "../session/connection";
 import { store } from "../store/store";
 import { held, sentence } from "./asking";
 import { Lease, type LeaseRequest } from "./lease";

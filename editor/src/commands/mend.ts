@@ -2,8 +2,9 @@
 
 import { t } from "@lingui/core/macro";
 import { refusedWith } from "../session/assets";
+import { call } from "../session/connection";
+import { loadLists } from "../session/lists";
 import { remembered } from "../session/memory";
-import { call, loadLists } from "../session/session";
 import { now } from "../store/store";
 import { refusal } from "./asking";
 

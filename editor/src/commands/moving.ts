@@ -4,7 +4,7 @@
  */
 
 import type { ObjectModel, Pose } from "../protocol/types";
-import { call, serves } from "../session/session";
+import { call, serves } from "../session/connection";
 import { now, setUi, store } from "../store/store";
 import { same } from "../transform/placing";
 import type { Target } from "../transform/target";

@@ -1,7 +1,7 @@
 import { beforeEach, expect, test, vi } from "vitest";
 
 const call = vi.fn();
-vi.mock("../session/session", () => ({ call, serves: () => true }));
+vi.mock("../session/connection", () => ({ call, serves: () => true }));
 const endHolds = vi.fn();
 vi.mock("./holds", () => ({ endHolds }));
 const tell = vi.fn();

@@ -1,7 +1,7 @@
 /** The scene in operation: online, offline, and stop. */
 
 import { t } from "@lingui/core/macro";
-import { call, serves } from "../session/session";
+import { call, serves } from "../session/connection";
 import { tell } from "../store/store";
 import { ask, sentence } from "./asking";
 import { endHolds } from "./holds";

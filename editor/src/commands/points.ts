@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import type { Joint, Orientation, Position } from "../protocol/types";
-import { call } from "../session/session";
+import { call } from "../session/connection";
 import type { State } from "../store/state";
 import { now, select, store } from "../store/store";
 import { relativeTo, worldOf } from "../viewmodel/frames";

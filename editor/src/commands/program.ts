@@ -14,11 +14,13 @@ import type {
   ProjectLogicIf,
   Requests,
 } from "../protocol/types";
-import { call } from "../session/session";
+import { call } from "../session/connection";
+import { barred } from "../store/permissions";
+import { put } from "../store/records";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
 import { now, select, setUi, store, tell } from "../store/store";
-import { ask, barred, held, refusal, sentence } from "./asking";
+import { ask, held, refusal, sentence } from "./asking";
 
 /** s within which an event that tells of what was just added has come. */
 const TOLD_WITHIN = 5;
@@ -163,8 +165,6 @@ function imageFor(type: string): string | undefined {
   return undefined;
 }
 
-/** The last known values of dynamic parameters, so that they can be chosen offline too. */
-const dynamicKnown = new Map<string, string[]>();
 const dynamicKey = (objectId: string, name: string, parents: { id: string; value: string }[]) =>
   JSON.stringify([objectId, name, parents]);
 
@@ -173,7 +173,7 @@ export function lastDynamicValues(
   name: string,
   parents: { id: string; value: string }[],
 ): string[] | undefined {
-  return dynamicKnown.get(dynamicKey(objectId, name, parents));
+  return now().dynamicValues[dynamicKey(objectId, name, parents)];
 }
 
 /** The values that a parameter may take now, as the live device knows them: a set, given in order. Rejects when it cannot be asked. */
@@ -184,7 +184,7 @@ export async function dynamicValues(
 ): Promise<string[]> {
   const found = await call("ActionParamValues", { id: objectId, param_id: name, parent_params: parents });
   const values = [...found].sort((a, b) => a.localeCompare(b, undefined, { numeric: true }));
-  dynamicKnown.set(dynamicKey(objectId, name, parents), values);
+  store.setState((state) => ({ dynamicValues: put(state.dynamicValues, dynamicKey(objectId, name, parents), values) }));
   return values;
 }
 

@@ -2,12 +2,14 @@
 
 import { t } from "@lingui/core/macro";
 import type { Joint, Pose, RobotArg, RobotFeatures, StepAxis, StepMode, StepWhat } from "../protocol/types";
-import { call } from "../session/session";
+import { call } from "../session/connection";
 import { robotsOf } from "../session/streams";
+import { stable } from "../store/memo";
+import { barred } from "../store/permissions";
 import type { Arm, Ghost, State } from "../store/state";
 import { now, setUi } from "../store/store";
 import { telemetry } from "../store/telemetry";
-import { barred, held, refusal, sentence } from "./asking";
+import { held, refusal, sentence } from "./asking";
 import { keepView } from "./viewstate";
 
 /** A robot, its arm (empty where it has one) and its end effector (empty until it is known). */
@@ -24,16 +26,11 @@ export interface Manner {
   linear: boolean;
 }
 
-let known: Chosen | null = null;
-
-/** The robot that the user works with: as he chose last, else the first that there is. The same object while it is the same. */
-export function chosenRobot(state: State): Chosen | null {
-  const next = found(state);
-  if (known && next && known.robotId === next.robotId && known.armId === next.armId && known.effector === next.effector)
-    return known;
-  known = next;
-  return known;
-}
+/** Return the active robot: the one that the user chose last, else the first; null without a robot. */
+export const chosenRobot = stable(
+  found,
+  (one, other) => one?.robotId === other?.robotId && one?.armId === other?.armId && one?.effector === other?.effector,
+);
 
 function found(state: State): Chosen | null {
   const robots = robotsOf(state);

@@ -1,11 +1,12 @@
 /** Running: the open project, packages, single actions; breakpoints. */
 
 import { t } from "@lingui/core/macro";
-import { call, serves } from "../session/session";
+import { call, serves } from "../session/connection";
+import { barred } from "../store/permissions";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
 import { now, tell } from "../store/store";
-import { ask, barred, sentence } from "./asking";
+import { ask, sentence } from "./asking";
 
 /** s: a build copies the code of the drivers, and a busy machine is slow. */
 const BUILT_WITHIN = 120;

@@ -4,14 +4,15 @@ import { t } from "@lingui/core/macro";
 import { freeName } from "../program/naming";
 import type { ObjectModel, ObjectTypeMeta, Parameter, Pose, SceneObject } from "../protocol/types";
 import { uploadAsset } from "../session/assets";
-import { call } from "../session/session";
+import { call } from "../session/connection";
+import { barred } from "../store/permissions";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
 import { now, select, setUi, tell } from "../store/store";
 import { lifted } from "../transform/sizes";
 import { ORIGIN, plus, rotated } from "../viewmodel/frames";
 import { aimedPlace } from "./aimed";
-import { ask, barred, held, refusal } from "./asking";
+import { ask, held, refusal } from "./asking";
 import { awaited } from "./program";
 
 /** Why objects cannot be added, removed or set up now; empty when they can. */

@@ -2,11 +2,12 @@
 
 import { t } from "@lingui/core/macro";
 import { create } from "zustand";
+import { call, serves } from "../session/connection";
 import { theEngine } from "../session/engine";
-import { call, serves } from "../session/session";
+import { barred } from "../store/permissions";
 import { openId } from "../store/selectors";
 import { now } from "../store/store";
-import { barred, refusal } from "./asking";
+import { refusal } from "./asking";
 
 /** px, and how many signs it may have at most. */
 const WIDTH = 320;

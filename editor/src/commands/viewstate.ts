@@ -1,7 +1,7 @@
 /** What a user finds again on another tablet, and what all share of how the document is looked at: kept by the server. */
 
 import type { ViewScope } from "../protocol/types";
-import { call, serves } from "../session/session";
+import { call, serves } from "../session/connection";
 import { openId } from "../store/selectors";
 import { now, store } from "../store/store";
 

@@ -6,15 +6,25 @@
 import {
   BufferAttribute,
   BufferGeometry,
+  type Color,
   DynamicDrawUsage,
   Matrix4,
   Mesh,
   MeshLambertMaterial,
+  type Object3D,
   type Scene,
   Vector3,
 } from "three";
-import type { Instance } from "./batches";
 import { cheapen } from "./surface";
+
+export interface Instance {
+  id: string;
+  /** Whose frame it has. */
+  frame: Object3D;
+  /** In that frame. */
+  offset: Matrix4;
+  color: Color;
+}
 
 const matrix = new Matrix4();
 const place = new Vector3();

@@ -12,7 +12,8 @@ import {
   Vector3,
 } from "three";
 import { expect, test } from "vitest";
-import { Batches, type Instance } from "./batches";
+import type { Instance } from "./baked";
+import { Batches } from "./batches";
 
 function instance(id: string, x: number, size = 1): Instance {
   const frame = new Object3D();

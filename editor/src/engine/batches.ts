@@ -1,25 +1,7 @@
 /** Many equal small things drawn in one go: points, pucks, arrows. Each keeps its frame in the scene graph. */
 
-import {
-  type BufferGeometry,
-  Color,
-  DynamicDrawUsage,
-  InstancedMesh,
-  type Material,
-  Matrix4,
-  type Object3D,
-  type Scene,
-} from "three";
-import { Baked } from "./baked";
-
-export interface Instance {
-  id: string;
-  /** Whose frame it has. */
-  frame: Object3D;
-  /** In that frame. */
-  offset: Matrix4;
-  color: Color;
-}
+import { type BufferGeometry, Color, DynamicDrawUsage, InstancedMesh, type Material, Matrix4, type Scene } from "three";
+import { Baked, type Instance } from "./baked";
 
 const FIRST_SIZE = 64;
 const matrix = new Matrix4();

@@ -4,7 +4,6 @@
  */
 
 import { Box3, Fog, GridHelper, PCFShadowMap, Scene, SRGBColorSpace, Vector3, WebGLRenderer } from "three";
-import type { Pose } from "../protocol/types";
 import type { Telemetry } from "../store/telemetry";
 import { Batches } from "./batches";
 import { View } from "./camera";
@@ -16,8 +15,10 @@ import { light } from "./light";
 import { labelsOf } from "./naming";
 import { DARK, LIGHT, type Palette } from "./palette";
 import { type Hit, onFloor, pick } from "./picking";
-import { worldPose } from "./poses";
-import { type Context, type Quality, type Thing, trianglesOf } from "./thing";
+import { followPointer } from "./pointer";
+import { type Probe, probe } from "./probe";
+import type { Quality } from "./surface";
+import type { Context, Thing } from "./thing";
 import { make } from "./things/make";
 import { type JointLimit, RobotThing } from "./things/robot";
 import { Ties } from "./ties";
@@ -33,28 +34,6 @@ export interface EngineOptions {
   trouble: Context["trouble"];
   quality: Quality;
   dark: boolean;
-}
-
-/** What a test may ask of an item. */
-export interface Probe {
-  kind: Item["kind"];
-  name: string;
-  pose: Pose;
-  /** Pixels from the view's upper left corner, of where its label would stand; null behind the camera. */
-  screen: { x: number; y: number } | null;
-  visible: boolean;
-  /** How much is seen through it: 0 opaque, 1 not there. */
-  faint: number;
-  badge: string;
-  /** What the sign on it tells by its shape. */
-  sign: string;
-  /** Why it is not shown as it looks; empty where it is. */
-  problem: string;
-  /** Triangles of its picture, without those of a ghost; 0 for what is drawn with others of its kind. */
-  triangles: number;
-  joints?: Record<string, number>;
-  ghost?: Record<string, number> | null;
-  endEffectors?: Pose[];
 }
 
 const SMALL = new Set<Item["kind"]>(["point", "orientation", "action", "logic"]);
@@ -99,7 +78,6 @@ export class Engine {
   readonly ties: Ties;
   private readonly wayLine: WayLine;
   private readonly ends: (() => void)[] = [];
-  private down: { x: number; y: number; time: number } | null = null;
 
   constructor(private readonly options: EngineOptions) {
     const { canvas, quality } = options;
@@ -150,7 +128,12 @@ export class Engine {
     const watch = new ResizeObserver(() => this.resize());
     watch.observe(canvas.parentElement ?? canvas);
     this.ends.push(() => watch.disconnect());
-    this.listen(canvas);
+    this.ends.push(
+      followPointer(canvas, {
+        onTap: (x, y, slack) => this.onTap(this.pick(x, y, slack), this.floor(x, y)),
+        onHover: (x, y) => this.hover(this.pick(x, y, 4)[0]?.id ?? ""),
+      }),
+    );
     this.resize();
   }
 
@@ -272,29 +255,7 @@ export class Engine {
     const thing = this.things.get(id);
     if (!thing) return undefined;
     this.place();
-    this.view.camera.updateMatrixWorld();
-    const at = thing.anchor(new Vector3()).project(this.view.camera);
-    const probe: Probe = {
-      kind: thing.item.kind,
-      name: thing.item.name,
-      pose: worldPose(thing.root),
-      screen: at.z > 1 ? null : { x: ((at.x + 1) / 2) * this.width, y: ((1 - at.y) / 2) * this.height },
-      visible: thing.root.visible && at.z <= 1 && Math.abs(at.x) <= 1 && Math.abs(at.y) <= 1,
-      faint: thing.item.faint,
-      badge: thing.badge(),
-      sign: thing.sign,
-      problem: thing.problem,
-      triangles: trianglesOf(thing.root, id),
-    };
-    if (thing instanceof RobotThing) {
-      const { telemetry } = this.context;
-      probe.joints = Object.fromEntries(
-        Object.entries(thing.robot?.joints ?? {}).map(([name, joint]) => [name, Number(joint.angle)]),
-      );
-      probe.ghost = thing.ghostJoints();
-      probe.endEffectors = telemetry.endEffectors(id).map((each) => each.pose);
-    }
-    return probe;
+    return probe(thing, this.context.telemetry, this.view.camera, { width: this.width, height: this.height });
   }
 
   /** Joints of a robot with their limits; none while its model is not loaded, or where it has none. */
@@ -437,37 +398,5 @@ export class Engine {
     const height = this.drop.show(at, this.palette);
     if (chosen) this.notes.set(chosen.item.id, heightWords(height));
     if (this.said.id) this.notes.set(this.said.id, this.said.text);
-  }
-
-  /** A tap is short, and stays where it began: everything else turns the view. */
-  private listen(canvas: HTMLCanvasElement): void {
-    const place = (event: PointerEvent) => {
-      const box = canvas.getBoundingClientRect();
-      return { x: event.clientX - box.left, y: event.clientY - box.top };
-    };
-    const down = (event: PointerEvent) => {
-      this.down = event.isPrimary && event.button === 0 ? { ...place(event), time: event.timeStamp } : null;
-    };
-    const up = (event: PointerEvent) => {
-      const began = this.down;
-      this.down = null;
-      if (!began || !event.isPrimary) return;
-      const { x, y } = place(event);
-      if (Math.hypot(x - began.x, y - began.y) > 8 || event.timeStamp - began.time > 600) return;
-      this.onTap(this.pick(x, y, event.pointerType === "mouse" ? 6 : 16), this.floor(x, y));
-    };
-    const move = (event: PointerEvent) => {
-      if (event.pointerType !== "mouse" || event.buttons) return;
-      const { x, y } = place(event);
-      this.hover(this.pick(x, y, 4)[0]?.id ?? "");
-    };
-    canvas.addEventListener("pointerdown", down);
-    canvas.addEventListener("pointerup", up);
-    canvas.addEventListener("pointermove", move);
-    this.ends.push(() => {
-      canvas.removeEventListener("pointerdown", down);
-      canvas.removeEventListener("pointerup", up);
-      canvas.removeEventListener("pointermove", move);
-    });
   }
 }

@@ -1,7 +1,9 @@
 /** What solid things are made of, and how they are drawn where each triangle and each pixel costs. */
 
 import { MeshLambertMaterial, type MeshLambertMaterialParameters } from "three";
-import type { Context } from "./thing";
+
+/** How much the view costs to draw: "low" is for machines without a graphics processor. */
+export type Quality = "low" | "high";
 
 /** As the Lambert material of three.js does it, with lights of the two kinds that there are. */
 const LIT = `
@@ -91,7 +93,7 @@ export function cheapen(material: MeshLambertMaterial, discs = false): void {
 
 /** A dull material, of a colour that can be set. */
 export function surface(
-  { quality }: Pick<Context, "quality">,
+  { quality }: { quality: Quality },
   parameters: MeshLambertMaterialParameters = {},
 ): MeshLambertMaterial {
   const material = new MeshLambertMaterial(parameters);

@@ -5,9 +5,7 @@ import type { Telemetry } from "../store/telemetry";
 import type { Batches } from "./batches";
 import type { Item } from "./items";
 import type { Palette } from "./palette";
-
-/** `low` draws less often, with fewer triangles, without shadows, and lights corners instead of pixels. */
-export type Quality = "low" | "high";
+import type { Quality } from "./surface";
 
 export interface Context {
   telemetry: Telemetry;

@@ -1,75 +1,14 @@
 /** What is asked of a program without a server: ways that are free, results that can be used, faults, values. */
 
-import { deflateRawSync } from "node:zlib";
 import { describe, expect, test } from "vitest";
-import { against } from "../commands/aimed";
-import type { LogicItem, ObjectAction, Project, Reach, Scene } from "../protocol/types";
-import { opened } from "../store/document";
-import type { OpenDocument, State } from "../store/state";
-import { initialState } from "../store/state";
-import { textOfZip } from "../ui/code/package";
-import { pieces } from "../ui/code/python";
-import { firstIn, graphOf, lastIn } from "../ui/flow/graph";
+import type { LogicItem, Reach } from "../protocol/types";
+import type { OpenDocument } from "../store/state";
 import { cannotLead, conditionWords, freeStep, usable } from "./logic";
 import { freeName, newOutputs } from "./naming";
 import { problemsOf, usersOf } from "./problems";
 import { reachOfAction } from "./reach";
-import { foldedRuns, runsOf } from "./runs";
+import { program, TYPES } from "./testing";
 import { double, extraOf, initial, rangeWords, read, textOf } from "./values";
-
-const meta = (name: string, returns: string[], parameters: ObjectAction["parameters"] = []): ObjectAction => ({
-  name,
-  parameters,
-  returns,
-  disabled: false,
-  meta: { composite: false, hidden: false, cancellable: false },
-});
-const number = { name: "by", type: "integer", dynamic_value: false };
-const TYPES: State["types"] = {
-  ...initialState().types,
-  actions: { Device: [meta("ask", ["boolean"]), meta("count", ["integer"], [number]), meta("act", [])] },
-};
-
-/** Actions a, b, ... by their kinds, on one point; steps as [from, to, value of from's result]. */
-function program(
-  kinds: Record<string, string>,
-  steps: [string, string, string?][] = [],
-  parameters: Record<string, object> = {},
-): OpenDocument {
-  const at = { x: 0, y: 0, z: 0 };
-  const actions = Object.entries(kinds).map(([id, kind]) => {
-    const outputs = kind === "act" ? [] : [`${id}_result`];
-    const given = kind === "count" ? [{ name: "by", type: "integer", value: "1", ...parameters[id] }] : [];
-    return { id, name: id, type: `device/${kind}`, parameters: given, flows: [{ type: "default" as const, outputs }] };
-  });
-  const logic = steps.map(
-    ([start, end, value], index): LogicItem => ({
-      id: `s${index}`,
-      start,
-      end,
-      ...(value === undefined ? {} : { condition: { what: `${start}/default/0`, value } }),
-    }),
-  );
-  const scene: Scene = {
-    id: "scene",
-    name: "scene",
-    description: "",
-    objects: [{ id: "device", name: "device", type: "Device", parameters: [] }],
-  };
-  const project: Project = {
-    id: "project",
-    name: "project",
-    scene_id: "scene",
-    description: "",
-    has_logic: true,
-    action_points: [{ id: "point", name: "point", position: at, orientations: [], robot_joints: [], actions }],
-    parameters: [{ id: "par", name: "so_many", type: "integer", value: "5" }],
-    functions: [],
-    logic,
-    object_overrides: [],
-  };
-  return opened(scene, project);
-}
 
 describe("steps", () => {
   test("the first way on asks for nothing, the second makes a branch of both", () => {
@@ -208,77 +147,6 @@ describe("faults", () => {
   });
 });
 
-test("the graph goes from top to bottom, and offers the ways that are free", () => {
-  const doc = program({ a: "ask", b: "act", c: "act" }, [
-    ["START", "a"],
-    ["a", "b", "true"],
-    ["b", "END"],
-  ]);
-  const { boxes, lines } = graphOf(doc, TYPES);
-  const of = (id: string) => boxes.find((each) => each.id === id);
-  const heights = ["START", "a", "b", "END"].map((id) => of(id)?.y ?? 0);
-  expect(heights).toEqual([...heights].sort((one, other) => one - other));
-  expect(new Set(heights).size).toBe(4);
-  expect(of("a")?.ways.map((each) => each.id)).toEqual(["false"]);
-  expect(of("START")?.ways).toEqual([]);
-  expect(of("c")?.ways.map((each) => each.id)).toEqual(["next"]);
-  expect(lines.map((each) => [each.words, each.branch])).toEqual([
-    ["", "always"],
-    ["yes", "true"],
-    ["", "always"],
-  ]);
-});
-
-describe("straight runs", () => {
-  const doc = program({ a: "ask", b: "act", c: "act", d: "act", e: "act", f: "act" }, [
-    ["START", "a"],
-    ["a", "b", "true"],
-    ["b", "c"],
-    ["c", "d"],
-    ["d", "e"],
-    ["a", "f", "false"],
-    ["f", "e"],
-    ["e", "END"],
-  ]);
-
-  test("end where ways part or meet, and are of three actions at least", () => {
-    expect(runsOf(doc)).toEqual([["b", "c", "d"]]);
-    // A condition, or a second way in, ends one.
-    expect(
-      runsOf(
-        program({ a: "act", b: "ask", c: "act", d: "act" }, [
-          ["a", "b"],
-          ["b", "c", "true"],
-          ["c", "d"],
-        ]),
-      ),
-    ).toEqual([]);
-    expect(runsOf(program({ a: "act", b: "act" }, [["a", "b"]]))).toEqual([]);
-  });
-
-  test("are one node with a count, which steps lead to and from as to and from its ends", () => {
-    const folded = foldedRuns(doc, new Set(["c"]), new Set());
-    const { boxes, lines } = graphOf(doc, TYPES, folded);
-    const one = boxes.find((each) => each.kind === "fold");
-    expect([one?.name, one?.detail]).toEqual(["3 actions", "b, c, d"]);
-    expect(boxes.map((each) => each.id)).toEqual(["START", "a", "e", "f", "fold/b", "END"]);
-    expect(lines.map((each) => [each.from, each.to])).toEqual([
-      ["START", "a"],
-      ["a", "fold/b"],
-      ["fold/b", "e"],
-      ["a", "f"],
-      ["f", "e"],
-      ["e", "END"],
-    ]);
-    expect(one && [firstIn(one), lastIn(one)]).toEqual(["b", "d"]);
-  });
-
-  test("are open where something in them is to be seen", () => {
-    expect(foldedRuns(doc, new Set(["b", "c", "d"]), new Set(["d"]))).toEqual([]);
-    expect(foldedRuns(doc, new Set(), new Set())).toEqual([]);
-  });
-});
-
 describe("values", () => {
   test("a double keeps its fraction, limits hold, and what is no number is said", () => {
     expect(read("double", "1")).toEqual({ json: "1.0" });
@@ -311,65 +179,6 @@ describe("values", () => {
     expect(newOutputs(program({ ask: "ask" }), "ask", 2)).toEqual(["ask_result_1", "ask_result_2"]);
     expect(newOutputs(program({ ask: "ask" }), "ask", 1)).toEqual(["ask_result_2"]);
   });
-});
-
-test("a tool that stands on a surface looks against its normal", () => {
-  for (const normal of [
-    { x: 0, y: 0, z: 1 },
-    { x: 1, y: 0, z: 0 },
-    { x: 0, y: -0.6, z: 0.8 },
-    { x: 0, y: 0, z: -1 },
-  ]) {
-    const { x, y, z, w } = against(normal);
-    // The third column of the rotation's matrix.
-    const axis = [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)];
-    [normal.x, normal.y, normal.z].forEach((each, index) => expect(axis[index]).toBeCloseTo(-each, 9));
-  }
-});
-
-test("a file is read out of a zip, packed or not", async () => {
-  const files: [string, string, boolean][] = [
-    ["a.txt", "first", false],
-    ["script.py", "print('hello')\n".repeat(50), true],
-  ];
-  const parts: Buffer[] = [];
-  const directory: Buffer[] = [];
-  let at = 0;
-  for (const [name, text, packed] of files) {
-    const content = packed ? deflateRawSync(Buffer.from(text)) : Buffer.from(text);
-    const local = Buffer.alloc(30);
-    local.writeUInt32LE(0x04034b50, 0);
-    local.writeUInt16LE(packed ? 8 : 0, 8);
-    local.writeUInt16LE(name.length, 26);
-    const entry = Buffer.alloc(46);
-    entry.writeUInt32LE(0x02014b50, 0);
-    entry.writeUInt16LE(packed ? 8 : 0, 10);
-    entry.writeUInt32LE(content.length, 20);
-    entry.writeUInt16LE(name.length, 28);
-    entry.writeUInt32LE(at, 42);
-    directory.push(entry, Buffer.from(name));
-    parts.push(local, Buffer.from(name), content);
-    at += 30 + name.length + content.length;
-  }
-  const end = Buffer.alloc(22);
-  end.writeUInt32LE(0x06054b50, 0);
-  end.writeUInt16LE(files.length, 10);
-  end.writeUInt32LE(at, 16);
-  const zip = new Uint8Array(Buffer.concat([...parts, ...directory, end])).buffer;
-  expect(await textOfZip(zip, "script.py")).toBe(files[1]?.[1]);
-  expect(await textOfZip(zip, "a.txt")).toBe("first");
-  expect(await textOfZip(zip, "none")).toBeUndefined();
-  await expect(textOfZip(new ArrayBuffer(40), "a.txt")).rejects.toThrow("cannot be downloaded");
-});
-
-test("Python in pieces keeps every character, and texts over lines stay texts", () => {
-  const source = 'def f(x):  # why\n    """One\n    two."""\n    return x_1 + 2.5e-3';
-  const lines = pieces(source);
-  expect(lines.map((line) => line.map((each) => each.text).join("")).join("\n")).toBe(source);
-  expect(lines[0]?.[0]).toEqual({ text: "def", kind: "word" });
-  expect(lines[0]?.at(-1)).toEqual({ text: "# why", kind: "comment" });
-  expect(lines[2]?.[0]?.kind).toBe("text");
-  expect(lines[3]?.at(-1)).toEqual({ text: "2.5e-3", kind: "number" });
 });
 
 describe("whether a robot gets there", () => {

@@ -46,6 +46,9 @@ interface Answer {
   response: string;
   result: boolean;
   messages?: string[];
+  /** Key and values of the message, so that it can be translated. */
+  key?: string;
+  values?: Record<string, string | number>;
   data?: unknown;
   code?: string;
 }
@@ -220,6 +223,6 @@ export class ProtocolClient {
     }
     waiting.done();
     if (message.result) waiting.resolve(message.data as never);
-    else waiting.reject(new Refused(waiting.request, message.messages ?? [], message.code));
+    else waiting.reject(new Refused(waiting.request, message.messages ?? [], message.code, message));
   }
 }

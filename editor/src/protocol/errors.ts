@@ -1,32 +1,34 @@
-/** Why a request was not granted. */
+/** Errors of requests. */
 
 import { t } from "@lingui/core/macro";
+import { type ServerMessage, translate } from "../i18n/serverMessages";
 
-/** The server refuses; the message is the sentence for the user, `code` names the reason where the server tells it. */
+/** The server refused a request. The message is meant for the user; `code` is the reason for programs. */
 export class Refused extends Error {
   override readonly name = "Refused";
   constructor(
     readonly request: string,
     readonly messages: string[],
     readonly code?: string,
+    translation: Omit<ServerMessage, "text"> = {},
   ) {
-    super(messages.join(" ") || t`${request} was refused.`);
+    super(translate({ ...translation, text: messages.join(" ") }) || t`${request} was refused.`);
   }
 }
 
-/** There is no connection, or it was lost before the answer came: what became of the request is not known. */
+/** There is no connection, or it was lost before the answer: whether the request was carried out is unknown. */
 export class ConnectionLost extends Error {
   override readonly name = "ConnectionLost";
   constructor(
     readonly request: string,
-    /** Whether the request had been sent: then it may have been carried out. */
+    /** Whether the request was sent, and may have been carried out. */
     readonly sent: boolean,
   ) {
     super(sent ? t`The connection was lost before ${request} was answered.` : t`There is no connection to the server.`);
   }
 }
 
-/** No answer came in time. It may still be carried out. */
+/** The server did not answer in time. It may still carry out the request. */
 export class DeadlineExceeded extends Error {
   override readonly name = "DeadlineExceeded";
   constructor(

@@ -1,44 +1,46 @@
-/** Asks which arms, end effectors, grippers and suction cups the robots have that came online. */
+/** Request the arms, end effectors, grippers and suction cups of robots that come online. */
 
 import { put } from "../store/records";
 import type { Arm, State } from "../store/state";
 import { store } from "../store/store";
-import { call } from "./session";
+import { call } from "./connection";
+import type { Follower } from "./follower";
 import { robotsOf } from "./streams";
 
-/** Robots that were asked. */
-const asked = new Set<string>();
+export class RobotArms implements Follower {
+  /** Ids of the robots whose arms were requested. */
+  private readonly requested = new Set<string>();
 
-export function forgetArms(): void {
-  asked.clear();
-}
-
-/** Called with each state. */
-export function followArms(state: State): void {
-  if (state.live.state !== "started" || state.connection.status !== "ready") {
-    if (state.live.state === "stopped") asked.clear();
-    return;
+  reset(): void {
+    this.requested.clear();
   }
-  for (const id of robotsOf(state)) {
-    const connection = state.live.objects[id]?.state;
-    const there = connection === undefined || connection === "online" || connection === "back";
-    if (!there) asked.delete(id);
-    else if (!asked.has(id)) {
-      asked.add(id);
-      const several = state.types.robots[state.doc?.objects[id]?.type ?? ""]?.multi_arm ?? false;
-      // Refused by a robot that is just being lost: it is asked again when it is back.
-      askArms(id, several).then(
-        (arms) =>
-          store.setState((now) =>
-            now.live.state === "started" ? { live: { ...now.live, arms: put(now.live.arms, id, arms) } } : {},
-          ),
-        () => {},
-      );
+
+  follow(state: State): void {
+    if (state.live.state !== "started" || state.connection.status !== "ready") {
+      if (state.live.state === "stopped") this.requested.clear();
+      return;
+    }
+    for (const id of robotsOf(state)) {
+      const connection = state.live.objects[id]?.state;
+      const connected = connection === undefined || connection === "online" || connection === "back";
+      if (!connected) this.requested.delete(id);
+      else if (!this.requested.has(id)) {
+        this.requested.add(id);
+        const several = state.types.robots[state.doc?.objects[id]?.type ?? ""]?.multi_arm ?? false;
+        // Refused if the robot disconnects meanwhile; requested again when it is back.
+        loadArms(id, several).then(
+          (arms) =>
+            store.setState((now) =>
+              now.live.state === "started" ? { live: { ...now.live, arms: put(now.live.arms, id, arms) } } : {},
+            ),
+          () => {},
+        );
+      }
     }
   }
 }
 
-async function askArms(robot_id: string, several: boolean): Promise<Arm[]> {
+async function loadArms(robot_id: string, several: boolean): Promise<Arm[]> {
   const ids = several ? await call("GetRobotArms", { robot_id }) : [""];
   return Promise.all(
     ids.map(async (id) => {

@@ -1,27 +1,30 @@
-/** Asks for what belongs to the open document and comes by no event at first: breakpoints, view state, reachability. */
+/** Request the data of the open document that no event brings at first: breakpoints, view state, reachability. */
 
 import type { State } from "../store/state";
 import { now, store } from "../store/store";
-import { call, serves } from "./session";
+import { call, serves } from "./connection";
+import type { Follower } from "./follower";
 
-let followed = "";
+export class DocumentDetails implements Follower {
+  /** Id of the document whose data was requested; "-" without a document. */
+  private current = "";
 
-export function forgetFollowed(): void {
-  followed = "";
+  reset(): void {
+    this.current = "";
+  }
+
+  follow(state: State): void {
+    if (state.connection.status !== "ready") return;
+    const id = state.doc ? (state.doc.project?.id ?? state.doc.scene.id) : "-";
+    if (id === this.current) return;
+    this.current = id;
+    const isCurrent = () => this.current === id;
+    void loadGeneral(isCurrent);
+    if (state.doc) void loadDetails(id, state.doc.project !== null, isCurrent);
+  }
 }
 
-/** Called with each state: asks when another document is open than the one that was asked for. */
-export function followDocument(state: State): void {
-  if (state.connection.status !== "ready") return;
-  const id = state.doc ? (state.doc.project?.id ?? state.doc.scene.id) : "-";
-  if (id === followed) return;
-  followed = id;
-  const still = () => followed === id;
-  void general(still);
-  if (state.doc) void ofDocument(id, state.doc.project !== null, still);
-}
-
-async function general(still: () => boolean): Promise<void> {
+async function loadGeneral(isCurrent: () => boolean): Promise<void> {
   if (!serves("GetViewState")) return;
   const read = (scope: "user" | "shared") =>
     call("GetViewState", { scope }).then(
@@ -29,13 +32,13 @@ async function general(still: () => boolean): Promise<void> {
       () => ({}),
     );
   const [shared, own] = await Promise.all([read("shared"), read("user")]);
-  if (still()) store.setState((state) => ({ view: { ...state.view, general: { ...shared, ...own } } }));
+  if (isCurrent()) store.setState((state) => ({ view: { ...state.view, general: { ...shared, ...own } } }));
 }
 
-async function ofDocument(document: string, project: boolean, still: () => boolean): Promise<void> {
+async function loadDetails(document: string, project: boolean, isCurrent: () => boolean): Promise<void> {
   const ask = async (work: Promise<Partial<State>>) => {
-    const change = await work.catch(() => null); // refused for want of a document that was closed meanwhile
-    if (change && still()) store.setState(change);
+    const change = await work.catch(() => null); // refused if the document was closed meanwhile
+    if (change && isCurrent()) store.setState(change);
   };
   if (serves("GetViewState")) {
     for (const scope of ["user", "shared"] as const) {
@@ -47,7 +50,7 @@ async function ofDocument(document: string, project: boolean, still: () => boole
   if (!project) return;
   if (serves("GetBreakpoints")) {
     void ask(
-      // By its id: while its program runs it is not open.
+      // By id, since the project is not open while its program runs.
       call("GetBreakpoints", { project_id: document }).then(({ ids }) => ({
         breakpoints: Object.fromEntries(ids.map((id) => [id, true as const])),
       })),

@@ -1,21 +1,16 @@
-/** Tells the others what this user looks at and works on; not more often than they can follow. */
+/** Report to the other users what this user selects and edits. */
 
 import type { Presence } from "../protocol/types";
 import { openId } from "../store/selectors";
 import type { State } from "../store/state";
-import { call, serves } from "./session";
+import { now } from "../store/store";
+import { call, serves } from "./connection";
+import type { Follower } from "./follower";
 
-/** s between two messages. */
-const PAUSE = 0.2;
+/** Time between two reports, s. */
+const PERIOD = 0.2;
 
-let told = "";
-let timer: ReturnType<typeof setTimeout> | undefined;
-
-export function forgetPresence(): void {
-  told = "";
-}
-
-/** The operator's screen shows no document: what is open there does not keep a program from starting. */
+/** Return whether the operator screen is shown. It uses no document, so it does not prevent a program from starting. */
 function atOperatorScreen(): boolean {
   return typeof location !== "undefined" && location.hash.startsWith("#/operator");
 }
@@ -32,16 +27,24 @@ export function presenceOf(state: State): Presence {
   };
 }
 
-/** Called with each state. */
-export function tellPresence(state: State, latest: () => State): void {
-  if (state.connection.status !== "ready" || timer !== undefined) return;
-  if (JSON.stringify(presenceOf(state)) === told) return;
-  timer = setTimeout(() => {
-    timer = undefined;
-    const now = latest();
-    if (now.connection.status !== "ready" || !serves("UpdatePresence")) return;
-    const presence = presenceOf(now);
-    told = JSON.stringify(presence);
-    call("UpdatePresence", presence).catch(() => {}); // it is told again with the next change
-  }, PAUSE * 1000);
+export class PresenceReporter implements Follower {
+  private reported = "";
+  private timer: ReturnType<typeof setTimeout> | undefined;
+
+  reset(): void {
+    this.reported = "";
+  }
+
+  follow(state: State): void {
+    if (state.connection.status !== "ready" || this.timer !== undefined) return;
+    if (JSON.stringify(presenceOf(state)) === this.reported) return;
+    this.timer = setTimeout(() => {
+      this.timer = undefined;
+      const latest = now();
+      if (latest.connection.status !== "ready" || !serves("UpdatePresence")) return;
+      const presence = presenceOf(latest);
+      this.reported = JSON.stringify(presence);
+      call("UpdatePresence", presence).catch(() => {}); // reported again with the next change
+    }, PERIOD * 1000);
+  }
 }

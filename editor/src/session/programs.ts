@@ -1,58 +1,62 @@
-/** Request the data of programs that events only update: actions of types, the run history, the trace of the running program. */
+/** Request the data of programs that events only update: actions of types, run history, trace of the running program. */
 
 import { withRuns } from "../store/reduce";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
 import { now, store } from "../store/store";
-import { actionsOf, call, serves } from "./session";
+import { call, serves } from "./connection";
+import type { Follower } from "./follower";
+import { loadActions } from "./lists";
 
-const asked = new Set<string>();
-/** Projects whose runs were requested; the empty string stands for the newest runs of all projects. */
-const runsAsked = new Set<string>();
-let traced = false;
+export class ProgramDetails implements Follower {
+  /** Types whose actions were requested. */
+  private readonly types = new Set<string>();
+  /** Projects whose runs were requested; the empty string stands for the newest runs of all projects. */
+  private readonly runs = new Set<string>();
+  private traced = false;
 
-export function forgetPrograms(): void {
-  asked.clear();
-  runsAsked.clear();
-  traced = false;
-}
-
-/** Called with each state. */
-export function followPrograms(state: State): void {
-  if (state.connection.status !== "ready") return;
-  followActions(state);
-  followRuns(state);
-  // A user who joins while a program is running sees its trace from the start.
-  if (isRunning(state) && !traced && serves("GetExecutionTrace")) {
-    traced = true;
-    void call("GetExecutionTrace", { limit: 1000 }).then(takeTrace, () => {});
+  reset(): void {
+    this.types.clear();
+    this.runs.clear();
+    this.traced = false;
   }
-  if (!isRunning(state)) traced = false;
-}
 
-/** Request the newest runs, and those of the open project, which may be older. */
-function followRuns(state: State): void {
-  if (!serves("ListRuns")) return;
-  for (const project_id of ["", state.doc?.project?.id ?? ""]) {
-    if (runsAsked.has(project_id)) continue;
-    runsAsked.add(project_id);
-    const wanted = project_id ? { limit: 20, project_id } : { limit: 100 };
-    void call("ListRuns", wanted).then(
-      ({ runs }) => store.setState(({ program }) => ({ program: withRuns(program, runs) })),
-      () => {},
-    );
+  follow(state: State): void {
+    if (state.connection.status !== "ready") return;
+    this.followActions(state);
+    this.followRuns(state);
+    // A user who joins while a program is running sees its trace from the start.
+    if (isRunning(state) && !this.traced && serves("GetExecutionTrace")) {
+      this.traced = true;
+      void call("GetExecutionTrace", { limit: 1000 }).then(takeTrace, () => {});
+    }
+    if (!isRunning(state)) this.traced = false;
   }
-}
 
-function followActions(state: State): void {
-  if (!state.doc?.project) return;
-  for (const { type } of Object.values(state.doc.objects)) {
-    if (!(type in state.types.byName)) continue;
-    if (type in state.types.actions)
-      asked.delete(type); // it is asked for again when the type was changed
-    else if (!asked.has(type)) {
-      asked.add(type);
-      actionsOf(type).catch(() => {});
+  /** Request the newest runs, and those of the open project, which may be older. */
+  private followRuns(state: State): void {
+    if (!serves("ListRuns")) return;
+    for (const project_id of ["", state.doc?.project?.id ?? ""]) {
+      if (this.runs.has(project_id)) continue;
+      this.runs.add(project_id);
+      const wanted = project_id ? { limit: 20, project_id } : { limit: 100 };
+      void call("ListRuns", wanted).then(
+        ({ runs }) => store.setState(({ program }) => ({ program: withRuns(program, runs) })),
+        () => {},
+      );
+    }
+  }
+
+  private followActions(state: State): void {
+    if (!state.doc?.project) return;
+    for (const { type } of Object.values(state.doc.objects)) {
+      if (!(type in state.types.byName)) continue;
+      if (type in state.types.actions)
+        this.types.delete(type); // requested again when the type changes
+      else if (!this.types.has(type)) {
+        this.types.add(type);
+        loadActions(type).catch(() => {});
+      }
     }
   }
 }

@@ -35,10 +35,13 @@ const PROJECT: Project = {
   object_overrides: [],
 };
 
+/** Time of the events, ms since 1970. */
+const NOW = 1_700_000_000_000;
+
 function after(...events: ServerEvent[]): State {
   let state = initialState();
   state = { ...state, connection: { ...state.connection, user: "me" } };
-  for (const event of events) state = { ...state, ...reduce(state, event) };
+  for (const event of events) state = { ...state, ...reduce(state, event, NOW) };
   return state;
 }
 const OPEN: ServerEvent = { event: "OpenProject", data: { scene: SCENE, project: PROJECT } };
@@ -109,13 +112,17 @@ describe("the open document", () => {
       ...after(OPEN),
       ui: { ...initialState().ui, selection: { kind: "action", id } },
     });
-    expect(reduce(selected("act"), OPEN).ui?.selection?.id).toBe("act");
-    expect(reduce(selected("other"), OPEN).ui?.selection).toBeNull();
-    const removed = reduce(selected("act"), {
-      event: "ActionChanged",
-      change_type: "remove",
-      data: { id: "act", name: "move", type: "obj/move" },
-    });
+    expect(reduce(selected("act"), OPEN, NOW).ui?.selection?.id).toBe("act");
+    expect(reduce(selected("other"), OPEN, NOW).ui?.selection).toBeNull();
+    const removed = reduce(
+      selected("act"),
+      {
+        event: "ActionChanged",
+        change_type: "remove",
+        data: { id: "act", name: "move", type: "obj/move" },
+      },
+      NOW,
+    );
     expect(removed.ui?.selection).toBeNull();
   });
 });
@@ -210,7 +217,7 @@ describe("operation", () => {
     });
     expect(state.program.running).toEqual(["b"]);
     expect(
-      { ...state, ...reduce(state, { event: "PackageState", data: { state: "stopped" } }) }.program.running,
+      { ...state, ...reduce(state, { event: "PackageState", data: { state: "stopped" } }, NOW) }.program.running,
     ).toEqual([]);
   });
 });
@@ -219,8 +226,8 @@ test("a type that is gone takes its actions along", () => {
   const type = { type: "UR5e" } as never;
   let state = after({ event: "ChangedObjectTypes", change_type: "add", data: [type] });
   state = { ...state, types: { ...state.types, actions: { UR5e: [] } } };
-  state = { ...state, ...reduce(state, { event: "ChangedObjectTypes", change_type: "update", data: [type] }) };
+  state = { ...state, ...reduce(state, { event: "ChangedObjectTypes", change_type: "update", data: [type] }, NOW) };
   expect(state.types.actions).toEqual({}); // they are to be asked for anew
-  state = { ...state, ...reduce(state, { event: "ChangedObjectTypes", change_type: "remove", data: [type] }) };
+  state = { ...state, ...reduce(state, { event: "ChangedObjectTypes", change_type: "remove", data: [type] }, NOW) };
   expect(state.types.byName).toEqual({});
 });

@@ -1,23 +1,29 @@
-/** What an event makes of the state: a pure function; what is not named stays. */
+/** The reducer: return the changes that an event makes to the state. A pure function of state, event and time. */
 
 import { t } from "@lingui/core/macro";
+import { translate } from "../i18n/serverMessages";
 import type { Run, ServerEvent, TaskStateData } from "../protocol/types";
 import { changed, opened } from "./document";
 import { put, without } from "./records";
 import { NO_PROGRAM, type Notice, OFFLINE, type State } from "./state";
 
-/** How many are kept. */
+/** Largest number of stored notices, entries of the trace, and results of single actions. */
 const NOTICES = 200;
 const TRACE = 1000;
 const TRIED = 50;
-let numberOfNotice = 0;
 
-export function notice(state: State, level: Notice["level"], text: string): Pick<State, "notices" | "said"> {
-  const added = { id: ++numberOfNotice, level, text, time: Date.now() };
+/** Return the notices with one more. `time` is in ms since 1970. */
+export function notice(
+  state: State,
+  level: Notice["level"],
+  text: string,
+  time: number,
+): Pick<State, "notices" | "said"> {
+  const added = { id: (state.said.at(-1)?.id ?? 0) + 1, level, text, time };
   return { notices: [...state.notices, added].slice(-NOTICES), said: [...state.said, added].slice(-NOTICES) };
 }
 
-/** Forget what belongs to the document that was open. */
+/** Reset what belongs to the open document. */
 const CLOSED = {
   doc: null,
   live: OFFLINE,
@@ -27,7 +33,8 @@ const CLOSED = {
   reach: {},
 } satisfies Partial<State>;
 
-export function reduce(state: State, event: ServerEvent): Partial<State> {
+/** Return the changes made by an event that arrived at `time`, ms since 1970. */
+export function reduce(state: State, event: ServerEvent, time: number): Partial<State> {
   if (state.doc) {
     const doc = changed(state.doc, event);
     if (doc !== state.doc) return { doc, ...lists(state, event), ui: stillThere(state, doc) };
@@ -39,7 +46,7 @@ export function reduce(state: State, event: ServerEvent): Partial<State> {
       return open(state, opened(event.data.scene, event.data.project));
     case "SceneClosed":
     case "ProjectClosed":
-      // Closed for good when the lists are shown next; a project that is about to run stays on the screen.
+      // The document leaves the screen with ShowMainScreen; a project that is about to run stays.
       return { live: OFFLINE };
     case "ShowMainScreen":
       return {
@@ -56,11 +63,11 @@ export function reduce(state: State, event: ServerEvent): Partial<State> {
     case "ObjectsLocked":
       return {
         locks: { ...state.locks, ...Object.fromEntries(event.data.object_ids.map((id) => [id, event.data.owner])) },
-        // Who is told again of the same owner does not hold it anew.
+        // A repeated event about the same owner does not restart the time.
         lockedAt: {
           ...state.lockedAt,
           ...Object.fromEntries(
-            event.data.object_ids.filter((id) => state.locks[id] !== event.data.owner).map((id) => [id, Date.now()]),
+            event.data.object_ids.filter((id) => state.locks[id] !== event.data.owner).map((id) => [id, time]),
           ),
         },
       };
@@ -102,22 +109,23 @@ export function reduce(state: State, event: ServerEvent): Partial<State> {
       return viewState(state, event.data);
     case "Notification": {
       const level = event.data.level === "Info" ? "info" : event.data.level === "Warn" ? "warn" : "error";
-      return notice(state, level, event.data.message);
+      return notice(state, level, translate({ ...event.data, text: event.data.message }), time);
     }
     case "TaskState":
-      return { tasks: put(state.tasks, event.data.id, event.data), ...over(state, event.data) };
+      return { tasks: put(state.tasks, event.data.id, event.data), ...over(state, event.data, time) };
     default:
-      return live(state, event) ?? program(state, event) ?? {};
+      return live(state, event, time) ?? program(state, event) ?? {};
   }
 }
 
-/** Work that is over is remembered among what was told. */
-function over(state: State, { title, state: how, message }: TaskStateData): Pick<State, "said"> | object {
+/** Add a finished task to the stored messages. */
+function over(state: State, { title, state: how, message }: TaskStateData, time: number): Pick<State, "said"> | object {
   if (how === "running") return {};
   const { said } = notice(
     state,
     how === "failed" ? "error" : "info",
-    `${title}: ${how}.${message ? ` ${message}` : ""}`,
+    message ? t`${title}: ${how}. ${message}` : t`${title}: ${how}.`,
+    time,
   );
   return { said };
 }
@@ -128,12 +136,12 @@ function open(state: State, doc: NonNullable<State["doc"]>): Partial<State> {
   return { ...CLOSED, doc, ui: shut(state) };
 }
 
-/** The screen without what belonged to the document that was open. */
+/** Return the screen state without what belonged to the open document. */
 function shut(state: State): State["ui"] {
   return { ...state.ui, selection: null, connecting: null, ghost: null, mode: "3d", tool: "" };
 }
 
-/** The selection, unless what was selected is gone. */
+/** Return the screen state, without the selection if the selected item no longer exists. */
 function stillThere(state: State, doc: NonNullable<State["doc"]>): State["ui"] {
   const selection = state.ui.selection;
   if (!selection) return state.ui;
@@ -143,7 +151,7 @@ function stillThere(state: State, doc: NonNullable<State["doc"]>): State["ui"] {
   return there ? state.ui : { ...state.ui, selection: null };
 }
 
-/** What the lists of the home screen become. */
+/** Return the lists of the home screen after an event. */
 function lists(state: State, event: ServerEvent): Partial<State> {
   const removed = event.change_type === "remove";
   const merged = <T extends { id: string }>(items: T[] | null, item: T): T[] | null => {
@@ -179,13 +187,12 @@ function viewState(state: State, data: import("../protocol/types").ViewState): P
   return { view: { ...state.view, [part]: values } };
 }
 
-/** The scene in operation; null when the event is about something else. */
-
 function isAnswering(objects: State["live"]["objects"]): boolean {
   return Object.values(objects).every((each) => each.answering !== false);
 }
 
-function live(state: State, event: ServerEvent): Partial<State> | null {
+/** Return the state of the online scene; null if the event concerns something else. */
+function live(state: State, event: ServerEvent, time: number): Partial<State> | null {
   const now = state.live;
   const become = (change: Partial<typeof now>) => ({ live: { ...now, ...change } });
   switch (event.event) {
@@ -206,11 +213,12 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
             state,
             "error",
             t`The devices do not answer: the process that controls them is frozen or overloaded. If a robot is moving, use the emergency stop.`,
+            time,
           ),
         };
       return {
         ...become({ objects }),
-        ...(event.data.state === "offline" ? {} : notice(state, "info", t`The devices are answering again.`)),
+        ...(event.data.state === "offline" ? {} : notice(state, "info", t`The devices are answering again.`, time)),
       };
     }
     case "ObjectHealth":
@@ -234,7 +242,8 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
             ? event.data.joints_id
             : "";
       const motions = put(now.motions, robot_id, { phase, goal, message: message ?? "" });
-      const told = phase === "failed" ? notice(state, "error", message || t`The robot did not reach its goal.`) : {};
+      const told =
+        phase === "failed" ? notice(state, "error", message || t`The robot did not reach its goal.`, time) : {};
       return { ...become({ moving, motions }), ...told };
     }
     case "ActionExecution":
@@ -242,15 +251,15 @@ function live(state: State, event: ServerEvent): Partial<State> | null {
     case "ActionResult":
       return {
         ...become({ executing: "", result: event.data }),
-        tried: [...state.tried, { ...event.data, time: Date.now() }].slice(-TRIED),
+        tried: [...state.tried, { ...event.data, time }].slice(-TRIED),
       };
     case "ActionCancelled":
       return become({ executing: "" });
     case "ProcessState": {
       const { id, state: phase, message } = event.data;
-      // The task of it says the same, and stays; an older server has none.
+      // The task reports the same; an older server has no tasks.
       const told = Object.values(state.tasks).some((each) => each.kind === "calibration");
-      return phase === "failed" && !told ? notice(state, "error", message || t`${id} failed.`) : {};
+      return phase === "failed" && !told ? notice(state, "error", message || t`${id} failed.`, time) : {};
     }
     default:
       return null;
@@ -266,7 +275,7 @@ export function withRuns(program: State["program"], added: Run[]): State["progra
   return { ...program, runs, watched };
 }
 
-/** The program in operation; null when the event is about something else. */
+/** Return the state of the running program; null if the event concerns something else. */
 function program(state: State, event: ServerEvent): Partial<State> | null {
   const now = state.program;
   const become = (change: Partial<typeof now>) => ({ program: { ...now, ...change } });

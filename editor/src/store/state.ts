@@ -209,6 +209,14 @@ export interface Ui {
   systemDark: boolean;
   leftHanded: boolean;
   quality: "auto" | "low" | "high";
+  /** The dialog that is open over the screen. */
+  overlay: "" | "search" | "about" | "messages";
+  /** Tabs that were open last. */
+  robotTab: "tool" | "joints" | "hand" | "go";
+  programTab: "add" | "steps" | "problems" | "parameters";
+  /** Keys of the actions and commands used last, newest first. */
+  recentActions: readonly string[];
+  recentCommands: readonly string[];
 }
 
 export interface State {
@@ -230,7 +238,9 @@ export interface State {
   view: { user: Record<string, unknown>; shared: Record<string, unknown>; general: Record<string, unknown> };
   live: Live;
   program: Program;
-  /** Actions that were tried, the newest last. */
+  /** Last known values of dynamic parameters, so that they can be chosen offline too. */
+  dynamicValues: Record<string, string[]>;
+  /** Results of actions that were run alone, newest last. */
   tried: Tried[];
   tasks: Record<string, TaskStateData>;
   notices: Notice[];
@@ -283,6 +293,7 @@ export function initialState(): State {
     tasks: {},
     notices: [],
     said: [],
+    dynamicValues: {},
     ui: {
       selection: null,
       mode: "3d",
@@ -294,6 +305,11 @@ export function initialState(): State {
       systemDark: false,
       leftHanded: false,
       quality: "auto",
+      overlay: "",
+      robotTab: "tool",
+      programTab: "add",
+      recentActions: [],
+      recentCommands: [],
     },
   };
 }

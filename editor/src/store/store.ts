@@ -1,4 +1,4 @@
-/** The one store, and how React looks at it. */
+/** The store of the editor, and the hook by which React reads it. */
 
 import { useStore } from "zustand";
 import { createStore } from "zustand/vanilla";
@@ -8,7 +8,7 @@ import { type Connection, initialState, type Notice, type Selection, type State,
 
 export const store = createStore<State>(initialState);
 
-/** Look at a part of the state; the component is drawn again when that part is another one. */
+/** Return a part of the state; the component is rendered again when that part changes. */
 export function useEditor<T>(select: (state: State) => T): T {
   return useStore(store, select);
 }
@@ -16,7 +16,7 @@ export function useEditor<T>(select: (state: State) => T): T {
 export const now = (): State => store.getState();
 
 export function applyEvent(event: ServerEvent): void {
-  store.setState((state) => reduce(state, event));
+  store.setState((state) => reduce(state, event, Date.now()));
 }
 
 export function setConnection(change: Partial<Connection>): void {
@@ -32,7 +32,7 @@ export function select(selection: Selection | null): void {
 }
 
 export function tell(level: Notice["level"], text: string): void {
-  store.setState((state) => notice(state, level, text));
+  store.setState((state) => notice(state, level, text, Date.now()));
 }
 
 export function dismiss(id: number): void {

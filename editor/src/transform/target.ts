@@ -1,8 +1,8 @@
 /** What can be moved, where it is, and by which request it gets elsewhere. */
 
 import { t } from "@lingui/core/macro";
-import { barred } from "../commands/asking";
 import type { ObjectModel, Pose } from "../protocol/types";
+import { barred } from "../store/permissions";
 import { heldBy, isOnline, isRunning } from "../store/selectors";
 import type { Selection, State } from "../store/state";
 import { composed, ORIGIN, worldOf } from "../viewmodel/frames";

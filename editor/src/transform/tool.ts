@@ -1,5 +1,6 @@
 /** How the transform tool is set: units, steps, whose axes, what it snaps to. The user finds it again on every tablet. */
 
+import { memoized } from "../store/memo";
 import type { State } from "../store/state";
 import { ANGLE_UNITS, type AngleUnit, LENGTH_UNITS, type LengthUnit } from "./amounts";
 import type { FrameName } from "./placing";
@@ -34,13 +35,11 @@ export const DEFAULTS: ToolSettings = {
 
 const FRAMES: readonly FrameName[] = ["world", "parent", "robot", "own", "view"];
 const SNAPS: readonly Snap[] = ["none", "grid", "surface", "point"];
-let last: { kept: unknown; settings: ToolSettings } = { kept: undefined, settings: DEFAULTS };
+const settingsMemo = memoized((stored: unknown): ToolSettings => ({ ...DEFAULTS, ...understood(stored) }));
 
-/** The settings, the same object while they are the same; what another version has kept is taken as far as it is understood. */
+/** Return the settings; the same object while they do not change. Unknown values of another version are ignored. */
 export function toolSettings(state: State): ToolSettings {
-  const kept = state.view.general[TOOL];
-  if (kept !== last.kept) last = { kept, settings: { ...DEFAULTS, ...understood(kept) } };
-  return last.settings;
+  return settingsMemo(state.view.general[TOOL]);
 }
 
 function understood(kept: unknown): Partial<ToolSettings> {

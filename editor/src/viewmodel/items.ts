@@ -238,7 +238,7 @@ function link(item: LogicItem, base: Omit<LinkItem, "kind" | "from" | "to" | "co
       : condition.value === "false"
         ? "false"
         : "value";
-  const words = branch === "true" ? "yes" : branch === "false" ? "no" : condition ? plain(condition.value) : "";
+  const words = branch === "true" ? t`yes` : branch === "false" ? t`no` : condition ? plain(condition.value) : "";
   return { ...base, kind: "logic", from: item.start, to: item.end, condition: words, branch };
 }
 

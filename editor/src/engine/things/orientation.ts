@@ -12,7 +12,8 @@ import {
   type Vector3,
 } from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
-import type { Batch, Instance } from "../batches";
+import type { Instance } from "../baked";
+import type { Batch } from "../batches";
 import type { OrientationItem } from "../items";
 import { setOrientation } from "../poses";
 import { type Context, Thing } from "../thing";

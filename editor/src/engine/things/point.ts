@@ -2,7 +2,8 @@
 
 import { t } from "@lingui/core/macro";
 import { Matrix4, MeshLambertMaterial, Object3D, SphereGeometry, Vector3 } from "three";
-import type { Batch, Instance } from "../batches";
+import type { Instance } from "../baked";
+import type { Batch } from "../batches";
 import type { PointItem } from "../items";
 import { setPosition } from "../poses";
 import { type Context, Thing } from "../thing";

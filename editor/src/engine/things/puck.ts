@@ -17,7 +17,8 @@ import {
   Vector3,
 } from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
-import type { Batch, Instance } from "../batches";
+import type { Instance } from "../baked";
+import type { Batch } from "../batches";
 import type { PuckItem, ReachShown } from "../items";
 import { type Context, Thing } from "../thing";
 

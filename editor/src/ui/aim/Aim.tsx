@@ -8,9 +8,9 @@ import { bearingOf } from "../../engine/bearing";
 import type { Engine } from "../../engine/engine";
 import { followCross, nextCandidate, useAiming } from "../../session/aiming";
 import { now, useEditor } from "../../store/store";
+import { kindName, nameOf, selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
-import { kindName, nameOf, selectionOf } from "../names";
-import { writing } from "../search/Overlays";
+import { isTyping } from "../search/overlay";
 import { pick } from "../workplace/pick";
 
 const NOTHING = msg`Nothing at the crosshair. Turn the view.`;
@@ -40,7 +40,13 @@ export function Aim({ engine }: { engine: Engine }) {
   useEffect(() => engine.invalidate(), [engine, chosen]);
   useEffect(() => {
     const key = (event: KeyboardEvent) => {
-      if (event.ctrlKey || event.metaKey || event.altKey || writing(event.target) || document.querySelector(".overlay"))
+      if (
+        event.ctrlKey ||
+        event.metaKey ||
+        event.altKey ||
+        isTyping(event.target) ||
+        document.querySelector(".overlay")
+      )
         return;
       if (event.key.toLowerCase() === "n") nextCandidate(event.shiftKey ? -1 : 1);
       // Enter is that of what has the focus, but of the view.

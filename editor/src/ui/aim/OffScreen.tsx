@@ -5,7 +5,7 @@ import { useLayoutEffect, useRef, useState } from "react";
 import { bearingOf, lookAt } from "../../engine/bearing";
 import type { Engine } from "../../engine/engine";
 import { useEditor } from "../../store/store";
-import { nameOf } from "../names";
+import { nameOf } from "../../viewmodel/names";
 import { atEdge, type Rect } from "./edge";
 
 /** What stands at the edge of the view. */

@@ -17,7 +17,7 @@ import { ToolTab } from "../robot/ToolTab";
 import "../points/points.css";
 import "../robot/robot.css";
 import "./calibrate.css";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 
 /** How well the points so far fit: `of` are the points that it is about. */
 interface Fit {

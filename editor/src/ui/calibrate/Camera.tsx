@@ -10,7 +10,7 @@ import { OnOff } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { RefusedText, useAsking } from "../points/Doing";
 import { useWhyNot } from "../points/editing";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { Records } from "./Records";
 import "./calibrate.css";
 

@@ -9,17 +9,17 @@ import { chosenRobot, effectorPose, notReady } from "../../commands/robot";
 import { translated } from "../../i18n/choices";
 import type { Pivot, Position } from "../../protocol/types";
 import { now, useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { OneOf, OnOff } from "../kit/fields";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { nameOf } from "../names";
 import { RefusedText, useAsking } from "../points/Doing";
 import { useWhyNot } from "../points/editing";
 import { RobotChooser } from "../robot/RobotChooser";
 import { useTelemetry } from "../robot/useTelemetry";
 import "../points/points.css";
 import "../robot/robot.css";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 
 const PIVOTS: readonly (readonly [Pivot, MessageDescriptor])[] = [
   ["top", msg`Top`],

@@ -5,7 +5,7 @@ import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { type CalibrationRecord, recordsOf } from "../../commands/calibrate";
 import { useEditor } from "../../store/store";
-import { nameOf } from "../names";
+import { nameOf } from "../../viewmodel/names";
 import { BeforeAfter } from "./BeforeAfter";
 import "./calibrate.css";
 

@@ -6,12 +6,12 @@ import { calibrateRobot } from "../../commands/calibrate";
 import { notReady } from "../../commands/robot";
 import { derivesFrom } from "../../store/selectors";
 import { useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { OnOff, Pick } from "../kit/fields";
 import { Button } from "../kit/kit";
-import { nameOf } from "../names";
 import { RefusedText, useAsking } from "../points/Doing";
 import { useWhyNot } from "../points/editing";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { Records } from "./Records";
 
 const RobotByCamera: Section["Body"] = ({ selection: { id } }) => {

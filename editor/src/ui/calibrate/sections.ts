@@ -5,7 +5,7 @@ import type { SceneObject } from "../../protocol/types";
 import { derivesFrom } from "../../store/selectors";
 import type { Selection, State } from "../../store/state";
 import { lazily } from "../kit/lazily";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 
 /** For objects of a scene that is open by itself. */
 const inScene = (wanted: (state: State, object: SceneObject) => boolean) => (selection: Selection, state: State) => {

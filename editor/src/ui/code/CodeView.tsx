@@ -2,9 +2,9 @@
 
 import { t } from "@lingui/core/macro";
 import { useCallback, useEffect, useMemo, useState } from "react";
-import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { remembered } from "../../session/memory";
+import { barred } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import { select, tell, useEditor } from "../../store/store";
 import { Button, Waiting } from "../kit/kit";

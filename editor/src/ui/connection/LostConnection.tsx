@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
-import { client } from "../../session/session";
+import { client } from "../../session/connection";
 import { now, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";

@@ -17,7 +17,7 @@ import { connect, endStep, notEditable, removeAction, removeStep } from "../../c
 import { cannotLead } from "../../program/logic";
 import { problemsOf } from "../../program/problems";
 import { now, select, setUi, tell, useEditor } from "../../store/store";
-import { selectionOf } from "../names";
+import { selectionOf } from "../../viewmodel/names";
 import { conditionOf, FlowNode, type FlowNodeType } from "./FlowNode";
 import { foldAll, unfold, useFolds } from "./folding";
 import { type Box, firstIn, graphOf, lastIn } from "./graph";

@@ -2,7 +2,6 @@
 
 import { plural, t } from "@lingui/core/macro";
 import { useRef, useState } from "react";
-import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { downloadPackage } from "../../commands/packages";
 import { runPackage } from "../../commands/run";
@@ -10,10 +9,13 @@ import { keepOwnPicture, useOwn } from "../../commands/thumbnail";
 import { keepGeneral } from "../../commands/viewstate";
 import type { Entry } from "../../home/entries";
 import type { Requests, Run } from "../../protocol/types";
+import { barred } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import { now, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
-import { AskName, Button, type Choice, More } from "../kit/kit";
+import { Button } from "../kit/kit";
+import { AskName, More } from "../kit/loaded";
+import type { Choice } from "../kit/props";
 import { endName } from "../run/History";
 import { ago } from "../times";
 import { Deleting } from "./Deleting";

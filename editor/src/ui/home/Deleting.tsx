@@ -4,7 +4,8 @@ import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import * as documents from "../../commands/documents";
 import type { Entry } from "../../home/entries";
-import { Button, Confirm } from "../kit/kit";
+import { Button } from "../kit/kit";
+import { Confirm } from "../kit/loaded";
 
 const DELETE = { scene: documents.deleteScene, project: documents.deleteProject, package: documents.deletePackage };
 

@@ -2,13 +2,15 @@
 
 import { plural, t } from "@lingui/core/macro";
 import { useState } from "react";
-import { barred, sentence } from "../../commands/asking";
+import { sentence } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { faultyObjects, takeOut } from "../../commands/mend";
 import type { Entry } from "../../home/entries";
+import { barred } from "../../store/permissions";
 import { tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
-import { Button, Confirm } from "../kit/kit";
+import { Button } from "../kit/kit";
+import { Confirm } from "../kit/loaded";
 
 interface ProblemsProps {
   entry: Entry;

@@ -2,8 +2,8 @@
 
 import { t } from "@lingui/core/macro";
 import { useRef, useState } from "react";
-import { barred } from "../../commands/asking";
 import { uploadPackage } from "../../commands/packages";
+import { barred } from "../../store/permissions";
 import { tell, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 

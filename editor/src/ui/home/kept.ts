@@ -1,20 +1,19 @@
-/** What the server keeps of the lists: what a user has opened last, and what all take as a template. */
+/** Documents opened recently by the user, and templates shared by all users. Both are stored on the server. */
 
 import { keepGeneral } from "../../commands/viewstate";
 import { beyond, type Opened, openedOf } from "../../home/opened";
+import { memoized } from "../../store/memo";
 import type { State } from "../../store/state";
 import { now } from "../../store/store";
 
-let last: { kept: unknown; opened: Opened } = { kept: undefined, opened: [] };
+const openedMemo = memoized(openedOf);
 
-/** Documents that the user has opened, the last first; the same list while it is the same. */
+/** Return the documents that the user opened, newest first; the same list while it does not change. */
 export function recentOf(state: State): Opened {
-  const { general } = state.view;
-  if (general !== last.kept) last = { kept: general, opened: openedOf(general) };
-  return last.opened;
+  return openedMemo(state.view.general);
 }
 
-/** One key each, so that two tablets of one user take nothing from each other. */
+/** Store that the user opened a document. Each document has its own key, so that two devices do not overwrite each other. */
 export function keepRecent(id: string): void {
   const forgotten = beyond(recentOf(now()), id).map((each) => [`opened/${each}`, null] as const);
   keepGeneral({ ...Object.fromEntries(forgotten), [`opened/${id}`]: Date.now() });

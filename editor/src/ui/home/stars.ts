@@ -1,12 +1,11 @@
-/** What a user has marked for himself, on whichever tablet. */
+/** The favorites of the user, stored on the server. */
 
+import { memoized } from "../../store/memo";
 import type { State } from "../../store/state";
 
-let last: { kept: unknown; stars: ReadonlySet<string> } = { kept: undefined, stars: new Set() };
+const setOf = memoized((stored: unknown): ReadonlySet<string> => new Set(Array.isArray(stored) ? stored : []));
 
-/** The same set while it is the same. */
+/** Return the ids of the favorites; the same set while they do not change. */
 export function starsOf(state: State): ReadonlySet<string> {
-  const kept = state.view.general.stars;
-  if (kept !== last.kept) last = { kept, stars: new Set(Array.isArray(kept) ? (kept as string[]) : []) };
-  return last.stars;
+  return setOf(state.view.general.stars);
 }

@@ -4,35 +4,13 @@ import { t } from "@lingui/core/macro";
 import { type FormEvent, type ReactNode, useState } from "react";
 import { Dialog, Heading, Modal, ModalOverlay } from "react-aria-components";
 import { Button, Field } from "./kit";
+import type { AskNameProps, ConfirmProps } from "./props";
 
 interface WindowProps {
   title: string;
   onClose: () => void;
   children: ReactNode;
   role?: "dialog" | "alertdialog";
-}
-
-export interface ConfirmProps {
-  title: string;
-  children: ReactNode;
-  /** What the button says that does it. */
-  yes: string;
-  /** Why it cannot be done now, as a sentence. */
-  not?: string;
-  onYes: () => void;
-  onClose: () => void;
-}
-
-export interface AskNameProps {
-  title: string;
-  label?: string;
-  initial?: string;
-  yes: string;
-  /** Names that there are already. */
-  taken?: string[];
-  children?: ReactNode;
-  onYes: (name: string) => void;
-  onClose: () => void;
 }
 
 /** A window over all others. `onClose` is called by Escape and by a tap beside it, too. */

@@ -1,7 +1,7 @@
-/** Controls of all screens: react-aria's behaviour in our clothes. */
+/** Controls of all screens, made of react-aria components. */
 
 import { t } from "@lingui/core/macro";
-import { type ReactNode, Suspense } from "react";
+import type { ReactNode } from "react";
 import {
   Button as AriaButton,
   type ButtonProps,
@@ -12,18 +12,8 @@ import {
   type TextFieldProps,
 } from "react-aria-components";
 import { tell } from "../../store/store";
-import type { AskNameProps, ConfirmProps } from "./dialogs";
 import { Icon, type IconName } from "./icons";
-import { lazily } from "./lazily";
-import type { MoreProps } from "./menu";
-
-export type { Choice } from "./menu";
-
-const ConfirmDialog = lazily(() => import("./dialogs").then((module) => ({ default: module.Confirm })));
-const AskNameDialog = lazily(() => import("./dialogs").then((module) => ({ default: module.AskName })));
-const MoreMenu = lazily(() => import("./menu"));
-
-export type Look = "" | "primary" | "plain" | "danger";
+import type { Look } from "./props";
 
 interface PlainButtonProps extends Omit<ButtonProps, "children" | "className"> {
   look?: Look;
@@ -64,40 +54,6 @@ export function Field({
       {hint && <span className="quiet small">{hint}</span>}
       <FieldError className="error" />
     </TextField>
-  );
-}
-
-/** Asks before something that cannot be taken back. */
-export function Confirm(props: ConfirmProps) {
-  return (
-    <Suspense fallback={null}>
-      <ConfirmDialog {...props} />
-    </Suspense>
-  );
-}
-
-/** Asks for a name. */
-export function AskName(props: AskNameProps) {
-  return (
-    <Suspense fallback={null}>
-      <AskNameDialog {...props} />
-    </Suspense>
-  );
-}
-
-/** A button that opens a list of further actions. The list's code comes when the page has nothing better to do. */
-export function More(props: MoreProps) {
-  const { label, icon = "more", children, look = "plain" } = props;
-  return (
-    <Suspense
-      fallback={
-        <Button look={look} icon={icon} aria-label={label}>
-          {children}
-        </Button>
-      }
-    >
-      <MoreMenu {...props} />
-    </Suspense>
   );
 }
 

@@ -1,26 +1,9 @@
 /** The list that `More` of kit.tsx opens; a chunk of its own. */
 
-import type { ReactNode } from "react";
 import { Menu, MenuItem, MenuTrigger, Popover } from "react-aria-components";
-import { Icon, type IconName } from "./icons";
-import { Button, type Look } from "./kit";
-
-export interface Choice {
-  id: string;
-  label: string;
-  icon?: IconName;
-  /** Why it cannot be chosen now. */
-  not?: string;
-  act: () => void;
-}
-
-export interface MoreProps {
-  label: string;
-  choices: Choice[];
-  icon?: IconName;
-  children?: ReactNode;
-  look?: Look;
-}
+import { Icon } from "./icons";
+import { Button } from "./kit";
+import type { MoreProps } from "./props";
 
 export default function MoreMenu({ label, choices, icon = "more", children, look = "plain" }: MoreProps) {
   const barred = choices.filter((each) => each.not).map((each) => each.id);

@@ -13,7 +13,7 @@ import { isLive } from "../../store/selectors";
 import { dismiss, store, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { openOverlay } from "../search/Overlays";
+import { openOverlay } from "../search/overlay";
 import "./notices.css";
 
 /** How long a message that is not an error stays, s. */

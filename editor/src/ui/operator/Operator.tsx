@@ -5,18 +5,18 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { barred } from "../../commands/asking";
 import * as commands from "../../commands/run";
 import { keepGeneral } from "../../commands/viewstate";
 import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
-import { tellPresence } from "../../session/presence";
+import { session } from "../../session/session";
 import { usersOfDocument } from "../../store/left";
+import { barred } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
-import { now, useEditor } from "../../store/store";
+import { useEditor } from "../../store/store";
+import { nameOf, withNames } from "../../viewmodel/names";
 import { Icon, type IconName } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { nameOf, withNames } from "../names";
 import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
 import { endName, History } from "../run/History";
@@ -65,10 +65,10 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
   const result = resultOf(run ?? undefined);
   useTicking();
   const { tone, word, icon } = shownState(state, starting, result);
-  // Which screen is shown is no part of the state that the presence follows.
+  // The shown screen is not part of the state, so the session does not notice the change by itself.
   useEffect(() => {
-    tellPresence(now(), now);
-    return () => tellPresence(now(), now);
+    session.reportPresence();
+    return () => session.reportPresence();
   }, []);
   const opened = doc && !runs ? (doc.project?.name ?? doc.scene.name) : "";
   const users = usersOfDocument(state);

@@ -2,13 +2,13 @@
 
 import { plural, t } from "@lingui/core/macro";
 import { Suspense, useState } from "react";
-import { serves } from "../../session/session";
+import { serves } from "../../session/connection";
 import { goneHolders } from "../../store/left";
 import { now, useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { lazily } from "../kit/lazily";
-import { nameOf } from "../names";
 import { colourOf, initials } from "./colours";
 import "./people.css";
 

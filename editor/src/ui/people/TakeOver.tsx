@@ -2,11 +2,12 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { ask, barred } from "../../commands/asking";
+import { ask } from "../../commands/asking";
 import type { LockHolder } from "../../protocol/types";
+import { barred } from "../../store/permissions";
 import { now, tell, useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { Confirm } from "../kit/dialogs";
-import { nameOf } from "../names";
 import { ago, clock } from "../times";
 
 export default function TakeOver({ user, onClose }: { user: string; onClose: () => void }) {

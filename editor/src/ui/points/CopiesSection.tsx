@@ -6,7 +6,7 @@ import { copyPoint } from "../../commands/points";
 import type { Position } from "../../protocol/types";
 import { Amount } from "../kit/fields";
 import { Button } from "../kit/kit";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { RefusedText, useAsking } from "./Doing";
 import { useWhyNot } from "./editing";
 

@@ -6,12 +6,12 @@ import { chosenRobot, hideGhost, moveToTaught, notReady, showAt, showJoints } fr
 import { theEngine } from "../../session/engine";
 import { now, useEditor } from "../../store/store";
 import { worldOf } from "../../viewmodel/frames";
+import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
-import { nameOf } from "../names";
 import { Answer } from "../robot/GoTab";
 import { MannerFields } from "../robot/MannerFields";
 import { mannerNow, useManner } from "../robot/manner";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { RefusedText, useAsking } from "./Doing";
 import "../robot/robot.css";
 

@@ -5,11 +5,11 @@ import { removeOrientation, renameOrientation, turnOrientation, turnOrientationT
 import { chosenRobot, notReady } from "../../commands/robot";
 import { select, useEditor } from "../../store/store";
 import { fromRollPitchYaw } from "../../viewmodel/frames";
+import { nameOf } from "../../viewmodel/names";
 import { rollPitchYaw } from "../../viewmodel/rotations";
 import { Amount } from "../kit/fields";
 import { Button } from "../kit/kit";
-import { nameOf } from "../names";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { RefusedText, useAsking } from "./Doing";
 import { useWhyNot } from "./editing";
 import { NameField } from "./NameField";

@@ -7,11 +7,11 @@ import { movePointToRobot, possibleParents, removePoint, renamePoint, setParent 
 import { chosenRobot, featuresOf, notReady } from "../../commands/robot";
 import { keepView } from "../../commands/viewstate";
 import { useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { Pick } from "../kit/fields";
 import { Button } from "../kit/kit";
-import { nameOf } from "../names";
 import { HoldButton } from "../robot/HoldButton";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { RefusedText, useAsking } from "./Doing";
 import { useWhyNot } from "./editing";
 import { NameField } from "./NameField";

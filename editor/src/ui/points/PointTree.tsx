@@ -7,8 +7,8 @@ import { possibleParents, setParent } from "../../commands/points";
 import { theEngine } from "../../session/engine";
 import type { OpenDocument } from "../../store/state";
 import { now, select, setUi, tell, useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
-import { nameOf } from "../names";
 import { ReachBadge } from "./Reach";
 
 const WORLD = "world";

@@ -6,7 +6,7 @@ import { reachOfAction, worse } from "../../program/reach";
 import type { Reach, ReachOfItem } from "../../protocol/types";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
-import { nameOf } from "../names";
+import { nameOf } from "../../viewmodel/names";
 import "./reach.css";
 
 const SIGNS: Record<Reach, string> = {

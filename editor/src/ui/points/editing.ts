@@ -1,8 +1,8 @@
 /** Why something of the open document cannot be changed by this user just now. */
 
 import { t } from "@lingui/core/macro";
-import { barred } from "../../commands/asking";
 import type { Requests } from "../../protocol/types";
+import { barred } from "../../store/permissions";
 import { heldBy, isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";

@@ -3,7 +3,7 @@
 import { msg } from "@lingui/core/macro";
 import type { Kind } from "../../store/state";
 import { lazily } from "../kit/lazily";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 
 const of =
   (...kinds: Kind[]): Section["applies"] =>

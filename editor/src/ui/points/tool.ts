@@ -2,7 +2,7 @@
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";
-import type { Tool } from "../workplace/tools";
+import type { Tool } from "../workplace/tool";
 
 export const points: Tool = {
   id: "points",

@@ -17,9 +17,9 @@ import { decoded, extraOf, initial, SIMPLE, type Source, sourceOf, typeName } fr
 import type { ActionParameter, ParameterMeta } from "../../protocol/types";
 import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
-import { nameOf } from "../names";
+import { nameOf } from "../../viewmodel/names";
 import { ReachOfAction } from "../points/Reach";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { type Choice, ValueField } from "./ValueField";
 import "./program.css";
 

@@ -19,13 +19,12 @@ import { addAction, notEditable, type Where } from "../../commands/program";
 import { words } from "../../program/naming";
 import type { ObjectAction } from "../../protocol/types";
 import type { State } from "../../store/state";
-import { now, tell, useEditor } from "../../store/store";
+import { now, setUi, tell, useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
-import { nameOf } from "../names";
 import { CATEGORY_ICONS } from "./categories";
 
-/** `<object id>/<action>`, the newest first; while the page is open. */
-let recent: string[] = [];
+/** Number of actions that are offered again. */
 const RECENT = 4;
 
 interface Offer {
@@ -44,6 +43,7 @@ export function AddAction() {
   const online = useEditor((state) => state.live.state === "started");
   const selected = useEditor(pointOfSelection);
   const pointName = useEditor((state) => nameOf(state, selected));
+  const recent = useEditor((state) => state.ui.recentActions);
   const [search, setSearch] = useState("");
   const [anew, setAnew] = useState(false);
   const [busy, setBusy] = useState("");
@@ -63,7 +63,7 @@ export function AddAction() {
     const where = placeFor(onPoint);
     if (!where) return tell("info", t`Nothing at the crosshair. Aim at the table or an object.`);
     setBusy(offer.key);
-    recent = [offer.key, ...recent.filter((each) => each !== offer.key)].slice(0, RECENT);
+    setUi({ recentActions: [offer.key, ...recent.filter((each) => each !== offer.key)].slice(0, RECENT) });
     await addAction(offer.objectId, offer.meta, where);
     setBusy("");
   };

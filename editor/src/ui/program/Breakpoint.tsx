@@ -1,11 +1,11 @@
 /** The breakpoint of a point: the program pauses before every action that uses a pose or joints of it. */
 
 import { t } from "@lingui/core/macro";
-import { barred } from "../../commands/asking";
 import { breakAt } from "../../commands/run";
+import { barred } from "../../store/permissions";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import "./program.css";
 
 const Breakpoint: Section["Body"] = ({ selection: { id } }) => {

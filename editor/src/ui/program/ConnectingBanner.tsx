@@ -4,8 +4,8 @@ import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { cancelStep } from "../../commands/program";
 import { now, useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
-import { nameOf } from "../names";
 
 export default function ConnectingBanner() {
   const connecting = useEditor((state) => state.ui.connecting);

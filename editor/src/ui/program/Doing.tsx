@@ -2,15 +2,15 @@
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
-import { barred } from "../../commands/asking";
 import { stopMotion } from "../../commands/operation";
 import { duplicateAction, notEditable, removeAction, renameAction } from "../../commands/program";
 import { breakAt, cancel, execute, notRunnable, runTo } from "../../commands/run";
 import { metaOf } from "../../program/logic";
+import { barred } from "../../store/permissions";
 import { useEditor } from "../../store/store";
 import { Button, Field } from "../kit/kit";
 import { ago } from "../times";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { Values } from "./Values";
 import "./program.css";
 

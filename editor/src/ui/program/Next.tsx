@@ -15,11 +15,11 @@ import {
 import { runsOf } from "../../program/runs";
 import type { ProjectLogicIf } from "../../protocol/types";
 import { select, useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { fold } from "../flow/folding";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { nameOf } from "../names";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { ordered } from "./Steps";
 import "./program.css";
 

@@ -5,8 +5,8 @@ import { Button as AriaButton } from "react-aria-components";
 import type { Problem } from "../../program/problems";
 import { theEngine } from "../../session/engine";
 import { now, select, setUi, useEditor } from "../../store/store";
+import { selectionOf, withNames } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
-import { selectionOf, withNames } from "../names";
 
 export function Problems({ problems }: { problems: Problem[] }) {
   const known = useEditor((state) =>

@@ -1,11 +1,11 @@
-/** The panel of the program: one tab for each question that is asked of it. */
+/** The panel of the program: add actions, list them, check the program, edit variables. */
 
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
-import { useMemo, useState } from "react";
+import { useMemo } from "react";
 import { ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import { problemsOf } from "../../program/problems";
-import { useEditor } from "../../store/store";
+import { setUi, useEditor } from "../../store/store";
 import { AddAction } from "./AddAction";
 import { Parameters } from "./Parameters";
 import { Problems } from "./Problems";
@@ -15,11 +15,8 @@ import "./program.css";
 const TABS = { add: msg`Add`, steps: msg`Actions`, problems: msg`Check`, parameters: msg`Variables` } as const;
 type Tab = keyof typeof TABS;
 
-/** The tab that was open last is open again. */
-let last: Tab = "add";
-
 export default function ProgramPanel() {
-  const [tab, setTab] = useState<Tab>(last);
+  const tab = useEditor((state) => state.ui.programTab);
   const doc = useEditor((state) => state.doc);
   const types = useEditor((state) => state.types);
   const reach = useEditor((state) => state.reach);
@@ -34,8 +31,7 @@ export default function ProgramPanel() {
         disallowEmptySelection
         selectedKeys={[tab]}
         onSelectionChange={(keys) => {
-          last = [...keys][0] as Tab;
-          setTab(last);
+          setUi({ programTab: [...keys][0] as Tab });
         }}
       >
         {(Object.keys(TABS) as Tab[]).map((each) => (

@@ -5,7 +5,7 @@ import { aimedPlace } from "../../commands/aimed";
 import { notEditable, placePuck } from "../../commands/program";
 import { tell, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import "./program.css";
 
 const Puck: Section["Body"] = ({ selection: { id, kind } }) => {

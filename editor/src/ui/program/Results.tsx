@@ -9,7 +9,7 @@ import { usersOf } from "../../program/problems";
 import { typeName } from "../../program/values";
 import { select, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { ValueField } from "./ValueField";
 import "./program.css";
 

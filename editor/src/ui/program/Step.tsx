@@ -5,9 +5,9 @@ import { useState } from "react";
 import { beginStep, notEditable, removeStep, setCondition } from "../../commands/program";
 import { conditionsOf, linkTo, outgoing, placeOf, resultAt, START } from "../../program/logic";
 import { now, select, useEditor } from "../../store/store";
+import { nameOf, selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
-import { nameOf, selectionOf } from "../names";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { ValueField } from "./ValueField";
 import "./program.css";
 

@@ -3,16 +3,16 @@
 import { t } from "@lingui/core/macro";
 import { useMemo } from "react";
 import { Button as AriaButton, ToggleButton } from "react-aria-components";
-import { barred } from "../../commands/asking";
 import { breakAt } from "../../commands/run";
 import { keepView } from "../../commands/viewstate";
 import { conditionWords, incoming, outgoing, placeOf, START } from "../../program/logic";
 import type { Problem } from "../../program/problems";
 import { theEngine } from "../../session/engine";
+import { barred } from "../../store/permissions";
 import type { OpenDocument } from "../../store/state";
 import { select, setUi, tell, useEditor } from "../../store/store";
+import { nameOf, withNames } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
-import { nameOf, withNames } from "../names";
 import { ReachBadge } from "../points/Reach";
 
 export function Steps({ problems }: { problems: Problem[] }) {

@@ -24,7 +24,7 @@ export function Values({ names, values }: { names: string[]; values: string[] })
 function Value({ json }: { json: string }) {
   const image = pictureOf(json);
   if (image) return <img src={image} alt={t`Camera picture`} />;
-  const text = json === "true" ? "yes" : json === "false" ? "no" : plain(json);
+  const text = json === "true" ? t`yes` : json === "false" ? t`no` : plain(json);
   if (text.length <= SHORT) return text;
   return (
     <details>

@@ -2,7 +2,7 @@
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 
 const isAction: Section["applies"] = ({ kind }) => kind === "action";
 

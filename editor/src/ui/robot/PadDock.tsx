@@ -5,7 +5,7 @@ import { createContext, type ReactNode, useContext } from "react";
 import { createPortal } from "react-dom";
 import type { Chosen } from "../../commands/robot";
 import { useEditor } from "../../store/store";
-import { nameOf } from "../names";
+import { nameOf } from "../../viewmodel/names";
 
 /** What to know before the first hold. */
 export const HOLD_HINT = msg`Motion stops as soon as you release the button.`;

@@ -6,8 +6,8 @@ import { addPointFromRobot } from "../../commands/points";
 import { chosenRobot, notReady } from "../../commands/robot";
 import { isRunning } from "../../store/selectors";
 import { setUi, tell, useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
-import { nameOf } from "../names";
 import "./chip.css";
 
 export default function RobotChip() {

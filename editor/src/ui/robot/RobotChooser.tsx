@@ -4,8 +4,8 @@ import { t } from "@lingui/core/macro";
 import { armOf, chooseRobot, chosenRobot } from "../../commands/robot";
 import { robotsOf } from "../../session/streams";
 import { useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { Pick } from "../kit/fields";
-import { nameOf } from "../names";
 
 export function RobotChooser() {
   const chosen = useEditor(chosenRobot);

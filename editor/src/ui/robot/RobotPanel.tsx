@@ -4,9 +4,9 @@ import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { chosenRobot, notReady } from "../../commands/robot";
 import { translated } from "../../i18n/choices";
-import { useEditor } from "../../store/store";
+import { setUi, useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { OneOf } from "../kit/fields";
-import { nameOf } from "../names";
 import { GoTab } from "./GoTab";
 import { HandTab } from "./HandTab";
 import { JointsTab } from "./JointsTab";
@@ -18,21 +18,18 @@ import { Status } from "./Status";
 import { ToolTab } from "./ToolTab";
 import "./robot.css";
 
-const WAYS = [
+const TABS = [
   ["tool", msg`Tool`],
   ["joints", msg`Joints`],
   ["hand", msg`By hand`],
   ["go", msg`Go to`],
 ] as const;
 
-/** The way that was selected last, while the page is open. */
-let last: (typeof WAYS)[number][0] = "tool";
-
 export default function RobotPanel() {
   const chosen = useEditor(chosenRobot);
   const name = useEditor((state) => (chosen ? nameOf(state, chosen.robotId) : ""));
   const why = useEditor((state) => notReady(state, chosen));
-  const [way, setWay] = useState(last);
+  const tab = useEditor((state) => state.ui.robotTab);
   const [place, setPlace] = useState<HTMLElement | null>(null);
   if (!chosen) return <p className="quiet">{t`The scene has no robot.`}</p>;
   return (
@@ -50,18 +47,15 @@ export default function RobotPanel() {
         <OneOf
           label={t`Control`}
           quiet
-          value={way}
-          choices={translated(WAYS)}
-          onChange={(next) => {
-            last = next;
-            setWay(next);
-          }}
+          value={tab}
+          choices={translated(TABS)}
+          onChange={(robotTab) => setUi({ robotTab })}
         />
-        {way === "tool" && <ToolTab chosen={chosen} />}
-        {way === "joints" && <JointsTab chosen={chosen} />}
-        {way === "hand" && <HandTab chosen={chosen} />}
-        {way === "go" && <GoTab chosen={chosen} key={`${chosen.robotId}/${chosen.armId}/${chosen.effector}`} />}
-        {way !== "hand" && <MannerFields />}
+        {tab === "tool" && <ToolTab chosen={chosen} />}
+        {tab === "joints" && <JointsTab chosen={chosen} />}
+        {tab === "hand" && <HandTab chosen={chosen} />}
+        {tab === "go" && <GoTab chosen={chosen} key={`${chosen.robotId}/${chosen.armId}/${chosen.effector}`} />}
+        {tab !== "hand" && <MannerFields />}
         <Kinematics robotId={chosen.robotId} />
       </div>
       <div className="pad-dock" ref={setPlace} />

@@ -16,9 +16,9 @@ import {
 import type { Pose, Position, StepAxis } from "../../protocol/types";
 import { now, useEditor } from "../../store/store";
 import { worldOf } from "../../viewmodel/frames";
+import { nameOf } from "../../viewmodel/names";
 import { Amount, OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
-import { nameOf } from "../names";
 import { HoldButton } from "./HoldButton";
 import { ANGLES, DISTANCES, FASTEST, type FrameName, mannerNow, setManner, useManner } from "./manner";
 import { HOLD_HINT, PadDock } from "./PadDock";

@@ -4,9 +4,9 @@ import { t } from "@lingui/core/macro";
 import { lastRun, type Result, resultOf } from "../../program/results";
 import { theEngine } from "../../session/engine";
 import { now, select, setUi, useEditor } from "../../store/store";
+import { nameOf, selectionOf, withNames } from "../../viewmodel/names";
 import { Icon, type IconName } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { nameOf, selectionOf, withNames } from "../names";
 import { ago, useTicking } from "../times";
 
 export const ICONS: Record<Result["tone"], IconName> = { good: "check", bad: "warn", warn: "warn", "": "stop" };

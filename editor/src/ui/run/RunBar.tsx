@@ -2,11 +2,11 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
-import { barred } from "../../commands/asking";
 import * as commands from "../../commands/run";
+import { barred } from "../../store/permissions";
 import { useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
-import { nameOf } from "../names";
 
 const STATES: Record<string, MessageDescriptor> = {
   started: msg`Starting…`,

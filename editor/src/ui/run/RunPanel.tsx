@@ -2,13 +2,14 @@
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
-import { barred } from "../../commands/asking";
 import { notEditable } from "../../commands/program";
 import { breakAt, build, notRunnable, run } from "../../commands/run";
+import { barred } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import { select, setUi, useEditor } from "../../store/store";
-import { AskName, Button } from "../kit/kit";
-import { nameOf } from "../names";
+import { nameOf } from "../../viewmodel/names";
+import { Button } from "../kit/kit";
+import { AskName } from "../kit/loaded";
 import { History } from "./History";
 import { LastResult } from "./Result";
 import { phaseName, RunButtons } from "./RunBar";

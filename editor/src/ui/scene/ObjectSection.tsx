@@ -7,9 +7,10 @@ import { keepView } from "../../commands/viewstate";
 import { heldBy } from "../../store/selectors";
 import { now, useEditor } from "../../store/store";
 import { MoreOrLess, OnOff } from "../kit/fields";
-import { Button, Confirm } from "../kit/kit";
+import { Button } from "../kit/kit";
+import { Confirm } from "../kit/loaded";
 import { NameField } from "../points/NameField";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { putAside } from "./seeing";
 import "./scene.css";
 

@@ -7,7 +7,7 @@ import { heldBy } from "../../store/selectors";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { RefusedText, useAsking } from "../points/Doing";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 import { missing, parametersOf, SettingsFields, type Values } from "./Settings";
 
 const Body: Section["Body"] = ({ selection: { id } }) => {

@@ -2,11 +2,13 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { barred, whyNot } from "../../commands/asking";
+import { whyNot } from "../../commands/asking";
 import { deleteType, scenesUsing } from "../../commands/scene";
 import type { ObjectTypeMeta } from "../../protocol/types";
+import { barred } from "../../store/permissions";
 import { useEditor } from "../../store/store";
-import { Button, Confirm } from "../kit/kit";
+import { Button } from "../kit/kit";
+import { Confirm } from "../kit/loaded";
 import { RefusedText, useAsking } from "../points/Doing";
 
 export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: () => void }) {

@@ -2,7 +2,7 @@
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";
-import type { Section } from "../workplace/sections";
+import type { Section } from "../workplace/section";
 
 export const objectSections: readonly Section[] = [
   {

@@ -1,38 +1,24 @@
-/** What opens over every screen: the search for commands and things, by "/"; what this is and which keys there are, by "?"; what was told. */
+/** Dialogs that open over every screen: search ("/"), about and keys ("?"), messages. */
 
 import { Suspense, useEffect } from "react";
-import { create } from "zustand";
 import { lazily } from "../kit/lazily";
+import { isTyping, type Overlay, openOverlay, useOverlay } from "./overlay";
 
 const Palette = lazily(() => import("./Palette"));
 const About = lazily(() => import("./About"));
 const Messages = lazily(() => import("../notices/Messages"));
 
-type Open = "" | "search" | "about" | "messages";
-const useOpen = create<{ open: Open }>(() => ({ open: "" }));
-
-export function openOverlay(open: Open): void {
-  useOpen.setState({ open });
-}
-
-/** Whether a key is typed into something. */
-export function writing(target: EventTarget | null): boolean {
-  return (
-    target instanceof HTMLElement && (target.isContentEditable || /^(INPUT|TEXTAREA|SELECT)$/.test(target.tagName))
-  );
-}
-
 export function Overlays() {
-  const open = useOpen((state) => state.open);
+  const open = useOverlay();
   useEffect(() => {
     const key = (event: KeyboardEvent) => {
-      const wanted: Open = event.key === "/" ? "search" : event.key === "?" ? "about" : "";
+      const wanted: Overlay = event.key === "/" ? "search" : event.key === "?" ? "about" : "";
       if (
         !wanted ||
         event.ctrlKey ||
         event.metaKey ||
         event.altKey ||
-        writing(event.target) ||
+        isTyping(event.target) ||
         document.querySelector(".overlay")
       )
         return;

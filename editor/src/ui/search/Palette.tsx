@@ -1,20 +1,20 @@
-/** One field that finds every command and every thing by its name; a chunk of its own. */
+/** Search for commands and objects by name. */
 
 import { t } from "@lingui/core/macro";
 import { useMemo, useState } from "react";
 import { Autocomplete, Input, Label, ListBox, ListBoxItem, SearchField } from "react-aria-components";
-import { tell, useEditor } from "../../store/store";
+import { setUi, tell, useEditor } from "../../store/store";
 import { Window } from "../kit/dialogs";
 import { entriesOf } from "./entries";
 import { found } from "./found";
 import "./search.css";
 
-/** What was used last, while the page is open. */
-let recent: string[] = [];
+/** Number of commands that are offered again. */
 const REMEMBERED = 5;
 
 export default function Palette({ onClose }: { onClose: () => void }) {
   const state = useEditor((each) => each);
+  const recent = state.ui.recentCommands;
   const [search, setSearch] = useState("");
   const entries = useMemo(() => entriesOf(state), [state]);
   const shown = found(entries, search, recent);
@@ -26,7 +26,7 @@ export default function Palette({ onClose }: { onClose: () => void }) {
       tell("info", `${entry.words}: ${entry.why}`);
       return;
     }
-    recent = [id, ...recent.filter((each) => each !== id)].slice(0, REMEMBERED);
+    setUi({ recentCommands: [id, ...recent.filter((each) => each !== id)].slice(0, REMEMBERED) });
     entry.act();
   };
   return (

@@ -1,8 +1,8 @@
 /** One press: a file for whoever helps. */
 
 import { t } from "@lingui/core/macro";
-import { barred } from "../../commands/asking";
 import { saveDiagnosis } from "../../commands/diagnosis";
+import { barred } from "../../store/permissions";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { RefusedText, useAsking } from "../points/Doing";

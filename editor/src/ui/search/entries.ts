@@ -2,22 +2,22 @@
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
-import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { goOffline, goOnline, stopMotion } from "../../commands/operation";
 import { keepGeneral } from "../../commands/viewstate";
 import { aimsAlways } from "../../session/aiming";
 import { theEngine } from "../../session/engine";
 import { remember } from "../../session/memory";
-import { leave } from "../../session/session";
+import { session } from "../../session/session";
+import { barred } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { now, select, setUi } from "../../store/store";
+import { kindName, selectionOf } from "../../viewmodel/names";
 import { allOf, thingsOf } from "../../viewmodel/things";
-import { kindName, selectionOf } from "../names";
 import { TOOLS } from "../workplace/tools";
 import type { Entry } from "./found";
-import { openOverlay } from "./Overlays";
+import { openOverlay } from "./overlay";
 
 export function entriesOf(state: State): Entry[] {
   return [...(state.doc ? [...ofWorkplace(state), ...things(state)] : ofHome(state)), ...everywhere(state)];
@@ -143,6 +143,6 @@ function everywhere(state: State): Entry[] {
       why: "",
       act: () => openOverlay("about"),
     },
-    { id: "leave", words: t`Leave`, detail: t`command`, why: "", act: leave },
+    { id: "leave", words: t`Leave`, detail: t`command`, why: "", act: () => session.leave() },
   ];
 }

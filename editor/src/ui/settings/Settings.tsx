@@ -4,11 +4,12 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { remember, remembered } from "../../session/memory";
-import { leave } from "../../session/session";
+import { session } from "../../session/session";
 import type { Ui } from "../../store/state";
 import { setUi, useEditor } from "../../store/store";
-import { type Choice, More } from "../kit/kit";
-import { openOverlay } from "../search/Overlays";
+import { More } from "../kit/loaded";
+import type { Choice } from "../kit/props";
+import { openOverlay } from "../search/overlay";
 
 const THEMES: Record<Ui["theme"], MessageDescriptor> = {
   system: msg`System theme`,
@@ -67,7 +68,7 @@ export function Settings() {
     },
     { id: "messages", label: t`Messages`, icon: "list", act: () => openOverlay("messages") },
     { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
-    { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: leave },
+    { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: () => session.leave() },
   ];
   return <More label={t`Settings`} icon="settings" choices={choices} />;
 }

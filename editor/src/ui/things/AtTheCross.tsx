@@ -7,9 +7,9 @@ import { keepGeneral } from "../../commands/viewstate";
 import { aimsAlways, listAimed, useAiming } from "../../session/aiming";
 import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
+import { kindName, nameOf, selectionOf } from "../../viewmodel/names";
 import { OnOff } from "../kit/fields";
 import { Icon } from "../kit/icons";
-import { kindName, nameOf, selectionOf } from "../names";
 import { pick } from "../workplace/pick";
 import { ICONS } from "./ThingTree";
 

@@ -7,9 +7,9 @@ import { theEngine } from "../../session/engine";
 import { heldBy } from "../../store/selectors";
 import type { Kind } from "../../store/state";
 import { now, select, setUi, useEditor } from "../../store/store";
+import { selectionOf } from "../../viewmodel/names";
 import { flat, type Row } from "../../viewmodel/things";
 import { Icon, type IconName } from "../kit/icons";
-import { selectionOf } from "../names";
 import { asideOf } from "../scene/seeing";
 
 export const ICONS: Record<Kind, IconName> = {

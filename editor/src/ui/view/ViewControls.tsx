@@ -11,8 +11,10 @@ import { aimsAlways, useAiming } from "../../session/aiming";
 import { now, useEditor } from "../../store/store";
 import { Aim } from "../aim/Aim";
 import { OffScreen } from "../aim/OffScreen";
-import { AskName, Button, type Choice, More } from "../kit/kit";
-import { writing } from "../search/Overlays";
+import { Button } from "../kit/kit";
+import { AskName, More } from "../kit/loaded";
+import type { Choice } from "../kit/props";
+import { isTyping } from "../search/overlay";
 import { FlyPad } from "./FlyPad";
 import "../aim/aim.css";
 import "./view.css";
@@ -126,7 +128,7 @@ function useCrossKey(): void {
   useEffect(() => {
     const key = (event: KeyboardEvent) => {
       if (event.key.toLowerCase() !== "x" || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
-      if (writing(event.target) || document.querySelector(".overlay")) return;
+      if (isTyping(event.target) || document.querySelector(".overlay")) return;
       switchCross();
     };
     window.addEventListener("keydown", key);

@@ -4,9 +4,9 @@ import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { Suspense, useState } from "react";
 import { select, setUi, useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { Button, Waiting } from "../kit/kit";
 import { lazily } from "../kit/lazily";
-import { nameOf } from "../names";
 import { SECTIONS } from "./sections";
 import { TOOLS } from "./tools";
 

@@ -3,12 +3,13 @@
 import { i18n } from "@lingui/core";
 import { msg, plural, t } from "@lingui/core/macro";
 import { useState } from "react";
-import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
 import { goOffline, goOnline } from "../../commands/operation";
+import { barred } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import { tell, useEditor } from "../../store/store";
-import { Button, Confirm } from "../kit/kit";
+import { Button } from "../kit/kit";
+import { Confirm } from "../kit/loaded";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
 import { useUndoKeys } from "./useUndoKeys";

@@ -55,7 +55,7 @@ export function View3D() {
       shown.focus();
       let noDrags = () => {};
       const pane = canvas.current;
-      void persistently(() => import("../../session/puckDrag")).then(({ dragPucks }) => {
+      void persistently(() => import("./dragPucks")).then(({ dragPucks }) => {
         if (!ended) noDrags = dragPucks(shown, pane);
       });
       const unsubscribe = store.subscribe((state, before) => {

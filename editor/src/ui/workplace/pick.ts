@@ -1,7 +1,7 @@
 /** What a pick in the view does: it says where a step leads while one is drawn, else it selects. */
 
 import { now, select, setUi } from "../../store/store";
-import { selectionOf } from "../names";
+import { selectionOf } from "../../viewmodel/names";
 
 /** `ids` are what was meant, the likeliest first. A pick of what is selected goes to what is behind it. */
 export function pick(ids: readonly string[]): void {

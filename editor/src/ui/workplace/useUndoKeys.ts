@@ -2,8 +2,8 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
-import { barred } from "../../commands/asking";
 import * as documents from "../../commands/documents";
+import { barred } from "../../store/permissions";
 import { now, tell } from "../../store/store";
 
 /** ms after a step in which the news of what can be undone next may still be on the way. */

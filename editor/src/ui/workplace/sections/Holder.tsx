@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useState } from "react";
 import { askFor, noLongerAsk } from "../../../commands/handover";
-import { serves } from "../../../session/session";
+import { serves } from "../../../session/connection";
 import { hasAsked } from "../../../store/handover";
 import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";

@@ -5,10 +5,10 @@ import { Suspense } from "react";
 import { theEngine } from "../../../session/engine";
 import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
+import { kindName, nameOf } from "../../../viewmodel/names";
 import { Button } from "../../kit/kit";
 import { lazily } from "../../kit/lazily";
-import { kindName, nameOf } from "../../names";
-import type { Section } from "../sections";
+import type { Section } from "../section";
 
 const Holder = lazily(() => import("./Holder"));
 

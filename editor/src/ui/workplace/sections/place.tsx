@@ -2,7 +2,7 @@
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../../kit/lazily";
-import type { Section } from "../sections";
+import type { Section } from "../section";
 
 export const place: Section = {
   id: "place",

@@ -2,9 +2,9 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
-import { barred } from "../../../commands/asking";
 import { retryObject } from "../../../commands/operation";
-import { serves } from "../../../session/session";
+import { serves } from "../../../session/connection";
+import { barred } from "../../../store/permissions";
 import { derivesFrom } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { Button } from "../../kit/kit";

@@ -3,7 +3,7 @@
 import { msg, t } from "@lingui/core/macro";
 import { robotsOf } from "../../../session/streams";
 import { lazily } from "../../kit/lazily";
-import type { Tool } from "../tools";
+import type { Tool } from "../tool";
 
 export const robot: Tool = {
   id: "robot",

@@ -2,7 +2,7 @@
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../../kit/lazily";
-import type { Tool } from "../tools";
+import type { Tool } from "../tool";
 
 export const things: Tool = {
   id: "things",

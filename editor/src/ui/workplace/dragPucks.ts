@@ -1,8 +1,8 @@
 /** Drags a puck that is selected over the level on which it stands; where it is let go, all see it. */
 
-import { notEditable, placePuck, showPuck } from "../commands/program";
-import type { Engine } from "../engine/engine";
-import { now } from "../store/store";
+import { notEditable, placePuck, showPuck } from "../../commands/program";
+import type { Engine } from "../../engine/engine";
+import { now } from "../../store/store";
 
 /** Pixels that a finger moves before it drags: less is a tap. */
 const BEGINS = 6;

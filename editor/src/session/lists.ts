@@ -1,0 +1,34 @@
+/** Load the lists of the home screen, the object types and their actions. */
+
+import { now, store } from "../store/store";
+import { call } from "./connection";
+
+export async function loadTypes(): Promise<void> {
+  const [types, robots] = await Promise.all([call("GetObjectTypes"), call("GetRobotMeta")]);
+  store.setState({
+    types: {
+      byName: Object.fromEntries(types.map((type) => [type.type, type])),
+      robots: Object.fromEntries(robots.map((robot) => [robot.type, robot])),
+      actions: {},
+    },
+  });
+}
+
+/** Load the lists of the home screen. Events keep them up to date, except for problems, which only the lists contain. */
+export async function loadLists(): Promise<void> {
+  const load = async <K extends "scenes" | "projects" | "packages">(
+    key: K,
+    request: "ListScenes" | "ListProjects" | "ListPackages",
+  ) => {
+    const items = await call(request);
+    store.setState((state) => ({ lists: { ...state.lists, [key]: items } }));
+  };
+  await Promise.all([load("scenes", "ListScenes"), load("projects", "ListProjects"), load("packages", "ListPackages")]);
+}
+
+/** Load the actions of a type, unless they are loaded. */
+export async function loadActions(type: string): Promise<void> {
+  if (type in now().types.actions) return;
+  const actions = await call("GetActions", { type });
+  store.setState((state) => ({ types: { ...state.types, actions: { ...state.types.actions, [type]: actions } } }));
+}

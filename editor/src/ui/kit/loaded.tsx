@@ -1,0 +1,44 @@
+/** Dialogs and menus whose code is loaded when it is needed. */
+
+import { Suspense } from "react";
+import { Button } from "./kit";
+import { lazily } from "./lazily";
+import type { AskNameProps, ConfirmProps, MoreProps } from "./props";
+
+const ConfirmDialog = lazily(() => import("./dialogs").then((module) => ({ default: module.Confirm })));
+const AskNameDialog = lazily(() => import("./dialogs").then((module) => ({ default: module.AskName })));
+const MoreMenu = lazily(() => import("./menu"));
+
+/** Ask for confirmation of an action that cannot be undone. */
+export function Confirm(props: ConfirmProps) {
+  return (
+    <Suspense fallback={null}>
+      <ConfirmDialog {...props} />
+    </Suspense>
+  );
+}
+
+/** Ask for a name. */
+export function AskName(props: AskNameProps) {
+  return (
+    <Suspense fallback={null}>
+      <AskNameDialog {...props} />
+    </Suspense>
+  );
+}
+
+/** A button that opens a menu. */
+export function More(props: MoreProps) {
+  const { label, icon = "more", children, look = "plain" } = props;
+  return (
+    <Suspense
+      fallback={
+        <Button look={look} icon={icon} aria-label={label}>
+          {children}
+        </Button>
+      }
+    >
+      <MoreMenu {...props} />
+    </Suspense>
+  );
+}

@@ -1,0 +1,46 @@
+/** Properties of the controls that kit.tsx loads when they are needed. */
+
+import type { ReactNode } from "react";
+import type { IconName } from "./icons";
+
+export type Look = "" | "primary" | "plain" | "danger";
+
+export interface ConfirmProps {
+  title: string;
+  children: ReactNode;
+  /** What the button says that does it. */
+  yes: string;
+  /** Why it cannot be done now, as a sentence. */
+  not?: string;
+  onYes: () => void;
+  onClose: () => void;
+}
+
+export interface AskNameProps {
+  title: string;
+  label?: string;
+  initial?: string;
+  yes: string;
+  /** Names that there are already. */
+  taken?: string[];
+  children?: ReactNode;
+  onYes: (name: string) => void;
+  onClose: () => void;
+}
+
+export interface Choice {
+  id: string;
+  label: string;
+  icon?: IconName;
+  /** Why it cannot be chosen now. */
+  not?: string;
+  act: () => void;
+}
+
+export interface MoreProps {
+  label: string;
+  choices: Choice[];
+  icon?: IconName;
+  children?: ReactNode;
+  look?: Look;
+}
