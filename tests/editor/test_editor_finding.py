@@ -255,7 +255,7 @@ async def test_selection_out_of_view_is_found_and_objects_are_faded(place: Place
 
         # For a selection outside the view there is an arrow at the edge; a tap turns the view.
         await page.get_by_role("row", name=f"{point.name} Action point").click()
-        arrow = page.get_by_role("button", name=f"Look at {point.name}, which is out of the view")
+        arrow = page.get_by_role("button", name=f"Turn the view to {point.name}")
         assert await arrow.count() == 0
         for size in ("phone", "tablet"):
             await page.set_viewport_size(VIEWPORTS[size])  # type: ignore[arg-type]

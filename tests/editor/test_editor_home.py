@@ -110,7 +110,7 @@ async def test_scenes_are_created_renamed_described_copied_and_deleted(
 
         # A scene in use names its projects and leads to them.
         await more(screen, scene.name, "Delete…")
-        await screen.sees("have to be deleted first")
+        await screen.sees("Delete the projects of this scene first")
         await screen.picture("home deletion")
         await screen.press(texts.open_document(project.name))
         await screen.page.get_by_role("heading", name=project.name).wait_for()
@@ -308,7 +308,7 @@ async def test_problems_are_shown_on_tiles_and_fixed_from_there(
             await screen.page.get_by_role("navigation").get_by_role("button", name=texts.ADD).click()
             await panel.get_by_role("button", name="Torch").click()
             await screen.sees("Used in lamps.")
-            delete = panel.get_by_role("button", name="Delete this kind")
+            delete = panel.get_by_role("button", name="Delete type")
             await expect(delete).to_have_attribute("aria-disabled", "true")
             await screen.press("← All types")
             await panel.get_by_role("button", name="Spare").click()

@@ -144,7 +144,7 @@ async def test_operator_takes_over_a_project_left_open_and_locked(
             await wendy.call("AddActionPoint", rpc.AddActionPointArgs("unsaved", Position()))
             await wendy.call("WriteLock", rpc.WriteLockArgs(point.id))
             start = page.get_by_role("button", name="Start")
-            why = re.compile(f"not now: Wendy has {project.name} open in the editor")
+            why = re.compile(rf"not available: {project.name} is open in the editor \(Wendy\)")
             await expect(start).to_have_accessible_name(why)
         await screen.sees(f"{project.name} was left open in the editor.")
         gone = page.get_by_role("button", name="Wendy left and still holds locks")

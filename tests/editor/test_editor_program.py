@@ -222,7 +222,7 @@ async def test_straight_sequences_are_folded_except_around_the_selection(work: W
     graph = page.get_by_role("region", name=texts.GRAPH)
     await graph.locator('.react-flow__node[aria-label^="second,"] .flow-name').click()
     await work.tap_button("Fold 4 actions in the graph", work.panel)
-    one = graph.locator('.react-flow__node[aria-label="4 actions folded into one, into_bad_box, first, second, third"]')
+    one = graph.locator('.react-flow__node[aria-label="4 actions, folded, into_bad_box, first, second, third"]')
     await one.wait_for()
     inner = graph.locator('.react-flow__node[aria-label^="second,"]')
     await expect(inner).to_have_count(0)
@@ -378,7 +378,7 @@ async def test_device_setting_is_overridden_in_one_project(work: Work) -> None:
     replaced = await work.told("OverrideUpdated")
     assert (replaced.change_type, replaced.parent_id) == (ChangeType.ADD, work.object("tester"))
     assert (replaced.data.name, replaced.data.value) == ("port", "1502")
-    await settings.get_by_text(f"instead of {scenes} in the scene").wait_for()
+    await settings.get_by_text(f"In the scene: {scenes}").wait_for()
     await settings.get_by_role("button", name="Reset port to the scene").click()
     assert (await work.told("OverrideUpdated")).change_type is ChangeType.REMOVE
     await expect(field).to_have_value(scenes)

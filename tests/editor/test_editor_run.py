@@ -132,7 +132,7 @@ async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: B
     await state(work, PackageStateEnum.STOPPED)
     await screen.sees("failed")
     assert await page.evaluate("__engine.view.camera.position.toArray()") == looked_from
-    await graph.locator('.react-flow__node[aria-label^="8 actions folded into one"]').wait_for()
+    await graph.locator('.react-flow__node[aria-label^="8 actions, folded"]').wait_for()
     await screen.picture("run failed")
     # The result stays and leads to the action.
     await work.tap_button("Show scan", fault)

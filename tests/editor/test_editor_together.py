@@ -34,8 +34,8 @@ async def edits_at_a_screen(screen: Screen, seed: int) -> None:
     chance = random.Random(seed)
     panel = screen.page.get_by_role("complementary")
     for _ in range(EDITS):
-        axis, way = chance.choice("XYZ"), chance.choice(("more", "less"))
-        await panel.get_by_role("button", name=f"{axis} 1 cm {way}").click()
+        axis, change = chance.choice("XYZ"), chance.choice(("Increase", "Decrease"))
+        await panel.get_by_role("button", name=f"{change} {axis} by 1 cm").click()
         back = screen.page.get_by_role("button", name="Undo ")
         if chance.random() < 0.3 and await back.is_enabled():
             await back.click()
