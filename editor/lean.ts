@@ -1,16 +1,18 @@
-/** Leaves out of the build what libraries carry along and nobody needs here. Whoever needs it takes it out of the lists. */
+/**
+ * Leave unused parts of libraries out of the build. Remove an entry from the lists when the editor starts to use it.
+ */
 
 import type { Plugin } from "vitest/config";
 
-/** Shaders of materials and shadows that the engine does not use: physical, toon, matcap, points, of lamps; and backgrounds that are pictures. */
+/** Shaders of materials and shadows that the engine does not use. */
 const UNUSED =
   /\/three\/src\/renderers\/shaders\/Shader(Lib\/(meshphysical|meshnormal|distance|vsm|meshtoon|meshmatcap|meshphong|points|background|backgroundCube|cube|equirect)|Chunk\/(lights_physical_\w+|lights_toon_\w+|lights_phong_\w+|transmission_\w+|iridescence_\w+|clearcoat_\w+|cube_uv_reflection_fragment|envmap_physical_pars_fragment|bsdfs_physical|tonemapping_\w+|gradientmap_\w+|map_particle_\w+|normalmap_pars_fragment))\.glsl\.js$/;
 
-/** Parts of three.js that the engine never calls, and what the renderer asks of them. */
+/** Modules of three.js that the engine never calls, with the stubs that the renderer needs. */
 const PARTS: Readonly<Record<string, string>> = {
   "extras/PMREMGenerator.js": "export class PMREMGenerator {}",
   "renderers/shaders/DFGLUTData.js": "export const getDFGLUT = () => null;",
-  // AR in the browser: comes back with it.
+  // Needed again by AR in the browser.
   "renderers/webxr/WebXRManager.js": `export class WebXRManager {
     enabled = false; isPresenting = false;
     addEventListener() {} removeEventListener() {} setAnimationLoop() {} dispose() {} hasDepthSensing() { return false; }
@@ -22,11 +24,11 @@ const PARTS: Readonly<Record<string, string>> = {
     "export class WebGLEnvironments { get(texture) { return texture ?? null; } dispose() {} }",
   "renderers/webgl/WebGLMorphtargets.js": "export class WebGLMorphtargets { update() {} }",
   "renderers/WebGLCubeRenderTarget.js": "export class WebGLCubeRenderTarget {}",
-  // Lines of the logic are of this kind; the others would be read from files.
+  // Curve of the program steps; the others are only used by file loaders.
   "extras/curves/Curves.js": "export { QuadraticBezierCurve3 } from './QuadraticBezierCurve3.js';",
 };
 
-/** What is never defined in a shader, since no material, mesh or light of ours asks for it. */
+/** Macros that no material, mesh or light of the editor defines. */
 const NEVER = new RegExp(
   `^(USE_(${[
     "TANGENT|SPECULAR\\w*|TRANSMISSION\\w*|ROUGHNESSMAP|METALNESSMAP|IRIDESCENCE\\w*|EMISSIVEMAP|CLEARCOAT\\w*|AOMAP",
@@ -37,7 +39,7 @@ const NEVER = new RegExp(
 );
 const NONE = /^NUM_(CLIPPING_PLANES|SUN_LIGHT\w*|SPOT_LIGHT\w*|POINT_LIGHT\w*|RECT_AREA_LIGHTS|LIGHT_PROBE_GRIDS) > 0$/;
 
-/** Whether a term of a condition is false for certain. */
+/** Return whether a term of a condition is always false. */
 function isFalse(term: string): boolean {
   const bare = term
     .trim()
@@ -47,7 +49,7 @@ function isFalse(term: string): boolean {
   return asked?.[1] ? NEVER.test(asked[1]) : NONE.test(bare);
 }
 
-/** What of a block stays: all, its `#else`, or what is in it, without the question. */
+/** Return what remains of a block: everything, its `#else` part, or its body without the condition. */
 function outcome(line: string): "all" | "else" | "body" {
   const named = /^#(ifdef|ifndef)\s+(\w+)/.exec(line);
   if (named?.[2]) return !NEVER.test(named[2]) ? "all" : named[1] === "ifdef" ? "else" : "body";
@@ -58,7 +60,7 @@ function outcome(line: string): "all" | "else" | "body" {
   return (and ? terms.some(isFalse) : terms.every(isFalse)) ? "else" : "all";
 }
 
-/** Give a shader without the blocks for what is never defined, without comments and indentation. */
+/** Return a shader without blocks of undefined macros, comments and indentation. */
 export function leanShader(text: string): string {
   const lines = text
     .replace(/\/\*(?! glsl)[\s\S]*?\*\//g, "")
@@ -88,7 +90,7 @@ export function leanShader(text: string): string {
   return kept.join("\n");
 }
 
-/** A block with several questions is left alone. */
+/** Return whether a block has `#elif`; such blocks are left unchanged. */
 function hasElif(lines: readonly string[], from: number): boolean {
   let depth = 0;
   for (const line of lines.slice(from)) {
@@ -99,14 +101,14 @@ function hasElif(lines: readonly string[], from: number): boolean {
   return false;
 }
 
-/** The plugin. Words of react-aria in other languages than the editor's own go, too. */
+/** The Vite plugin. It also drops the texts of react-aria in languages that the editor does not have. */
 export function lean(): Plugin {
   return {
     name: "lean",
     apply: "build",
     enforce: "pre",
     resolveId(source, importer) {
-      // The server reads meshes: the readers that come with that of URDF are never used.
+      // The server converts meshes, so the mesh loaders of urdf-loader are never used.
       return importer?.includes("/urdf-loader/") && /\/(STL|Collada)Loader\.js$/.test(source) ? "\0no-loaders" : null;
     },
     load(id) {

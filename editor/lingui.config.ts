@@ -2,7 +2,7 @@ import { defineConfig } from "@lingui/conf";
 import { formatter } from "@lingui/format-po";
 import { createSwcExtractor } from "@lingui/native-tools";
 
-/** English is written in the source code. A translation is one more locale here, and its file after `npm run extract`. */
+/** English is the source language. To add a language, add its locale here and run `npm run extract`. */
 export default defineConfig({
   sourceLocale: "en",
   locales: ["en"],

@@ -1,4 +1,4 @@
-/** Build of the editor: into the server's static files, with a gzip and a brotli copy beside each text file. */
+/** Build of the editor into the server's static files, with gzip and brotli copies of text files. */
 
 import { readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
@@ -11,7 +11,7 @@ import { lean } from "./lean.ts";
 const OUT = join(import.meta.dirname, "../server/arcor2_server/editor_files");
 const SERVER = process.env.ARCOR2_HW_URL ?? "http://127.0.0.1:6789";
 
-/** Compressing at build time costs the server nothing and is denser than it could afford per request. */
+/** Compression at build time is denser, and the server need not compress. */
 function compressed(): Plugin {
   let out = OUT;
   return {
@@ -40,7 +40,7 @@ export default defineConfig({
     lean(),
     compressed(),
   ],
-  // From its sources, so that what is not used of it is left out.
+  // From its sources, so that unused parts are left out.
   resolve: { alias: [{ find: /^three$/, replacement: "three/src/Three.js" }] },
   build: {
     outDir: OUT,

@@ -13,7 +13,7 @@ import "./ui/base.css";
 async function start(): Promise<void> {
   takeTokenFromAddress();
   const name = remembered("name");
-  // A document is probably open: load the view while the server is asked.
+  // A document is probably open: load the view at the same time.
   if (name) import("./engine/engine").catch(() => {});
   await persistently(() => loadCatalogue(preferredLanguage()));
   if (name) session.join(name, remembered("token"));
@@ -24,7 +24,7 @@ async function start(): Promise<void> {
       <App />
     </StrictMode>,
   );
-  // Parts that a first tap opens are loaded after the first picture.
+  // Load the parts that the first tap may open after the page is shown.
   setTimeout(() => {
     for (const load of [
       () => import("./ui/kit/menu"),
@@ -32,7 +32,7 @@ async function start(): Promise<void> {
       () => import("./ui/workplace/Panel"),
       () => import("./ui/things/ThingsPanel"),
     ]) {
-      load().catch(() => {}); // the server is away: it is loaded when it is needed
+      load().catch(() => {}); // offline: loaded when needed
     }
   }, 1500);
 }

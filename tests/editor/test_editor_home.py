@@ -345,7 +345,7 @@ async def test_problems_are_shown_on_tiles_and_fixed_from_there(
             card = screen.page.locator(".card").filter(has=screen.page.get_by_role("heading", name="lamps"))
             await card.get_by_text("2 problems").click()
             await screen.press("Repair lamps")
-            await screen.sees("goes out of the scene: lamp, torch.")
+            await screen.sees("are removed from the scene: lamp, torch.")
             await screen.picture("home mending")
             await screen.press("Remove objects")
             await screen.sees("lamps can be opened again.")

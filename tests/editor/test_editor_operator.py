@@ -146,7 +146,7 @@ async def test_operator_takes_over_a_project_left_open_and_locked(
             start = page.get_by_role("button", name="Start")
             why = re.compile(rf"not available: {project.name} is open in the editor \(Wendy\)")
             await expect(start).to_have_accessible_name(why)
-        await screen.sees(f"{project.name} was left open in the editor.")
+        await screen.sees(f"{project.name} is open in the editor. It is closed during the run")
         gone = page.get_by_role("button", name="Wendy left and still holds locks")
         await gone.wait_for()
         asked = page.get_by_role("alertdialog", name="Take over from Wendy?")

@@ -1,10 +1,10 @@
-/** The place in the middle of the view, where the cross is. */
+/** The point in the middle of the view, at the crosshair. */
 
 import type { Orientation, Position } from "../protocol/types";
 import { theEngine } from "../session/engine";
 import { DOWN } from "./program";
 
-/** Give where the cross points, and how a tool would stand on that surface; null when it points at nothing. */
+/** Return the point at the crosshair and the orientation of a tool facing that surface; null if there is none. */
 export function aimedPlace(): { position: Position; orientation: Orientation } | null {
   const engine = theEngine();
   const view = document.querySelector(".view")?.getBoundingClientRect();
@@ -17,9 +17,9 @@ export function aimedPlace(): { position: Position; orientation: Orientation } |
   return { position, orientation: hit?.normal ? against(hit.normal) : DOWN };
 }
 
-/** The rotation that turns z against a normal: a tool that stands on the surface. */
+/** Return the rotation that turns z against a normal: a tool facing the surface. */
 export function against({ x, y, z }: Position): Orientation {
-  // Half way from +z to -normal; straight up is turned about x.
+  // Halfway from +z to -normal; a tool facing straight up is turned about x.
   if (z > 0.9999) return DOWN;
   const w = 1 - z;
   const length = Math.hypot(y, x, w);

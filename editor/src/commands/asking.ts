@@ -1,4 +1,4 @@
-/** How commands ask: a refusal becomes a notice with the server's sentence, and the caller learns that it failed. */
+/** Send requests from commands: a refusal becomes a notice, and the caller gets to know that it failed. */
 
 import type { CallOptions } from "../protocol/client";
 import { ConnectionLost, Refused } from "../protocol/errors";
@@ -6,7 +6,7 @@ import type { Requests } from "../protocol/types";
 import { call } from "../session/connection";
 import { tell } from "../store/store";
 
-/** Ask; gives undefined after telling the user when it was refused, lost or too late. */
+/** Send a request. Return undefined after notifying the user if it was refused, lost or too late. */
 export async function ask<N extends keyof Requests>(
   request: N,
   args?: Requests[N]["args"],
@@ -20,7 +20,7 @@ export async function ask<N extends keyof Requests>(
   }
 }
 
-/** Give why a request would be refused, empty when it would be granted; nothing is changed. */
+/** Return why a request would be refused, an empty string if it would be accepted; nothing is changed. */
 export async function whyNot<N extends keyof Requests>(request: N, args?: Requests[N]["args"]): Promise<string> {
   try {
     await call(request, args, { dryRun: true });
@@ -31,10 +31,10 @@ export async function whyNot<N extends keyof Requests>(request: N, args?: Reques
   }
 }
 
-/** What this tablet has locked, and for how many at once: the last one gives the lock back. */
+/** Locks held by this page, with the number of users of each; the last one releases the lock. */
 const locked = new Map<string, { times: number; taken: Promise<unknown> }>();
 
-/** Take an item's write lock, unless this tablet has it already; gives what gives it back. Rejects when it is refused. */
+/** Lock an item for writing, unless this page has locked it. Return the function that releases it. */
 async function take(id: string, tree: boolean): Promise<() => Promise<void>> {
   const key = tree ? `${id}/tree` : id;
   const mine = locked.get(key) ?? { times: 0, taken: call("WriteLock", { object_id: id, lock_tree: tree }) };
@@ -53,12 +53,12 @@ async function take(id: string, tree: boolean): Promise<() => Promise<void>> {
     throw error;
   }
   return async () => {
-    // Some requests unlock by themselves: then there is nothing to give back.
+    // Some requests release the lock themselves.
     if (last()) await call("WriteUnlock", { object_id: id }).catch(() => {});
   };
 }
 
-/** Do something while holding an item's write lock, which is given back in any case unless the request does that. */
+/** Do something while holding the write lock of an item, and release it afterwards. */
 export async function holding<T>(id: string, work: () => Promise<T | undefined>, tree = false): Promise<T | undefined> {
   let giveBack: () => Promise<void>;
   try {
@@ -74,7 +74,7 @@ export async function holding<T>(id: string, work: () => Promise<T | undefined>,
   }
 }
 
-/** Do something for a form: gives why it was refused, to be shown where it happened; empty when it was done. */
+/** Do something for a form. Return why it was refused, to be shown in the form; an empty string on success. */
 export async function refusal(work: () => Promise<unknown>): Promise<string> {
   try {
     await work();
@@ -84,7 +84,7 @@ export async function refusal(work: () => Promise<unknown>): Promise<string> {
   }
 }
 
-/** As `holding`, but rejects with what was refused instead of telling it: for `refusal`. */
+/** Like `holding`, but reject with the refusal instead of notifying the user: for `refusal`. */
 export async function held<T>(id: string, work: () => Promise<T>, tree = false): Promise<T> {
   const giveBack = await take(id, tree);
   try {

@@ -1,4 +1,4 @@
-/** Where things stand, found out by robots and cameras. Each gives why it was refused, empty when it was done or begun. */
+/** Poses of objects measured by robots and cameras. Functions return why they were refused, or an empty string. */
 
 import { t } from "@lingui/core/macro";
 import { createStore } from "zustand/vanilla";
@@ -12,11 +12,11 @@ import { composed } from "../viewmodel/frames";
 import { held, refusal } from "./asking";
 import { type Chosen, robotArg } from "./robot";
 
-/** Put an object where the robot's tool points; `pivot` is which of its places is touched. */
+/** Set the pose of an object from the robot tool; `pivot` is the touched part of the object. */
 export const placeByRobot = (id: string, chosen: Chosen, pivot: Pivot) =>
   refusal(() => call("UpdateObjectPoseUsingRobot", { id, robot: robotArg(chosen), pivot }));
 
-/** Show an object where `placeByRobot` would put it, with the tool at a pose in the world; gives why it cannot be. */
+/** Preview `placeByRobot` with the tool at a pose in the world. Return why it is impossible, or an empty string. */
 export function showAtTool(id: string, tool: Pose, pivot: Pivot): string {
   const state = now();
   const of = state.doc?.objects[id];
@@ -27,29 +27,29 @@ export function showAtTool(id: string, tool: Pose, pivot: Pivot): string {
   return "";
 }
 
-/** Show it where it stands again. */
+/** End the preview. */
 export function hideAtTool(id: string): void {
   if (now().ui.draft?.id === id) setUi({ draft: undefined });
 }
 
-// ------------------------------------------------------------------------------------------------ aiming
-/** An aiming that is under way: it holds the object and the robot until it is over. */
+// ------------------------------------------------------------------------------------------------ focus points
+/** A running measurement of focus points. It locks the object and the robot until it ends. */
 export interface Aiming {
-  /** Take the tool's place for a focus point; gives those that are done. */
+  /** Record the tool position as a focus point. Return the numbers of the recorded points. */
   add: (index: number) => Promise<number[]>;
-  /** Put the object where its points were found. */
+  /** Set the pose of the object from the recorded points. */
   done: () => Promise<void>;
   cancel: () => Promise<void>;
 }
 
-/** Begin; rejects with why it was refused. `onLost` is called when it ends by itself. */
+/** Start; reject with the reason if refused. `onLost` is called when the measurement ends by itself. */
 export function beginAiming(id: string, chosen: Chosen, onLost: () => void): Promise<Aiming> {
   return new Promise((resolve, reject) => {
     held(id, () =>
       held(chosen.robotId, async () => {
         await call("ObjectAimingStart", { object_id: id, robot: robotArg(chosen) });
         await new Promise<void>((over) => {
-          // The server forgets it with the connection, and when the scene goes offline.
+          // The server cancels it on disconnect and when the scene goes offline.
           const stop = store.subscribe((state) => {
             if (state.connection.status === "ready" && state.live.state === "started") return;
             stop();
@@ -65,7 +65,7 @@ export function beginAiming(id: string, chosen: Chosen, onLost: () => void): Pro
             },
             cancel: () =>
               call("ObjectAimingCancel")
-                .catch(() => {}) // the connection or the scene is gone, and it with them
+                .catch(() => {}) // the connection or the scene is closed, and the measurement with it
                 .then(() => {
                   stop();
                   over();
@@ -90,7 +90,7 @@ export const calibrateRobot = (robot_id: string, camera_id: string, move_to_cali
     ),
   );
 
-/** Where the thing that was calibrated last stood before, until somebody has said that its new place is right. */
+/** Pose of the last calibrated object before the calibration, until the user accepts or reverts the new one. */
 export const before = createStore<{ id: string; pose: Pose | null }>(() => ({ id: "", pose: null }));
 export const keepPlace = (): void => before.setState({ id: "", pose: null });
 
@@ -100,13 +100,13 @@ async function remembering(id: string, begin: () => Promise<unknown>): Promise<v
   before.setState({ id, pose });
 }
 
-/** Take a picture; a JPEG, whose bytes come as one character each. Rejects with why it was refused. */
+/** Take a picture. Return a JPEG with one character per byte. Reject with the reason if refused. */
 export async function takePicture(id: string): Promise<Blob> {
   const text = await held(id, () => call("CameraColorImage", { id }, { deadline: 20 }));
   return new Blob([Uint8Array.from(text, (each) => each.charCodeAt(0))], { type: "image/jpeg" });
 }
 
-// ------------------------------------------------------------------------------------------------ records and touching
+// -------------------------------------------------------------------------------- history and touched points
 export interface CalibrationRecord {
   id: string;
   date: string;
@@ -127,7 +127,7 @@ async function rest<T>(path: string, options: RequestInit = {}): Promise<T> {
   return (await response.json()) as T;
 }
 
-/** The newest records of an object. */
+/** Return the newest calibrations of an object. */
 export const recordsOf = (object: string) =>
   rest<CalibrationRecord[]>(`/api/calibrations?object_id=${encodeURIComponent(object)}&limit=3`);
 
@@ -135,21 +135,23 @@ export interface TouchedFrame {
   pose: Pose;
   grade: string;
   verdict: string;
-  /** m, of each point, in the order given; `checked`: there are more than are needed, so that they say something. */
+  /**
+   * Errors of the points, m, in the given order. `checked`: there are enough points for the errors to be meaningful.
+   */
   residuals: number[];
   residual: number;
   worst: number;
   checked: boolean;
 }
 
-/** The frame of points that are known in it, and were touched, in the same order; nothing is kept of it. */
+/** Return the frame of points with known coordinates that were touched in the same order. Nothing is stored. */
 export const frameByPoints = (known: Position[], touched: Position[]) =>
   rest<TouchedFrame>("/api/calibration/touch/frame-by-points", {
     method: "PUT",
     body: JSON.stringify({ known, touched }),
   });
 
-/** The frame of three touched points: its origin, one on its x axis, one in its xy plane. */
+/** Return the frame of three touched points: origin, a point on the x axis, a point in the xy plane. */
 export const frameByAxes = (
   origin: Position,
   on_x: Position,

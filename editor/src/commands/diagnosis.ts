@@ -1,4 +1,4 @@
-/** A file for whoever helps: what the server has for it, and what this page has seen. Sent to nobody. */
+/** The diagnosis file: data of the server and what this page recorded. It is not sent anywhere. */
 
 import { t } from "@lingui/core/macro";
 import { version } from "../../package.json";
@@ -9,7 +9,7 @@ import { now } from "../store/store";
 import { refusal } from "./asking";
 import { saveAs } from "./files";
 
-/** Save it on this device; gives why not. */
+/** Save the file on this device. Return why it failed, or an empty string. */
 export function saveDiagnosis(): Promise<string> {
   return refusal(async () => {
     const token = remembered("token");

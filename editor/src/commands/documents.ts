@@ -1,4 +1,4 @@
-/** Scenes, projects and packages as wholes: open, make, save, close, copy, rename, delete. */
+/** Scenes, projects and packages: open, create, save, close, copy, rename, delete. */
 
 import { call } from "../session/connection";
 import { now, store } from "../store/store";
@@ -11,17 +11,17 @@ export const newScene = (name: string, description = "") => ask("NewScene", { na
 export const newProject = (scene_id: string, name: string, description = "", has_logic = true) =>
   ask("NewProject", { scene_id, name, description, has_logic });
 
-/** Make a copy under another name and open it; gives whether it was made. */
+/** Create a copy with another name and open it. Return whether it was created. */
 export async function fromTemplate(kind: "scene" | "project", source: string, name: string): Promise<boolean> {
   const made = await (kind === "scene" ? duplicateScene(source, name) : duplicateProject(source, name));
   if (!made) return false;
-  // Its id comes with the list.
+  // The list contains its id.
   const id = await listed(kind, name);
   if (id) await (kind === "scene" ? openScene(id) : openProject(id));
   return true;
 }
 
-/** ms until a list has what was made. */
+/** Time within which a list contains a new document, ms. */
 const LISTED = 10_000;
 
 function listed(kind: "scene" | "project", name: string): Promise<string> {
@@ -41,11 +41,11 @@ function listed(kind: "scene" | "project", name: string): Promise<string> {
 
 export async function save() {
   const saved = await (now().doc?.project ? ask("SaveProject") : ask("SaveScene"));
-  if (saved) void keepThumbnail().catch(() => {}); // a tile without a picture is no harm
+  if (saved) void keepThumbnail().catch(() => {}); // a missing picture is harmless
   return saved;
 }
 
-/** Close what is open; `force` throws unsaved changes away. */
+/** Close the open document; `force` discards unsaved changes. */
 export function close(force: boolean) {
   return now().doc?.project ? ask("CloseProject", { force }) : ask("CloseScene", { force });
 }
@@ -54,7 +54,7 @@ export const duplicateScene = (source_id: string, target_name: string) => ask("C
 export const duplicateProject = (source_id: string, target_name: string) =>
   ask("CopyProject", { source_id, target_name });
 
-/** For fields on the tiles: they tell by themselves why it was refused. */
+/** For fields that show the reason of a refusal themselves. */
 export const describe = (kind: "scene" | "project", id: string, new_description: string): Promise<string> =>
   refusal(() =>
     kind === "scene"
@@ -76,7 +76,7 @@ export const deleteScene = (id: string) => ask("DeleteScene", { id });
 export const deleteProject = (id: string) => ask("DeleteProject", { id });
 export const deletePackage = (id: string) => ask("DeletePackage", { id });
 
-/** The projects that need a scene. */
+/** Return the projects of a scene. */
 export async function projectsOf(sceneId: string): Promise<{ id: string; name: string }[]> {
   const ids = await call("ProjectsWithScene", { id: sceneId });
   const projects = now().lists.projects ?? [];

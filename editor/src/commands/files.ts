@@ -1,6 +1,6 @@
-/** Files for this device. */
+/** Files on this device. */
 
-/** Let the browser save what was made or fetched. */
+/** Let the browser save data as a file. */
 export function saveAs(content: Blob, name: string): void {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(content);

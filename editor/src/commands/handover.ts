@@ -1,4 +1,4 @@
-/** Asking somebody for what he holds, and being told when others ask, or when it is free. */
+/** Request an item that another user has locked, and notify users about requests and released items. */
 
 import { t } from "@lingui/core/macro";
 import { handOver, keyOf } from "../store/handover";
@@ -14,7 +14,7 @@ export function noLongerAsk(id: string): void {
   keepView("shared", { [keyOf(id)]: null });
 }
 
-/** Tell the user of wishes from now on; gives what ends that. */
+/** Notify the user of requests from now on. Return a function that ends it. */
 export function followWishes(): () => void {
   return store.subscribe((state, before) => {
     const { wanted, free } = handOver(state, before);

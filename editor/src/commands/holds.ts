@@ -1,6 +1,6 @@
 /**
- * What a user holds: at most one thing at a time. It ends when he lets go, and when the page cannot see his hand any
- * longer: it is hidden, frozen, left, loses the focus or the connection. The server ends it by itself within 300 ms.
+ * Hold-to-run: at most one motion at a time. It stops when the user releases the button, and when the page is hidden,
+ * frozen or left, or loses the focus or the connection. The server stops it by itself within 300 ms.
  */
 
 import type { JogRobotArgs } from "../protocol/types";
@@ -11,7 +11,7 @@ import { Lease, type LeaseRequest } from "./lease";
 
 export type JogWhat = Omit<JogRobotArgs, "robot_id" | "hold" | "sent_ms" | "valid_ms">;
 
-/** Something that is held. `over` resolves with why it ended where it was not simply let go. */
+/** A held motion. `over` resolves with the reason if it ended for another reason than release. */
 export interface Held {
   end: () => void;
   over: Promise<string>;
@@ -19,7 +19,7 @@ export interface Held {
 
 let current: Lease | null = null;
 
-/** Let go of everything. */
+/** Release everything. */
 export function endHolds(): void {
   current?.end();
 }
@@ -42,7 +42,7 @@ function hold(robotId: string, send: (request: LeaseRequest) => Promise<unknown>
   })
     .catch(sentence)
     .then((reason) => {
-      lease.end(); // not begun when the lock was refused
+      lease.end(); // not started if the lock was refused
       if (current === lease) current = null;
       return reason;
     });

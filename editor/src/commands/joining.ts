@@ -1,15 +1,15 @@
-/** How others join this server. */
+/** How other users can join this server. */
 
 import { remembered } from "../session/memory";
 
 export interface Joining {
-  /** The best first; empty when only this machine reaches the server. */
+  /** Addresses, best first; empty if only this computer can reach the server. */
   addresses: string[];
-  /** SHA-256 of the certificate; empty without TLS. */
+  /** SHA-256 fingerprint of the certificate; empty without TLS. */
   fingerprint: string;
 }
 
-/** Ask the server; where it does not say, others may come as this page did. */
+/** Request it from the server; an older server does not know it, so the address of this page is returned. */
 export async function howToJoin(): Promise<Joining> {
   const token = remembered("token");
   const here = isHere(location.hostname) ? [] : [location.origin];
@@ -17,14 +17,14 @@ export async function howToJoin(): Promise<Joining> {
     const response = await fetch("/api/joining", { headers: token ? { Authorization: `Bearer ${token}` } : {} });
     if (!response.ok) throw new Error(`${response.status}`);
     const { addresses, fingerprint } = (await response.json()) as Partial<Joining>;
-    // How this page was reached is known to work.
+    // The address of this page is known to work.
     return { addresses: [...new Set([...here, ...(addresses ?? [])])], fingerprint: fingerprint ?? "" };
   } catch {
     return { addresses: here, fingerprint: "" };
   }
 }
 
-/** Whether a host is this machine to itself, so that nobody else gets anywhere by it. A name may begin with digits, too. */
+/** Return whether a host name means the local computer, which other devices cannot reach. */
 export const isHere = (host: string) =>
   host === "localhost" ||
   host.endsWith(".localhost") ||

@@ -1,23 +1,25 @@
 /**
- * A motion that lasts as long as it is held: a lease that is renewed again and again, and ends by itself when nothing
- * renews it. Nothing here begins anew what has ended.
+ * Hold-to-run with a deadman timeout: a lease that is renewed until release, and ends by itself without renewal. A
+ * lease that has ended never starts again.
  */
 
-/** How a lease is asked for: in ms, as JogRobot and HoldHandTeaching take it. */
+/** Arguments of a lease in JogRobot and HoldHandTeaching; times in ms. */
 export interface LeaseRequest {
   hold: number;
   sent_ms: number;
   valid_ms: number;
 }
 
-/** ms between renewals, and for which each of them holds. */
+/** Period of the renewals, and duration of each, ms. */
 export const RENEW = 100;
 export const VALID = 300;
 
 let numberOfHold = 0;
 
 export class Lease {
-  /** Resolves when it is over and the robot stands, or is no longer known; with why, where it was not simply let go. */
+  /**
+   * Resolves when the robot is at standstill or its state is unknown, with the reason if the lease was not released.
+   */
   readonly over: Promise<string>;
   private readonly hold = ++numberOfHold;
   private timer: ReturnType<typeof setInterval> | undefined;
@@ -37,7 +39,7 @@ export class Lease {
     return this.state === "held";
   }
 
-  /** Begin, unless it was let go before. */
+  /** Start, unless it was released before. */
   begin(): void {
     if (this.state !== "new") return;
     this.state = "held";
@@ -45,7 +47,7 @@ export class Lease {
     this.timer = setInterval(() => this.renew(), RENEW);
   }
 
-  /** Let go. Does nothing when it is over. */
+  /** Release. Has no effect when it is over. */
   end(): void {
     if (this.state === "over") return;
     const begun = this.state === "held";
@@ -54,7 +56,7 @@ export class Lease {
       this.resolve("");
       return;
     }
-    // Refused when it had ended by itself, lost with the connection: in both cases the server ends it.
+    // Refused after it ended by itself, or lost with the connection; in both cases the server ends it.
     this.request(0).then(
       () => this.resolve(""),
       () => this.resolve(""),

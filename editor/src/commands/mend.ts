@@ -1,4 +1,4 @@
-/** What cannot be opened as it is: the server refuses a document with problems, so it is mended where it is kept. */
+/** Repair scenes that the server refuses to open because of problems. */
 
 import { t } from "@lingui/core/macro";
 import { refusedWith } from "../session/assets";
@@ -8,7 +8,7 @@ import { remembered } from "../session/memory";
 import { now } from "../store/store";
 import { refusal } from "./asking";
 
-/** The objects that problems of a scene are about: the server begins each with the object's name. */
+/** Return the objects that the problems of a scene name: the server starts each problem with the object's name. */
 export const atFault = (problems: readonly string[], names: readonly string[]): string[] =>
   names.filter((name) => problems.some((each) => each.startsWith(`${name}: `)));
 
@@ -26,7 +26,7 @@ async function stored(path: string, options: RequestInit = {}): Promise<unknown>
 
 const read = async (id: string) => (await stored(`/scenes/${encodeURIComponent(id)}`)) as StoredScene;
 
-/** The names of the objects of a scene that something is wrong with; rejects with why nobody knows. */
+/** Return the names of faulty objects of a scene; reject if no object is named. */
 export async function faultyObjects(id: string, problems: readonly string[]): Promise<string[]> {
   return atFault(
     problems,
@@ -34,7 +34,7 @@ export async function faultyObjects(id: string, problems: readonly string[]): Pr
   );
 }
 
-/** Take objects out of a saved scene; the scene as it was stays as a copy. Gives why not. */
+/** Remove objects from a saved scene, after storing a backup. Return why it failed, or an empty string. */
 export function takeOut(id: string, name: string, objects: readonly string[]): Promise<string> {
   return refusal(async () => {
     const taken = new Set(now().lists.scenes?.map((each) => each.name));
@@ -44,6 +44,6 @@ export function takeOut(id: string, name: string, objects: readonly string[]): P
     await call("CopyScene", { source_id: id, target_name: copy });
     const kept = { ...scene, objects: scene.objects.filter((each) => !objects.includes(each.name)) };
     await stored("/scenes", { method: "PUT", body: JSON.stringify(kept) });
-    await loadLists(); // problems, which no event tells
+    await loadLists(); // no event reports problems
   });
 }

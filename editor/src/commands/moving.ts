@@ -1,6 +1,6 @@
 /**
- * Moves, turns and sizes a thing: shown at once, told to the others while it lasts, and asked of the server once, at its
- * end. The thing is held meanwhile.
+ * Move, turn and resize an item: shown at once, previewed to other users meanwhile, and sent to the server as one edit
+ * at the end. The item is locked meanwhile.
  */
 
 import type { ObjectModel, Pose } from "../protocol/types";
@@ -11,19 +11,19 @@ import type { Target } from "../transform/target";
 import { relativeTo } from "../viewmodel/frames";
 import { ask, holding } from "./asking";
 
-/** s between two previews. */
+/** Time between two previews, s. */
 const PREVIEW = 1 / 30;
-/** s after which single steps are over. */
+/** Time after which a series of steps ends, s. */
 export const SETTLED = 0.6;
 
-/** One change that is going on. */
+/** A change in progress. */
 export class Moving {
-  /** It came to nothing: refused, or given up. */
+  /** It was refused or cancelled. */
   failed = false;
-  /** Resolves when the server has it, or has refused it. */
+  /** Resolves when the server has accepted or refused the edit. */
   readonly over: Promise<void>;
   private end: (keep: boolean) => void = () => {};
-  /** Nothing more can be added to it. */
+  /** No further changes are accepted. */
   finishing = false;
   private ended = false;
   private stored: Pose | null = null;
@@ -37,11 +37,11 @@ export class Moving {
     const decided = new Promise<boolean>((resolve) => (this.end = resolve));
     const work = async () => {
       this.held = true;
-      if (!this.finishing) this.tell(); // else the edit itself tells
+      if (!this.finishing) this.tell(); // otherwise the edit itself notifies the users
       return !(await decided) || (await this.store());
     };
     const before = latest;
-    // Its lock would be given back by the one before, if both were under way.
+    // Wait for the previous change, which would release the lock of this one.
     this.over = before
       .then(() => holding(target.id, work, target.kind === "point"))
       .then((done) => {
@@ -56,7 +56,7 @@ export class Moving {
     latest = this.over;
   }
 
-  /** Show it at a pose in the world. */
+  /** Show the item at a pose in the world. */
   to(pose: Pose, model?: ObjectModel): void {
     if (this.failed || this.ended) return;
     const { target } = this;
@@ -68,19 +68,19 @@ export class Moving {
     this.tell();
   }
 
-  /** It is where it is to be. */
+  /** End the change and send the edit. */
   finish(): void {
     this.finishing = true;
     this.end(true);
   }
 
-  /** As `finish`, when nothing more came for a moment. */
+  /** Like `finish`, if nothing follows within a moment. */
   settle(): void {
     clearTimeout(this.settling);
     this.settling = setTimeout(() => this.finish(), SETTLED * 1000);
   }
 
-  /** Put it back to where it was; nobody asked for anything. */
+  /** Restore the previous pose; nothing is sent. */
   cancel(): void {
     this.failed = this.finishing = true;
     this.forget();
@@ -91,7 +91,7 @@ export class Moving {
     if (now().ui.draft?.id === this.target.id) setUi({ draft: undefined });
   }
 
-  /** Tell the others where it is just now, the newest alone. */
+  /** Send the current pose to the other users; older ones are dropped. */
   private tell(): void {
     if (!this.held || !this.stored || this.failed || this.telling !== undefined || !serves("PreviewMove")) return;
     const wait = Math.max(0, this.told + PREVIEW * 1000 - performance.now());
@@ -102,11 +102,11 @@ export class Moving {
       const { kind, id } = this.target;
       const { position, orientation } = this.stored;
       const shown = { ...(kind === "orientation" ? {} : { position }), ...(kind === "point" ? {} : { orientation }) };
-      call("PreviewMove", { id, ...shown }).catch(() => {}); // the next one, or the end, tells where it is
+      call("PreviewMove", { id, ...shown }).catch(() => {}); // the next preview, or the edit, follows
     }, wait);
   }
 
-  /** Ask for it; gives whether it is so. */
+  /** Send the edit. Return whether it was accepted. */
   private async store(): Promise<boolean> {
     const { target, stored, model } = this;
     if (model && target.type) {
@@ -136,7 +136,7 @@ function asked({ kind, id }: Target, { position, orientation }: Pose) {
 let current: Moving | null = null;
 let latest: Promise<void> = Promise.resolve();
 
-/** Begin to move something, or go on with it. What was moved before is finished. */
+/** Start to move an item, or continue. A previous change of another item is finished. */
 export function moving(target: Target): Moving {
   if (current && !current.finishing && !current.failed && current.target.id === target.id) return current;
   current?.finish();
@@ -144,7 +144,7 @@ export function moving(target: Target): Moving {
   return current;
 }
 
-/** Put it to a pose in the world, by one edit. */
+/** Move the item to a pose in the world by one edit. */
 export async function place(target: Target, pose: Pose, model?: ObjectModel): Promise<boolean> {
   const one = moving(target);
   one.to(pose, model);
@@ -153,7 +153,7 @@ export async function place(target: Target, pose: Pose, model?: ObjectModel): Pr
   return !one.failed;
 }
 
-/** A step: several that come quickly are one edit. */
+/** Make a step; several quick steps become one edit. */
 export function step(target: Target, pose: Pose): void {
   const one = moving(target);
   one.to(pose);
@@ -161,13 +161,13 @@ export function step(target: Target, pose: Pose): void {
 }
 
 store.subscribe((state, before) => {
-  // What was begun is not left behind when another thing is selected.
+  // Selecting another item finishes the change.
   const { selection, draft } = state.ui;
   if (current && selection?.id !== before.ui.selection?.id && selection?.id !== current.target.id) current.finish();
   if (!draft || state.doc === before.doc) return;
   const thing = known(state, draft.id);
   if (thing === draft.of) return;
-  // The edit came back as an event: what was shown until then is over, unless the next one has begun already.
+  // The event of the edit has arrived: end the preview, unless the next change has started.
   const goesOn = thing !== undefined && current?.target.id === draft.id && !current.finishing;
   setUi({ draft: goesOn ? { ...draft, of: thing } : undefined });
 });

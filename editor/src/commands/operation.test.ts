@@ -10,7 +10,7 @@ const { stopMotion } = await import("./operation");
 
 beforeEach(() => vi.clearAllMocks());
 
-test("Stop sends one request, ends holds without waiting for the answer, and is quiet when all was stopped", async () => {
+test("Stop sends one request, ends holds at once, and reports nothing if everything was stopped", async () => {
   let answer: (data: object) => void = () => {};
   call.mockReturnValue(new Promise((done) => (answer = done)));
   const stopped = stopMotion();

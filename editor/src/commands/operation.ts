@@ -1,4 +1,4 @@
-/** The scene in operation: online, offline, and stop. */
+/** The online scene: go online, go offline, stop. */
 
 import { t } from "@lingui/core/macro";
 import { call, serves } from "../session/connection";
@@ -6,17 +6,17 @@ import { tell } from "../store/store";
 import { ask, sentence } from "./asking";
 import { endHolds } from "./holds";
 
-/** Go online; devices that fail are left out where the server can do without them. */
+/** Go online; devices that fail are left out if the server supports it. */
 export const goOnline = () => ask(serves("StartSceneKeepGoing") ? "StartSceneKeepGoing" : "StartScene");
 export const goOffline = () => ask("StopScene");
 export const retryObject = (object_id: string) => ask("RetryObject", { object_id }, { deadline: 60 });
 
-/** Seconds for the answer of a stop; the server gives the devices three. */
+/** Time limit of Stop, s. The server allows the devices three seconds. */
 const STOPPED_WITHIN = 5;
 
 /**
- * Stop the program, every robot and device, and the action that is being tried, and say at once what was not stopped.
- * This is a functional stop, not a safety function.
+ * Stop the program, every robot and device, and the running action, and report what was not stopped. This is a
+ * functional stop, not a safety function.
  */
 export async function stopMotion(): Promise<void> {
   const answer = call("StopAll", undefined, { deadline: STOPPED_WITHIN });

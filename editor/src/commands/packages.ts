@@ -1,4 +1,4 @@
-/** Packages as files: taken to the server, and fetched from it. */
+/** Import and export of packages. */
 
 import { t } from "@lingui/core/macro";
 import { refusedWith } from "../session/assets";
@@ -12,7 +12,7 @@ const headers = (): HeadersInit => {
   return token ? { Authorization: `Bearer ${token}` } : {};
 };
 
-/** Take a package in under a new id; gives why not. */
+/** Import a package with a new id. Return why it failed, or an empty string. */
 export function uploadPackage(file: File): Promise<string> {
   return refusal(async () => {
     const base = file.name.replace(/\.zip$/i, "").replace(/[^\w-]+/g, "_") || "package";
@@ -26,7 +26,7 @@ export function uploadPackage(file: File): Promise<string> {
   });
 }
 
-/** Save a package as a file of this device; gives why not. */
+/** Save a package as a file on this device. Return why it failed, or an empty string. */
 export function downloadPackage(id: string, name: string): Promise<string> {
   return refusal(async () => {
     const response = await fetch(`/packages/${encodeURIComponent(id)}`, { headers: headers() });

@@ -1,4 +1,4 @@
-/** Points, and the orientations and joints that are taught at them. Each gives why it was refused, empty when it was done. */
+/** Action points, orientations and joints. Functions return why they were refused, or an empty string. */
 
 import { t } from "@lingui/core/macro";
 import type { Joint, Orientation, Position } from "../protocol/types";
@@ -9,10 +9,10 @@ import { relativeTo, worldOf } from "../viewmodel/frames";
 import { held, refusal } from "./asking";
 import { type Chosen, robotArg } from "./robot";
 
-/** s for the event of what was added to come after the answer. */
+/** Time within which the event of an added item arrives after the answer, s. */
 const SEEN_WITHIN = 3;
 
-/** A name that is not taken: `stem`, or with a number. */
+/** Return a free name: `stem`, with a number if necessary. */
 export function freeName(stem: string, taken: Iterable<string>): string {
   const used = new Set(taken);
   for (let number = 1; ; number++) {
@@ -23,13 +23,13 @@ export function freeName(stem: string, taken: Iterable<string>): string {
 
 const names = (of: Record<string, { name: string }> | undefined) => Object.values(of ?? {}).map((each) => each.name);
 
-/** Names of what is at a point. */
+/** Return the names of the items at a point. */
 const namesAt = <T extends { name: string; pointId: string }>(of: Record<string, T> | undefined, point: string) =>
   Object.values(of ?? {})
     .filter((each) => each.pointId === point)
     .map((each) => each.name);
 
-/** Wait until something is in the store, as told by an event; undefined when it does not come. */
+/** Wait until an event brings something into the store. Return undefined if it does not arrive. */
 function seen<T>(look: (state: State) => T | undefined): Promise<T | undefined> {
   return new Promise((resolve) => {
     const found = look(now());
@@ -54,7 +54,7 @@ const pointNamed = (name: string) =>
   seen((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name));
 
 // ------------------------------------------------------------------------------------------------ points
-/** Add a point where something is in the world, on a parent if one is given, and select it. */
+/** Add a point at a position in the world, with an optional parent, and select it. */
 export function addPoint(world: Position, parent = "", orientation?: Orientation): Promise<string> {
   return refusal(async () => {
     const { doc } = now();
@@ -75,7 +75,7 @@ export function addPoint(world: Position, parent = "", orientation?: Orientation
   });
 }
 
-/** Keep where the robot is as a point with orientation and joints, and select it. */
+/** Save the robot pose as a point with orientation and joints, and select it. */
 export function addPointFromRobot({ robotId, armId, effector }: Chosen): Promise<string> {
   return refusal(async () => {
     const name = freeName("point", names(now().doc?.points));
@@ -90,7 +90,7 @@ export function addPointFromRobot({ robotId, armId, effector }: Chosen): Promise
   });
 }
 
-/** Move a point, in its parent's frame, with all that hangs on it. */
+/** Move a point in the frame of its parent, together with its children. */
 export const movePoint = (id: string, position: Position) =>
   refusal(() =>
     held(id, () => call("UpdateActionPointPosition", { action_point_id: id, new_position: position }), true),
@@ -101,11 +101,11 @@ export const movePointToRobot = (id: string, chosen: Chosen) =>
     held(id, () => call("UpdateActionPointUsingRobot", { action_point_id: id, robot: robotArg(chosen) }), true),
   );
 
-/** Hang a point on another thing, or in the world; it stays where it is. */
+/** Change the parent of a point; its position in the world stays the same. */
 export const setParent = (id: string, parent: string) =>
   refusal(() => held(id, () => call("UpdateActionPointParent", { action_point_id: id, new_parent_id: parent })));
 
-/** What a point may hang on: what has a place, but not what hangs on it. */
+/** Return the possible parents of a point: items with a pose, except its own descendants. */
 export function possibleParents(state: State, id: string): string[] {
   const { doc } = state;
   if (!doc) return [];
@@ -116,7 +116,7 @@ export function possibleParents(state: State, id: string): string[] {
   return [...objects, ...points].map((each) => each.id);
 }
 
-/** Copy a point with all that hangs on it: `count` times, each a step from the one before, in its parent's frame. */
+/** Copy a point and its children `count` times, each one step further, in the frame of the parent. */
 export function copyPoint(id: string, count: number, step: Position): Promise<string> {
   return refusal(async () => {
     const from = now().doc?.points[id]?.position;
@@ -161,7 +161,7 @@ export const removeOrientation = (id: string) =>
   refusal(() => call("RemoveActionPointOrientation", { orientation_id: id }));
 
 // ------------------------------------------------------------------------------------------------ joints
-/** The point at which joints are kept: its lock is theirs. */
+/** Return the point of a joint configuration, which has to be locked to edit it. */
 const pointOf = (joints: string): string => now().doc?.joints[joints]?.pointId ?? "";
 
 export function addJointsFromRobot(point: string, { robotId, armId, effector }: Chosen): Promise<string> {
@@ -185,7 +185,10 @@ export const renameJoints = (id: string, new_name: string) =>
 export const removeJoints = (id: string) =>
   refusal(() => held(pointOf(id), () => call("RemoveActionPointJoints", { joints_id: id })));
 
-/** Compute the joints anew, for an orientation of their point: near to what they were, so that the arm bends the same way. */
+/**
+ * Recompute the joints for an orientation of their point, close to the previous ones, so that the arm keeps its
+ * posture.
+ */
 export function solveJoints(id: string, orientationId: string): Promise<string> {
   return refusal(async () => {
     const { doc, live } = now();

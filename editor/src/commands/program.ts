@@ -1,4 +1,4 @@
-/** The program: actions, their parameters, the steps between them, project parameters and overrides. */
+/** The program: actions, parameters, connections, project parameters and overrides. */
 
 import { t } from "@lingui/core/macro";
 import { cannotLead, freeStep, incoming, outgoing } from "../program/logic";
@@ -22,16 +22,16 @@ import type { State } from "../store/state";
 import { now, select, setUi, store, tell } from "../store/store";
 import { ask, held, refusal, sentence } from "./asking";
 
-/** s within which an event that tells of what was just added has come. */
+/** Time within which the event of an added item arrives, s. */
 const TOLD_WITHIN = 5;
 
-/** Give why the program cannot be edited by this request now; empty when it can. */
+/** Return why a request cannot edit the program now; an empty string if it can. */
 export function notEditable(state: State, request: keyof Requests = "UpdateAction"): string {
   if (!state.doc?.project) return t`Open a project first. A scene has no program.`;
   return barred(state, request) || (isRunning(state) ? t`Stop the program first.` : "");
 }
 
-/** Wait for something that an event brings. Rejects when it does not come. */
+/** Wait until an event brings something into the store. Reject if it does not arrive. */
 export function awaited<T>(find: (state: State) => T | undefined): Promise<T> {
   return new Promise((resolve, reject) => {
     const known = find(now());
@@ -50,12 +50,12 @@ export function awaited<T>(find: (state: State) => T | undefined): Promise<T> {
   });
 }
 
-/** Where an action is to be put: on a point, or on a new one at a place. */
+/** Where to add an action: at a point, or at a position in the world, where a point is added. */
 export type Where = { pointId: string; orientationId?: string } | { position: Position; orientation: Orientation };
 
 /**
- * Add an action with names for its results and what it needs: point, orientation. Gives its id, or undefined after
- * telling why not.
+ * Add an action with names for its results, and the point and orientation that it needs. Return its id, or undefined
+ * after notifying the user.
  */
 export async function addAction(objectId: string, meta: ObjectAction, where: Where): Promise<string | undefined> {
   try {
@@ -83,7 +83,7 @@ async function newPoint(base: string, position: Position): Promise<string> {
   return (await awaited((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name))).id;
 }
 
-/** The tool looks down: what a gripper above a table needs. */
+/** The tool points down, which suits a gripper above a table. */
 export const DOWN: Orientation = { x: 1, y: 0, z: 0, w: 0 };
 
 async function orientationOf(pointId: string, where: Where): Promise<string> {
@@ -99,7 +99,7 @@ async function orientationOf(pointId: string, where: Where): Promise<string> {
   return awaited(on);
 }
 
-/** Joints of a robot on a point; taken from where it stands when there are none. */
+/** Return joints of a robot at a point; they are read from the robot if there are none. */
 async function jointsOf(pointId: string, robotId: string): Promise<string> {
   const on = (state: State) =>
     Object.values(state.doc?.joints ?? {}).find((each) => each.pointId === pointId && each.robot_id === robotId)?.id;
@@ -152,7 +152,7 @@ async function startingValue(
   return initial(wanted);
 }
 
-/** A result of that type that there is already, as a link. */
+/** Return an existing result of a type as a link. */
 function imageFor(type: string): string | undefined {
   const { doc, types } = now();
   for (const action of Object.values(doc?.actions ?? {})) {
@@ -176,7 +176,7 @@ export function lastDynamicValues(
   return now().dynamicValues[dynamicKey(objectId, name, parents)];
 }
 
-/** The values that a parameter may take now, as the live device knows them: a set, given in order. Rejects when it cannot be asked. */
+/** Return the possible values of a parameter according to the device. Reject if it cannot be reached. */
 export async function dynamicValues(
   objectId: string,
   name: string,
@@ -190,7 +190,7 @@ export async function dynamicValues(
 
 // ------------------------------------------------------------------------------------------------ actions
 
-/** Change one parameter; gives why not, for the form. */
+/** Change a parameter. Return why it was refused, for the form. */
 export const setParameter = (actionId: string, parameter: ActionParameter): Promise<string> =>
   refusal(() =>
     held(actionId, () => {
@@ -201,7 +201,7 @@ export const setParameter = (actionId: string, parameter: ActionParameter): Prom
     }),
   );
 
-/** Name the results of an action; gives why not. */
+/** Name the results of an action. Return why it was refused. */
 export const nameResults = (actionId: string, outputs: string[]): Promise<string> =>
   refusal(() =>
     held(actionId, () => call("UpdateAction", { action_id: actionId, flows: [{ type: "default", outputs }] })),
@@ -210,7 +210,7 @@ export const nameResults = (actionId: string, outputs: string[]): Promise<string
 export const renameAction = (action_id: string, new_name: string): Promise<string> =>
   refusal(() => held(action_id, () => call("RenameAction", { action_id, new_name })));
 
-/** Another one of the same kind beside it, with results of its own and no steps. */
+/** Add a copy of an action at the same point, with its own results and without connections. */
 export async function duplicateAction(action: Action & { pointId: string }): Promise<void> {
   const { doc } = now();
   if (!doc) return;
@@ -235,7 +235,7 @@ export async function duplicateAction(action: Action & { pointId: string }): Pro
   if (added) select({ kind: "action", id: added.id });
 }
 
-/** Remove an action and its steps, by one edit. Where one way alone leads on from it, what led to it leads there instead. */
+/** Remove an action and its connections by one edit. If it has one next step, its predecessors continue there. */
 export async function removeAction(id: string): Promise<void> {
   const { doc } = now();
   const name = doc?.actions[id]?.name;
@@ -250,16 +250,16 @@ export async function removeAction(id: string): Promise<void> {
     );
 }
 
-// ------------------------------------------------------------------------------------------------ steps
+// ------------------------------------------------------------------------------------------------ connections
 
-/** Begin a step: the next tap on an action says where it leads. */
+/** Start a connection: the next tap on an action ends it. */
 export function beginStep(from: string, condition?: ProjectLogicIf, item?: string): void {
   setUi({ connecting: { from, condition, item } });
 }
 
 export const cancelStep = (): void => setUi({ connecting: null });
 
-/** The step that was begun leads here. */
+/** End the connection at an item. */
 export async function endStep(to: string): Promise<void> {
   const { connecting } = now().ui;
   if (!connecting) return;
@@ -271,7 +271,7 @@ export async function endStep(to: string): Promise<void> {
   } else await connect(from, to, condition);
 }
 
-/** Let `to` follow `from`, under a condition that is still free unless one is given. Tells why not. */
+/** Connect `to` after `from`, under a free condition unless one is given. Notify the user if it is impossible. */
 export async function connect(from: string, to: string, condition?: ProjectLogicIf): Promise<void> {
   const { doc, types } = now();
   if (!doc) return;
@@ -298,7 +298,7 @@ export async function connect(from: string, to: string, condition?: ProjectLogic
 export const updateStep = (logic_item_id: string, start: string, end: string, condition: ProjectLogicIf | undefined) =>
   ask("UpdateLogicItem", { logic_item_id, start, end, condition });
 
-/** As `updateStep`, for a form. */
+/** Like `updateStep`, for a form. */
 export const setCondition = (id: string, condition: ProjectLogicIf | undefined): Promise<string> =>
   refusal(() => {
     const step = now().doc?.logic[id];
@@ -308,7 +308,7 @@ export const setCondition = (id: string, condition: ProjectLogicIf | undefined):
 
 export const removeStep = (logic_item_id: string) => ask("RemoveLogicItem", { logic_item_id });
 
-/** Show the puck of an action, START or END somewhere, to nobody else; undefined: where it belongs. */
+/** Show the puck of an action, START or END at a position, on this page only; undefined: at its own position. */
 export function showPuck(id: string, position: unknown): void {
   const key = `place/${id}`;
   store.setState(({ view }) => {
@@ -317,11 +317,11 @@ export function showPuck(id: string, position: unknown): void {
   });
 }
 
-/** Put the puck of an action, START or END somewhere else in the view, for all; null: back to where it belongs. */
+/** Move the puck of an action, START or END, for all users; null: back to its own position. */
 export async function placePuck(id: string, position: Position | null): Promise<void> {
   const document = now().doc?.project?.id ?? "";
   const before = now().view.shared[`place/${id}`];
-  // Of a change of the view state everybody is told but who makes it.
+  // The server sends changes of the view state to everybody except the user who made them.
   showPuck(id, position);
   if (!(await ask("SetViewState", { scope: "shared", document, values: { [`place/${id}`]: position } })))
     showPuck(id, before);
@@ -335,7 +335,7 @@ export const updateParameter = (id: string, change: { name?: string; value?: str
   refusal(() => held(id, () => call("UpdateProjectParameter", { id, ...change })));
 export const removeParameter = (id: string) => ask("RemoveProjectParameter", { id });
 
-/** Let the project replace a setting of a device, or no longer (`value` undefined). */
+/** Override a device setting in the project; `value` undefined removes the override. */
 export const override = (
   objectId: string,
   setting: Omit<Parameter, "value">,

@@ -1,4 +1,4 @@
-/** The robot in hand: which one, where it shall go, how it is shown where it would be. Holding it: holds.ts. */
+/** The active robot: selection, motion, and the ghost that shows it elsewhere. Held motions: holds.ts. */
 
 import { t } from "@lingui/core/macro";
 import type { Joint, Pose, RobotArg, RobotFeatures, StepAxis, StepMode, StepWhat } from "../protocol/types";
@@ -12,14 +12,14 @@ import { telemetry } from "../store/telemetry";
 import { held, refusal, sentence } from "./asking";
 import { keepView } from "./viewstate";
 
-/** A robot, its arm (empty where it has one) and its end effector (empty until it is known). */
+/** A robot, its arm (empty if it has one) and its end effector (empty if unknown). */
 export interface Chosen {
   robotId: string;
   armId: string;
   effector: string;
 }
 
-/** How a motion is asked for; `speed` is the part of the robot's own. */
+/** Options of a motion; `speed` is relative to the maximum of the robot. */
 export interface Manner {
   speed: number;
   safe: boolean;
@@ -56,21 +56,21 @@ export function featuresOf(state: State, robotId: string): RobotFeatures | undef
   return state.types.robots[state.doc?.objects[robotId]?.type ?? ""]?.features;
 }
 
-/** As requests about points and objects name the robot. */
+/** Return the robot as requests about points and objects name it. */
 export function robotArg({ robotId, armId, effector }: Chosen): RobotArg {
   return { robot_id: robotId, end_effector: effector, ...ofArm(armId) };
 }
 
 const ofArm = (armId: string) => (armId ? { arm_id: armId } : {});
 
-/** Where the end effector is, as last reported; undefined when it is not known, or no longer. */
+/** Return the last reported end effector pose; undefined if unknown or outdated. */
 export function effectorPose({ robotId, armId, effector }: Chosen): Pose | undefined {
   return telemetry
     .endEffectors(robotId)
     .find((each) => each.end_effector_id === effector && (each.arm_id ?? "") === armId)?.pose;
 }
 
-/** Why the robot cannot be asked to do something now; empty when it can. */
+/** Return why the robot cannot be moved now; an empty string if it can. */
 export function notReady(
   state: State,
   chosen: Chosen | null,
@@ -94,13 +94,13 @@ export interface Step {
   what: StepWhat;
   axis: StepAxis;
   mode: StepMode;
-  /** m or rad. */
+  /** Size of the step, m or rad. */
   step: number;
-  /** Whose axes are meant, with the mode `relative`. */
+  /** Pose of the axes, for the mode `relative`. */
   pose?: Pose | undefined;
 }
 
-/** Gives why it was refused, empty when the robot moves. */
+/** Return why it was refused, or an empty string. */
 export function stepEffector(
   { robotId, armId, effector }: Chosen,
   { pose, ...step }: Step,
@@ -122,7 +122,7 @@ export function alignDown({ robotId, armId, effector }: Chosen, manner: Manner):
   return refusal(() => held(robotId, () => call("SetEefPerpendicularToWorld", args, { deadline: 30 })));
 }
 
-/** Move to a pose in the world; what is left out of it stays. */
+/** Move to a pose in the world; omitted parts stay. */
 export function moveToPose({ robotId, armId, effector }: Chosen, pose: Partial<Pose>, manner: Manner): Promise<string> {
   return refusal(() =>
     call(
@@ -139,7 +139,7 @@ export function moveToJoints({ robotId, armId }: Chosen, joints: Joint[], { spee
   );
 }
 
-/** Move to an orientation of a point, or to joints kept there. */
+/** Move to an orientation or to joints of a point. */
 export function moveToTaught(
   { robotId, armId, effector }: Chosen,
   goal: { orientation_id: string } | { joints_id: string },
@@ -151,22 +151,22 @@ export function moveToTaught(
   );
 }
 
-/** Unlock what a protective stop has left, by the person who has looked. */
+/** Acknowledge a protective stop, after the user has checked the robot. */
 export function acknowledgeStop(object_id: string): Promise<string> {
   return refusal(() => call("AcknowledgeStop", { object_id }, { deadline: 30 }));
 }
 
 // ------------------------------------------------------------------------------------------------ ghost
 export interface Showing {
-  /** Whether it is still wanted when the answer is there. */
+  /** Return whether the answer is still needed. */
   current?: () => boolean;
-  /** Where nobody knows joints for it: leave the ghost that there is, marked as impossible. */
+  /** No joints are known for the pose: keep the ghost and mark it as impossible. */
   keep?: boolean;
 }
 
 /**
- * Show the robot where it would be at a pose in the world. Gives what stands against it as a sentence, empty when
- * nothing does; what would collide is shown all the same, as far as there are joints for it.
+ * Show the robot at a pose in the world. Return why it cannot be there, or an empty string. A pose in collision is
+ * shown too, if there are joints for it.
  */
 export async function showAt(
   chosen: Chosen,
@@ -199,7 +199,7 @@ export function showJoints(robotId: string, joints: Joint[], problem = ""): void
   setUi({ ghost: { robotId, joints, problem } });
 }
 
-/** Show the robot as it is, but standing elsewhere: its base at a pose in the world. */
+/** Show the robot with its base at a pose in the world. */
 export function showStanding(robotId: string, at: Pose): void {
   const joints = [...(telemetry.latest(robotId)?.joints ?? [])].map(([name, value]) => ({ name, value }));
   setUi({ ghost: { robotId, joints, problem: "", at } });

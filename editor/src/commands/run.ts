@@ -1,4 +1,4 @@
-/** Running: the open project, packages, single actions; breakpoints. */
+/** Run the open project, packages and single actions; breakpoints. */
 
 import { t } from "@lingui/core/macro";
 import { call, serves } from "../session/connection";
@@ -8,10 +8,10 @@ import type { State } from "../store/state";
 import { now, tell } from "../store/store";
 import { ask, sentence } from "./asking";
 
-/** s: a build copies the code of the drivers, and a busy machine is slow. */
+/** Time limit, s. A build copies the code of the drivers, which takes time on a busy computer. */
 const BUILT_WITHIN = 120;
 
-/** Give why the open project cannot be run now; empty when it can. */
+/** Return why the open project cannot be run now; an empty string if it can. */
 export function notRunnable(state: State): string {
   if (!state.doc?.project) return t`Open a project first. A scene cannot be run.`;
   if (isRunning(state)) return t`The program is already running.`;
@@ -21,7 +21,7 @@ export function notRunnable(state: State): string {
   return barred(state, "TemporaryPackage");
 }
 
-/** Run the open project, saved before where that is needed; gives whether it was begun. */
+/** Run the open project; save it first if necessary. Return whether it was started. */
 export async function run({ paused = false } = {}): Promise<boolean> {
   try {
     if (now().doc?.unsaved) await call("SaveProject");
@@ -45,10 +45,10 @@ export const runPackage = (id: string, paused = false) =>
 export const pause = () => ask("PausePackage");
 export const resume = () => ask("ResumePackage");
 export const step = () => ask("StepAction");
-/** At once, without a question: what has been stopped can be run again. */
+/** Stop at once, without confirmation; the program can be started again. */
 export const stop = () => ask("StopPackage");
 
-/** Make a package of the open project, saved before where that is needed. */
+/** Build a package of the open project; save it first if necessary. */
 export async function build(name: string): Promise<boolean> {
   const { doc } = now();
   if (!doc?.project) return false;
@@ -62,7 +62,7 @@ export async function build(name: string): Promise<boolean> {
   return built !== undefined;
 }
 
-/** Set the breakpoints of a point or action, or take them away: also while the program runs, when no project is open. */
+/** Set or remove the breakpoint of a point or action, also while the program is running. */
 export const breakAt = (id: string, on: boolean) =>
   ask("SetBreakpoints", { ...(on ? { add: [id] } : { remove: [id] }), project_id: now().doc?.project?.id });
 
@@ -72,6 +72,6 @@ export async function runTo(id: string): Promise<void> {
   await run();
 }
 
-/** Try one action on the devices; how it ends is told by events. */
+/** Run one action on the devices; events report how it ends. */
 export const execute = (action_id: string) => ask("ExecuteAction", { action_id });
 export const cancel = () => ask("CancelAction");

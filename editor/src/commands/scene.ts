@@ -1,4 +1,7 @@
-/** The objects of the open scene: add, name, copy, remove, their settings and shapes. Forms are given why something was refused. */
+/**
+ * The objects of the open scene: add, rename, copy, remove; settings and shapes. Functions return why they were
+ * refused.
+ */
 
 import { t } from "@lingui/core/macro";
 import { freeName } from "../program/naming";
@@ -15,7 +18,7 @@ import { aimedPlace } from "./aimed";
 import { ask, held, refusal } from "./asking";
 import { awaited } from "./program";
 
-/** Why objects cannot be added, removed or set up now; empty when they can. */
+/** Return why objects cannot be added, removed or configured now; an empty string if they can. */
 export function notBuildable(state: State, request: Parameters<typeof barred>[1] = "AddObjectToScene"): string {
   if (!state.doc) return t`No scene or project is open.`;
   if (state.doc.project) return t`Objects belong to the scene. Close the project and open the scene.`;
@@ -24,14 +27,14 @@ export function notBuildable(state: State, request: Parameters<typeof barred>[1]
   return barred(state, request);
 }
 
-/** A name for an object that no other object and no type has. */
+/** Return a name that no other object and no type has. */
 export function freeObjectName(base: string): string {
   const { doc, types } = now();
   const clean = base.replace(/\W/g, "_").replace(/^(\d)/, "_$1") || "object";
   return freeName(clean, [...Object.values(doc?.objects ?? {}).map((each) => each.name), ...Object.keys(types.byName)]);
 }
 
-/** Where something new stands: on the surface in the middle of the view, upright. */
+/** Return the pose of a new object: on the surface in the middle of the view, upright. */
 export function newPlace(model?: ObjectModel): Pose {
   const aimed = aimedPlace();
   if (!aimed) return ORIGIN;
@@ -42,7 +45,7 @@ export function newPlace(model?: ObjectModel): Pose {
   return { ...ORIGIN, position: { x: fine(x), y: fine(y), z: fine(z) } };
 }
 
-/** Wait for the new object, and take it in hand. */
+/** Wait for the new object and select it. */
 async function taken(name: string): Promise<void> {
   const added = await awaited((state) => Object.values(state.doc?.objects ?? {}).find((each) => each.name === name));
   select({ kind: "object", id: added.id });
@@ -59,7 +62,7 @@ export function addObject(type: ObjectTypeMeta, name: string, parameters: Parame
 
 export type ShapeKind = "box" | "cylinder" | "sphere";
 
-/** A shape of 10 cm by its kind; `id` is the name of its type. */
+/** A shape of 10 cm; `id` becomes the name of its type. */
 export function shapeModel(kind: ShapeKind, id: string): ObjectModel {
   const size = 0.1;
   if (kind === "box") return { type: "Box", box: { id, size_x: size, size_y: size, size_z: size } };
@@ -67,7 +70,7 @@ export function shapeModel(kind: ShapeKind, id: string): ObjectModel {
   return { type: "Sphere", sphere: { id, radius: size / 2 } };
 }
 
-/** Add a shape at once, with a name of its own: all else can be changed where it stands. */
+/** Add a shape with a generated name at once; everything else can be changed later. */
 export async function addShape(kind: ShapeKind): Promise<void> {
   const name = freeObjectName(kind);
   const why = await addModel(name, shapeModel(kind, name));
@@ -81,7 +84,7 @@ function addModel(name: string, model: ObjectModel, pose = newPlace(model)): Pro
   });
 }
 
-/** Upload a mesh and add an object of it. */
+/** Upload a mesh and add an object with it. */
 export function addMesh(name: string, file: File): Promise<string> {
   return refusal(async () => {
     const asset = await uploadAsset(file);
@@ -93,7 +96,7 @@ export function addMesh(name: string, file: File): Promise<string> {
 export const renameObject = (id: string, new_name: string): Promise<string> =>
   refusal(() => held(id, () => call("RenameObject", { id, new_name })));
 
-/** A copy beside it; of a shape, with a shape of its own. */
+/** Add a copy next to the object; the copy of a shape has its own type. */
 export async function duplicateObject({ name, type, pose, parameters }: SceneObject): Promise<void> {
   const { types } = now();
   const meta = types.byName[type];
@@ -107,10 +110,10 @@ export async function duplicateObject({ name, type, pose, parameters }: SceneObj
         model: named(meta.object_model as ObjectModel, copy),
       })
     : await ask("AddObjectToScene", { name: copy, type, parameters, ...(beside ? { pose: beside } : {}) });
-  if (done) await taken(copy).catch(() => {}); // somebody took it away again
+  if (done) await taken(copy).catch(() => {}); // another user has removed it meanwhile
 }
 
-/** The same model under another type's name. */
+/** Return the same model with another type name. */
 export function named(model: ObjectModel, id: string): ObjectModel {
   const { type, box, cylinder, sphere, mesh } = model;
   if (box) return { type, box: { ...box, id } };
@@ -119,7 +122,7 @@ export function named(model: ObjectModel, id: string): ObjectModel {
   return { type, ...(mesh ? { mesh: { ...mesh, id } } : {}) };
 }
 
-/** Names of the projects that use an object. */
+/** Return the names of the projects that use an object. */
 export async function projectsUsing(id: string): Promise<string[]> {
   const ids = await call("SceneObjectUsage", { id });
   return ids.map((each) => now().lists.projects?.find((one) => one.id === each)?.name ?? each);
@@ -130,7 +133,7 @@ export const removeObject = (id: string, force = false) => ask("RemoveFromScene"
 export const setParameters = (id: string, parameters: Parameter[]): Promise<string> =>
   refusal(() => held(id, () => call("UpdateObjectParameters", { id, parameters })));
 
-/** Scenes in which a type is used, by name; and delete it. */
+/** Scenes that use a type, and its deletion. */
 export async function scenesUsing(type: string): Promise<string[]> {
   const ids = await call("ObjectTypeUsage", { id: type });
   return ids.map((each) => now().lists.scenes?.find((one) => one.id === each)?.name ?? each);

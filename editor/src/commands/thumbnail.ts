@@ -1,4 +1,4 @@
-/** A small picture of the workplace, kept with it for all: taken from the view when it is saved, shown on its tile. */
+/** A thumbnail of the workplace for all users: taken from the view when the document is saved, shown on its tile. */
 
 import { t } from "@lingui/core/macro";
 import { create } from "zustand";
@@ -9,19 +9,19 @@ import { openId } from "../store/selectors";
 import { now } from "../store/store";
 import { refusal } from "./asking";
 
-/** px, and how many signs it may have at most. */
+/** Size in pixels, and largest number of characters. */
 const WIDTH = 320;
 const HEIGHT = 180;
 const MOST = 48_000;
-/** The first that is small enough is taken. */
+/** Qualities in the order in which they are tried. */
 const QUALITIES = [0.75, 0.5, 0.25];
-/** The view has much air around what it shows. */
+/** Part of the view that is cut out, since its borders are mostly empty. */
 const CLOSER = 1.5;
 
-/** Pictures by document, as data addresses; empty where there is none. */
+/** Thumbnails by document, as data URLs; empty if there is none. */
 export const useThumbnails = create<Record<string, string>>(() => ({}));
 
-/** Take a picture of what is open and keep it, also when that is closed meanwhile. */
+/** Take a thumbnail of the open document and store it, even if the document is closed meanwhile. */
 export async function keepThumbnail(): Promise<void> {
   const document = openId(now());
   const blob = barred(now(), "SaveProject") || !serves("SetViewState") ? null : await theEngine()?.picture();
@@ -32,10 +32,10 @@ export async function keepThumbnail(): Promise<void> {
   await call("SetViewState", { scope: "shared", document, values: { thumbnail } });
 }
 
-/** Of which documents the picture is somebody's own, which saving does not replace. */
+/** Documents with a picture chosen by a user, which saving does not replace. */
 export const useOwn = create<Record<string, boolean>>(() => ({}));
 
-/** Keep a picture of the user's own for a document, for all; null: that of the view again. Gives why not. */
+/** Store a picture chosen by the user for a document; null: use the view again. Return why it failed. */
 export function keepOwnPicture(document: string, file: Blob | null): Promise<string> {
   return refusal(async () => {
     const picture = file && (await smaller(file, 1));
@@ -45,7 +45,7 @@ export function keepOwnPicture(document: string, file: Blob | null): Promise<str
   });
 }
 
-/** Ask for the picture of a document. */
+/** Request the thumbnail of a document. */
 export async function readThumbnail(document: string): Promise<void> {
   if (!serves("GetViewState")) return;
   const { values } = await call("GetViewState", { scope: "shared", document });
@@ -57,7 +57,9 @@ export async function readThumbnail(document: string): Promise<void> {
   useThumbnails.setState({ [document]: own || taken || "" });
 }
 
-/** The middle of a picture, as wide as a tile; empty when it stays too large. Rejects when it is none. */
+/**
+ * Return the middle of a picture in the format of a tile; empty if it stays too large. Reject if it is not a picture.
+ */
 async function smaller(blob: Blob, closer = CLOSER): Promise<string> {
   const picture = await createImageBitmap(blob).catch(() => {
     throw new Error(t`The browser cannot read this picture file.`);

@@ -1,11 +1,11 @@
-/** What a user finds again on another tablet, and what all share of how the document is looked at: kept by the server. */
+/** View state stored on the server: settings of a user for all devices, and the shared view state of a document. */
 
 import type { ViewScope } from "../protocol/types";
 import { call, serves } from "../session/connection";
 import { openId } from "../store/selectors";
 import { now, store } from "../store/store";
 
-/** Keep values of the open document by their keys; null takes one away. Seen at once, told to the others by the server. */
+/** Store values of the open document by their keys; null removes one. They take effect at once. */
 export function keepView(scope: ViewScope, values: Record<string, unknown>): void {
   store.setState((state) => {
     const kept = { ...state.view[scope], ...values };
@@ -13,11 +13,11 @@ export function keepView(scope: ViewScope, values: Record<string, unknown>): voi
     return { view: { ...state.view, [scope]: kept } };
   });
   if (!serves("SetViewState")) return;
-  // Lost with the connection: then it is as it was, as told when it is back.
+  // Lost with the connection: after the reconnect the server sends the old values.
   call("SetViewState", { scope, document: openId(now()), values }).catch(() => {});
 }
 
-/** Keep values that belong to no document, by their keys: of the user, as stars and how he likes his tools, or of all. */
+/** Store values that belong to no document, by their keys: of the user, such as favorites, or of all users. */
 export function keepGeneral(values: Record<string, unknown>, scope: ViewScope = "user"): void {
   store.setState((state) => {
     const kept = { ...state.view.general, ...values };

@@ -1,4 +1,4 @@
-/** What the cross means, and which way to turn for what is not in view. */
+/** Candidates at the crosshair, and the direction to items outside the view. */
 
 import { Box3, Matrix4, PerspectiveCamera, Ray, Vector3 } from "three";
 import { expect, test } from "vitest";
@@ -32,8 +32,8 @@ test("what stands in front does not hide what is behind, but comes first of two 
   expect(ids([ball("low", 0, -1), ball("high", 0, 0.5)])).toEqual(["high", "low"]);
 });
 
-test("the angle is that of the nearest place of a box, however it is turned, and of the nearest part of a thing", () => {
-  // A corner 0.03 m beside the ray, 1 m away.
+test("the angle is that of the closest point of a rotated box, and of the closest part of an item", () => {
+  // A corner 0.03 m from the ray, at a distance of 1 m.
   const [turned] = aimed([box("turned", [0.1, 0.1, 0.001], [0.03 + 0.05 * Math.SQRT2, 0, 0], Math.PI / 4)], RAY, CONE);
   expect(turned?.off).toBeCloseTo(Math.atan(0.03), 3);
   expect(ids([box("far off", [0.1, 0.1, 0.1], [0.2, 0, 0])])).toEqual([]);

@@ -1,39 +1,39 @@
 /**
- * What the cross in the middle of the view may mean: everything near the ray through it, the likeliest first. Unlike a
- * tap, it goes through what stands in front, and small things are found beside their edge, too.
+ * Candidates at the crosshair in the middle of the view: everything near the ray through it, most likely first. Unlike
+ * a tap, it also finds hidden items and small items next to it.
  */
 
 import { type Box3, Matrix4, type Mesh, type Object3D, type PerspectiveCamera, Ray, Vector3 } from "three";
 import type { Thing } from "./thing";
 
-/** Pixels around the cross within which something may be meant. */
+/** Radius of the search around the crosshair, pixels. */
 export const CONE = 56;
-/** At most so many are offered: more are not read. */
+/** Largest number of candidates. */
 export const MOST_CANDIDATES = 8;
-/** What a large picture and a great distance count, of what a cone's width beside the cross does. */
+/** Weights of size and distance relative to the distance from the crosshair. */
 const LARGE = 0.5;
 const FAR = 0.3;
-/** m: how large those are that are drawn with all others of their kind. */
+/** Assumed size of items that are drawn as instances, m. */
 const SMALL = 0.015;
-/** How often a place on the ray and one in a box are brought closer to each other. */
+/** Iterations of the search for the closest points of a ray and a box. */
 const TURNS = 8;
 
-/** A part of a thing: a box in a frame of its own, or a ball. */
+/** A part of an item: a box in its own frame, or a sphere. */
 export type Target = { id: string } & ({ box: Box3; frame: Matrix4 } | { centre: Vector3; radius: number });
 
 export interface Candidate {
   id: string;
-  /** rad between the cross and its nearest place. */
+  /** Angle between the crosshair and its closest point, rad. */
   off: number;
-  /** m from the eye. */
+  /** Distance from the camera, m. */
   distance: number;
-  /** The lower, the likelier. */
+  /** Lower is more likely. */
   score: number;
 }
 
 /**
- * Give what lies within a cone around a ray from the eye, each thing once. `cone` is its half angle in rad. Near the
- * ray comes before beside it, small before large, near before far; `before` is who was best, who stays so in doubt.
+ * Return the items within a cone around a ray from the camera, each once. `cone` is its half angle, rad. Items near the
+ * ray come first, small before large, near before far; `before` is the previous best one, which wins ties.
  */
 export function aimed(targets: Iterable<Target>, ray: Ray, cone: number, before = ""): Candidate[] {
   const found = new Map<string, { off: number; distance: number; size: number }>();
@@ -77,7 +77,7 @@ function ofBall({ centre, radius }: { centre: Vector3; radius: number }, ray: Ra
   return { off, distance, size };
 }
 
-/** The nearest places of ray and box, each sought from the other: both are convex, so that this comes to an end. */
+/** Closest points of ray and box by alternating projection, which converges since both are convex. */
 function ofBox({ box, frame }: { box: Box3; frame: Matrix4 }, ray: Ray) {
   local.copy(ray).applyMatrix4(inverse.copy(frame).invert());
   local.direction.normalize();
@@ -95,7 +95,7 @@ function ofBox({ box, frame }: { box: Box3; frame: Matrix4 }, ray: Ray) {
   return { off: hit ? 0 : corner.angleTo(ray.direction), distance, size: Math.atan(size / distance) };
 }
 
-/** The parts of all things that are shown, where they were drawn. */
+/** Return the parts of all visible items, as drawn in the last frame. */
 export function* targetsOf(things: Iterable<Thing>): Generator<Target> {
   for (const thing of things) {
     const { id, faint, kind } = thing.item;
@@ -109,7 +109,7 @@ export function* targetsOf(things: Iterable<Thing>): Generator<Target> {
   }
 }
 
-/** The meshes of a thing; not those of what hangs on it. */
+/** Return the meshes of an item, without those of its children. */
 function meshesOf(root: Object3D, id: string, found: Mesh[] = []): Mesh[] {
   for (const child of root.children) {
     const owner = child.userData.item as string | undefined;
@@ -120,7 +120,7 @@ function meshesOf(root: Object3D, id: string, found: Mesh[] = []): Mesh[] {
   return found;
 }
 
-/** The ray through the middle of the view, and the half angle of the cone of so many pixels around it, rad. */
+/** Return the ray through the middle of the view, and the half angle of a cone with a radius in pixels, rad. */
 export function middle(camera: PerspectiveCamera, height: number, pixels = CONE): { ray: Ray; cone: number } {
   camera.updateMatrixWorld();
   const ray = new Ray(camera.getWorldPosition(new Vector3()), camera.getWorldDirection(new Vector3()));

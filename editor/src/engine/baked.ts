@@ -1,6 +1,6 @@
 /**
- * Instances as one mesh: what draws in software goes through instances one by one, and takes as long for each as for a
- * hundred triangles. Nothing is done per frame; all is written anew when something changed its place or its colour.
+ * Instances merged into one mesh: software rendering needs as long for an instance as for a hundred triangles. The mesh
+ * is only rewritten when a pose or colour changes.
  */
 
 import {
@@ -19,9 +19,9 @@ import { cheapen } from "./surface";
 
 export interface Instance {
   id: string;
-  /** Whose frame it has. */
+  /** Object whose frame it is in. */
   frame: Object3D;
-  /** In that frame. */
+  /** Offset in that frame. */
   offset: Matrix4;
   color: Color;
 }
@@ -29,7 +29,7 @@ export interface Instance {
 const matrix = new Matrix4();
 const place = new Vector3();
 const normal = new Vector3();
-/** Of a square that faces the eye. */
+/** Corners of a square that faces the camera. */
 const CORNERS = [-1, -1, 1, -1, 1, 1, -1, 1];
 
 export class Baked {
@@ -37,7 +37,9 @@ export class Baked {
   private readonly material = new MeshLambertMaterial({ vertexColors: true });
   private room = 0;
 
-  /** Draws `shape` at every instance; balls of a radius of `ball` m, where that is not 0, as squares on which they are painted. */
+  /**
+   * Draw `shape` at every instance; spheres with a radius of `ball`, m, if it is not 0, as squares facing the camera.
+   */
   constructor(
     private readonly scene: Scene,
     private readonly shape: BufferGeometry,
@@ -93,7 +95,7 @@ export class Baked {
     this.material.dispose();
   }
 
-  /** Corners of triangles of an instance. */
+  /** Vertices of the triangles of an instance. */
   private get corners(): number {
     return this.ball > 0 ? 6 : (this.shape.index?.count ?? this.shape.getAttribute("position").count);
   }

@@ -1,4 +1,4 @@
-/** Many small things in one mesh: where they are drawn, and that they are met although the instances are not drawn. */
+/** Many small items in one mesh: their positions, and that they can be picked although they are not drawn. */
 
 import {
   Color,

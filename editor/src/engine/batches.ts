@@ -1,4 +1,4 @@
-/** Many equal small things drawn in one go: points, pucks, arrows. Each keeps its frame in the scene graph. */
+/** Many equal small items in one draw call: points, pucks, arrows. Each has its frame in the scene graph. */
 
 import { type BufferGeometry, Color, DynamicDrawUsage, InstancedMesh, type Material, Matrix4, type Scene } from "three";
 import { Baked, type Instance } from "./baked";
@@ -6,7 +6,7 @@ import { Baked, type Instance } from "./baked";
 const FIRST_SIZE = 64;
 const matrix = new Matrix4();
 
-/** One geometry and material, drawn at every instance; where there is `baked`, by that, and the instances are only met by who points at them. */
+/** One geometry and material, drawn at every instance; with `baked`, the instances serve only for picking. */
 export class Batch {
   private mesh: InstancedMesh;
   private readonly instances: Instance[] = [];
@@ -31,7 +31,7 @@ export class Batch {
     if (last !== instance) this.instances[index] = last;
   }
 
-  /** Take over where the frames are, and the colours. */
+  /** Update the frames and colours. */
   refresh(): void {
     if (this.instances.length > this.mesh.instanceMatrix.count) {
       this.scene.remove(this.mesh);
@@ -61,7 +61,7 @@ export class Batch {
   private made(size: number): InstancedMesh {
     const mesh = new InstancedMesh(this.geometry, this.material, size);
     mesh.instanceMatrix.setUsage(DynamicDrawUsage);
-    mesh.setColorAt(0, new Color(1, 1, 1)); // makes the attribute, so that the shader is compiled once
+    mesh.setColorAt(0, new Color(1, 1, 1)); // creates the attribute, so that the shader is compiled only once
     mesh.count = 0;
     mesh.userData.batch = (index: number) => this.instances[index]?.id;
     this.scene.add(mesh);
@@ -69,7 +69,7 @@ export class Batch {
   }
 }
 
-/** The batches by their names, made by what uses them first. */
+/** The batches by name; the first user of a name creates the batch. */
 export class Batches {
   private readonly byName = new Map<string, Batch>();
 
@@ -78,7 +78,7 @@ export class Batches {
     private readonly cheap: boolean,
   ) {}
 
-  /** Where it is to be cheap, balls of a radius of `ball` m are painted instead of modelled. */
+  /** At low quality, spheres with a radius of `ball`, m, are drawn as squares. */
   of(name: string, make: () => [BufferGeometry, Material], ball = 0): Batch {
     let batch = this.byName.get(name);
     if (!batch) {

@@ -1,10 +1,10 @@
-/** Where something is, seen from the view: in it, or which way to turn. Beside the engine, which loads without it. */
+/** Position of an item in the view, or the direction to it. Works without loading the engine. */
 
 import { type PerspectiveCamera, Vector3 } from "three";
 import type { Engine } from "./engine";
 
 export interface Bearing {
-  /** Pixels from the view's upper left corner; where it is not in view, on the line there, outside of the view. */
+  /** Pixels from the upper left corner of the view; for an item outside the view, a point on the line towards it. */
   x: number;
   y: number;
   inView: boolean;
@@ -12,7 +12,7 @@ export interface Bearing {
 
 const at = new Vector3();
 
-/** Where a thing is in the view; null: it is not shown. */
+/** Return the position of an item in the view; null if it is not shown. */
 export function bearingOf(engine: Engine, id: string): Bearing | null {
   const { things, width, height } = engine.shown();
   const thing = things.get(id);
@@ -20,7 +20,7 @@ export function bearingOf(engine: Engine, id: string): Bearing | null {
   return bearing(thing.anchor(new Vector3()), engine.view.camera, width, height);
 }
 
-/** Bring a thing into the middle of the view, as far away as what is looked at now. */
+/** Turn the view to an item without changing the distance to the target. */
 export function lookAt(engine: Engine, id: string): void {
   const thing = engine.shown().things.get(id);
   if (!thing) return;
@@ -38,14 +38,14 @@ export function bearing(place: Vector3, camera: PerspectiveCamera, width: number
   camera.updateMatrixWorld();
   at.copy(place).applyMatrix4(camera.matrixWorldInverse);
   const behind = at.z > -camera.near;
-  // What is behind the camera would be drawn upside down: the way to it is that of its picture on the camera's plane.
+  // A projection behind the camera is mirrored: use the direction on the camera plane.
   let [x, y] = [at.x, at.y];
   if (!behind) {
     at.applyMatrix4(camera.projectionMatrix);
     [x, y] = [at.x, at.y];
   } else {
     const length = Math.hypot(x, y);
-    // Exactly behind: it is as far to the right as to the left.
+    // Exactly behind the camera: left and right are equivalent.
     [x, y] = length < 1e-6 ? [4, 0] : [(4 * x) / length, (4 * y) / length];
   }
   const inView = !behind && Math.abs(x) <= 1 && Math.abs(y) <= 1;

@@ -1,4 +1,4 @@
-/** The view: orbit around a point, or fly. z is up. Tells when something has to be drawn. */
+/** The camera: orbit around a point, or fly. z is up. It reports when a frame has to be drawn. */
 
 import { type Box3, PerspectiveCamera, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -12,25 +12,25 @@ const KEYS: Record<string, [number, number, number]> = {
   KeyE: [0, 1, 0],
   KeyQ: [0, -1, 0],
 };
-/** Part of the view that what is shown fills, and the nearest that the camera goes for it, m. */
+/** Part of the view that the shown items fill, and smallest distance of the camera, m. */
 const MARGIN = 0.88;
 const CLOSEST = 0.35;
-/** m/s. */
+/** Speed, m/s. */
 const FLY_SPEED = 0.8;
 
-/** `side` is the right one. */
+/** `side` is the right side. */
 export type ViewName = "home" | "top" | "front" | "side" | "back" | "left";
 
-/** Around what is looked at, or about the camera itself, which is moved by keys and by `hold`. */
+/** Orbit around the target, or fly with keys and `hold`. */
 export type ViewMode = "orbit" | "fly";
 
-/** Where the camera is and what it looks at, in the world. */
+/** Position of the camera and its target, in the world. */
 export interface Viewpoint {
   position: [number, number, number];
   target: [number, number, number];
 }
 
-/** m ahead of a camera that flies, around which it is turned: as good as itself. */
+/** Distance of the target from a flying camera, m; small enough to turn on the spot. */
 const NOSE = 0.05;
 
 export class View {
@@ -47,7 +47,7 @@ export class View {
     this.camera.position.copy(START);
     this.controls = new OrbitControls(this.camera, element);
     this.controls.target.set(0.2, 0, 0.2);
-    this.controls.enableDamping = false; // it would draw on after the hand is off
+    this.controls.enableDamping = false; // without inertia: no frames are drawn after the release
     this.controls.maxDistance = 40;
     this.controls.minDistance = 0.05;
     this.controls.zoomToCursor = true;
@@ -64,7 +64,7 @@ export class View {
     this.camera.updateProjectionMatrix();
   }
 
-  /** Fly by the keys that are down, for the time since the last frame in s; gives whether it flies. */
+  /** Move a flying camera by the pressed keys for the time since the last frame, s. Return whether it moves. */
   fly(seconds: number): boolean {
     if (this.pressed.size === 0) return false;
     const step = new Vector3();
@@ -82,7 +82,7 @@ export class View {
     return true;
   }
 
-  /** Show all of a box, from the side from which it is seen now, as large as it can be. */
+  /** Show a whole box as large as possible, from the current direction. */
   fit(box: Box3): void {
     if (box.isEmpty()) return;
     this.setMode("orbit");
@@ -113,7 +113,7 @@ export class View {
     return this.controls.enableZoom ? "orbit" : "fly";
   }
 
-  /** Fly from where it is, or turn around what is in front. */
+  /** Fly from the current position, or orbit around a point in front of the camera. */
   setMode(mode: ViewMode): void {
     if (mode === this.mode) return;
     const ahead = this.camera.getWorldDirection(new Vector3());
@@ -124,7 +124,7 @@ export class View {
     this.changed();
   }
 
-  /** Fly as long as it is held; `key` as of the keyboard: KeyW ahead, KeyE up, and so on. */
+  /** Fly while held; `key` is a key code: KeyW forward, KeyE up, and so on. */
   hold(key: string, down: boolean): void {
     if (down && key in KEYS) this.pressed.add(key);
     else this.pressed.delete(key);
@@ -135,7 +135,7 @@ export class View {
     return { position: this.camera.position.toArray(), target: this.controls.target.toArray() };
   }
 
-  /** Look from a side, at what is looked at now. */
+  /** Look at the target from a side. */
   look(from: ViewName): void {
     this.setMode("orbit");
     const distance = this.camera.position.distanceTo(this.controls.target);
@@ -163,7 +163,7 @@ export class View {
     return this.controls.target;
   }
 
-  /** Off while something else is dragged. */
+  /** Disabled while something else is dragged. */
   enable(on: boolean): void {
     this.controls.enabled = on;
   }

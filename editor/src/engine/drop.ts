@@ -1,4 +1,4 @@
-/** How high something is, to be seen from any side: a dashed line down to the floor, and a ring where it stands above. */
+/** Height of an item: a dashed line down to the floor with a ring at its end. */
 
 import { t } from "@lingui/core/macro";
 import {
@@ -14,7 +14,7 @@ import {
 } from "three";
 import type { Palette } from "./palette";
 
-/** m: what is lower stands on the floor. */
+/** Lowest height that is shown, m. */
 const LOW = 0.005;
 
 export class DropLine {
@@ -29,13 +29,13 @@ export class DropLine {
   );
 
   constructor(scene: Scene) {
-    this.root.userData.ground = true; // not to be picked
+    this.root.userData.ground = true; // not pickable
     this.root.add(this.line, this.ring);
     this.root.visible = false;
     scene.add(this.root);
   }
 
-  /** Show it below a place in the world; null: nowhere. Gives how high that is, m. */
+  /** Show the line below a point in the world; null hides it. Return the height, m. */
   show(at: Vector3 | null, palette: Palette): number {
     this.root.visible = at !== null && Math.abs(at.z) > LOW;
     if (!at || !this.root.visible) return at?.z ?? 0;
@@ -43,7 +43,7 @@ export class DropLine {
     this.ring.material.color.copy(palette.selected);
     this.line.position.copy(at);
     this.line.scale.set(1, 1, at.z);
-    // Dashes are measured before the scale.
+    // Dash lengths apply before scaling.
     this.line.material.scale = Math.abs(at.z);
     this.line.computeLineDistances();
     this.ring.position.set(at.x, at.y, 0.001);
@@ -60,7 +60,7 @@ export class DropLine {
   }
 }
 
-/** A height as words; the unit is mm, as in most drawings. */
+/** Return a height as text, mm. */
 export function heightWords(z: number): string {
   if (Math.abs(z) <= LOW) return "";
   const height = Math.round(Math.abs(z) * 1000);

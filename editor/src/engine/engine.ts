@@ -1,7 +1,4 @@
-/**
- * The 3D view: shows items, follows robots, tells what was tapped. No React in it, and nothing is drawn unless
- * something changed.
- */
+/** The 3D view: shows items, follows robots, reports taps. It does not use React, and draws only after changes. */
 
 import { Box3, Fog, GridHelper, PCFShadowMap, Scene, SRGBColorSpace, Vector3, WebGLRenderer } from "three";
 import type { Telemetry } from "../store/telemetry";
@@ -37,15 +34,15 @@ export interface EngineOptions {
 }
 
 const SMALL = new Set<Item["kind"]>(["point", "orientation", "action", "logic"]);
-/** s between two frames. */
+/** Time between two frames, s. */
 const PERIODS: Record<Quality, number> = { low: 1 / 30, high: 1 / 60 };
 
 export class Engine {
   readonly view: View;
   readonly scene = new Scene();
-  /** Moves, turns and sizes what the transform tool has in hand. */
+  /** The gizmo of the transform tool: moves, turns and resizes an item. */
   readonly gizmo: Gizmo;
-  /** Frames drawn since the start. */
+  /** Number of drawn frames. */
   frames = 0;
   onTap: (hits: Hit[], floor: Vector3 | null) => void = () => {};
 
@@ -59,29 +56,29 @@ export class Engine {
   private palette: Palette = LIGHT;
   private scheduled = 0;
   private last = 0;
-  /** When the next frame may be drawn, ms. */
+  /** Earliest time of the next frame, ms. */
   private due = 0;
-  /** Frames of things may have changed since the last drawn frame. */
+  /** Frames of items may have changed since the last frame. */
   private dirty = true;
-  /** Robots whose joints have changed since then, and nothing else. */
+  /** Robots whose joints changed since the last frame. */
   private readonly stirred = new Set<RobotThing>();
   private width = 1;
   private height = 1;
   private hovered = "";
-  /** Where the eye was put when all was brought into view. */
+  /** Position of the camera after the last fit to all items. */
   private fitted: Vector3 | null = null;
   private readonly notes = new Map<string, string>();
-  /** What is said of a thing while somebody moves it, in place of how high it is. */
+  /** Text shown next to an item while it is moved, instead of its height. */
   private said = { id: "", text: "" };
   private readonly drop: DropLine;
-  /** Lines from points to what they hang on. */
+  /** Lines from points to their parents. */
   readonly ties: Ties;
   private readonly wayLine: WayLine;
   private readonly ends: (() => void)[] = [];
 
   constructor(private readonly options: EngineOptions) {
     const { canvas, quality } = options;
-    // Nothing is seen through the view: what draws pages need not look for what is behind it.
+    // An opaque canvas saves blending with the page.
     const context = canvas.getContext("webgl2", {
       alpha: false,
       antialias: quality !== "low",
@@ -137,7 +134,7 @@ export class Engine {
     this.resize();
   }
 
-  /** Show these items and no others. What is the same object as before is left alone. */
+  /** Show these items and no others. An item that is the same object as before is not updated. */
   show(items: Iterable<Item>): void {
     const wanted = new Set<string>();
     let changed = false;
@@ -166,13 +163,13 @@ export class Engine {
     this.invalidate();
   }
 
-  /** Say something beside a thing's name; nothing is said any more with empty words. */
+  /** Show a text next to the name of an item; an empty text removes it. */
   note(id: string, text: string): void {
     this.said = { id: text ? id : "", text };
     this.draw();
   }
 
-  /** Show the straight way to somewhere, in place of another; null: none. */
+  /** Show the straight path of the tool instead of the previous one; null hides it. */
   showWay(way: Way | null): void {
     if (this.wayLine.show(way, this.palette)) this.draw();
   }
@@ -181,7 +178,7 @@ export class Engine {
     return this.wayLine.shown;
   }
 
-  /** Show the label of what the pointer is on. */
+  /** Show the label of the item under the pointer. */
   hover(id: string): void {
     if (id === this.hovered) return;
     this.hovered = id;
@@ -203,7 +200,7 @@ export class Engine {
     this.invalidate();
   }
 
-  /** What lies under a place of the view, in pixels, the best first. */
+  /** Return the items at a position in the view, pixels, best first. */
   pick(x: number, y: number, slack = 12): Hit[] {
     this.place();
     const roots = this.scene.children.filter((each) => each !== this.grid && !each.userData.ground);
@@ -213,24 +210,24 @@ export class Engine {
     });
   }
 
-  /** What is shown, where it is drawn, and how large the view is in pixels: for what is laid over it. */
+  /** Return the shown items as drawn, and the size of the view, pixels: for overlays. */
   shown(): { things: ReadonlyMap<string, Thing>; width: number; height: number } {
     this.place();
     return { things: this.things, width: this.width, height: this.height };
   }
 
-  /** Be called after each drawn frame; gives what ends that. */
+  /** Call a function after each frame; return a function that ends it. */
   watch(by: () => void): () => void {
     this.watchers.add(by);
     return () => this.watchers.delete(by);
   }
 
-  /** Where a place of the view is on the floor, or on a level above it, m. */
+  /** Return the point on the floor, or on a level above it, m, at a position in the view. */
   floor(x: number, y: number, level = 0): Vector3 | null {
     return onFloor(x, y, { width: this.width, height: this.height }, this.view.camera, 20, level);
   }
 
-  /** Bring an item, or all, into the view. */
+  /** Bring an item, or all items, into the view. */
   focus(id?: string): void {
     this.place();
     const box = new Box3();
@@ -245,7 +242,7 @@ export class Engine {
     this.fitted = id === undefined ? this.view.camera.position.clone() : null;
   }
 
-  /** What was all in view is so again with what came, unless somebody has moved since. */
+  /** Fit the view again after loading, unless the user has moved the camera. */
   private loaded(): void {
     if (this.fitted?.equals(this.view.camera.position)) this.focus();
     this.invalidate();
@@ -258,7 +255,7 @@ export class Engine {
     return probe(thing, this.context.telemetry, this.view.camera, { width: this.width, height: this.height });
   }
 
-  /** Joints of a robot with their limits; none while its model is not loaded, or where it has none. */
+  /** Return the joints of a robot with their limits; none if its model is missing or not loaded. */
   limits(id: string): JointLimit[] {
     const thing = this.things.get(id);
     return thing instanceof RobotThing ? thing.limits() : [];
@@ -268,13 +265,13 @@ export class Engine {
     return [...this.things.keys()];
   }
 
-  /** Something moved or looks another way. */
+  /** Draw a frame after a change. */
   invalidate(): void {
     this.dirty = true;
     this.draw();
   }
 
-  /** A picture of the view as it is. */
+  /** Return a picture of the view. */
   async picture(type = "image/webp"): Promise<Blob | null> {
     this.render();
     return new Promise((resolve) => this.options.canvas.toBlob(resolve, type, 0.8));
@@ -297,13 +294,13 @@ export class Engine {
 
   private remove(id: string, thing: Thing): void {
     if (thing instanceof RobotThing) this.stirred.delete(thing);
-    // What hangs on it gets its own place by `hang`, or goes by itself.
+    // Children get another frame by `hang`, or are removed themselves.
     for (const other of this.things.values()) if (other.root.parent === thing.root) other.root.removeFromParent();
     thing.dispose();
     this.things.delete(id);
   }
 
-  /** Put a thing into its parent's frame. */
+  /** Put an item into the frame of its parent. */
   private hang(thing: Thing): void {
     const { parent } = thing.item as { parent?: string };
     const frame = (parent !== undefined && this.things.get(parent)?.root) || this.scene;
@@ -340,7 +337,7 @@ export class Engine {
         return;
       }
       this.last = time;
-      // A frame that came late does not keep the next one back.
+      // A late frame does not delay the next one.
       const period = this.context.period * 1000;
       this.due = Math.max(this.due + period, time + period / 2);
       const flying = this.view.fly(seconds);
@@ -349,7 +346,7 @@ export class Engine {
     });
   }
 
-  /** Bring all frames up to date, or those of robots alone, on whose joints nothing else hangs. */
+  /** Update all frames, or only those of robots, whose joints have no children. */
   private place(): void {
     const stirred = [...this.stirred];
     this.stirred.clear();
@@ -390,7 +387,7 @@ export class Engine {
     if (this.stirred.size > 0) this.draw();
   }
 
-  /** The line below what is selected, and how high it is. */
+  /** Show the line below the selected item, and its height. */
   private tellHeight(): void {
     this.notes.clear();
     const chosen = [...this.things.values()].find((each) => each.item.selected && each.item.kind !== "logic");

@@ -1,4 +1,4 @@
-/** What the 3D view is told to show: plain data. An item that is the same object as before is not looked at again. */
+/** Items of the 3D view, as plain data. An item that is the same object as before is not updated. */
 
 import type { Orientation, Pose, Position } from "../protocol/types";
 
@@ -7,18 +7,18 @@ export type Shape =
   | { kind: "cylinder"; radius: number; height: number }
   | { kind: "sphere"; radius: number }
   | { kind: "mesh"; asset: string }
-  /** No model: a marker where it stands. */
+  /** Without a model: a marker. */
   | { kind: "none" };
 
 interface Base {
   id: string;
   name: string;
-  /** In whose frame `pose` or `position` is; the world's when absent. */
+  /** Id of the item in whose frame `pose` or `position` is; by default the world. */
   parent?: string;
   selected: boolean;
-  /** Somebody else holds it: his name. */
+  /** Name of another user who has locked it. */
   lockedBy: string;
-  /** How much is seen through it: 0 opaque, 1 not there. */
+  /** Transparency from 0, opaque, to 1, invisible. */
   faint: number;
 }
 
@@ -32,28 +32,28 @@ export interface ObjectItem extends Base {
 export interface RobotItem extends Base {
   kind: "robot";
   pose: Pose;
-  /** Asset of its URDF package; empty where it has none. */
+  /** Asset of its URDF package; empty if it has none. */
   urdf: string;
-  /** The axes of its end effectors are drawn. */
+  /** Whether the axes of its end effectors are drawn. */
   axes: boolean;
-  /** Joints are expected; where none come it is marked as stale. */
+  /** Joints are expected; without reports it is marked as outdated. */
   online: boolean;
   trouble: boolean;
-  /** Where it would be, beside where it is. */
+  /** Pose of the ghost, shown in addition to the robot. */
   ghost?: { joints: Record<string, number>; possible: boolean; at?: Pose | undefined } | undefined;
 }
 
 export interface PointItem extends Base {
   kind: "point";
-  /** A line leads to what it hangs on. */
+  /** Whether a line to its parent is drawn. */
   tied: boolean;
-  /** How large the user wants points, of what they are. */
+  /** Size of points chosen by the user, relative. */
   size: number;
   position: Position;
   breakpoint: boolean;
 }
 
-/** Empty: nothing is known, or nothing is to be reached. */
+/** Empty: unknown, or nothing has to be reached. */
 export type ReachShown = "" | "reachable" | "near_limit" | "in_collision" | "out_of_reach" | "unknown";
 
 export interface OrientationItem extends Base {
@@ -68,16 +68,16 @@ export interface PuckItem extends Base {
   /** Its point; START and END have a position in the world instead. */
   parent?: string;
   position?: Position;
-  /** Which it is of the pucks above its point, from 0. */
+  /** Number among the pucks above its point, from 0. */
   level: number;
-  /** How many there are. */
+  /** Number of these pucks. */
   count: number;
   role: "action" | "start" | "end";
   running: boolean;
   breakpoint: boolean;
-  /** Of its object, so that all of one object have one colour. */
+  /** Color index of its object, so that all actions of an object look the same. */
   colour: number;
-  /** Whether its robot gets where it is told to go. */
+  /** Reachability of its targets. */
   reach: ReachShown;
 }
 
@@ -85,7 +85,7 @@ export interface LinkItem extends Base {
   kind: "logic";
   from: string;
   to: string;
-  /** Empty for what is taken in any case; else what stands at the line. */
+  /** Text at the line; empty for an unconditional connection. */
   condition: string;
   branch: "always" | "true" | "false" | "value";
 }

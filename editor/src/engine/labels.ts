@@ -1,23 +1,23 @@
-/** Names in the view: a few elements above the canvas, the most important first, none over another. */
+/** Labels in the view: a few elements above the canvas, most important first, without overlaps. */
 
 import type { PerspectiveCamera } from "three";
 import { Vector3 } from "three";
 
-/** At most so many: more are not read, and cost. */
+/** Largest number of labels. */
 export const MOST_LABELS = 8;
-/** Of so many it is looked whether they have room: where things stand close together, most have none. */
+/** Largest number of candidates; in crowded views most do not fit. */
 const MOST_TRIED = 24;
-/** Pixels between two labels. */
+/** Distance between two labels, pixels. */
 const GAP = 3;
 
 export interface Label {
   id: string;
   text: string;
   badge: string;
-  /** How high it is, or how it is moved. */
+  /** Height of the item, or its current change. */
   note: string;
   selected: boolean;
-  /** The higher, the earlier. */
+  /** Higher priorities come first. */
   weight: number;
   anchor: (target: Vector3) => Vector3;
 }
@@ -29,7 +29,7 @@ export class Labels {
 
   constructor(private readonly host: HTMLElement) {}
 
-  /** Put the labels where their things are drawn now. */
+  /** Move the labels to the items as drawn. */
   show(labels: Label[], camera: PerspectiveCamera, width: number, height: number): void {
     const placed: { left: number; top: number; right: number; bottom: number }[] = [];
     const tried = new Set<string>();
@@ -43,7 +43,7 @@ export class Labels {
       tried.add(label.id);
       const element = this.element(label);
       const half = element.offsetWidth / 2;
-      // Inside the view, even when what it names is at its edge.
+      // Keep the label inside the view.
       const centre = Math.min(Math.max(x, half + 4), Math.max(half + 4, width - half - 4));
       const top = Math.max(4, y - element.offsetHeight - 8);
       const box = { left: centre - half, right: centre + half, top, bottom: top + element.offsetHeight };

@@ -1,4 +1,4 @@
-/** Shaders without what is never defined. */
+/** Shaders without undefined macros. */
 
 import { readdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";

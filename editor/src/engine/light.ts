@@ -1,8 +1,8 @@
-/** Light of the workplace: the sky, a sun that casts shadows, and the ground that they fall on. */
+/** Lights of the workplace: the sky, a sun with shadows, and the ground. */
 
 import { DirectionalLight, HemisphereLight, Mesh, PlaneGeometry, type Scene, ShadowMaterial } from "three";
 
-/** Put the light into a scene; gives what frees it. */
+/** Add the lights to a scene; return a function that frees them. */
 export function light(scene: Scene, shadows: boolean): () => void {
   const sky = new HemisphereLight(0xffffff, 0x8d8f94, 1.5);
   const sun = new DirectionalLight(0xffffff, 2.1);

@@ -1,4 +1,4 @@
-/** Which things have their name in the view, how important each is, and what stands beside it. */
+/** Which items have a label, how important it is, and the text next to the name. */
 
 import { Vector3 } from "three";
 import type { Item } from "./items";
@@ -14,11 +14,11 @@ const WEIGHTS: Record<Item["kind"], number> = {
   logic: 0,
 };
 
-/** m from the eye within which points and actions have their names, too. */
+/** Distance from the camera within which points and actions are labelled, m. */
 const NEAR = 0.9;
 const place = new Vector3();
 
-/** What is selected comes first, then what the pointer or the cross is on, what has something to tell, and what is near. */
+/** Priority: selected, under the pointer or crosshair, with a badge, near. */
 export function labelsOf(
   things: Map<string, Thing>,
   hovered: string,

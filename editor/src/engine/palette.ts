@@ -16,16 +16,16 @@ export interface Palette {
   running: Color;
   start: Color;
   end: Color;
-  /** Of lines, by branch; dash and label tell them apart as well. */
+  /** Colours of connections by branch; dashes and labels distinguish them too. */
   link: Record<"always" | "true" | "false" | "value", Color>;
   reach: Record<"reachable" | "near_limit" | "in_collision" | "out_of_reach" | "unknown", Color>;
-  /** Of actions, by their object. */
+  /** Colours of actions by object. */
   actions: Color[];
 }
 
 const color = (hex: number) => new Color(hex);
 
-// Wong's colours, which people who see colours differently can tell apart.
+// Wong's palette, which people with colour vision deficiencies can distinguish.
 const ACTIONS = [0x0072b2, 0x009e73, 0xcc79a7, 0x56b4e9, 0xe69f00, 0x8a6fc0, 0x5f7a1e, 0xb0522d].map(color);
 
 const COMMON = {

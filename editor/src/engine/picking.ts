@@ -1,25 +1,25 @@
-/** What is under the pointer or the crosshair: all candidates, the best first. */
+/** Items under the pointer: all candidates, best first. */
 
 import { type Camera, type Intersection, type Object3D, Raycaster, Vector2, type Vector3 } from "three";
 
 export interface Hit {
   id: string;
-  /** In the world. */
+  /** Point in the world. */
   point: Vector3;
-  /** Outward normal of the surface in the world, where there is one. */
+  /** Outward normal of the surface in the world, if there is one. */
   normal: Vector3 | null;
-  /** m from the camera. */
+  /** Distance from the camera, m. */
   distance: number;
 }
 
-/** Fingers are wide, and points small: further rays around the pointer, at so many pixels. */
+/** Radii of additional rays around the pointer, pixels, since fingers are wide and points small. */
 const AROUND: [number, number][] = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [
   Math.cos((n * Math.PI) / 4),
   Math.sin((n * Math.PI) / 4),
 ]);
 
 const caster = new Raycaster();
-caster.params.Line.threshold = 0.002; // m; outlines and axes would be hit a metre beside them
+caster.params.Line.threshold = 0.002; // Tolerance for lines, m; the default of three.js is 1 m
 const place = new Vector2();
 
 export interface Size {
@@ -28,9 +28,9 @@ export interface Size {
 }
 
 /**
- * Give what lies under a place of the view, in pixels from its upper left corner. What the ray itself meets comes
- * first, near before far; then what is within `slack` pixels. `small` tells the ids that are hard to hit: they come
- * before large ones behind or just in front of them.
+ * Return the items at a position in the view, pixels from the upper left corner. Direct hits come first, near before
+ * far; then items within `slack` pixels. `small` tells which ids are hard to hit: they precede large items close to
+ * them.
  */
 export function pick(
   x: number,
@@ -71,7 +71,7 @@ function idOf(hit: Intersection): string | undefined {
   return undefined;
 }
 
-/** Where the ray meets the floor, or the level of that z, within `far` m. */
+/** Return where the ray meets the floor, or the level z, within `far`, m. */
 export function onFloor(x: number, y: number, size: Size, camera: Camera, far = 20, level = 0): Vector3 | null {
   place.set((x / size.width) * 2 - 1, 1 - (y / size.height) * 2);
   caster.setFromCamera(place, camera);

@@ -1,4 +1,4 @@
-/** Poses of the protocol as three.js has them. */
+/** Conversion of protocol poses to three.js. */
 
 import { type Object3D, Quaternion, Vector3 } from "three";
 import type { Orientation, Pose, Position } from "../protocol/types";
@@ -16,7 +16,7 @@ export function setOrientation(of: Object3D, { x, y, z, w }: Orientation): void 
   of.quaternion.set(x, y, z, w).normalize();
 }
 
-/** Give an object's frame in the world. */
+/** Return the pose of an object in the world. */
 export function worldPose(of: Object3D): Pose {
   const p = of.getWorldPosition(new Vector3());
   const q = of.getWorldQuaternion(new Quaternion());

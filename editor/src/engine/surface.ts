@@ -1,11 +1,11 @@
-/** What solid things are made of, and how they are drawn where each triangle and each pixel costs. */
+/** Materials of solid items, also for software rendering, where triangles and pixels are expensive. */
 
 import { MeshLambertMaterial, type MeshLambertMaterialParameters } from "three";
 
 /** How much the view costs to draw: "low" is for machines without a graphics processor. */
 export type Quality = "low" | "high";
 
-/** As the Lambert material of three.js does it, with lights of the two kinds that there are. */
+/** Diffuse lighting as in the Lambert material of three.js, for the two kinds of light that are used. */
 const LIT = `
 uniform vec3 diffuse;
 struct DirectionalLight { vec3 direction; vec3 color; };
@@ -39,7 +39,7 @@ vec3 lit( vec3 color, vec3 normal, float far ) {
 #endif
 `;
 
-/** Lit at the corners of triangles, of which few cover many pixels. */
+/** Lighting per vertex, since few vertices cover many pixels. */
 const CORNERS = {
   vertexShader: `
 #include <common>
@@ -60,7 +60,7 @@ varying vec3 vShade;
 void main() { gl_FragColor = vec4( vShade, opacity ); }`,
 };
 
-/** Squares that face the eye, on which a ball is painted: in place of a normal they have the corner and half of the edge, m. */
+/** Squares that face the camera and show a sphere: the normal contains the corner and the half edge, m. */
 const DISCS = {
   vertexShader: `
 #include <common>
@@ -84,14 +84,14 @@ void main() {
 }`,
 };
 
-/** Have a dull material drawn at little cost: as it is, or as balls on squares. */
+/** Make a diffuse material cheap to draw: as it is, or as spheres on squares. */
 export function cheapen(material: MeshLambertMaterial, discs = false): void {
   const shaders = discs ? DISCS : CORNERS;
   material.onBeforeCompile = (shader) => void Object.assign(shader, shaders);
   material.customProgramCacheKey = () => (discs ? "discs" : "corners");
 }
 
-/** A dull material, of a colour that can be set. */
+/** Return a diffuse material with a colour that can be changed. */
 export function surface(
   { quality }: { quality: Quality },
   parameters: MeshLambertMaterialParameters = {},

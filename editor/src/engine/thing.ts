@@ -1,4 +1,4 @@
-/** The picture of one item, and what it is given by the engine. */
+/** The model of an item in the view, and what the engine provides for it. */
 
 import type { Material, Mesh, Object3D, Vector3 } from "three";
 import type { Telemetry } from "../store/telemetry";
@@ -12,24 +12,24 @@ export interface Context {
   palette: Palette;
   batches: Batches;
   quality: Quality;
-  /** s between two frames while something moves. */
+  /** Time between two frames during a motion, s. */
   period: number;
-  /** Read an asset of the server, ready to be shown. */
+  /** Load an asset of the server for display. */
   asset: (id: string) => Promise<ArrayBuffer>;
-  /** Tell people what cannot be shown, and why. */
+  /** Report what cannot be shown, and why. */
   trouble: (sentence: string) => void;
-  /** The thing with an id, for what connects two. */
+  /** Return the model with an id. */
   thing: (id: string) => Thing | undefined;
-  /** m in the world that one pixel is worth at a place. */
+  /** Return the size of a pixel at a point in the world, m. */
   metresPerPixel: (at: Vector3) => number;
-  /** Something has to be drawn anew. */
+  /** Request a new frame. */
   invalidate: () => void;
-  /** A shape came that was being loaded. */
+  /** Report that a model was loaded. */
   loaded: () => void;
 }
 
 export abstract class Thing<I extends Item = Item> {
-  /** Its frame, a child of its parent's; things that are drawn by a batch have nothing in it. */
+  /** Its frame, a child of the parent's frame; empty for items drawn by a batch. */
   abstract readonly root: Object3D;
   abstract item: I;
 
@@ -38,30 +38,30 @@ export abstract class Thing<I extends Item = Item> {
   /** Show another state of the item. */
   abstract update(item: I): void;
 
-  /** Called before each drawn frame, also when only the camera moved: gives whether it has another size now. */
+  /** Called before each frame, also if only the camera moved. Return whether the size changed. */
   resized(): boolean {
     return false;
   }
 
-  /** Called after all frames are known, for what depends on where others are. */
+  /** Called after all frames are updated, for models that depend on others. */
   placed(): void {}
 
-  /** Where its label stands, in the world. */
+  /** Position of the label in the world. */
   anchor(target: Vector3): Vector3 {
     return this.root.getWorldPosition(target);
   }
 
-  /** Why it is not shown as it looks; empty where it is. */
+  /** Why the model is not shown; empty if it is. */
   get problem(): string {
     return "";
   }
 
-  /** What the sign on it tells by its shape; empty where there is none. */
+  /** Meaning of the symbol on it; empty without one. */
   get sign(): string {
     return "";
   }
 
-  /** A word beside the name, when something is to be told. */
+  /** A word next to the name; empty if there is nothing to report. */
   badge(): string {
     return "";
   }
@@ -72,14 +72,14 @@ export abstract class Thing<I extends Item = Item> {
   }
 }
 
-/** Mark an object and what is below it as the picture of an item, for picking. */
+/** Mark an object and its children as the model of an item, for picking. */
 export function ownedBy(root: Object3D, id: string): void {
   root.traverse((each) => {
     each.userData.item = id;
   });
 }
 
-/** Count the triangles of an item's picture; not those of what hangs on it, nor of doubles. */
+/** Return the number of triangles of an item's model, without children and ghosts. */
 export function trianglesOf(root: Object3D, id: string): number {
   let count = 0;
   root.traverse((each) => {
@@ -90,14 +90,14 @@ export function trianglesOf(root: Object3D, id: string): number {
   return count;
 }
 
-/** Let a material be seen through, or not: its shader is another one then. */
+/** Make a material transparent or opaque, which changes its shader. */
 export function seenThrough(material: Material, on: boolean): void {
   if (material.transparent === on) return;
   material.transparent = on;
   material.needsUpdate = true;
 }
 
-/** Free what the graphics card holds of a tree; shared geometry and material are marked and stay. */
+/** Free the graphics memory of a tree; shared geometry and materials are marked and kept. */
 export function disposeTree(root: Object3D): void {
   root.traverse((each) => {
     const mesh = each as { geometry?: { dispose(): void; userData?: object }; material?: Material | Material[] };

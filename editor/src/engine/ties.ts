@@ -1,4 +1,4 @@
-/** Lines from points to what they hang on, all drawn in one go. */
+/** Lines from points to their parents, in one draw call. */
 
 import {
   BufferAttribute,
@@ -20,17 +20,17 @@ export class Ties {
     new LineBasicMaterial({ transparent: true, opacity: 0.75 }),
   );
   private room = 0;
-  /** How many are drawn. */
+  /** Number of lines. */
   count = 0;
 
   constructor(scene: Scene) {
-    this.lines.userData.ground = true; // not to be picked
+    this.lines.userData.ground = true; // not pickable
     this.lines.frustumCulled = false;
     this.lines.visible = false;
     scene.add(this.lines);
   }
 
-  /** Draw a line for each point that is tied, to the origin of what it hangs on. */
+  /** Draw a line from each point to the origin of its parent. */
   show(things: ReadonlyMap<string, Thing>, palette: Palette): void {
     const ends = [...things.values()].flatMap(({ item, root }) => {
       const parent = item.kind === "point" && item.tied && item.faint < 1 && things.get(item.parent ?? "");

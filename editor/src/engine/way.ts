@@ -1,4 +1,4 @@
-/** The straight way from one place to another, before somebody goes it: unbroken where it is free, else dashed. */
+/** The straight path of the tool before a motion: solid if it is free, otherwise dashed. */
 
 import {
   type BufferGeometry,
@@ -13,7 +13,7 @@ import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js
 import type { Position } from "../protocol/types";
 import type { Palette } from "./palette";
 
-/** `unknown`: nobody has looked, or it will not be straight. */
+/** `unknown`: not checked, or the motion is not straight. */
 export type WayState = "free" | "blocked" | "unknown";
 
 export interface Way {
@@ -22,7 +22,7 @@ export interface Way {
   state: WayState;
 }
 
-/** m: half of its thickness, what is shorter is not drawn, lengths of a dash and of what is between. */
+/** Half thickness, shortest drawn length, lengths of a dash and of a gap, m. */
 const RADIUS = 0.003;
 const SHORTEST = 0.005;
 const DASHES: Record<WayState, readonly [number, number] | null> = {
@@ -40,12 +40,12 @@ export class WayLine {
   private readonly mesh = new Mesh<BufferGeometry, MeshBasicMaterial>(undefined, this.material);
 
   constructor(scene: Scene) {
-    this.mesh.userData.ground = true; // not to be picked
+    this.mesh.userData.ground = true; // not pickable
     this.mesh.visible = false;
     scene.add(this.mesh);
   }
 
-  /** Gives whether it looks another way now. */
+  /** Return whether it looks different now. */
   show(way: Way | null, palette: Palette): boolean {
     if (same(way, this.wanted)) return false;
     this.wanted = way;
@@ -73,7 +73,7 @@ export class WayLine {
   }
 }
 
-/** m: a robot that stands is reported a little elsewhere each time. */
+/** Tolerance, m: the pose reported by a robot at standstill varies a little. */
 const STILL = 2e-4;
 
 function same(a: Way | null, b: Way | null): boolean {
@@ -82,11 +82,11 @@ function same(a: Way | null, b: Way | null): boolean {
   return a.state === b.state && apart(a.from, b.from) < STILL && apart(a.to, b.to) < STILL;
 }
 
-/** Along y, from the origin; a ball at its end. */
+/** Along y, from the origin; a sphere at its end. */
 function pieces(length: number, dash: readonly [number, number] | null): BufferGeometry {
   const found: BufferGeometry[] = [new SphereGeometry(RADIUS * 3, 12, 8).translate(0, length, 0)];
   const [on, off] = dash ?? [length, 0];
-  const step = Math.max(on + off, length / MOST_DASHES); // of a long way the dashes grow, not their number
+  const step = Math.max(on + off, length / MOST_DASHES); // long paths have longer dashes, not more of them
   for (let at = 0; at < length - 1e-6; at += step) {
     const piece = Math.min((step * on) / (on + off), length - at);
     found.push(new CylinderGeometry(RADIUS, RADIUS, piece, 6, 1, true).translate(0, at + piece / 2, 0));

@@ -1,4 +1,4 @@
-/** What the home screen lists, as one kind of thing: pure. */
+/** Entries of the home screen. Pure functions. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -9,15 +9,15 @@ export interface Entry {
   id: string;
   name: string;
   description: string;
-  /** When it was changed or built, and made; RFC 3339, empty where nobody knows. */
+  /** When it was changed or built, and created; RFC 3339, empty if unknown. */
   time: string;
   created: string;
   problems: string[];
-  /** Of a project its scene, of a package its project. */
+  /** Scene of a project, project of a package. */
   from?: { id: string; name: string; gone: boolean };
-  /** Of a scene: how many projects are on it. */
+  /** Number of projects of a scene. */
   projects?: number;
-  /** Of a package: when it has run last; empty: never. */
+  /** When a package was last run; empty if never. */
   executed?: string;
 }
 
@@ -84,7 +84,7 @@ function from(id: string, of: { id: string; name: string }[] | null): Entry["fro
   return { id, name: found?.name ?? t`a deleted scene`, gone: found === undefined };
 }
 
-/** Those that are looked for, sorted; starred ones are not before others unless asked for alone. */
+/** Return the matching entries, sorted; favorites only if asked for. */
 export function chosen(
   entries: Entry[],
   search: string,
@@ -102,7 +102,7 @@ export function chosen(
   const last = ({ id }: Entry) => opened.get(id) ?? recent.length;
   const by: Record<Sort, (a: Entry, b: Entry) => number> = {
     changed: (a, b) => b.time.localeCompare(a.time),
-    // What was never opened follows, as it was changed.
+    // Documents that were never opened follow, sorted by their change.
     recent: (a, b) => last(a) - last(b) || b.time.localeCompare(a.time),
     oldest: (a, b) => a.time.localeCompare(b.time),
     created: (a, b) => b.created.localeCompare(a.created),

@@ -1,12 +1,12 @@
-/** What a user has opened last: pure. */
+/** Documents that a user opened recently. Pure functions. */
 
 export type Opened = readonly string[];
 
-/** So many are remembered. */
+/** Number of remembered documents. */
 const MOST = 50;
 const PREFIX = "opened/";
 
-/** Ids from the values that are kept of a user, `opened/<id>` with the time in ms; the last opened first. */
+/** Return ids from stored values, `opened/<id>` with the time in ms; newest first. */
 export function openedOf(values: Record<string, unknown>): Opened {
   return Object.entries(values)
     .flatMap(([key, time]) =>
@@ -16,7 +16,7 @@ export function openedOf(values: Record<string, unknown>): Opened {
     .map(({ id }) => id);
 }
 
-/** Those that are to be forgotten when `id` is opened. */
+/** Return the documents to forget when `id` is opened. */
 export function beyond(opened: Opened, id: string): Opened {
   return opened.filter((each) => each !== id).slice(MOST - 1);
 }

@@ -1,8 +1,7 @@
 /**
  * The texts of the interface in the user's language: one catalogue per language, loaded before the page is shown.
- *
- * A text that is a constant of a module is a descriptor (`msg`), since modules are evaluated before the catalogue is
- * there; it becomes a text by `i18n._()` where it is shown.
+ * Constants of modules use descriptors (`msg`), since modules are evaluated before the catalogue is loaded; `i18n._()`
+ * turns them into text.
  */
 
 import { i18n, type Messages } from "@lingui/core";
@@ -18,7 +17,7 @@ export function preferredLanguage(languages: readonly string[] = navigator.langu
   return short.find((each) => each in CATALOGUES) ?? FALLBACK;
 }
 
-/** Load the texts of a language and use them. Another language needs a reload of the page. */
+/** Load the texts of a language and use them. To change the language, reload the page. */
 export async function loadCatalogue(language: string): Promise<void> {
   const load = CATALOGUES[language] ?? CATALOGUES[FALLBACK];
   if (!load) return;

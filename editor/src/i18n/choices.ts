@@ -1,4 +1,4 @@
-/** Choices whose texts are constants of a module. */
+/** Choices whose texts are constants. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 

@@ -1,4 +1,4 @@
-/** Texts of modules are looked up when they are shown, not while modules are evaluated. */
+/** Texts are looked up when they are shown, not when modules are evaluated. */
 
 import { readdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";

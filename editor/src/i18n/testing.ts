@@ -1,4 +1,4 @@
-/** Set-up of the unit tests: the English texts as they are written in the source code. */
+/** Set-up of the unit tests: use the English texts of the source code. */
 
 import { i18n } from "@lingui/core";
 

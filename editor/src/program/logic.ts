@@ -1,4 +1,4 @@
-/** Questions about the steps of a program: what follows what, what can be branched on, which way is still free. */
+/** The connections of a program: predecessors, successors, conditions and free branches. */
 
 import { t } from "@lingui/core/macro";
 import type { Action, LogicItem, ObjectAction, ProjectLogicIf } from "../protocol/types";
@@ -8,7 +8,7 @@ export const START = "START";
 export const END = "END";
 const BRANCHABLE = new Set(["boolean", "integer", "integer_enum", "string_enum"]);
 
-/** The action, START or END at one side of a step: ends may name a flow behind a slash. */
+/** Return the action, START or END at one end of a connection, without the name of the flow. */
 export const placeOf = (end: string): string => end.split("/")[0] ?? end;
 
 export const outgoing = (doc: OpenDocument, id: string): LogicItem[] =>
@@ -16,7 +16,7 @@ export const outgoing = (doc: OpenDocument, id: string): LogicItem[] =>
 export const incoming = (doc: OpenDocument, id: string): LogicItem[] =>
   Object.values(doc.logic).filter((item) => placeOf(item.end) === id);
 
-/** What an action's type says of it; undefined when it is not known (yet, or any more). */
+/** Return the description of an action by its type; undefined if unknown. */
 export function metaOf(
   types: State["types"],
   doc: OpenDocument,
@@ -38,10 +38,10 @@ function reached(doc: OpenDocument, from: string, next: (doc: OpenDocument, id: 
   return found;
 }
 
-/** Everything that comes after an action. */
+/** Return all actions that can run after an action. */
 export const after = (doc: OpenDocument, id: string): Set<string> =>
   reached(doc, id, (of, each) => outgoing(of, each).map((item) => placeOf(item.end)));
-/** Everything that comes before an action. */
+/** Return all actions that can run before an action. */
 export const before = (doc: OpenDocument, id: string): Set<string> =>
   reached(doc, id, (of, each) => incoming(of, each).map((item) => placeOf(item.start)));
 
@@ -52,7 +52,7 @@ export interface Result {
   type: string;
 }
 
-/** The results of an action that are kept. */
+/** Return the stored results of an action. */
 export function resultsOf(doc: OpenDocument, types: State["types"], action: Of<Action>): Result[] {
   const returns = metaOf(types, doc, action)?.returns ?? [];
   const outputs = action.flows.find((flow) => flow.type === "default")?.outputs ?? [];
@@ -63,8 +63,8 @@ export function resultsOf(doc: OpenDocument, types: State["types"], action: Of<A
 }
 
 /**
- * Results of a type that an action may use: those of actions that come before it. One that is not connected yet may
- * use all but those that need it.
+ * Return the results of a type that an action can use: those of actions before it. An unconnected action can use all
+ * results except those that depend on it.
  */
 export function usable(doc: OpenDocument, types: State["types"], id: string, type: string): Result[] {
   const earlier = before(doc, id);
@@ -78,14 +78,14 @@ export function usable(doc: OpenDocument, types: State["types"], id: string, typ
 
 export const linkTo = (result: Result): string => `${result.action.id}/default/${result.index}`;
 
-/** The result that a link or condition names. */
+/** Return the result that a link or condition names. */
 export function resultAt(doc: OpenDocument, types: State["types"], link: string): Result | undefined {
   const [id = "", , index = ""] = link.split("/");
   const action = doc.actions[id];
   return action && resultsOf(doc, types, action).find((each) => each.index === Number(index));
 }
 
-/** What a step from an action may depend on: its own results first, then earlier ones. */
+/** Return the results that a connection from an action can depend on: its own first, then earlier ones. */
 export function conditionsOf(doc: OpenDocument, types: State["types"], id: string): Result[] {
   const own = doc.actions[id];
   if (!own) return [];
@@ -94,14 +94,14 @@ export function conditionsOf(doc: OpenDocument, types: State["types"], id: strin
   return [own, ...others].flatMap((each) => resultsOf(doc, types, each)).filter((each) => BRANCHABLE.has(each.type));
 }
 
-/** What a new step from an action has to be, so that the server takes it beside those that there are. */
+/** What a new connection from an action has to be to go with the existing ones. */
 export interface NewStep {
   condition?: ProjectLogicIf;
-  /** A step without a condition that needs one first, because there will be two. */
+  /** The existing connection, which needs a condition first. */
   first?: { item: LogicItem; condition: ProjectLogicIf };
 }
 
-/** Give what is free for another step from `from`; a sentence when there is nothing. */
+/** Return a free branch of `from`, or a sentence if there is none. */
 export function freeStep(doc: OpenDocument, types: State["types"], from: string): NewStep | string {
   const siblings = outgoing(doc, from);
   if (siblings.length === 0) return {};
@@ -127,7 +127,7 @@ function firstFree(type: string, taken: string[]): string | undefined {
   for (let number = 0; ; number++) if (!taken.includes(String(number))) return String(number);
 }
 
-/** Why a step cannot lead there; empty when it can. The server has the last word. */
+/** Return why a connection cannot lead to an item; an empty string if it can. The server decides in the end. */
 export function cannotLead(doc: OpenDocument, from: string, to: string, item = ""): string {
   if (to === START) return t`Start cannot follow a step.`;
   if (from === END) return t`Nothing can follow End.`;
@@ -139,7 +139,7 @@ export function cannotLead(doc: OpenDocument, from: string, to: string, item = "
   return "";
 }
 
-/** A condition as words: "passed is yes". */
+/** Return a condition as text: "passed is yes". */
 export function conditionWords(doc: OpenDocument, types: State["types"], item: LogicItem): string {
   const { condition } = item;
   if (!condition) return outgoing(doc, placeOf(item.start)).length > 1 ? t`else` : "";

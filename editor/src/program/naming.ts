@@ -1,8 +1,8 @@
-/** Names that are not taken yet. */
+/** Free names. */
 
 import type { OpenDocument } from "../store/state";
 
-/** Give the name itself, or with the first number that makes it new. */
+/** Return a name, with the first number that makes it unique. */
 export function freeName(base: string, taken: Iterable<string>): string {
   const names = new Set(taken);
   if (!names.has(base)) return base;
@@ -12,7 +12,7 @@ export function freeName(base: string, taken: Iterable<string>): string {
   }
 }
 
-/** An action's or parameter's name as words. */
+/** Return the name of an action or parameter as words. */
 export function words(name: string): string {
   return name.replaceAll("_", " ");
 }
@@ -21,12 +21,12 @@ export function actionNames(doc: OpenDocument): string[] {
   return Object.values(doc.actions).map((each) => each.name);
 }
 
-/** Names of all results that are kept: no two may be called the same. */
+/** Return the names of all stored results, which have to be unique. */
 export function outputNames(doc: OpenDocument): string[] {
   return Object.values(doc.actions).flatMap((each) => each.flows.flatMap((flow) => flow.outputs));
 }
 
-/** Names for the results of a new action, by what it is called and how many there are. */
+/** Return names for the results of a new action. */
 export function newOutputs(doc: OpenDocument, method: string, count: number): string[] {
   const taken = outputNames(doc);
   const names: string[] = [];

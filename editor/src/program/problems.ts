@@ -1,4 +1,4 @@
-/** What is wrong with a program before it is run: each fault in words, and where it is. */
+/** Problems of a program, found before it runs. */
 
 import { t } from "@lingui/core/macro";
 import type { OpenDocument, State } from "../store/state";
@@ -7,10 +7,10 @@ import { reachOfAction } from "./reach";
 import { decoded } from "./values";
 
 export interface Problem {
-  /** Of the thing that has it; what a tap leads to. */
+  /** Id of the faulty item, which a tap selects. */
   id: string;
   text: string;
-  /** Without it the program could still be run. */
+  /** A warning does not prevent a run. */
   level: "error" | "warn";
 }
 
@@ -145,7 +145,7 @@ function ofAction(
   }
 }
 
-/** Names of what uses a project parameter or a result of an action. */
+/** Return the names of the actions that use a project parameter or a result. */
 export function usersOf(
   doc: OpenDocument,
   types: State["types"],

@@ -1,4 +1,4 @@
-/** What is asked of a program without a server: ways that are free, results that can be used, faults, values. */
+/** Free branches, usable results, problems and values of programs. */
 
 import { describe, expect, test } from "vitest";
 import type { LogicItem, Reach } from "../protocol/types";
@@ -63,7 +63,7 @@ describe("steps", () => {
     expect(usable(doc, TYPES, "b", "integer").map((each) => each.name)).toEqual(["a_result"]);
     expect(usable(doc, TYPES, "c", "integer").map((each) => each.name)).toEqual(["a_result", "b_result"]);
     expect(usable(doc, TYPES, "c", "boolean")).toEqual([]);
-    // One that is connected to nothing may come to stand anywhere.
+    // An unconnected action can be connected anywhere.
     expect(usable(doc, TYPES, "d", "integer")).toHaveLength(3);
   });
 });

@@ -1,22 +1,22 @@
-/** Whether the robot of an action gets where the action is told to go. Pure. */
+/** Reachability of the targets of an action. Pure functions. */
 
 import type { Action, Reach, ReachabilityData } from "../protocol/types";
 import { decoded } from "./values";
 
-/** From the best to the worst. */
+/** From best to worst. */
 export const REACHES: readonly Reach[] = ["reachable", "near_limit", "unknown", "in_collision", "out_of_reach"];
 
 export const worse = (a: Reach, b: Reach): boolean => REACHES.indexOf(a) > REACHES.indexOf(b);
 
 export interface ActionReach {
   reach: Reach;
-  /** Why not, as the server says it; empty where it gets there. */
+  /** The reason given by the server; empty if it is reachable. */
   reason: string;
-  /** The orientation or joints that are the worst of what it is told. */
+  /** Id of the worst orientation or joints among the targets. */
   goal: string;
 }
 
-/** Orientations and joints that an action is told to go to. */
+/** Return the orientations and joints that are targets of an action. */
 export function goalsOf({ parameters }: Pick<Action, "parameters">): string[] {
   return parameters.flatMap(({ type, value }) =>
     type === "pose" || type === "joints" ? [String(decoded(value))] : [],
@@ -24,8 +24,8 @@ export function goalsOf({ parameters }: Pick<Action, "parameters">): string[] {
 }
 
 /**
- * How the robot of an action gets to all that the action is told to go to: of each goal the answer of the end effector
- * that gets there best, of all goals the worst. Null where nothing is known, or it goes nowhere.
+ * Return the reachability of an action: for each target the best end effector, of all targets the worst. Null if it is
+ * unknown or there are no targets.
  */
 export function reachOfAction(
   action: Pick<Action, "parameters" | "type">,

@@ -1,14 +1,14 @@
-/** Straight runs of actions, which can be folded into one: pure. */
+/** Sequences of actions that can be folded. Pure functions. */
 
 import type { OpenDocument } from "../store/state";
 import { END, incoming, outgoing, placeOf } from "./logic";
 
-/** So many actions at least: fewer are as easily read as their number. */
+/** Fewest actions of a sequence that can be folded. */
 export const LEAST_FOLDED = 3;
 
-/** Runs of actions that follow each other in any case, with no other way in or out between them; each in its order. */
+/** Return sequences of actions without branches in or out; each in its order. */
 export function runsOf(doc: OpenDocument): string[][] {
-  /** What follows an action and nothing else; only where nothing else leads there. */
+  /** Return the only successor of an action, if the action is its only predecessor. */
   const onlyNext = (id: string): string | undefined => {
     const ways = outgoing(doc, id);
     const next = placeOf(ways[0]?.end ?? END);
@@ -20,7 +20,7 @@ export function runsOf(doc: OpenDocument): string[][] {
   for (const id of Object.keys(doc.actions)) {
     const ways = incoming(doc, id);
     const before = ways.length === 1 ? placeOf(ways[0]?.start ?? "") : "";
-    if (before in doc.actions && onlyNext(before) === id) continue; // not where a run begins
+    if (before in doc.actions && onlyNext(before) === id) continue; // not the first action of a sequence
     const run = [id];
     for (let next = onlyNext(id); next !== undefined && next !== id; next = onlyNext(next)) run.push(next);
     if (run.length >= LEAST_FOLDED) found.push(run);
@@ -28,7 +28,7 @@ export function runsOf(doc: OpenDocument): string[][] {
   return found;
 }
 
-/** The runs that are folded: those of which an action is wished folded, and none is to be seen. */
+/** Return the folded sequences: those that the user folded, unless an action in them has to be visible. */
 export function foldedRuns(doc: OpenDocument, wished: ReadonlySet<string>, seen: ReadonlySet<string>): string[][] {
   return runsOf(doc).filter((run) => run.some((id) => wished.has(id)) && !run.some((id) => seen.has(id)));
 }

@@ -18,7 +18,10 @@ export const TYPES: State["types"] = {
   actions: { Device: [meta("ask", ["boolean"]), meta("count", ["integer"], [number]), meta("act", [])] },
 };
 
-/** Actions a, b, ... by their kinds, on one point; steps as [from, to, value of from's result]. */
+/**
+ * Build a program: actions a, b, ... by their kinds, at one point; connections as [from, to, value of the result of
+ * from].
+ */
 export function program(
   kinds: Record<string, string>,
   steps: [string, string, string?][] = [],

@@ -1,10 +1,10 @@
-/** Values of parameters: how they are written, read, and checked before the server sees them. */
+/** Values of parameters: written, read and checked before they are sent. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import type { ActionParameter, ParameterMeta } from "../protocol/types";
 
-/** What an action says of a parameter beside its type. */
+/** Additional data of a parameter. */
 export interface Extra {
   minimum?: number;
   maximum?: number;
@@ -51,7 +51,7 @@ export function sourceOf(parameter: ActionParameter): Source {
   return parameter.type === "link" || parameter.type === "project_parameter" ? parameter.type : "value";
 }
 
-/** The JSON in a value; undefined when it is none. */
+/** Return the decoded value; undefined if it is not JSON. */
 export function decoded(json: string | undefined): unknown {
   if (json === undefined) return undefined;
   try {
@@ -61,7 +61,7 @@ export function decoded(json: string | undefined): unknown {
   }
 }
 
-/** A value as it stands in a field. */
+/** Return a value as the text of a field. */
 export function textOf(type: string, json: string | undefined): string {
   const value = decoded(json);
   if (value === undefined || value === null) return "";
@@ -72,7 +72,7 @@ export function textOf(type: string, json: string | undefined): string {
 
 export type Read = { json: string } | { problem: string };
 
-/** Read what stands in a field: JSON as the server takes it, or what is wrong, as a sentence. */
+/** Read the text of a field: JSON for the server, or the problem as a sentence. */
 export function read(type: string, text: string, extra: Extra = {}): Read {
   const clean = text.trim();
   switch (type) {
@@ -101,13 +101,13 @@ function readNumber(type: "integer" | "double", text: string, { minimum, maximum
   return { json: type === "double" ? double(value) : String(value) };
 }
 
-/** A double needs its fraction on the wire. */
+/** On the wire a double has a fraction. */
 export function double(value: number): string {
   const text = String(value);
   return /[.e]/.test(text) ? text : `${text}.0`;
 }
 
-/** The value that a parameter of a simple type gets when nobody has said one; undefined where there is none. */
+/** Return the initial value of a parameter of a simple type; undefined if there is none. */
 export function initial(meta: ParameterMeta): string | undefined {
   if (meta.default_value !== undefined) return meta.default_value;
   const { minimum, maximum, allowed_values } = extraOf(meta);
@@ -129,7 +129,7 @@ export function initial(meta: ParameterMeta): string | undefined {
   }
 }
 
-/** The range as words, with its unit; empty where there is none. */
+/** Return the range with its unit as text; an empty string without one. */
 export function rangeWords({ minimum, maximum, unit = "" }: Extra): string {
   const tail = unit ? ` ${unit}` : "";
   if (minimum !== undefined && maximum !== undefined) return t`${minimum} to ${maximum}${tail}`;

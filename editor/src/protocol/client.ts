@@ -1,15 +1,14 @@
 /**
- * One connection to the server that comes back by itself: requests with ids and deadlines, events as they come.
- *
- * A request is sent once or not at all. What was under way when the connection was lost fails, and nothing is kept to
- * be sent later: no motion begins by itself when the connection is back.
+ * A connection to the server with automatic reconnect: requests with ids and time limits, events. A request is sent
+ * once or not at all. Requests in progress fail on disconnect, and none is stored: no motion starts by itself after a
+ * reconnect.
  */
 
 import { t } from "@lingui/core/macro";
 import { ConnectionLost, DeadlineExceeded, Refused } from "./errors";
 import type { Requests, ServerEvent } from "./types";
 
-/** What the client needs of a WebSocket. */
+/** The part of a WebSocket that the client uses. */
 export interface Socket {
   readonly readyState: number;
   send(text: string): void;
@@ -23,16 +22,16 @@ export type ConnectionState = "closed" | "connecting" | "open" | "waiting";
 
 export interface ClientOptions {
   open: () => Socket;
-  /** Seconds before the first, and at most before any, new attempt. */
+  /** Delay before the first attempt to reconnect, and largest delay, s. */
   backoff?: { first: number; most: number };
-  /** Seconds without any message after which the server is asked whether it is there, and for which it may be silent then. */
+  /** Silence after which the client sends a request to check the connection, and time limit of its answer, s. */
   liveness?: { quiet: number; answer: number };
   random?: () => number;
 }
 
 export interface CallOptions {
   dryRun?: boolean;
-  /** Seconds. */
+  /** Time limit of the connection, s. */
   deadline?: number;
   signal?: AbortSignal;
 }
@@ -60,18 +59,18 @@ interface Waiting {
   done: () => void;
 }
 
-/** Seconds: what answers at once, and what waits for a device. */
+/** Time limits of requests, s: without and with device access. */
 export const DEADLINE = 15;
 const OPEN = 1;
-/** The server's code for a token that is missing or not valid: trying again would not help. */
+/** Close code for a missing or invalid token; a further attempt would fail too. */
 const NOT_ADMITTED = 4401;
 
 export class ProtocolClient {
   state: ConnectionState = "closed";
-  /** Called with each change of the state; `reason` is the server's when it closed the connection. */
+  /** Called on each change of the state; `reason` is the server's if it closed the connection. */
   onState: (state: ConnectionState, reason: string, code: number) => void = () => {};
   onEvent: (event: ServerEvent) => void = () => {};
-  /** Messages that are no answer and no event of the protocol; only told. */
+  /** Called with messages that are neither answers nor known events. */
   onOddity: (text: string) => void = () => {};
 
   private socket: Socket | null = null;
@@ -90,12 +89,12 @@ export class ProtocolClient {
     this.random = options.random ?? Math.random;
   }
 
-  /** Connect, and stay connected until `stop`. */
+  /** Connect, and reconnect until `stop`. */
   start(): void {
     if (this.state === "closed") this.connect();
   }
 
-  /** Close, and don't come back. */
+  /** Close the connection for good. */
   stop(reason = "left"): void {
     clearTimeout(this.retry);
     const socket = this.detach();
@@ -104,7 +103,7 @@ export class ProtocolClient {
     socket?.close(1000, reason);
   }
 
-  /** Try again at once instead of when the pause is over; for when the network, or the user, is back. */
+  /** Reconnect at once, since the network or the user is back. */
   hurry(): void {
     if (this.state !== "waiting") return;
     clearTimeout(this.retry);
@@ -112,7 +111,7 @@ export class ProtocolClient {
   }
 
   /**
-   * Ask the server. Rejects with Refused, ConnectionLost, DeadlineExceeded, or the signal's reason; never asks twice.
+   * Send a request. Reject with Refused, ConnectionLost, DeadlineExceeded, or the signal's reason; never send it twice.
    */
   call<N extends keyof Requests>(request: N, ...[args, options]: Args<N>): Promise<Requests[N]["data"]> {
     const socket = this.socket;
@@ -172,7 +171,7 @@ export class ProtocolClient {
     } else {
       this.enter("waiting", reason, code);
       const pause = Math.min(this.backoff.most, this.backoff.first * 2 ** this.attempts++);
-      // Spread, so that not all tablets of a hall come at once.
+      // Randomised, so that not all devices reconnect at once.
       this.retry = setTimeout(() => this.connect(), pause * (0.75 + 0.5 * this.random()) * 1000);
     }
     this.failAll();
@@ -190,7 +189,7 @@ export class ProtocolClient {
     this.onState(state, reason, code);
   }
 
-  /** A cable that is pulled is told by nobody: who is silent is asked, and given up when there is no answer. */
+  /** A pulled cable is not reported: after a silence the client sends a request, and disconnects without an answer. */
   private expectLife(): void {
     clearTimeout(this.watch);
     this.watch = setTimeout(() => {
@@ -219,7 +218,7 @@ export class ProtocolClient {
     const waiting = this.waiting.get(message.id);
     if (!waiting) {
       if (message.id === 0) this.onOddity(text.slice(0, 200));
-      return; // an answer after its deadline answers nothing any more
+      return; // too late: the request has already failed
     }
     waiting.done();
     if (message.result) waiting.resolve(message.data as never);

@@ -1,4 +1,4 @@
-/** A mesh before it is uploaded: how large it is, and the same in m. A chunk of its own, with the loaders. */
+/** A mesh before the upload: its size, and its conversion to m. In its own chunk with the loaders. */
 
 import { t } from "@lingui/core/macro";
 import type { BufferGeometry } from "three";
@@ -8,11 +8,11 @@ export interface MeshFile {
   file: File;
   geometry: BufferGeometry;
   triangles: number;
-  /** As the file says, in its own unit. */
+  /** In the unit of the file. */
   size: [number, number, number];
 }
 
-/** Read a file; rejects with a sentence where it is no mesh. */
+/** Read a file; reject with a sentence if it is not a mesh. */
 export async function readMesh(file: File): Promise<MeshFile> {
   let geometry: BufferGeometry;
   try {
@@ -33,12 +33,12 @@ export async function readMesh(file: File): Promise<MeshFile> {
   return { file, geometry, triangles: Math.floor(count), size };
 }
 
-/** The unit that makes it as large as things in a workplace are. */
+/** Return the unit that gives the mesh a plausible size. */
 export function likelyUnit(size: readonly number[]): "m" | "mm" {
   return Math.max(...size) > 5 ? "mm" : "m";
 }
 
-/** The mesh in m as a binary STL; the file itself where it is in m already. */
+/** Return the mesh in m as a binary STL; the original file if it is in m. */
 export function inMetres({ file, geometry }: Pick<MeshFile, "file" | "geometry">, worth: number): File {
   if (worth === 1) return file;
   const flat = geometry.index ? geometry.toNonIndexed() : geometry;
@@ -47,7 +47,7 @@ export function inMetres({ file, geometry }: Pick<MeshFile, "file" | "geometry">
   const view = new DataView(new ArrayBuffer(84 + triangles * 50));
   view.setUint32(80, triangles, true);
   for (let n = 0; n < triangles; n++) {
-    const at = 84 + n * 50 + 12; // normals are left out: who reads works them out of the corners
+    const at = 84 + n * 50 + 12; // readers compute the normals
     for (let corner = 0; corner < 3; corner++) {
       const from = n * 3 + corner;
       [position.getX(from), position.getY(from), position.getZ(from)].forEach((value, axis) => {

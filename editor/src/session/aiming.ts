@@ -1,4 +1,4 @@
-/** The cross in the middle of the view: what it may mean, and which of that is taken next. */
+/** The crosshair in the middle of the view: its candidates, and which one is chosen. */
 
 import { create } from "zustand";
 import { aimed, middle, targetsOf } from "../engine/aiming";
@@ -7,9 +7,9 @@ import type { State } from "../store/state";
 import { setUi } from "../store/store";
 
 interface Aiming {
-  /** A list of what is at the cross is open. */
+  /** A list of the candidates is open. */
   listed: boolean;
-  /** Ids, the likeliest first. */
+  /** Ids, most likely first. */
   candidates: string[];
   chosen: string;
 }
@@ -18,16 +18,16 @@ const NOTHING = { candidates: [], chosen: "" };
 
 export const useAiming = create<Aiming>(() => ({ listed: false, ...NOTHING }));
 
-/** Whether the user picks by the cross: kept by the server, for all his tablets. */
+/** Return whether the crosshair is always shown: a setting of the user, stored on the server. */
 export const aimsAlways = (state: State): boolean => state.view.general.aiming === true;
 
-/** Say that a list of it is open, until what this gives is called. */
+/** Report that a list of candidates is open, until the returned function is called. */
 export function listAimed(): () => void {
   useAiming.setState({ listed: true });
   return () => useAiming.setState({ listed: false });
 }
 
-/** Go on to the next candidate, or back; from the last to the first. */
+/** Choose the next or previous candidate, cyclically. */
 export function nextCandidate(by: 1 | -1 = 1): void {
   const { candidates, chosen } = useAiming.getState();
   const next = candidates[(candidates.indexOf(chosen) + by + candidates.length) % candidates.length];
@@ -35,8 +35,8 @@ export function nextCandidate(by: 1 | -1 = 1): void {
 }
 
 /**
- * Look with each drawn frame what the cross may mean; gives what ends that. Who went on to another candidate keeps it
- * as long as it is near the cross. `drawn` is called after each look.
+ * Update the candidates with each frame; return a function that ends it. A chosen candidate is kept as long as it is
+ * near the crosshair. `drawn` is called after each update.
  */
 export function followCross(engine: Engine, drawn: () => void): () => void {
   let best = "";

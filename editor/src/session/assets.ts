@@ -1,9 +1,9 @@
-/** Assets of the server: meshes, models of robots. */
+/** Assets of the server: meshes and robot models. */
 
 import { t } from "@lingui/core/macro";
 import { remembered } from "./memory";
 
-/** Give an asset as the server makes it ready to be shown, binary glTF; rejects with the server's sentence. */
+/** Return an asset as binary glTF, prepared by the server; reject with the server's sentence. */
 export async function readShown(id: string): Promise<ArrayBuffer> {
   const token = remembered("token");
   const headers: HeadersInit = token ? { Authorization: `Bearer ${token}` } : {};
@@ -12,7 +12,7 @@ export async function readShown(id: string): Promise<ArrayBuffer> {
   return response.arrayBuffer();
 }
 
-/** Take a file to the server as a new asset; gives its id. Rejects with a sentence. */
+/** Upload a file as a new asset and return its id. Reject with a sentence. */
 export async function uploadAsset(file: File): Promise<string> {
   const token = remembered("token");
   const body = new FormData();
@@ -26,7 +26,7 @@ export async function uploadAsset(file: File): Promise<string> {
   return ((await response.json()) as { id: string }).id;
 }
 
-/** Why the server refused, by its own sentence where there is one. */
+/** Return the reason given by the server, or a general one. */
 export async function refusedWith(response: Response, otherwise: string): Promise<string> {
   const { message } = (await response.json().catch(() => ({}))) as { message?: string };
   return message ?? `${otherwise} (${response.status}).`;

@@ -1,6 +1,6 @@
-/** What this page has seen last, for a file of diagnosis: events by name, refusals, faults. It stays in the page. */
+/** What this page did recently, for the diagnosis file: events, refusals, faults. It is not sent anywhere. */
 
-/** So many entries, and signs of each. */
+/** Number of entries, and characters of each. */
 const MOST = 400;
 const LONGEST = 400;
 
@@ -17,7 +17,7 @@ export function note(what: Entry["what"], text: string): void {
   if (entries.length > MOST) entries.splice(0, entries.length - MOST);
 }
 
-/** The oldest first. */
+/** Oldest first. */
 export const diary = (): readonly Entry[] => entries;
 
 if (typeof window !== "undefined") {

@@ -1,4 +1,4 @@
-/** The engine of the view that is on the screen, for panels and commands; null while there is none. */
+/** The engine of the visible view, for panels and commands; null without a view. */
 
 import type { Engine } from "../engine/engine";
 
@@ -6,7 +6,7 @@ let engine: Engine | null = null;
 
 declare global {
   interface Window {
-    /** For tests, and for who looks into the console. */
+    /** For tests and the browser console. */
     __engine?: Engine | null;
   }
 }

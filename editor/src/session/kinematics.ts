@@ -1,4 +1,4 @@
-/** Which kinematics of a robot are in force (docs/protocol.md). */
+/** Kinematics used for a robot (docs/protocol.md). */
 
 import { remembered } from "./memory";
 
@@ -9,7 +9,7 @@ export interface RobotKinematics {
   refused?: string;
 }
 
-/** Ask for those of a robot of the open scene; rejects when there is no answer. */
+/** Request the kinematics of a robot of the open scene; reject without an answer. */
 export async function readKinematics(robotId: string, signal: AbortSignal): Promise<RobotKinematics> {
   const token = remembered("token");
   const headers: HeadersInit = token ? { Authorization: `Bearer ${token}` } : {};

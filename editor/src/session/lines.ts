@@ -1,11 +1,11 @@
-/** Straight lines in the world, looked at by the server. */
+/** Straight paths in the world, checked by the server. */
 
 import { t } from "@lingui/core/macro";
 import type { Position } from "../protocol/types";
 import { refusedWith } from "./assets";
 import { remembered } from "./memory";
 
-/** Give the id of what a straight line meets first of all that stands in the way, null where it is free. Rejects with a sentence. */
+/** Return the id of the first obstacle on a straight path; null if it is free. Reject with a sentence. */
 export async function metBy(from: Position, to: Position): Promise<string | null> {
   const token = remembered("token");
   const headers: HeadersInit = {

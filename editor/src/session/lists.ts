@@ -14,7 +14,7 @@ export async function loadTypes(): Promise<void> {
   });
 }
 
-/** Load the lists of the home screen. Events keep them up to date, except for problems, which only the lists contain. */
+/** Load the lists of the home screen. Events update them, except for problems, which only the lists contain. */
 export async function loadLists(): Promise<void> {
   const load = async <K extends "scenes" | "projects" | "packages">(
     key: K,

@@ -1,4 +1,4 @@
-/** What this browser remembers: who uses it, the token, and how it likes the screen. The rest is kept by the server. */
+/** What this browser stores: user, token and display settings. Everything else is stored on the server. */
 
 const KEYS = {
   name: "arcor2-hw.name",
@@ -12,7 +12,7 @@ export function remembered(key: keyof typeof KEYS): string {
   try {
     return localStorage.getItem(KEYS[key]) ?? "";
   } catch {
-    return ""; // private windows of some browsers
+    return ""; // private windows of some browsers refuse it
   }
 }
 
@@ -25,10 +25,10 @@ export function remember(key: keyof typeof KEYS, value: string): void {
   }
 }
 
-/** So many people of one tablet are remembered. */
+/** Number of remembered users. */
 const PEOPLE = 6;
 
-/** Who has come in with this browser, the last first. */
+/** Return the users who joined with this browser, newest first. */
 export function peopleHere(): string[] {
   return remembered("names").split("\n").filter(Boolean);
 }
@@ -37,7 +37,7 @@ export function rememberPerson(name: string): void {
   remember("names", [name, ...peopleHere().filter((each) => each !== name)].slice(0, PEOPLE).join("\n"));
 }
 
-/** Take a token out of the address, where it would be seen and kept, into memory. */
+/** Move a token from the address, where it would be visible, to the storage of the browser. */
 export function takeTokenFromAddress(): void {
   const url = new URL(location.href);
   const token = url.searchParams.get("token");

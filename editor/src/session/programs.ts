@@ -1,4 +1,4 @@
-/** Request the data of programs that events only update: actions of types, run history, trace of the running program. */
+/** Request the data of programs that events only update: actions, run history, trace of the running program. */
 
 import { withRuns } from "../store/reduce";
 import { isRunning } from "../store/selectors";

@@ -1,14 +1,14 @@
-/** Who takes the next taps in the view instead of selecting: a tool that asks for a place. */
+/** Who receives the next taps in the view instead of the selection: a tool that needs a position. */
 
 import type { Vector3 } from "three";
 import type { Hit } from "../engine/picking";
 
-/** Gives whether it took the tap; then nothing is selected by it. */
+/** Return whether it handled the tap; then nothing is selected. */
 export type TapTaker = (hits: Hit[], floor: Vector3 | null) => boolean;
 
 let taker: TapTaker | null = null;
 
-/** Take taps from now on; gives what ends that. */
+/** Receive taps from now on; return a function that ends it. */
 export function takeTaps(by: TapTaker): () => void {
   taker = by;
   return () => {

@@ -1,10 +1,10 @@
-/** What events make of the open document: pure functions. */
+/** Changes that events make to the open document. Pure functions. */
 
 import type { Action, ActionPoint, Project, Scene, ServerEvent } from "../protocol/types";
 import { byId, keep, put, without } from "./records";
 import type { OpenDocument } from "./state";
 
-/** Take a scene, and the project on it, apart. */
+/** Return a scene and its project, split into records by id. */
 export function opened(scene: Scene, project: Project | null): OpenDocument {
   const { objects, ...bareScene } = scene;
   const doc: OpenDocument = {
@@ -35,7 +35,7 @@ function isUnsaved(of: { modified?: string; int_modified?: string }): boolean {
   return of.int_modified !== undefined && Date.parse(of.int_modified) > Date.parse(of.modified);
 }
 
-/** A point with all that is on it, in place of what was known of it. */
+/** Replace a point with everything on it. */
 function withPoint(doc: OpenDocument, point: ActionPoint): OpenDocument {
   const { orientations, robot_joints, actions, ...bare } = point;
   const of = <T extends { id: string }>(items: T[]) => byId(items.map((item) => ({ ...item, pointId: point.id })));
@@ -60,7 +60,7 @@ function withoutPoint(doc: OpenDocument, id: string): OpenDocument {
   };
 }
 
-/** An item of a point: added to the one it names, changed where it is, or gone. */
+/** Add, update or remove an item of a point. */
 function onPoint<T extends { id: string }>(
   record: Record<string, T & { pointId: string }>,
   event: { change_type?: string; parent_id?: string },
@@ -72,7 +72,7 @@ function onPoint<T extends { id: string }>(
   return put(record, item.id, { ...record[item.id], ...item, pointId });
 }
 
-/** Give the document after an event; the same one when the event is about something else. */
+/** Return the document after an event; the same object if the event concerns something else. */
 export function changed(doc: OpenDocument, event: ServerEvent): OpenDocument {
   const removed = event.change_type === "remove";
   switch (event.event) {

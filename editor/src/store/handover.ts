@@ -1,17 +1,17 @@
 /**
- * Asking for what somebody else holds. The protocol has no request for it: by agreement of our clients the wish stands
- * in the shared view state of the document, as `asked/<id>`, until the thing is free. An existing client does not hear it.
+ * Requests for items that another user has locked. The protocol has no such request: our clients store it in the shared
+ * view state of the document, as `asked/<id>`, until the item is released. Other clients ignore it.
  */
 
 import type { State } from "./state";
 
 const KEY = "asked/";
-/** ms after which a wish is no news any more. */
+/** Time after which a request is no longer announced, ms. */
 const STALE = 10 * 60_000;
 
 interface Wish {
   by: string;
-  /** As `Date.now()` of who asked. */
+  /** Clock time of the requesting client, ms since 1970. */
   at: number;
 }
 
@@ -22,19 +22,19 @@ function wish(value: unknown): Wish | null {
 
 export const keyOf = (id: string): string => KEY + id;
 
-/** Whether the user has asked for a thing. */
+/** Return whether the user has requested an item. */
 export function hasAsked(state: State, id: string): boolean {
   return wish(state.view.shared[keyOf(id)])?.by === state.connection.user;
 }
 
 export interface HandOver {
-  /** Wishes for what the user holds, which came just now. */
+  /** New requests for items that the user holds. */
   wanted: { id: string; by: string }[];
-  /** What he has asked for, and can have now. */
+  /** Items that the user requested and that are released now. */
   free: string[];
 }
 
-/** What changed between two states. */
+/** Return the differences between two states. */
 export function handOver(state: State, before: State, present = Date.now()): HandOver {
   const found: HandOver = { wanted: [], free: [] };
   if (state.view.shared === before.view.shared && state.locks === before.locks) return found;

@@ -1,15 +1,15 @@
-/** Users who left: what they still hold, and whether anybody still has the open document open. Pure. */
+/** Users who left: the locks they still hold, and whether others have the document open. Pure functions. */
 
 import type { State } from "./state";
 
-/** Users who hold locks but are not connected. */
+/** Return users who hold locks but are not connected. */
 export function goneHolders(state: State): string[] {
   if (state.connection.status !== "ready") return [];
   const owners = new Set(Object.values(state.locks));
   return [...owners].filter((name) => name !== state.connection.user && !state.users[name]?.online).sort();
 }
 
-/** Others who have the open document open, by the server's rule for RunPackage (docs/protocol.md). */
+/** Return other users who have the open document open, by the server's rule for RunPackage (docs/protocol.md). */
 export function usersOfDocument(state: State): string[] {
   if (!state.doc) return [];
   const ids = [state.doc.project?.id, state.doc.scene.id];

@@ -1,4 +1,4 @@
-/** Small changes of records, which leave the one given as it is. */
+/** Copies of records with small changes. */
 
 export function put<T>(record: Record<string, T>, key: string, value: T): Record<string, T> {
   return { ...record, [key]: value };

@@ -70,7 +70,7 @@ describe("the open document", () => {
     });
     expect(added.doc?.actions.act2).toMatchObject({ pointId: "acp", type: "obj/grip" });
     expect(added.doc?.unsaved).toBe(true);
-    // Other events than "add" do not say on which point it is.
+    // Events other than "add" do not name the point.
     const renamed = after(OPEN, {
       event: "ActionChanged",
       change_type: "update_base",
@@ -227,7 +227,7 @@ test("a type that is gone takes its actions along", () => {
   let state = after({ event: "ChangedObjectTypes", change_type: "add", data: [type] });
   state = { ...state, types: { ...state.types, actions: { UR5e: [] } } };
   state = { ...state, ...reduce(state, { event: "ChangedObjectTypes", change_type: "update", data: [type] }, NOW) };
-  expect(state.types.actions).toEqual({}); // they are to be asked for anew
+  expect(state.types.actions).toEqual({}); // they have to be requested again
   state = { ...state, ...reduce(state, { event: "ChangedObjectTypes", change_type: "remove", data: [type] }, NOW) };
   expect(state.types.byName).toEqual({});
 });

@@ -212,7 +212,7 @@ function live(state: State, event: ServerEvent, time: number): Partial<State> | 
           ...notice(
             state,
             "error",
-            t`The devices do not answer: the process that controls them is frozen or overloaded. If a robot is moving, use the emergency stop.`,
+            t`The devices do not answer: their process is overloaded. If a robot moves, use the emergency stop.`,
             time,
           ),
         };

@@ -1,8 +1,6 @@
 /**
- * What the editor knows, by subject. All but `ui` and `connection` comes from the server; nothing of that is changed
- * here on the user's word: an edit is a request, and what it does comes back as an event.
- *
- * What moves at 30 Hz is not here but in telemetry.ts.
+ * The state of the editor. Everything except `ui` and `connection` comes from the server and is changed only by its
+ * events: an edit is a request, and its effect comes back as an event. Telemetry at 30 Hz is in telemetry.ts.
  */
 
 import type {
@@ -42,7 +40,7 @@ import type {
   UserPresenceData,
 } from "../protocol/types";
 
-/** `joining`: connected, being let in and told what there is. `lost`: was there and is being looked for. */
+/** `joining`: connected and loading. `lost`: reconnecting. */
 export type ConnectionStatus = "left" | "connecting" | "joining" | "ready" | "lost" | "refused";
 
 export interface Connection {
@@ -50,7 +48,7 @@ export interface Connection {
   /** Why it is lost or refused, as a sentence. */
   reason: string;
   user: string;
-  /** 1 to 5; the server says it by refusing, and by the token. */
+  /** Role from 1 to 5, given by the token. */
   role: number;
   server: SystemInfoData | null;
 }
@@ -69,16 +67,16 @@ export interface OpenDocument {
   actions: Record<string, Of<Action>>;
   logic: Record<string, LogicItem>;
   parameters: Record<string, ProjectParameter>;
-  /** By object, by the parameter's name. */
+  /** By object, then by name of the parameter. */
   overrides: Record<string, Record<string, Parameter>>;
 }
 
 export interface Lists {
-  /** null until they are known. */
+  /** Null until they are loaded. */
   scenes: ListScenesData[] | null;
   projects: ListProjectsData[] | null;
   packages: PackageSummary[] | null;
-  /** Which of the lists the server would show, and what in it. */
+  /** The list that the server suggests, and the highlighted entry. */
   shown: "ScenesList" | "ProjectsList" | "PackagesList";
   highlight: string;
 }
@@ -86,11 +84,11 @@ export interface Lists {
 export interface Types {
   byName: Record<string, ObjectTypeMeta>;
   robots: Record<string, RobotMeta>;
-  /** Actions by type, asked for when they are first needed. */
+  /** Actions by type, loaded when they are needed. */
   actions: Record<string, ObjectAction[]>;
 }
 
-/** An arm of a robot, with what is on it; `id` is empty where the robot has one arm. */
+/** An arm of a robot with its devices; `id` is empty if the robot has one arm. */
 export interface Arm {
   id: string;
   effectors: string[];
@@ -98,38 +96,38 @@ export interface Arm {
   suctions: string[];
 }
 
-/** The last motion that was asked of a robot, and how it ended. */
+/** The last requested motion of a robot, and how it ended. */
 export interface Motion {
   phase: "start" | "end" | "failed";
-  /** Id of the orientation or joints it leads to; empty for another goal. */
+  /** Id of the orientation or joints that are the target; empty for other targets. */
   goal: string;
   message: string;
 }
 
-/** The scene in operation. */
+/** The online scene. */
 export interface Live {
   state: SceneStateEnum;
   message: string;
   objects: Record<string, ObjectStateData>;
   health: Record<string, ObjectHealthData>;
   holds: Record<string, RobotHoldData>;
-  /** Robots that move, with what they are doing. */
+  /** Moving robots with the kind of motion. */
   moving: Record<string, string>;
   motions: Record<string, Motion>;
   handTeaching: Record<string, boolean>;
-  /** Of robots that are online; asked for when they come. */
+  /** Arms of robots that are online. */
   arms: Record<string, Arm[]>;
-  /** The action that is tried out, and how the last one ended. */
+  /** The action that runs alone, and the result of the last one. */
   executing: string;
   result: ActionResultData | null;
 }
 
-/** The program in operation. */
+/** The running program. */
 export interface Program {
   state: PackageStateEnum;
   packageId: string;
   packageName: string;
-  /** Actions that run now. */
+  /** Actions that are running. */
   running: string[];
   trace: TraceEntry[];
   /** The run history of the server, newest first. */
@@ -138,7 +136,7 @@ export interface Program {
   watched: number;
 }
 
-/** How an action that was tried by itself ended. */
+/** Result of an action that was run alone. */
 export interface Tried extends ActionResultData {
   time: number;
 }
@@ -158,54 +156,54 @@ export interface Selection {
   id: string;
 }
 
-/** How the open project is looked at. */
+/** View mode of the open project. */
 export type Mode = "3d" | "flow" | "split" | "code";
 
-/** A step that is being drawn: the next tap says where it leads. */
+/** A connection in progress: the next tap ends it. */
 export interface Connecting {
   from: string;
-  /** When it is to be taken; left out: what is still free. */
+  /** Its condition; by default a free one. */
   condition?: ProjectLogicIf;
-  /** The step whose end is moved, instead of a new one. */
+  /** The existing connection whose target is changed. */
   item?: string;
 }
 
-/** A robot shown where it would be, beside where it is. */
+/** The ghost: a robot shown at another pose. */
 export interface Ghost {
   robotId: string;
   joints: Joint[];
-  /** Where its base stands, in the world; left out: where the robot's own does. */
+  /** Pose of its base in the world; by default that of the robot. */
   at?: Pose | undefined;
-  /** What is wrong with it, as a sentence; empty when it can go there. */
+  /** Why the robot cannot reach it, as a sentence; empty if it can. */
   problem: string;
 }
 
-/** What the user does to a thing and has not told the server yet: shown by him, and to others as a preview. */
+/** A change that has not been sent to the server: shown locally, and to others as a preview. */
 export interface Draft {
   id: string;
-  /** The thing as it was: with the next event about it the draft is over. */
+  /** The item before the change; the next event about it ends the draft. */
   of: unknown;
-  /** In the frame in which it is stored. */
+  /** Pose in the frame in which it is stored. */
   pose: Pose;
-  /** Its type as it was, and the shape that it is to have. */
+  /** Its previous type, and its new shape. */
   type?: unknown;
   model?: ObjectModel;
 }
 
 export interface Ui {
   selection: Selection | null;
-  /** What is at the cross, where the user picks by it. */
+  /** The item at the crosshair. */
   aimed?: string | undefined;
   draft?: Draft | undefined;
   mode: Mode;
   connecting: Connecting | null;
-  /** The view goes where the program is. */
+  /** Whether the view follows the running action. */
   follow: boolean;
   ghost: Ghost | null;
-  /** The tool of the left rail that is open. */
+  /** The open tool of the rail. */
   tool: string;
   theme: "system" | "light" | "dark";
-  /** The device asks for dark colours. */
+  /** Whether the system uses a dark theme. */
   systemDark: boolean;
   leftHanded: boolean;
   quality: "auto" | "low" | "high";
@@ -224,9 +222,9 @@ export interface State {
   lists: Lists;
   types: Types;
   doc: OpenDocument | null;
-  /** Owners by what they hold. */
+  /** Owners of locks by item. */
   locks: Record<string, string>;
-  /** When it was heard that they do, as `Date.now()`: what was held before this user came, since he came. */
+  /** When the lock was reported, ms since 1970; older locks count from joining. */
   lockedAt: Record<string, number>;
   users: Record<string, UserPresenceData>;
   previews: Record<string, MovePreviewData>;
@@ -234,7 +232,10 @@ export interface State {
   breakpoints: Record<string, true>;
   /** By robot, arm and end effector, then by orientation or joints. */
   reach: Record<string, ReachabilityData>;
-  /** Shared and own view state of the open document, and of none (stars, settings). */
+  /**
+   * View state of the open document, shared and of the user, and the view state without a document (favorites,
+   * settings).
+   */
   view: { user: Record<string, unknown>; shared: Record<string, unknown>; general: Record<string, unknown> };
   live: Live;
   program: Program;
@@ -244,7 +245,7 @@ export interface State {
   tried: Tried[];
   tasks: Record<string, TaskStateData>;
   notices: Notice[];
-  /** All that was told since the page is open, also what is dismissed and work that is over; the newest last. */
+  /** All messages since the page was opened, including dismissed ones and finished tasks; newest last. */
   said: Notice[];
   ui: Ui;
 }

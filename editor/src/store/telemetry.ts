@@ -1,22 +1,22 @@
 /**
- * What robots report many times a second: joints and end effectors. It goes past the store, straight to the 3D view
- * and to the read-outs that want it, and is drawn a little late so that it can be interpolated.
+ * Telemetry of robots: joints and end effectors, many times a second. It bypasses the store, and is drawn with a small
+ * delay for interpolation.
  */
 
 import type { EefPose, RobotEefData, RobotJointsData } from "../protocol/types";
 
 export interface Sample {
-  /** Seconds, of `performance.now()`, when it came. */
+  /** Time of arrival, s, as `performance.now()`. */
   at: number;
-  /** Seconds, of the cell's clock, when it was read; as `at` where the server does not say it. */
+  /** Time of measurement by the clock of the server, s; like `at` if unknown. */
   read: number;
   joints: Map<string, number>;
 }
 
-/** Seconds after which what is shown is stale. */
+/** Age after which data is outdated, s. */
 export const STALE = 0.5;
 
-/** rad or m: what moves less is not drawn anew. */
+/** Smallest change that is drawn, rad or m. */
 export const STILL = 1e-4;
 
 type Listener = (robotId: string) => void;
@@ -41,7 +41,7 @@ export class Telemetry {
     this.tell(data.robot_id);
   }
 
-  /** Joints as last reported; undefined when nothing is known. */
+  /** Return the last reported joints; undefined if unknown. */
   latest(robotId: string): Sample | undefined {
     return this.joints.get(robotId)?.[1];
   }
@@ -50,23 +50,23 @@ export class Telemetry {
     return this.eefs.get(robotId)?.poses ?? [];
   }
 
-  /** Seconds since the robot last reported; Infinity when it never did. */
+  /** Return the time since the last report, s; Infinity without one. */
   age(robotId: string): number {
     const at = Math.max(this.latest(robotId)?.at ?? -Infinity, this.eefs.get(robotId)?.at ?? -Infinity);
     return this.clock() - at;
   }
 
   /**
-   * Joints to be drawn now: between the last two samples, one sample's time after them. `settled` when the last one
-   * is reached, so that there is nothing more to draw until another comes. Where samples come about as often as is
-   * drawn, every `period` s, there is nothing between them to be seen: the last one is drawn at once.
+   * Return the joints to draw now, interpolated between the last two samples with a delay of one sample period.
+   * `settled` is true at the last sample, when no further frame is needed. If samples arrive about as often as frames
+   * are drawn, every `period` s, the last one is drawn at once.
    */
   interpolated(robotId: string, period = 0): { joints: Map<string, number>; settled: boolean } | undefined {
     const pair = this.joints.get(robotId);
     if (!pair) return undefined;
     const [before, last] = pair;
-    // After a pause there is nothing to interpolate from; between samples a tenth of a second at most.
-    // By when they were read, not by when they came: the network bunches them.
+    // Without interpolation after a pause; otherwise over at most 0.1 s. Times of measurement are used, since the
+    // network delivers samples in bursts.
     const span = before ? last.read - before.read : 0;
     if (!before || span <= period * 1.5 || span <= 0 || span > 0.25 || alike(before, last))
       return { joints: last.joints, settled: true };
@@ -80,13 +80,13 @@ export class Telemetry {
     return { joints: between, settled: false };
   }
 
-  /** Be called with each report, by the robot's id; gives what ends that. */
+  /** Call a function with the robot's id on each report; return a function that ends it. */
   subscribe(listener: Listener): () => void {
     this.listeners.add(listener);
     return () => this.listeners.delete(listener);
   }
 
-  /** Forget all: the scene went offline. */
+  /** Forget everything: the scene went offline. */
   clear(): void {
     const known = new Set([...this.joints.keys(), ...this.eefs.keys()]);
     this.joints.clear();
@@ -99,7 +99,7 @@ export class Telemetry {
   }
 }
 
-/** An arm at rest goes on reporting: there is no way from one sample to the next. */
+/** A robot at standstill keeps reporting; equal samples need no interpolation. */
 function alike(one: Sample, other: Sample): boolean {
   for (const [name, value] of other.joints) if (Math.abs((one.joints.get(name) ?? value) - value) > STILL) return false;
   return true;

@@ -1,4 +1,4 @@
-/** Lengths and angles as people write them: with units, as sums, as changes of what is there. All values are in m and rad. */
+/** Lengths and angles as users type them: with units, sums and relative changes. All values are in m and rad. */
 
 export type LengthUnit = "m" | "cm" | "mm" | "in";
 export type AngleUnit = "°" | "rad";
@@ -8,14 +8,14 @@ export type Quantity = "length" | "angle";
 export const LENGTH_UNITS: readonly LengthUnit[] = ["mm", "cm", "m", "in"];
 export const ANGLE_UNITS: readonly AngleUnit[] = ["°", "rad"];
 
-/** What one of it is in m or rad. */
+/** The value of one unit in m or rad. */
 export const WORTH: Record<Unit, number> = { m: 1, cm: 0.01, mm: 0.001, in: 0.0254, "°": Math.PI / 180, rad: 1 };
-/** Digits after the point that are worth showing: 10 µm, a thousandth of a degree. */
+/** Useful number of decimals: 10 µm, 0.001°. */
 export const DIGITS: Record<Unit, number> = { m: 5, cm: 3, mm: 2, in: 4, "°": 3, rad: 5 };
 
-/** Other ways to write a unit. */
+/** Other spellings of units. */
 const ALIASES: Record<string, Unit> = { '"': "in", inch: "in", deg: "°", d: "°" };
-/** Parts of a degree, told by their marks. */
+/** Minutes and seconds of arc. */
 const MINUTE = "′";
 const SECOND = "″";
 
@@ -25,8 +25,8 @@ export function show(value: number, unit: Unit): string {
 }
 
 /**
- * Read what somebody typed: `12.5`, `3cm`, `1in/2`, `10 + 2.5mm`. With a sign of change (`+12.5`, `-=3mm`), or where
- * `by` says that a change is meant, it is added to what is there. Gives null for what is no amount.
+ * Read a typed amount: `12.5`, `3cm`, `1in/2`, `10 + 2.5mm`. With a sign (`+12.5`, `-=3mm`), or if `by` is set, it is
+ * added to the present value. Return null if it is invalid.
  */
 export function amount(text: string, now: number, unit: Unit, by = false): number | null {
   const clean = text.trim().replaceAll(",", ".").replaceAll("−", "-");
@@ -37,7 +37,7 @@ export function amount(text: string, now: number, unit: Unit, by = false): numbe
   return by ? now + value : value;
 }
 
-/** A sum of terms, each with a unit of its own or the one that is set. */
+/** A sum of terms, each with its own unit or the current one. */
 function sum(text: string, unit: Unit): number | null {
   const terms = text.match(/[+-]?[^+-]+/g);
   if (!terms || terms.join("") !== text) return null;
@@ -62,7 +62,7 @@ function term(text: string, unit: Unit): number | null {
   return Number.isFinite(value) ? value : null;
 }
 
-/** What the written unit is worth; null when it is none, or measures something else. */
+/** Return the value of a typed unit; null if it is unknown or of another quantity. */
 function worthOf(named: string, unit: Unit): number | null {
   if (!named) return WORTH[unit];
   const angle = isAngle(unit);
@@ -76,7 +76,7 @@ export function isAngle(unit: Unit): unit is AngleUnit {
   return unit === "°" || unit === "rad";
 }
 
-/** Steps of the wheel, m and rad, with what they are called. */
+/** Steps of the wheel, m and rad, with their names. */
 export const LENGTH_STEPS: readonly (readonly [number, string])[] = [
   [0.1, "10 cm"],
   [0.05, "5 cm"],
@@ -92,7 +92,7 @@ export const ANGLE_STEPS: readonly (readonly [number, string])[] = [
   [Math.PI / 180 / 3600, "1″"],
 ];
 
-/** A step as words: the table's, or the free value. */
+/** Return the name of a step. */
 export function stepWords(step: number, quantity: Quantity): string {
   const steps = quantity === "length" ? LENGTH_STEPS : ANGLE_STEPS;
   const known = steps.find(([value]) => Math.abs(value - step) < 1e-12);

@@ -4,7 +4,7 @@ import { composed } from "../viewmodel/frames";
 import { FLIPPED, pivotOffset } from "./pivots";
 
 const box = { type: "Box", box: { id: "b", size_x: 0.1, size_y: 0.2, size_z: 0.3 } } satisfies ObjectModel;
-/** Its z axis down. */
+/** Its z axis points down. */
 const tool = { position: { x: 0.5, y: 0, z: 0.4 }, orientation: { x: 1, y: 0, z: 0, w: 0 } };
 
 it.each([

@@ -1,4 +1,4 @@
-/** Where a thing gets to by a pull, a step or a number: pure, all poses in the world unless said otherwise. */
+/** Poses after a drag, a step or a typed number. Pure functions; poses are in the world unless stated otherwise. */
 
 import type { Orientation, Pose, Position } from "../protocol/types";
 import { composed, inverted, ORIGIN, plus, relativeTo, rotated, times, turn } from "../viewmodel/frames";
@@ -6,7 +6,7 @@ import { rollPitchYaw } from "../viewmodel/rotations";
 
 export type Axis = "x" | "y" | "z";
 export const AXES: readonly Axis[] = ["x", "y", "z"];
-/** Whose axes are meant. `own`: the thing's, as it is turned; `view`: right, up, and towards the viewer. */
+/** Frames of the axes. `own`: of the item; `view`: right, up, and towards the camera. */
 export type FrameName = "world" | "parent" | "robot" | "own" | "view";
 
 export const unit = (axis: Axis): Position => ({
@@ -18,12 +18,12 @@ export const scaled = ({ x, y, z }: Position, by: number): Position => ({ x: x *
 export const minus = (a: Position, b: Position): Position => plus(a, scaled(b, -1));
 export const dot = (a: Position, b: Position): number => a.x * b.x + a.y * b.y + a.z * b.z;
 
-/** Move along an axis of a frame, by m. */
+/** Move along an axis of a frame, m. */
 export function moved(pose: Pose, frame: Pose, axis: Axis, by: number): Pose {
   return { ...pose, position: plus(pose.position, scaled(rotated(unit(axis), frame.orientation), by)) };
 }
 
-/** Turn about an axis of a frame, by rad, around the thing's own origin. */
+/** Turn about an axis of a frame around the item's origin, rad. */
 export function turned(pose: Pose, frame: Pose, axis: Axis, by: number): Pose {
   return { ...pose, orientation: normal(times(turn(rotated(unit(axis), frame.orientation), by), pose.orientation)) };
 }
@@ -32,13 +32,13 @@ export function turnedAbout(pose: Pose, axis: Position, by: number): Pose {
   return { ...pose, orientation: normal(times(turn(axis, by), pose.orientation)) };
 }
 
-/** Put one coordinate to a value, as seen from a frame. */
+/** Set one coordinate in a frame. */
 export function placedAt(pose: Pose, frame: Pose, axis: Axis, value: number): Pose {
   const seen = relativeTo(frame, pose);
   return composed(frame, { ...seen, position: { ...seen.position, [axis]: value } });
 }
 
-/** Put roll, pitch or yaw to a value in rad, as seen from a frame; the other two stay. */
+/** Set roll, pitch or yaw in a frame, rad; the other two stay. */
 export function turnedTo(pose: Pose, frame: Pose, axis: Axis, value: number): Pose {
   const seen = relativeTo(frame, pose);
   const [roll, pitch, yaw] = angles(seen.orientation);
@@ -46,7 +46,7 @@ export function turnedTo(pose: Pose, frame: Pose, axis: Axis, value: number): Po
   return composed(frame, { ...seen, orientation: fromAngles(wanted) });
 }
 
-/** Roll, pitch and yaw in rad. */
+/** Return roll, pitch and yaw, rad. */
 export function angles(orientation: Orientation): [number, number, number] {
   return rollPitchYaw(orientation).map((each) => (each * Math.PI) / 180) as [number, number, number];
 }
@@ -55,12 +55,12 @@ export function fromAngles({ x, y, z }: Position): Orientation {
   return times(turn(unit("z"), z), times(turn(unit("y"), y), turn(unit("x"), x)));
 }
 
-/** The next multiple of a step; the value itself where there is no step. */
+/** Return the nearest multiple of a step; the value itself without a step. */
 export function rounded(value: number, step: number): number {
   return step > 0 ? Math.round(value / step) * step : value;
 }
 
-/** The place of a raster of a frame that is next, along the axes that are named; the others stay. */
+/** Return the nearest point of a frame's grid along the named axes; the other coordinates stay. */
 export function onGrid(position: Position, frame: Pose, step: number, along: readonly Axis[] = AXES): Position {
   const seen = relativeTo(frame, { position, orientation: ORIGIN.orientation }).position;
   const next = { ...seen };
@@ -68,7 +68,7 @@ export function onGrid(position: Position, frame: Pose, step: number, along: rea
   return composed(frame, { position: next, orientation: ORIGIN.orientation }).position;
 }
 
-/** The nearest of the 24 rotations whose axes lie along those of a frame. */
+/** Return the nearest of the 24 rotations that align the axes with those of a frame. */
 export function squared(orientation: Orientation, frame: Orientation): Orientation {
   const seen = times(inverted(frame), orientation);
   let best: Orientation = ORIGIN.orientation;
@@ -80,7 +80,7 @@ export function squared(orientation: Orientation, frame: Orientation): Orientati
   return normal(times(frame, best));
 }
 
-/** All rotations by quarter turns. */
+/** All rotations by multiples of 90°. */
 const UPRIGHT: readonly Orientation[] = (() => {
   const quarter = (axis: Axis, n: number) => turn(unit(axis), (n * Math.PI) / 2);
   const faces = [quarter("x", 0), quarter("x", 1), quarter("x", 2), quarter("x", 3), quarter("y", 1), quarter("y", 3)];
@@ -100,9 +100,8 @@ export function same(a: Pose, b: Pose): boolean {
 }
 
 /**
- * Read a pose that was copied from somewhere: three numbers are a position, four a quaternion (x, y, z, w), seven both,
- * six a position with roll, pitch and yaw in °; lengths in m. What is not in the text is taken from `now`; null for
- * what is no pose.
+ * Read a copied pose: three numbers are a position, four a quaternion (x, y, z, w), seven both, six a position with
+ * roll, pitch and yaw in °; lengths in m. Missing parts are taken from `now`. Return null if it is not a pose.
  */
 export function poseFrom(text: string, now: Pose): Pose | null {
   const numbers = text.match(/-?\d*\.?\d+(?:e[+-]?\d+)?/gi)?.map(Number) ?? [];
@@ -119,12 +118,12 @@ export function poseFrom(text: string, now: Pose): Pose | null {
   return { position: numbers.length === 7 ? p(0) : now.position, orientation };
 }
 
-/** A pose to be copied: position in m and quaternion. */
+/** Return a pose as text: position in m and quaternion. */
 export function poseText({ position: p, orientation: o }: Pose): string {
   return [p.x, p.y, p.z, o.x, o.y, o.z, o.w].map((each) => Number(each.toFixed(6))).join(", ");
 }
 
-/** A place some way along a direction from another. */
+/** Return a point at a distance along a direction. */
 export function plusOf(from: Position, direction: Position, by: number): Position {
   return { x: from.x + direction.x * by, y: from.y + direction.y * by, z: from.z + direction.z * by };
 }

@@ -1,17 +1,17 @@
-/** Sizes of shapes: what pulling a face, or a number, makes of them. Pure; all in m. */
+/** Sizes of shapes after dragging a face or typing a number. Pure functions; all in m. */
 
 import { t } from "@lingui/core/macro";
 import type { ObjectModel, Pose, Position } from "../protocol/types";
 import { inverted, rotated } from "../viewmodel/frames";
 import { type Axis, dot, plusOf } from "./placing";
 
-/** Thinner would not be seen, and could not be taken hold of. */
+/** Smallest size. */
 export const THINNEST = 0.001;
 const WIDEST = 50;
 
 const within = (value: number) => Math.min(WIDEST, Math.max(THINNEST, value));
 
-/** Half of its size along its own axes. */
+/** Return half extents along the own axes. */
 export function halfOf({ box, cylinder, sphere }: ObjectModel): Record<Axis, number> {
   if (box) return { x: box.size_x / 2, y: box.size_y / 2, z: box.size_z / 2 };
   if (cylinder) return { x: cylinder.radius, y: cylinder.radius, z: cylinder.height / 2 };
@@ -20,8 +20,8 @@ export function halfOf({ box, cylinder, sphere }: ObjectModel): Record<Axis, num
 }
 
 /**
- * Pull a face outwards by so much. What has an opposite face keeps it where it is, so its middle goes by half of that
- * (`shift`, m); round things grow about their axis.
+ * Drag a face outwards by a distance. The opposite face stays, so the centre moves by half of it (`shift`, m); round
+ * shapes grow about their axis.
  */
 export function pulled(model: ObjectModel, axis: Axis, by: number): { model: ObjectModel; shift: number } {
   const { box, cylinder, sphere } = model;
@@ -40,7 +40,7 @@ export function pulled(model: ObjectModel, axis: Axis, by: number): { model: Obj
   return { model, shift: 0 };
 }
 
-/** A measure of a shape that can be typed. */
+/** A size that can be typed. */
 export interface Measure {
   label: string;
   value: number;
@@ -83,7 +83,7 @@ export function measures(model: ObjectModel): Measure[] {
   ];
 }
 
-/** Where something stands that is put onto a surface: as far before it as it reaches behind its own middle. */
+/** Return the distance of the centre from a surface on which the shape is placed. */
 export function lifted(
   point: Position,
   normal: Position,

@@ -1,4 +1,4 @@
-/** What can be moved, where it is, and by which request it gets elsewhere. */
+/** Items that can be moved: their pose, and the request that changes it. */
 
 import { t } from "@lingui/core/macro";
 import type { ObjectModel, Pose } from "../protocol/types";
@@ -11,19 +11,19 @@ import type { FrameName } from "./placing";
 export interface Target {
   kind: "object" | "point" | "orientation";
   id: string;
-  /** The thing as the server knows it. */
+  /** The item as the server knows it. */
   of: unknown;
-  /** The frame in which it is stored, and where it is now, in the world. */
+  /** The frame in which it is stored, and its pose in the world. */
   frame: Pose;
   pose: Pose;
   moves: boolean;
   turns: boolean;
-  /** Its collision model, where it has one that can be sized, and the name of the type that has it. */
+  /** Its collision model if it can be resized, and the name of its type. */
   model?: ObjectModel;
   type?: string;
 }
 
-/** The selected thing as what can be moved; null for what has no place of its own. */
+/** Return the selected item as a target; null if it has no pose of its own. */
 export function targetOf(state: State, selection: Selection | null): Target | null {
   const { doc } = state;
   if (!doc || !selection) return null;
@@ -61,7 +61,7 @@ export function targetOf(state: State, selection: Selection | null): Target | nu
   return { kind: "orientation", id, of: one, frame, pose, moves: false, turns: true };
 }
 
-/** A type that was made as a shape or mesh of its own, not a device that has a model. */
+/** Return whether a type was created as a shape or mesh, not for a device. */
 export function isShapeAlone(state: State, type: string): boolean {
   for (let name: string | undefined = type, left = 10; name && left > 0; left--) {
     if (name === "CollisionObject" || name === "VirtualCollisionObject") return true;
@@ -76,7 +76,7 @@ const REQUESTS = {
   orientation: "UpdateActionPointOrientation",
 } as const;
 
-/** Why it cannot be moved now, as a sentence; empty when it can. */
+/** Return why it cannot be moved now, as a sentence; an empty string if it can. */
 export function notMovable(state: State, { kind, id }: Pick<Target, "kind" | "id">): string {
   const { doc } = state;
   if (isRunning(state)) return t`Stop the program first.`;
@@ -89,7 +89,7 @@ export function notMovable(state: State, { kind, id }: Pick<Target, "kind" | "id
   return barred(state, REQUESTS[kind]);
 }
 
-/** Why its size cannot be changed now. */
+/** Return why it cannot be resized now. */
 export function notSizable(state: State, target: Pick<Target, "kind" | "id">): string {
   return (
     notMovable(state, target) ||
@@ -98,7 +98,7 @@ export function notSizable(state: State, target: Pick<Target, "kind" | "id">): s
   );
 }
 
-/** A frame by its name, in the world; for `view` what the viewer sees. */
+/** Return a frame in the world by its name; for `view` the axes of the camera. */
 export function frameOf(
   state: State,
   name: FrameName,

@@ -1,26 +1,29 @@
-/** How the transform tool is set: units, steps, whose axes, what it snaps to. The user finds it again on every tablet. */
+/**
+ * Settings of the transform tool: units, steps, frame, snapping. They are stored on the server for all devices of the
+ * user.
+ */
 
 import { memoized } from "../store/memo";
 import type { State } from "../store/state";
 import { ANGLE_UNITS, type AngleUnit, LENGTH_UNITS, type LengthUnit } from "./amounts";
 import type { FrameName } from "./placing";
 
-/** `grid`: the steps' raster; `surface`: on what is below the pointer; `point`: where another thing stands. */
+/** `grid`: multiples of the step; `surface`: the surface under the pointer; `point`: the position of another item. */
 export type Snap = "none" | "grid" | "surface" | "point";
 
 export interface ToolSettings {
   length: LengthUnit;
   angle: AngleUnit;
-  /** m and rad. */
+  /** Steps, m and rad. */
   lengthStep: number;
   angleStep: number;
   frame: FrameName;
   snap: Snap;
-  /** Numbers that are typed are changes. */
+  /** Whether typed numbers are relative. */
   by: boolean;
 }
 
-/** Key of the user's general view state. */
+/** Key in the general view state of the user. */
 export const TOOL = "transform";
 
 export const DEFAULTS: ToolSettings = {

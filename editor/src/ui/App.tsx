@@ -15,12 +15,12 @@ import { Overlays } from "./search/Overlays";
 import { useScreenSettings } from "./settings/Settings";
 import { Workplace } from "./workplace/Workplace";
 
-/** Screens of which most see one: each is a chunk of its own. */
+/** Screens that most users see one of: a chunk each. */
 const Home = lazily(() => import("./home/Home").then((module) => ({ default: module.Home })));
 const Operator = lazily(() => import("./operator/Operator"));
 const ResultBanner = lazily(() => import("./run/ResultBanner"));
 
-/** The part of the address behind the hash, which chooses between the editor and the operator's screen. */
+/** The hash of the address, which selects the editor or the operator screen. */
 function useHash(): string {
   return useSyncExternalStore(
     (changed) => {

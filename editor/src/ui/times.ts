@@ -1,4 +1,4 @@
-/** Times in words. */
+/** Times as text. */
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
@@ -30,7 +30,7 @@ export function clock(time: string | number, seconds = false): string {
   });
 }
 
-/** "5 minutes ago", or the date when that is longer than a week ago. `time` is RFC 3339. */
+/** Return "5 minutes ago", or the date if it is longer than a week ago. `time` is RFC 3339. */
 export function ago(time: string, present = Date.now()): string {
   const seconds = Math.round((Date.parse(time) - present) / 1000);
   if (Math.abs(seconds) < 10) return t`just now`;

@@ -1,4 +1,4 @@
-/** Poses in one frame and another: pure, in the protocol's own shapes. */
+/** Conversion of poses between frames, in the types of the protocol. Pure functions. */
 
 import type { Orientation, Pose, Position } from "../protocol/types";
 import type { OpenDocument } from "../store/state";
@@ -27,7 +27,7 @@ export function plus(a: Position, b: Position): Position {
   return { x: a.x + b.x, y: a.y + b.y, z: a.z + b.z };
 }
 
-/** What is `pose` in `frame`, in the frame in which `frame` is. */
+/** Return `pose`, given in `frame`, in the parent of `frame`. */
 export function composed(frame: Pose, pose: Pose): Pose {
   return {
     position: plus(frame.position, rotated(pose.position, frame.orientation)),
@@ -35,7 +35,7 @@ export function composed(frame: Pose, pose: Pose): Pose {
   };
 }
 
-/** What is `pose` as seen from `frame`, both in the same frame. */
+/** Return `pose` relative to `frame`, both in the same frame. */
 export function relativeTo(frame: Pose, pose: Pose): Pose {
   const back = inverted(frame.orientation);
   const { x, y, z } = frame.position;
@@ -45,7 +45,7 @@ export function relativeTo(frame: Pose, pose: Pose): Pose {
   };
 }
 
-/** How far two poses in one frame are from each other, m and degrees. */
+/** Return the distance of two poses in the same frame, m and degrees. */
 export function apart(a: Pose, b: Pose): { distance: number; degrees: number } {
   const { position: p, orientation: q } = relativeTo(a, b);
   return {
@@ -54,13 +54,13 @@ export function apart(a: Pose, b: Pose): { distance: number; degrees: number } {
   };
 }
 
-/** The rotation by an angle in rad about an axis of length 1. */
+/** Return the rotation by an angle, rad, about a unit axis. */
 export function turn(axis: Position, angle: number): Orientation {
   const sine = Math.sin(angle / 2);
   return { x: axis.x * sine, y: axis.y * sine, z: axis.z * sine, w: Math.cos(angle / 2) };
 }
 
-/** From roll, pitch and yaw in degrees, as `rollPitchYaw` gives them. */
+/** Return the rotation of roll, pitch and yaw in degrees, the inverse of `rollPitchYaw`. */
 export function fromRollPitchYaw([roll, pitch, yaw]: readonly [number, number, number]): Orientation {
   const RAD = Math.PI / 180;
   const x = turn({ x: 1, y: 0, z: 0 }, roll * RAD);
@@ -69,7 +69,7 @@ export function fromRollPitchYaw([roll, pitch, yaw]: readonly [number, number, n
   return times(z, times(y, x));
 }
 
-/** An orientation whose z axis is the direction, turned about it as little as can be from the given one. */
+/** Return the orientation closest to a given one whose z axis has a given direction. */
 export function alongZ(direction: Position, from: Orientation = ORIGIN.orientation): Orientation {
   const z = rotated({ x: 0, y: 0, z: 1 }, from);
   const dot = z.x * direction.x + z.y * direction.y + z.z * direction.z;
@@ -84,7 +84,7 @@ export function alongZ(direction: Position, from: Orientation = ORIGIN.orientati
   return times({ x: q.x / length, y: q.y / length, z: q.z / length, w: q.w / length }, from);
 }
 
-/** Where an object or a point is in the world; the world's origin for what has no place. */
+/** Return the pose of an object or a point in the world; the origin if it has none. */
 export function worldOf(doc: OpenDocument, id: string | undefined): Pose {
   if (!id) return ORIGIN;
   const object = doc.objects[id];

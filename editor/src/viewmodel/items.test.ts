@@ -108,7 +108,7 @@ test("previews of others, places, what is hidden and how well it is reached", ()
   expect(made.START).toMatchObject({ position: { x: 1, y: 2, z: 3 } });
   expect(made.END).toMatchObject({ position: { x: -0.3 } });
   expect([made.box?.faint, made.ur?.faint]).toEqual([1, 0.75]);
-  expect(made.ori).toMatchObject({ reach: "near_limit" }); // by the robot that reaches it best
+  expect(made.ori).toMatchObject({ reach: "near_limit" }); // by the best robot
 });
 
 test("a type without a model has a marker, values are shown as people write them", () => {

@@ -1,4 +1,4 @@
-/** From the state to what the 3D view shows: pure, and the same object for what did not change. */
+/** From the state to the items of the 3D view. Pure functions that return the same item while nothing changed. */
 
 import { t } from "@lingui/core/macro";
 import type { Item, LinkItem, RobotItem, Shape } from "../engine/items";
@@ -11,12 +11,12 @@ import { faintness } from "./seeing";
 export const START = "START";
 export const END = "END";
 
-/** Where START and END stand until somebody puts them elsewhere. */
+/** Default positions of START and END. */
 const PLACES: Record<string, Position> = { START: { x: -0.3, y: -0.3, z: 0.02 }, END: { x: -0.3, y: 0.3, z: 0.02 } };
 const NO_PLACE = { x: 0, y: 0, z: 0 };
 const UPRIGHT = { position: NO_PLACE, orientation: { x: 0, y: 0, z: 0, w: 1 } };
 
-/** Makes the items of states that follow each other. */
+/** Create the items of successive states. */
 export class ItemMaker {
   private known = new Map<string, { inputs: unknown[]; item: Item }>();
 
@@ -53,7 +53,7 @@ export class ItemMaker {
     for (const object of Object.values(doc.objects)) {
       const type = state.types.byName[object.type];
       const robot = state.types.robots[object.type];
-      if (!object.pose && !robot) continue; // shown in lists alone
+      if (!object.pose && !robot) continue; // shown in lists only
       const trouble = isTrouble(state, object.id);
       const online = state.live.state === "started" || isRunning(state);
       const preview = drafted(draft, object) ?? state.previews[object.id];
@@ -174,20 +174,20 @@ export class ItemMaker {
   }
 }
 
-/** How large points are drawn, of what they are by themselves: as the user wants it on all his tablets. */
+/** Return the size of points, relative: a setting of the user. */
 export function pointSize(state: State): number {
   const kept = state.view.general.point_size;
   return typeof kept === "number" ? Math.min(4, Math.max(0.5, kept)) : 1;
 }
 
-/** Whether lines lead from all points to what they hang on; else from the selected one alone. */
+/** Return whether lines connect all points to their parents, not only the selected one. */
 export const parentLines = (state: State): boolean => state.view.general.parent_lines === true;
 
 function ghostOf({ joints, problem, at }: Ghost): RobotItem["ghost"] {
   return { joints: Object.fromEntries(joints.map((each) => [each.name, each.value])), possible: problem === "", at };
 }
 
-/** Where the user has a thing just now, while the server still knows it as it was. */
+/** Return the pose of an item during a change by this user. */
 function drafted(draft: Draft | undefined, thing: { id: string }): Pose | undefined {
   return draft?.of === thing ? draft.pose : undefined;
 }
@@ -217,7 +217,7 @@ export function shapeOf(type: ObjectTypeMeta | undefined): Shape {
   return { kind: "none" };
 }
 
-/** How an orientation can be reached by the robot that reaches it best. */
+/** Return the reachability of an orientation by the best robot. */
 function bestReach(state: State): Record<string, Reach> {
   const best: Record<string, Reach> = {};
   for (const robot of Object.values(state.reach)) {
@@ -242,7 +242,7 @@ function link(item: LogicItem, base: Omit<LinkItem, "kind" | "from" | "to" | "co
   return { ...base, kind: "logic", from: item.start, to: item.end, condition: words, branch };
 }
 
-/** A value as people write it: the JSON of text has quotes. */
+/** Return a value as text: JSON strings have quotes. */
 export function plain(json: string): string {
   try {
     const value: unknown = JSON.parse(json);

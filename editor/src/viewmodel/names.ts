@@ -1,4 +1,4 @@
-/** What things are called on the screen: by their names, never by ids. */
+/** Names of items as shown to users. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -28,12 +28,12 @@ export function nameOf(state: State, id: string): string {
   return named?.name ?? "";
 }
 
-/** A sentence of the server with names in place of ids. */
+/** Return a sentence of the server with names instead of ids. */
 export function withNames(state: State, text: string): string {
   return text.replace(/\b[a-z]{3}_[0-9a-f]{32}\b/g, (id) => nameOf(state, id) || id);
 }
 
-/** What is selected when the thing with this id is tapped. */
+/** Return the selection of a tapped item. */
 export function selectionOf(state: State, id: string): Selection | null {
   const { doc } = state;
   if (!doc) return null;

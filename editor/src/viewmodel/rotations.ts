@@ -1,14 +1,14 @@
-/** Rotations as people read them. */
+/** Rotations as roll, pitch and yaw. */
 
 import type { Orientation } from "../protocol/types";
 
 const DEGREES = 180 / Math.PI;
 
-/** Roll, pitch and yaw in degrees: about the fixed axes x, y and z, in this order. */
+/** Return roll, pitch and yaw in degrees: about the fixed axes x, y and z, in this order. */
 export function rollPitchYaw({ x, y, z, w }: Orientation): [number, number, number] {
   const sine = Math.min(1, Math.max(-1, 2 * (w * y - z * x)));
   if (Math.abs(sine) > 0.999_999) {
-    // Roll and yaw turn about the same axis: all of it is told as yaw.
+    // Gimbal lock: roll and yaw have the same axis, so everything is yaw.
     return [0, Math.sign(sine) * 90, -Math.sign(sine) * 2 * Math.atan2(x, w) * DEGREES];
   }
   return [

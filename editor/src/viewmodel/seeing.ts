@@ -1,30 +1,30 @@
-/** How the user sees things: what he hides, what he sees through, what fades beside what he looks for. */
+/** Visibility of items for the user: hidden, transparent, faded. */
 
 import type { OpenDocument, State } from "../store/state";
 
-/** Kinds of things to look for; `program`: its start, its end and the steps between. */
+/** Kinds of items that can be filtered; `program`: start, end and connections. */
 export const GROUPS = ["robots", "objects", "points", "actions", "program", "others"] as const;
 export type Group = (typeof GROUPS)[number];
 
-/** How much is seen through what is not looked for. */
+/** Transparency of faded items. */
 const FADED = 0.85;
 
-/** Kinds to which the list of things is narrowed; empty: all. */
+/** Kinds shown in the object list; empty: all. */
 export function groupsOf(state: State): Group[] {
   const kept = state.view.user.filters;
   return Array.isArray(kept) ? GROUPS.filter((each) => kept.includes(each)) : [];
 }
 
-/** Whether what is not of these kinds fades in the view. */
+/** Whether other kinds fade in the view. */
 export const fadesOthers = (state: State): boolean => state.view.user.fade_others === true;
 
-/** Opaqueness of all objects but robots: 1 as they are, 0 not there. */
+/** Opacity of all objects except robots, from 0 to 1. */
 export function opacityOfAll(state: State): number {
   const kept = state.view.user.opacity_all;
   return typeof kept === "number" ? Math.min(1, Math.max(0, kept)) : 1;
 }
 
-/** Tells of each thing how much is seen through it: 0 nothing, 1 it is not shown, and not aimed at. */
+/** Return the transparency of each item; at 1 it is neither drawn nor picked. */
 export function faintness(state: State): (id: string) => number {
   const { doc, ui } = state;
   const { blocklist, opacity } = state.view.user;

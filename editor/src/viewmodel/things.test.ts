@@ -94,7 +94,7 @@ test("what is hidden, seen through by itself or with all others, and what fades 
   const all = ["table", "arm", "pick", "grip", "START"];
   expect(seen({}, all)).toEqual([0, 0, 0, 0, 0]);
   expect(seen({ blocklist: ["table"], opacity: { arm: 0.25 } }, all)).toEqual([1, 0.75, 0, 0, 0]);
-  // All objects but robots; a thing's own value stands where that is more.
+  // All objects except robots; the larger transparency applies.
   expect(seen({ opacity_all: 0.5, opacity: { table: 0.25 } }, all)).toEqual([0.75, 0, 0, 0, 0]);
   expect(seen({ opacity_all: 0.5, opacity: { table: 0.75 } }, all)[0]).toBe(0.5);
   expect(seen({ filters: ["points", "no such"], fade_others: true }, all)).toEqual([0.85, 0.85, 0, 1, 1]);
@@ -104,5 +104,5 @@ test("what is hidden, seen through by itself or with all others, and what fades 
     seen({ filters: "points", opacity_all: "half", opacity: { arm: "much" }, blocklist: 3, fade_others: true }, all),
   ).toEqual([0, 0, 0, 0, 0]);
   state.ui.selection = { kind: "action", id: "grip" };
-  expect(seen({ filters: ["points"], fade_others: true }, all)[3]).toBe(0); // what is selected stays
+  expect(seen({ filters: ["points"], fade_others: true }, all)[3]).toBe(0); // the selected item stays
 });

@@ -1,4 +1,4 @@
-/** All that is in the workplace, as the list of things shows it: what hangs on what, by kinds, found by words. */
+/** The items of the workplace for the object list: tree, kinds, search. */
 
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -10,15 +10,15 @@ export interface Row {
   kind: Kind;
   group: Group;
   name: string;
-  /** What it is: its type, or its kind in words. */
+  /** Its type or kind as text. */
   detail: string;
   below: Row[];
 }
 
 export interface Things {
-  /** What has a place in the view, each with what hangs on it. */
+  /** Items with a pose, with their children. */
   placed: Row[];
-  /** Objects without a pose: what has no place. */
+  /** Objects without a pose. */
   unplaced: Row[];
   program: Row[];
 }
@@ -87,14 +87,14 @@ export function thingsOf({ doc, types }: Pick<State, "doc" | "types">): Things {
   };
 }
 
-/** All of them, one below the other. */
+/** Return all items in order. */
 export function flat(rows: readonly Row[]): Row[] {
   return rows.flatMap((each) => [each, ...flat(each.below)]);
 }
 
 export const allOf = (things: Things): Row[] => flat([...things.placed, ...things.unplaced, ...things.program]);
 
-/** Those that fit, with what they hang on. */
+/** Return the matching items with their ancestors. */
 export function narrowed(rows: readonly Row[], fits: (row: Row) => boolean): Row[] {
   return rows.flatMap((row) => {
     const below = narrowed(row.below, fits);
@@ -102,7 +102,7 @@ export function narrowed(rows: readonly Row[], fits: (row: Row) => boolean): Row
   });
 }
 
-/** Whether it is of one of the groups, all where there is none, and is called so: every word stands in it. */
+/** Return whether an item is of one of the groups and contains every word of the search. */
 export function fitting(groups: ReadonlySet<string>, words: string): (row: Row) => boolean {
   const wanted = words.toLowerCase().split(/\s+/).filter(Boolean);
   return ({ group, name, detail }) => {
@@ -117,7 +117,7 @@ export function counts(rows: readonly Row[]): Record<Group, number> {
   return found;
 }
 
-/** The one `by` further on from this, from the end to the beginning again; null where it is alone. */
+/** Return the item `by` places further, cyclically; null if there is no other. */
 export function neighbour(rows: readonly Row[], id: string, by: 1 | -1): Row | null {
   const at = rows.findIndex((each) => each.id === id);
   const next = rows[(at < 0 ? (by > 0 ? 0 : rows.length - 1) : at + by + rows.length) % rows.length];

@@ -1,11 +1,11 @@
-/** How a pointer that moves over the view becomes a way along an axis, in a plane, or about an axis: pure geometry. */
+/** Convert pointer movements to distances along an axis, in a plane, or to angles about an axis. Pure geometry. */
 
 import { type Ray, Vector3 } from "three";
 
-/** Rays flatter than this to a plane, or closer than this to an axis, would make a pixel worth metres. */
+/** Smallest angle between a ray and a plane or axis; below it a pixel would mean metres. */
 const FLAT = 0.03;
 
-/** Where on an axis the ray comes closest to it, m from the origin; null when it runs along the axis. */
+/** Return the point of an axis closest to the ray, m from the origin; null if they are parallel. */
 export function alongAxis(ray: Ray, origin: Vector3, axis: Vector3): number | null {
   const between = new Vector3().subVectors(origin, ray.origin);
   const cosine = axis.dot(ray.direction);
@@ -14,7 +14,7 @@ export function alongAxis(ray: Ray, origin: Vector3, axis: Vector3): number | nu
   return (cosine * ray.direction.dot(between) - axis.dot(between)) / apart;
 }
 
-/** Where the ray meets a plane in front of it. */
+/** Return the point where the ray meets a plane in front of it. */
 export function onPlane(ray: Ray, origin: Vector3, normal: Vector3): Vector3 | null {
   const slope = normal.dot(ray.direction);
   if (Math.abs(slope) < FLAT) return null;
@@ -22,19 +22,19 @@ export function onPlane(ray: Ray, origin: Vector3, normal: Vector3): Vector3 | n
   return distance > 0 ? ray.origin.clone().addScaledVector(ray.direction, distance) : null;
 }
 
-/** Angle in rad from one direction to another about an axis; both need not be square to it. */
+/** Return the angle from one direction to another about an axis, rad; they need not be perpendicular to it. */
 export function angleBetween(from: Vector3, to: Vector3, axis: Vector3): number {
   const a = from.clone().projectOnPlane(axis);
   const b = to.clone().projectOnPlane(axis);
   return Math.atan2(axis.dot(a.clone().cross(b)), a.dot(b));
 }
 
-/** An angle that goes on past half a turn: the one nearest to the last. */
+/** Return the equivalent angle that is closest to the last one, so that turns can exceed 180°. */
 export function unwound(angle: number, last: number): number {
   return angle + Math.round((last - angle) / (2 * Math.PI)) * 2 * Math.PI;
 }
 
-/** px from a point to a line between two others. */
+/** Return the distance of a point from a line segment, px. */
 export function toSegment(x: number, y: number, a: { x: number; y: number }, b: { x: number; y: number }): number {
   const dx = b.x - a.x;
   const dy = b.y - a.y;

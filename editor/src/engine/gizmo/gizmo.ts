@@ -1,6 +1,6 @@
 /**
- * What a thing is moved, turned and sized with in the view: arrows, squares, rings, knobs. It tells what the hand does,
- * in the world; what becomes of the thing is for who shows it (`show`) and listens (`onDrag`).
+ * The gizmo that moves, turns and resizes an item: arrows, squares, rings, knobs. It reports drags in world
+ * coordinates; its user shows the item (`show`) and applies the change (`onDrag`).
  */
 
 import { type Camera, Quaternion, Raycaster, type Scene, Vector2, Vector3 } from "three";
@@ -22,28 +22,28 @@ import { Picture } from "./picture";
 
 export interface GizmoSetup {
   mode: GizmoMode;
-  /** Where it stands in the world, and how its axes are turned; `view`: as the viewer sees. */
+  /** Pose in the world; `view`: axes of the camera. */
   at: Position;
   axes: Orientation | "view";
-  /** Left out: all three. */
+  /** Axes; all three by default. */
   allowed?: readonly Axis[];
-  /** Of what is sized: half of its size along its own axes, m. */
+  /** Half extents along the own axes of an item that can be resized, m. */
   half?: Record<Axis, number>;
 }
 
-/** What the hand has done since it took hold. */
+/** The drag since it started. */
 export interface Drag {
   phase: "start" | "move" | "end" | "cancel";
   handle: Handle;
-  /** m in the world. */
+  /** Translation in the world, m. */
   translation: Vector3;
-  /** m along the handle's axis; outwards for a face. */
+  /** Distance along the axis of the handle, outwards for a face, m. */
   length: number;
-  /** rad about the handle's axis, more than a turn where it went on. */
+  /** Angle about the axis of the handle, rad; can exceed a full turn. */
   angle: number;
-  /** The handle's axis in the world, as it was at the start; of `free`, towards the viewer. */
+  /** Axis of the handle in the world at the start; for `free`, towards the camera. */
   axis: Vector3;
-  /** The pointer, px from the view's upper left corner. */
+  /** The pointer, px from the upper left corner of the view. */
   x: number;
   y: number;
 }
@@ -56,15 +56,15 @@ interface Surroundings {
   draw: () => void;
 }
 
-/** px: length of an arrow, and how near a handle is hit. */
+/** Length of an arrow, and distance within which a handle is hit, px. */
 const LENGTH = 96;
 const NEAR_MOUSE = 10;
 const NEAR_FINGER = 24;
-/** px: what is seen shorter than this points at the viewer, and cannot be pulled. */
+/** Shortest length on the screen of a handle that can be dragged, px. */
 const SHORT = 22;
 
 export class Gizmo {
-  /** Called while somebody drags. */
+  /** Called during a drag. */
   onDrag: (drag: Drag) => void = () => {};
 
   private setup: GizmoSetup | null = null;
@@ -114,7 +114,7 @@ export class Gizmo {
     this.around.draw();
   }
 
-  /** Where its handles are on the screen, px, by their names: for tests, and hints. */
+  /** Return the positions of its handles on the screen by name, px: for tests and hints. */
   places(): Record<string, { x: number; y: number }> {
     const { setup } = this;
     if (!setup) return {};
@@ -127,7 +127,7 @@ export class Gizmo {
     );
   }
 
-  /** Called before each drawn frame: the same size on the screen from near and far. */
+  /** Called before each frame; keeps the size on the screen constant. */
   place(): void {
     if (!this.setup) return;
     this.picture.place(this.origin(), this.turned(), this.scale(), this.half(), (handle) => this.isShort(handle));
@@ -138,7 +138,7 @@ export class Gizmo {
     this.picture.dispose();
   }
 
-  // ------------------------------------------------------------------------------------------------ where it is
+  // ------------------------------------------------------------------------------------------------ pose
   private origin(): Vector3 {
     const { x, y, z } = this.setup?.at ?? { x: 0, y: 0, z: 0 };
     return new Vector3(x, y, z);
@@ -150,7 +150,7 @@ export class Gizmo {
     return new Quaternion(axes.x, axes.y, axes.z, axes.w).normalize();
   }
 
-  /** m in the world that are `LENGTH` px on the screen, there where it stands. */
+  /** Return the length in the world, m, of `LENGTH` pixels at the gizmo. */
   private scale(): number {
     const camera = this.around.camera();
     const origin = this.origin();
@@ -161,7 +161,7 @@ export class Gizmo {
     return (0.01 * LENGTH) / Math.max(0.01, Math.hypot(a.x - b.x, a.y - b.y));
   }
 
-  /** Half the size of what is sized, in lengths of the gizmo: a knob stands a bit before its face. */
+  /** Return the half extent in lengths of the gizmo; a knob is a bit outside its face. */
   private half(): Record<Axis, number> {
     const { half } = this.setup ?? {};
     const scale = this.scale();
@@ -180,7 +180,7 @@ export class Gizmo {
     );
   }
 
-  /** An arrow or knob that points at the viewer: pulling it would mean nothing. */
+  /** Return whether an arrow or knob points at the camera and cannot be dragged. */
   private isShort(handle: Handle): boolean {
     if (handle.do !== "axis" && handle.do !== "face") return false;
     const line = this.line({ do: "axis", axis: handle.axis });
@@ -205,7 +205,7 @@ export class Gizmo {
     return best;
   }
 
-  // ------------------------------------------------------------------------------------------------ the hand
+  // ------------------------------------------------------------------------------------------------ drag
   private pointer(event: PointerEvent): { x: number; y: number } {
     const box = this.around.canvas.getBoundingClientRect();
     return { x: event.clientX - box.left, y: event.clientY - box.top };
@@ -229,7 +229,7 @@ export class Gizmo {
     this.onDrag(last);
   }
 
-  /** Where the pointer is on the handle's axis or plane. */
+  /** Return the pointer position on the axis or plane of the handle. */
   private reach(handle: Handle, x: number, y: number, origin: Vector3, axis: Vector3): Vector3 | null {
     const { width, height } = this.around.size();
     this.caster.setFromCamera(new Vector2((x / width) * 2 - 1, 1 - (y / height) * 2), this.around.camera());
@@ -253,7 +253,7 @@ export class Gizmo {
     event.stopImmediatePropagation();
     const { handle, from, origin, axis, last } = dragging;
     const to = this.reach(handle, x, y, origin, axis);
-    if (!to) return; // the pointer went past the horizon: it stays where it was
+    if (!to) return; // the pointer is above the horizon: keep the last position
     const translation = new Vector3().subVectors(to, from);
     const ring = handle.do === "ring";
     const angle = ring ? unwound(angleBetween(from.clone().sub(origin), to.clone().sub(origin), axis), last.angle) : 0;

@@ -1,4 +1,6 @@
-/** What there is to take hold of, and which of it is under a pointer: judged in pixels, so that it suits fingers. */
+/**
+ * The handles of the gizmo, and which one is under the pointer. Distances are in pixels, so that fingers can hit them.
+ */
 
 import { type Camera, Vector3 } from "three";
 import { toSegment } from "./drags";
@@ -7,13 +9,13 @@ export type Axis = "x" | "y" | "z";
 export const AXES: readonly Axis[] = ["x", "y", "z"];
 
 export type Handle =
-  /** Move along an axis, in the plane square to an axis, or anywhere. */
+  /** Move along an axis, in a plane perpendicular to an axis, or freely. */
   | { do: "axis"; axis: Axis }
   | { do: "plane"; axis: Axis }
   | { do: "free" }
   /** Turn about an axis. */
   | { do: "ring"; axis: Axis }
-  /** Pull a face: the one in the direction of an axis, or against it. */
+  /** Drag a face: the one in the direction of an axis, or opposite to it. */
   | { do: "face"; axis: Axis; sign: 1 | -1 };
 
 export type GizmoMode = "move" | "turn" | "size";
@@ -25,7 +27,7 @@ export const keyOf = (handle: Handle): string =>
       ? `face ${handle.sign > 0 ? "+" : "-"}${handle.axis}`
       : `${handle.do} ${handle.axis}`;
 
-/** In lengths of the gizmo: where a shaft begins and ends, where a plane's square is, how large a ring is. */
+/** Proportions in lengths of the gizmo: start and end of a shaft, position of a square, radius of a ring. */
 export const SHAFT = [0.3, 1.05] as const;
 export const SQUARE = [0.34, 0.56] as const;
 export const RING = 0.85;
@@ -48,13 +50,13 @@ export function handlesOf(mode: GizmoMode, allowed: readonly Axis[]): Handle[] {
   ];
 }
 
-/** Two axes square to one, in the order that turns from the first to the second about it. */
+/** Return two axes perpendicular to one, in right-handed order. */
 export function square(axis: Axis): [Vector3, Vector3] {
   const at = AXES.indexOf(axis);
   return [UNIT[AXES[(at + 1) % 3] ?? "x"], UNIT[AXES[(at + 2) % 3] ?? "x"]];
 }
 
-/** The line by which a handle is hit, in lengths of the gizmo in its own frame; a single point for small ones. */
+/** Return the line by which a handle is hit, in lengths of the gizmo and its frame; a point for small handles. */
 export function outline(handle: Handle, half: Record<Axis, number>): Vector3[] {
   switch (handle.do) {
     case "free":
@@ -84,7 +86,7 @@ export function outline(handle: Handle, half: Record<Axis, number>): Vector3[] {
 export interface OnScreen {
   x: number;
   y: number;
-  /** Of normalised device coordinates: larger is farther. */
+  /** Depth in normalised device coordinates; larger is farther. */
   depth: number;
 }
 
@@ -93,7 +95,7 @@ export function onScreen(point: Vector3, camera: Camera, width: number, height: 
   return { x: ((at.x + 1) / 2) * width, y: ((1 - at.y) / 2) * height, depth: at.z };
 }
 
-/** px from a pointer to a handle whose outline is on the screen; of what turns away from the viewer a bit more. */
+/** Return the distance of a pointer from a handle's outline on the screen, px; a bit more for its rear half. */
 export function apart(x: number, y: number, line: OnScreen[], centre: OnScreen): number {
   const [first] = line;
   if (!first || line.some((each) => each.depth > 1)) return Infinity;

@@ -1,4 +1,4 @@
-/** How the gizmo looks: over everything, axes told apart by colour and letter. */
+/** The model of the gizmo: drawn over everything, with coloured and lettered axes. */
 
 import {
   BoxGeometry,
@@ -38,7 +38,7 @@ export class Picture {
   >();
 
   constructor(scene: Scene) {
-    // Not to be picked: the gizmo looks for its handles itself.
+    // Not pickable: the gizmo finds its handles itself.
     this.root.userData.ground = true;
     scene.add(this.root);
   }
@@ -143,7 +143,7 @@ function shape(handle: Handle, material: MeshBasicMaterial): Group {
   return group;
 }
 
-/** Turns what points along y so that it points along the axis. */
+/** Rotation from the y axis to an axis. */
 function towards(axis: Axis): Matrix4 {
   if (axis === "x") return new Matrix4().makeRotationZ(-Math.PI / 2);
   if (axis === "z") return new Matrix4().makeRotationX(Math.PI / 2);
@@ -152,7 +152,7 @@ function towards(axis: Axis): Matrix4 {
 
 const letters = new Map<Axis, CanvasTexture>();
 
-/** Drawn once, and kept. */
+/** Textures of the letters, drawn once. */
 function letterOf(axis: Axis): CanvasTexture {
   const known = letters.get(axis);
   if (known) return known;

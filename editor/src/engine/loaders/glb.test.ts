@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { readGlb, readMesh } from "./glb";
 
-/** A file as the server writes it: one triangle for each name, those of `coloured` in red. */
+/** Write a file like the server's: a triangle per name, those of `coloured` in red. */
 function file(names: string[], extras: object, coloured: string[] = []): ArrayBuffer {
   const views: object[] = [];
   const accessors: object[] = [];

@@ -1,9 +1,9 @@
-/** Reads the binary glTF that the server makes of meshes and robots (docs/protocol.md): no other, and nothing else of it. */
+/** Read the binary glTF that the server creates from meshes and robots (docs/protocol.md), and only that. */
 
 import { t } from "@lingui/core/macro";
 import { BufferAttribute, BufferGeometry } from "three";
 
-/** Of a robot: its URDF, the mesh of each file that it names, and why others are not there. */
+/** Extras of a robot: its URDF, the meshes of its files, and the reasons for missing ones. */
 export interface RobotExtras {
   urdf: string;
   meshes: Record<string, string>;
@@ -11,7 +11,7 @@ export interface RobotExtras {
 }
 
 export interface Shown {
-  /** By their names, in m, z up. */
+  /** By file name, in m, z up. */
   meshes: Map<string, BufferGeometry>;
   extras: Partial<RobotExtras>;
 }
@@ -35,7 +35,7 @@ const ARRAYS = { 5120: Int8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Fl
 const SIZES = { SCALAR: 1, VEC3: 3, VEC4: 4 };
 const NAMES = { POSITION: "position", NORMAL: "normal", COLOR_0: "color" } as const;
 
-/** Read a file; throws for what is none. The geometries hold the file's own memory. */
+/** Read a file; throw if it is invalid. The geometries share the memory of the file. */
 export function readGlb(content: ArrayBuffer): Shown {
   const head = new DataView(content);
   if (content.byteLength < 20 || head.getUint32(0, true) !== 0x46546c67)
@@ -50,7 +50,7 @@ export function readGlb(content: ArrayBuffer): Shown {
     // biome-ignore lint/correctness/noUnsafeOptionalChaining: a damaged file throws, and is reported.
     const { byteOffset, byteStride } = told.bufferViews?.[bufferView] as { byteOffset: number; byteStride?: number };
     const kind = ARRAYS[componentType];
-    // What is padded is taken with its padding: shaders pass over what they do not ask for.
+    // Padded attributes keep their padding: shaders ignore it.
     const size = byteStride ? byteStride / kind.BYTES_PER_ELEMENT : SIZES[type];
     return new BufferAttribute(new kind(content, start + byteOffset, count * size), size, normalized);
   };
@@ -69,7 +69,7 @@ export function readGlb(content: ArrayBuffer): Shown {
   return { meshes, extras: told.scenes[0]?.extras ?? {} };
 }
 
-/** The one mesh of an asset that is no robot. */
+/** Return the only mesh of an asset that is not a robot. */
 export function readMesh(content: ArrayBuffer): BufferGeometry {
   const [mesh] = readGlb(content).meshes.values();
   if (!mesh) throw new Error(t`The model contains no surface.`);

@@ -1,4 +1,4 @@
-/** Meshes of the kinds that people upload, before they are: as one geometry, in the file's unit. A chunk of its own. */
+/** Read uploaded meshes as one geometry in the unit of the file. A separate chunk. */
 
 import { t } from "@lingui/core/macro";
 import { type BufferGeometry, type Group, LoadingManager, Matrix4, type Mesh, type Object3D } from "three";
@@ -9,27 +9,27 @@ import { PLYLoader } from "three/examples/jsm/loaders/PLYLoader.js";
 import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 
-/** Read a mesh; its kind is told by its first bytes and, where these say nothing, by its name. */
+/** Read a mesh; its format is detected by its first bytes, or by its name. */
 export async function loadMesh(content: ArrayBuffer, name: string): Promise<BufferGeometry> {
   const head = new TextDecoder("latin1").decode(content.slice(0, 512));
   const ending = name.toLowerCase().split(".").pop();
   if (head.startsWith("glTF") || ending === "gltf") {
     const { scene } = await new GLTFLoader(noFetch()).parseAsync(content, "");
-    // glTF has y up, we have z.
+    // glTF has y up; here z is up.
     return whole(scene, new Matrix4().makeRotationX(Math.PI / 2));
   }
   if (head.startsWith("ply")) return withNormals(new PLYLoader().parse(content));
   if (head.includes("<COLLADA")) {
     const read = new ColladaLoader(noFetch()).parse(new TextDecoder().decode(content), "");
     if (!read) throw new Error(t`The COLLADA file cannot be read.`);
-    // The loader turns what has z up so that y is; we want it back.
+    // The loader converts z-up to y-up; undo that.
     return whole(read.scene as unknown as Group, new Matrix4().makeRotationX(Math.PI / 2));
   }
   if (ending === "obj") return whole(new OBJLoader().parse(new TextDecoder().decode(content)));
   return withNormals(new STLLoader().parse(content));
 }
 
-/** Files name further files, as textures: none of them is fetched. */
+/** Referenced files, such as textures, are not loaded. */
 function noFetch(): LoadingManager {
   const manager = new LoadingManager();
   manager.setURLModifier(() => "data:,");

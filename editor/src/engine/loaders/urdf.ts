@@ -1,4 +1,4 @@
-/** A robot as the server makes it ready to be shown: its URDF with its meshes. A chunk of its own. */
+/** Load a robot prepared by the server: its URDF with meshes. A separate chunk. */
 
 import { t } from "@lingui/core/macro";
 import { LoadingManager, type Material, Mesh, type Object3D, SphereGeometry } from "three";
@@ -6,7 +6,7 @@ import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js
 import URDFLoader, { type URDFLink, type URDFRobot, type URDFVisual } from "urdf-loader";
 import { readGlb } from "./glb";
 
-/** What surfaces are made of: those with colours of their own, and all others. */
+/** Materials: for coloured surfaces, and for all others. */
 export interface RobotMaterials {
   plain: Material;
   coloured: Material;
@@ -18,11 +18,11 @@ export interface LoadedRobot {
   problems: string[];
 }
 
-/** Give the robot; what of it cannot be shown is left out. Throws when there is no URDF in it. */
+/** Return the robot without the parts that cannot be shown. Throw if there is no URDF. */
 export function loadRobot(content: ArrayBuffer, { plain, coloured }: RobotMaterials): LoadedRobot {
   const { meshes, extras } = readGlb(content);
   if (extras.urdf === undefined) throw new Error(t`The file describes no robot.`);
-  // The loader takes the scheme away before it asks.
+  // The loader removes the scheme from the URL.
   const named = new Map(
     Object.entries(extras.meshes ?? {}).map(([reference, name]) => [reference.replace(/^package:\/\//, ""), name]),
   );
@@ -43,7 +43,7 @@ export function loadRobot(content: ArrayBuffer, { plain, coloured }: RobotMateri
   return { robot, problems: [...new Set(Object.values(extras.problems ?? {}))] };
 }
 
-/** The balls, cylinders and boxes of a link become one mesh: each piece that is drawn costs, however small it is. */
+/** Merge the primitive shapes of a link into one mesh: each draw call has a cost. */
 function joinShapes(link: URDFLink): void {
   link.updateWorldMatrix(true, true);
   const base = link.matrixWorld.clone().invert();
@@ -52,7 +52,7 @@ function joinShapes(link: URDFLink): void {
     if ((each as Partial<URDFVisual>).isURDFVisual) each.traverse((one) => void (isShape(one) && pieces.push(one)));
   if (pieces.length === 0) return;
   const shapes = pieces.map(({ geometry, matrixWorld }) => {
-    // The loader's balls have as many triangles as a whole robot needs.
+    // The loader's spheres have too many triangles.
     const shape = geometry instanceof SphereGeometry ? new SphereGeometry(1, 18, 10) : geometry;
     shape.deleteAttribute("uv");
     return shape.applyMatrix4(base.clone().multiply(matrixWorld));
@@ -61,7 +61,7 @@ function joinShapes(link: URDFLink): void {
   link.add(new Mesh(mergeGeometries(shapes)));
 }
 
-/** Whether it is one of the shapes that URDF itself has; the geometries of meshes have no type of their own. */
+/** Return whether it is a URDF primitive; meshes have no geometry type. */
 function isShape(of: Object3D): of is Mesh {
   return (of as Mesh).isMesh && (of as Mesh).geometry.type !== "BufferGeometry";
 }

@@ -18,7 +18,7 @@ it("stands where it is told to, wherever the robot's own base is", () => {
   ghost.show({ joints: {}, possible: true, at }, of, LIGHT);
   host.updateMatrixWorld();
   expect(base()?.map((each) => Math.round(each * 1e6) / 1e6)).toEqual([0.9, -0.2, 0.1]);
-  // Without a pose of its own it stands in the robot.
+  // Without a pose of its own it is at the robot.
   ghost.show({ joints: {}, possible: true }, of, LIGHT);
   host.updateMatrixWorld();
   expect(base()?.map((each) => Math.round(each * 1e6) / 1e6)).toEqual([1, 2.5, 0]);

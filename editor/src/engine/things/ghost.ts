@@ -1,4 +1,4 @@
-/** A robot where it would be: seen through, in another colour, and never instead of the real one. */
+/** The ghost: a transparent robot in another colour that shows a possible pose. */
 
 import { Group, type Material, Matrix4, type Mesh, MeshLambertMaterial } from "three";
 import type { URDFRobot } from "urdf-loader";
@@ -12,13 +12,13 @@ const inverse = new Matrix4();
 export class GhostRobot {
   private robot: URDFRobot | null = null;
   private of: URDFRobot | null = null;
-  /** Where its base is. */
+  /** Pose of its base. */
   private readonly frame = new Group();
   private readonly material = new MeshLambertMaterial({ transparent: true, opacity: 0.45, depthWrite: false });
 
   constructor(private readonly host: Group) {}
 
-  /** Show it, or nothing; `model` is the robot whose double it is. */
+  /** Show the ghost, or hide it; `model` is the robot that it copies. */
   show(ghost: RobotItem["ghost"], model: URDFRobot | null, palette: Palette): void {
     if (this.robot && (!ghost || this.of !== model)) this.remove();
     if (!ghost || !model) return;
@@ -26,7 +26,7 @@ export class GhostRobot {
       this.of = model;
       this.robot = model.clone() as URDFRobot;
       this.robot.traverse((each) => {
-        // Geometry is the model's, and goes with it; nobody can tap a ghost.
+        // The geometry belongs to the model; ghosts cannot be picked.
         each.userData = { shared: true };
         each.raycast = () => {};
         const mesh = each as Mesh<never, Material>;
@@ -38,12 +38,12 @@ export class GhostRobot {
       this.host.add(this.frame);
     }
     this.place(ghost.at);
-    // Beside a robot that is selected it has to be another colour.
+    // Its colour differs from that of a selected robot.
     this.material.color.copy(ghost.at ? palette.point : ghost.possible ? palette.selected : palette.trouble);
     for (const [name, value] of Object.entries(ghost.joints)) this.robot.joints[name]?.setJointValue(value);
   }
 
-  /** What it shows, for tests. */
+  /** Return what it shows, for tests. */
   get joints(): Record<string, number> | null {
     return (
       this.robot &&
@@ -56,7 +56,7 @@ export class GhostRobot {
     this.material.dispose();
   }
 
-  /** Put its base to a pose in the world, or to that of the robot. */
+  /** Move its base to a pose in the world, or to that of the robot. */
   private place(at: Pose | undefined): void {
     const { frame, host } = this;
     frame.position.set(0, 0, 0);

@@ -1,4 +1,4 @@
-/** A step of the logic: a bow from one puck to the next, whose colour, dash and label tell its branch. */
+/** A connection of the program: an arc between two pucks, with colour, dashes and label by branch. */
 
 import {
   type BufferGeometry,
@@ -20,9 +20,9 @@ import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js
 import type { LinkItem } from "../items";
 import { type Context, ownedBy, Thing } from "../thing";
 
-/** m. */
+/** Dimensions, m. */
 const RADIUS = 0.0028;
-/** Lengths of dash and gap in m; none: unbroken. */
+/** Lengths of dash and gap, m; empty: solid. */
 const DASHES: Record<LinkItem["branch"], [number, number] | null> = {
   always: null,
   true: [0.05, 0.014],
@@ -30,7 +30,7 @@ const DASHES: Record<LinkItem["branch"], [number, number] | null> = {
   value: [0.03, 0.02],
 };
 const Z = new Vector3(0, 1, 0);
-/** Height of the plate with the word, m; and in pixels, so that it is read from afar and covers nothing close by. */
+/** Height of the label, m, and its limits on the screen, pixels. */
 const PLATE = 0.036;
 const LEAST = 14;
 const MOST = 30;
@@ -97,7 +97,7 @@ export class LinkThing extends Thing<LinkItem> {
     const pixel = this.context.metresPerPixel(this.middle);
     const height = Math.min(MOST * pixel, Math.max(LEAST * pixel, PLATE));
     this.label.scale.multiplyScalar(height / this.label.scale.y).setZ(1);
-    return false; // nothing else stands where it does
+    return false; // drawn at the same position as nothing else
   }
 
   override anchor(target: Vector3): Vector3 {
@@ -122,7 +122,7 @@ export class LinkThing extends Thing<LinkItem> {
     if (!dash) pieces.push(new TubeGeometry(curve, 14, RADIUS, around));
     else {
       const [on, off] = dash;
-      const most = Math.max(on + off, full / 40); // of long lines the dashes grow, not their number
+      const most = Math.max(on + off, full / 40); // long lines have longer dashes, not more of them
       for (let at = 0; at < full; at += most) {
         const from = at / full;
         const to = Math.min(1, (at + (most * on) / (on + off)) / full);
@@ -140,7 +140,7 @@ export class LinkThing extends Thing<LinkItem> {
   }
 }
 
-/** The part of a quadratic curve between two of its parameters is one, too. */
+/** A section of a quadratic curve is a quadratic curve. */
 function subdivided(curve: QuadraticBezierCurve3, a: number, b: number): [Vector3, Vector3, Vector3] {
   const start = curve.getPoint(a);
   const end = curve.getPoint(b);
@@ -148,7 +148,7 @@ function subdivided(curve: QuadraticBezierCurve3, a: number, b: number): [Vector
   return [start, start.clone().addScaledVector(tangent, b - a), end];
 }
 
-/** A word on a plate that always faces the camera. */
+/** A label that always faces the camera. */
 function text(word: string, ink: string, plate: string): Sprite {
   const canvas = document.createElement("canvas");
   const pen = canvas.getContext("2d") as CanvasRenderingContext2D;

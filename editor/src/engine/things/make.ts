@@ -1,4 +1,4 @@
-/** Which picture an item has. */
+/** Create the model of an item. */
 
 import type { Item } from "../items";
 import type { Context, Thing } from "../thing";

@@ -1,4 +1,4 @@
-/** An object of the scene: its collision model, or a marker where it has none. */
+/** An object of the scene: its collision model, or a marker. */
 
 import { t } from "@lingui/core/macro";
 import {
@@ -27,7 +27,7 @@ export class ObjectThing extends Thing<ObjectItem> {
   private shape = "";
   private readonly material = surface(this.context);
   private readonly edges = new LineBasicMaterial({ transparent: true, opacity: 0.35 });
-  /** Counts shapes, so that a mesh that comes late does not replace a newer one. */
+  /** Counts models, so that a mesh that loads late does not replace a newer one. */
   private loading = 0;
   private height = 0.05;
   private coloured = false;
@@ -54,7 +54,7 @@ export class ObjectThing extends Thing<ObjectItem> {
         : item.lockedBy
           ? palette.locked
           : null;
-    // A mesh with colours of its own has these, until there is something to tell.
+    // A mesh keeps its own colours unless it is highlighted.
     if (color || !this.coloured) this.material.color.copy(color ?? palette.object);
     else this.material.color.setRGB(1, 1, 1);
     this.edges.color.copy(item.selected ? palette.selected : palette.gridStrong);
@@ -88,7 +88,7 @@ export class ObjectThing extends Thing<ObjectItem> {
     const mine = ++this.loading;
     this.reason = "";
     for (const child of [...this.root.children]) {
-      // Items that hang on this one stay.
+      // Children of the item stay.
       if (child.userData.item !== this.item.id) continue;
       child.removeFromParent();
       disposeTree(child);
@@ -137,7 +137,7 @@ export class ObjectThing extends Thing<ObjectItem> {
     geometry.computeBoundingBox();
     this.height = Math.max(0.02, geometry.boundingBox?.max.z ?? 0);
     const count = geometry.index?.count ?? geometry.getAttribute("position").count;
-    // Outlines make shapes readable without shadows; of dense meshes they would be a tangle.
+    // Edges make shapes readable without shadows; dense meshes would have too many.
     if (count < 3000) mesh.add(new LineSegments(new EdgesGeometry(geometry, 30), this.edges));
     ownedBy(mesh, this.item.id);
     this.root.add(mesh);

@@ -1,4 +1,4 @@
-/** An orientation of a point: an arrow the way the tool points; where reachability is known, its colour and shape tell. */
+/** An orientation of a point: an arrow in the tool direction, whose colour and shape show the reachability. */
 
 import {
   type BufferGeometry,
@@ -18,7 +18,7 @@ import type { OrientationItem } from "../items";
 import { setOrientation } from "../poses";
 import { type Context, Thing } from "../thing";
 
-/** m: an arrow along z, which is where tools point. */
+/** Arrow along z, the direction in which tools point, m. */
 const LENGTH = 0.05;
 
 function merged(...parts: BufferGeometry[]): BufferGeometry {
@@ -29,7 +29,7 @@ function merged(...parts: BufferGeometry[]): BufferGeometry {
 
 const shaft = () => new CylinderGeometry(0.002, 0.002, LENGTH, 6).rotateX(Math.PI / 2).translate(0, 0, LENGTH / 2);
 
-/** An arrowhead; a ring around it near a limit; a lump in collision; a cross-bar out of reach. Readable in grey, too. */
+/** Arrowhead; with a ring near a limit, a lump in collision, a bar out of reach. Readable without colours. */
 const HEADS: Record<string, () => BufferGeometry> = {
   reachable: () => merged(shaft(), new ConeGeometry(0.006, 0.016, 10).rotateX(Math.PI / 2).translate(0, 0, LENGTH)),
   near_limit: () =>

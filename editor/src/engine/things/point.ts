@@ -1,4 +1,4 @@
-/** An action point: a ball, drawn with all others at once. From afar it grows, so that it stays as large as is seen and hit. */
+/** An action point: a sphere, drawn together with all others. It keeps a minimum size on the screen. */
 
 import { t } from "@lingui/core/macro";
 import { Matrix4, MeshLambertMaterial, Object3D, SphereGeometry, Vector3 } from "three";
@@ -9,7 +9,7 @@ import { setPosition } from "../poses";
 import { type Context, Thing } from "../thing";
 
 const RADIUS = 0.012;
-/** Pixels: the least radius on the screen; it grows by steps, and so many times at most. */
+/** Smallest radius on the screen, pixels; steps and limit of the magnification. */
 const LEAST = 5;
 const MOST = 8;
 const at = new Vector3();

@@ -1,6 +1,6 @@
 /**
- * An action: a disc above its point; several stand around it, each a step higher. START and END stand where people put
- * them. From afar they grow, so that they stay as large as fingers need.
+ * An action: a disc above its point; several of a point are stacked. START and END are where users put them. They keep
+ * a minimum size on the screen, so that fingers can hit them.
  */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
@@ -22,18 +22,18 @@ import type { Batch } from "../batches";
 import type { PuckItem, ReachShown } from "../items";
 import { type Context, Thing } from "../thing";
 
-/** m: radius of a puck, of START and END, height of the first one above its point, and from one to the next. */
+/** Radius of a puck, of START and END, height of the first one above its point, and distance between pucks, m. */
 const RADIUS = 0.018;
 const BORDER = 0.03;
 const FIRST = 0.035;
 const NEXT = 0.006;
-/** Pixels: the least radius on the screen. */
+/** Smallest radius on the screen, pixels. */
 const LEAST = 9;
-/** So much it grows at most; by steps, since lines between pucks are drawn anew with each. */
+/** Largest magnification; in steps, since the lines between pucks are redrawn with each. */
 const MOST = 4;
 const up = new Vector3();
 
-/** m: how high above a puck's middle the sign stands that tells whether its robot gets there. */
+/** Height of the reachability symbol above the middle of the puck, m. */
 const SIGN = 0.012;
 const bar = () => new CylinderGeometry(0.0028, 0.0028, 0.034, 6).rotateZ(Math.PI / 2);
 function cross(): BufferGeometry {
@@ -42,7 +42,7 @@ function cross(): BufferGeometry {
   for (const each of bars) each.dispose();
   return whole;
 }
-/** A dot that it does; a ring near a limit; a lump in collision; a cross out of reach. Readable in grey, too. */
+/** Reachable: a dot; near a limit: a ring; in collision: a lump; out of reach: a cross. Readable without colours. */
 const SIGNS: Partial<Record<ReachShown, () => BufferGeometry>> = {
   reachable: () => new SphereGeometry(0.0055, 12, 8),
   near_limit: () => new TorusGeometry(0.011, 0.0026, 8, 24),
@@ -104,7 +104,7 @@ export class PuckThing extends Thing<PuckItem> {
     this.scale();
   }
 
-  /** The sign that stands on it. */
+  /** The symbol on it. */
   private showReach(): void {
     const { reach } = this.item;
     const make = SIGNS[reach];
@@ -133,7 +133,7 @@ export class PuckThing extends Thing<PuckItem> {
     return true;
   }
 
-  /** Above the point in the world, however the point's parent is turned. */
+  /** Above the point along the world's z axis, independent of the parent's rotation. */
   override placed(): void {
     if (this.item.position || !this.root.parent) return;
     const { level, count } = this.item;

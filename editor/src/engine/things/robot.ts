@@ -1,4 +1,4 @@
-/** A robot: its URDF moved by live joints, or a stand-in; a frame at each end effector; greyed when nothing is heard. */
+/** A robot: its URDF moved by live joints, or a stand-in; a frame at each end effector; grey without a signal. */
 
 import { t } from "@lingui/core/macro";
 import { AxesHelper, CylinderGeometry, Group, Matrix4, Mesh, type Object3D, SphereGeometry, Vector3 } from "three";
@@ -10,7 +10,7 @@ import { surface } from "../surface";
 import { type Context, disposeTree, ownedBy, seenThrough, Thing } from "../thing";
 import { GhostRobot } from "./ghost";
 
-/** How far a joint goes, rad, m where prismatic. */
+/** Limits of a joint, rad; m if prismatic. */
 export interface JointLimit {
   name: string;
   lower: number;
@@ -24,13 +24,13 @@ const tip = new Vector3();
 export class RobotThing extends Thing<RobotItem> {
   readonly root = new Group();
   item: RobotItem;
-  /** Null until it is loaded, and where the type has none. */
+  /** Null until it is loaded, and if the type has no model. */
   robot: URDFRobot | null = null;
   private readonly body = new Group();
   private readonly tips = new Map<string, Object3D>();
   private readonly shown = new Map<string, number>();
   private readonly material = surface(this.context);
-  /** Of surfaces that have colours of their own. */
+  /** Materials of surfaces with their own colour. */
   private readonly coloured = surface(this.context, { vertexColors: true });
   private reason = "";
   private readonly ghost = new GhostRobot(this.root);
@@ -57,12 +57,12 @@ export class RobotThing extends Thing<RobotItem> {
     this.paint();
   }
 
-  /** Joints of the ghost; null while there is none. */
+  /** Joints of the ghost; null without a ghost. */
   ghostJoints(): Record<string, number> | null {
     return this.ghost.joints;
   }
 
-  /** Joints that can be moved, in the order of the model, with their limits. */
+  /** Return the movable joints in the order of the model, with their limits. */
   limits(): JointLimit[] {
     return Object.entries(this.robot?.joints ?? {})
       .filter(([, joint]) => joint.jointType !== "fixed")
@@ -78,7 +78,7 @@ export class RobotThing extends Thing<RobotItem> {
       });
   }
 
-  /** Whether what was reported differs from what is shown. */
+  /** Return whether the reported joints differ from the shown ones. */
   moved(): boolean {
     const reported = this.context.telemetry.latest(this.item.id)?.joints;
     if (reported && this.robot) {
@@ -95,7 +95,7 @@ export class RobotThing extends Thing<RobotItem> {
     });
   }
 
-  /** Called before a drawn frame when its joints changed, or anything did; gives whether it goes on moving by itself. */
+  /** Called before a frame when joints or anything else changed. Return whether the motion continues. */
   frame(): boolean {
     this.placeTips();
     const drawn = this.context.telemetry.interpolated(this.item.id, this.context.period);
@@ -109,7 +109,7 @@ export class RobotThing extends Thing<RobotItem> {
     return !drawn.settled;
   }
 
-  /** Look whether the robot is still heard of; gives whether that changed. */
+  /** Check whether the robot still reports. Return whether that changed. */
   checkAge(): boolean {
     const stale = this.item.online && this.context.telemetry.age(this.item.id) > STALE;
     if (stale === this.stale) return false;
@@ -147,7 +147,7 @@ export class RobotThing extends Thing<RobotItem> {
     this.material.color.copy(told ?? palette.robot);
     if (told) this.coloured.color.copy(told);
     else this.coloured.color.setRGB(1, 1, 1);
-    // Where its joints are is not known: what is shown is only where it stands.
+    // Its joints are unknown: only its base is shown.
     const vague = this.stale || (this.robot !== null && this.shown.size === 0);
     for (const material of [this.material, this.coloured]) {
       seenThrough(material, faint > 0 || vague);
@@ -169,7 +169,7 @@ export class RobotThing extends Thing<RobotItem> {
         this.root.add(frame);
       }
       frame.visible = this.item.axes;
-      // Reported in the world; the robot's own frame may be another.
+      // End effector poses are reported in the world; the robot's frame may differ.
       setPose(frame, pose);
       frame.updateMatrix();
       inverse
@@ -221,7 +221,7 @@ export class RobotThing extends Thing<RobotItem> {
     this.context.loaded();
   }
 
-  /** A foot and a column: a robot stands here, and its type has no model. */
+  /** A foot and a column that mark a robot whose type has no model. */
   private standIn(): Object3D {
     const foot = new Mesh(
       new CylinderGeometry(0.09, 0.1, 0.05, 32).rotateX(Math.PI / 2).translate(0, 0, 0.025),

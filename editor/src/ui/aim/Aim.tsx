@@ -1,4 +1,4 @@
-/** The cross in the middle of the view, what it means, and the next that it may mean. */
+/** The crosshair in the middle of the view, and its candidates. */
 
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -36,7 +36,7 @@ export function Aim({ engine }: { engine: Engine }) {
       }),
     [engine],
   );
-  // Another candidate by key or tap: its name and mark are drawn now.
+  // Another candidate was chosen: draw its name and marker.
   useEffect(() => engine.invalidate(), [engine, chosen]);
   useEffect(() => {
     const key = (event: KeyboardEvent) => {
@@ -49,7 +49,7 @@ export function Aim({ engine }: { engine: Engine }) {
       )
         return;
       if (event.key.toLowerCase() === "n") nextCandidate(event.shiftKey ? -1 : 1);
-      // Enter is that of what has the focus, but of the view.
+      // Enter belongs to the focused element, except for the view.
       else if (event.key === "Enter" && event.target instanceof Element && event.target.matches("body, .view canvas"))
         takeCandidate();
       else return;

@@ -1,4 +1,4 @@
-/** An arrow at the edge of the view to what is selected and not in it; a tap turns there. */
+/** An arrow at the edge of the view that points to the selected item outside it; a tap turns the view. */
 
 import { t } from "@lingui/core/macro";
 import { useLayoutEffect, useRef, useState } from "react";
@@ -8,7 +8,7 @@ import { useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { atEdge, type Rect } from "./edge";
 
-/** What stands at the edge of the view. */
+/** Controls at the edge of the view. */
 const OTHERS = ".view-controls, .centre-top > *, .stop, .aim-bar, .fly-pad, .tray";
 
 export function OffScreen({ engine }: { engine: Engine }) {
@@ -65,7 +65,7 @@ export function OffScreen({ engine }: { engine: Engine }) {
   );
 }
 
-/** What the arrow must not cover, in pixels of the view. */
+/** Areas that the arrow must not cover, pixels in the view. */
 function taken(view: DOMRect): Rect[] {
   return [...document.querySelectorAll(OTHERS)]
     .map((each) => each.getBoundingClientRect())

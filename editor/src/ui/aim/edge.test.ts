@@ -18,13 +18,13 @@ test("it goes out of the way of what is there, along its edge, and stays in the 
   expect(beside.angle).toBeCloseTo((Math.atan2(10, 1600) * 180) / Math.PI);
   const below = atEdge({ x: 2000, y: 310 }, 800, 600, [stop, { ...stop, top: 350, bottom: 600 }]);
   expect(below.y).toBeLessThanOrEqual(228);
-  // Where the whole edge is taken, it stands further in.
+  // If the whole edge is occupied, the arrow is further inside.
   expect(atEdge({ x: 400, y: 4000 }, 800, 600, [{ left: 0, top: 540, right: 800, bottom: 600 }])).toEqual({
     x: 400,
     y: 496,
     angle: 90,
   });
-  // Where all is taken, it stands over something rather than nowhere.
+  // If everything is occupied, the arrow is still shown.
   expect(atEdge({ x: 2000, y: 300 }, 800, 600, [{ left: 0, top: 0, right: 800, bottom: 600 }])).toMatchObject({
     x: 766,
     y: 300,

@@ -1,4 +1,4 @@
-/** Where an arrow stands at the edge of a view, and where it points. */
+/** Position and direction of the arrow at the edge of a view. */
 
 export interface Rect {
   left: number;
@@ -7,14 +7,17 @@ export interface Rect {
   bottom: number;
 }
 
-/** Pixels: half of the arrow's side, from one tried place to the next, and from the edge to its middle, at first and further in. */
+/**
+ * Half size of the arrow, distance between tried positions, and distance from the edge at first and further inside,
+ * pixels.
+ */
 const HALF = 22;
 const STEP = 11;
 const INSETS = [34, 104, 174];
 
 /**
- * Give the middle of an arrow towards a place outside of a view, where it covers nothing of what is at its edge, and
- * its angle in degrees, to the right 0, downwards 90. It is moved along its edge as little as that needs, or inwards.
+ * Return the middle of an arrow towards a point outside the view so that it covers no control, and its angle in
+ * degrees: 0 to the right, 90 down. It is moved along the edge as little as possible, or inwards.
  */
 export function atEdge(
   to: { x: number; y: number },

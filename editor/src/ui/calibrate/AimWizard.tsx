@@ -1,4 +1,4 @@
-/** Where a mesh stands, by touching its focus points one after the other. */
+/** Measure the pose of a mesh by touching its focus points in turn. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
@@ -19,7 +19,7 @@ import "../robot/robot.css";
 import "./calibrate.css";
 import type { Section } from "../workplace/section";
 
-/** How well the points so far fit: `of` are the points that it is about. */
+/** Fit of the recorded points; `of` are these points. */
 interface Fit {
   of: number[];
   found: TouchedFrame;
@@ -34,13 +34,13 @@ interface Aim {
 }
 
 const NONE: Aim = { id: "", aiming: null, done: [], touched: {}, fit: null };
-/** What is aimed at; it goes on while other panels are open. */
+/** The running measurement; it continues while other panels are open. */
 const aim = createStore<Aim>(() => NONE);
 
-/** Points that a frame needs; one more shows by how much they differ. */
+/** Points that define a frame; one more shows the error. */
 const NEEDED = 3;
 
-/** Ask how well the points that were touched so far fit each other. */
+/** Request the fit of the recorded points. */
 async function fit(known: readonly Position[]): Promise<void> {
   const { touched, aiming } = aim.getState();
   const of = Object.keys(touched).map(Number);
@@ -100,7 +100,7 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
     );
   }
   const take = async (n: number) => {
-    // The server reads the tool itself; what is reported here is for the fit that is shown on the way.
+    // The server reads the tool position itself; this one is for the preview of the fit.
     const tool = chosen && effectorPose(chosen);
     aim.setState({ done: await aiming.add(n) });
     if (tool) aim.setState((so) => ({ touched: { ...so.touched, [n]: tool.position }, fit: null }));

@@ -1,4 +1,4 @@
-/** By how much a calibration has moved a thing, and where it stood before: to be kept, or put back. */
+/** How far a calibration has moved an object, and its previous pose, to be accepted or reverted. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
@@ -11,7 +11,7 @@ import { apart } from "../../viewmodel/frames";
 import { Button } from "../kit/kit";
 import { RefusedText, useAsking } from "../points/Doing";
 
-/** m and degrees: less is the noise of numbers. */
+/** Smallest change, m and degrees; less is numerical noise. */
 const NOTHING = 1e-6;
 
 export function BeforeAfter({ id }: { id: string }) {

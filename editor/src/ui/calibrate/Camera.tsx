@@ -1,4 +1,4 @@
-/** What a camera sees, and where it stands by the markers that it sees. */
+/** The picture of a camera, and its calibration with markers. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
@@ -14,7 +14,7 @@ import type { Section } from "../workplace/section";
 import { Records } from "./Records";
 import "./calibrate.css";
 
-/** s between two pictures that follow each other. */
+/** Time between two pictures, s. */
 const PAUSE = 0.5;
 
 const Camera: Section["Body"] = ({ selection: { id } }) => {

@@ -1,4 +1,4 @@
-/** Where an object stands, shown by the robot: one touch with a straight tool, or three points of its frame. */
+/** Set the pose of an object with the robot: one touch with a straight tool, or three points of its frame. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -54,7 +54,7 @@ const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
 
 export default PlaceByRobot;
 
-/** Shows the object on the tool, as it would be put there, and follows the tool. */
+/** Preview the object at the tool, and follow the tool. */
 function Preview({ id, pivot, why }: { id: string; pivot: Pivot; why: string }) {
   const chosen = useEditor(chosenRobot);
   const [on, setOn] = useState(false);

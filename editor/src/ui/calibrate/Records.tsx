@@ -1,4 +1,4 @@
-/** How the calibrations of a thing went: the verdicts, newest first; what is under way is told as it goes. */
+/** Calibrations of an object, newest first, and the running one. */
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
@@ -20,7 +20,7 @@ export function Records({ id }: { id: string }) {
     let over = false;
     recordsOf(id).then(
       (found) => over || setRecords(found),
-      () => over || setRecords([]), // an older server keeps none
+      () => over || setRecords([]), // an older server stores none
     );
     return () => {
       over = true;

@@ -1,4 +1,4 @@
-/** Where a robot stands, by a depth camera that sees it. */
+/** Calibrate the pose of a robot with a depth camera. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";

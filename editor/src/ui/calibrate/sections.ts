@@ -1,4 +1,4 @@
-/** What the panel shows of objects whose place a robot or a camera can tell: in a scene, where objects are placed. */
+/** Sections about objects whose pose a robot or a camera can measure; for scenes. */
 
 import { msg } from "@lingui/core/macro";
 import type { SceneObject } from "../../protocol/types";
@@ -7,7 +7,7 @@ import type { Selection, State } from "../../store/state";
 import { lazily } from "../kit/lazily";
 import type { Section } from "../workplace/section";
 
-/** For objects of a scene that is open by itself. */
+/** For objects of an open scene, not of a project. */
 const inScene = (wanted: (state: State, object: SceneObject) => boolean) => (selection: Selection, state: State) => {
   const object = state.doc?.objects[selection.id];
   return object !== undefined && state.doc?.project === null && wanted(state, object);

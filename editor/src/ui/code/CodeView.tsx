@@ -1,4 +1,4 @@
-/** The program as the Python that runs, made by the server from what is saved. It is read, not edited. */
+/** The generated Python program of the saved project, read-only. */
 
 import { t } from "@lingui/core/macro";
 import { useCallback, useEffect, useMemo, useState } from "react";
@@ -49,7 +49,7 @@ export default function CodeView() {
       ended = true;
     };
   }, [id]);
-  // Of what is saved: read again when that changed.
+  // Load it again after each save.
   useEffect(() => (unsaved ? undefined : load()), [load, unsaved]);
   useEffect(load, [load]);
   const lines = useMemo(() => (code && "source" in code ? pieces(code.source) : []), [code]);
@@ -113,7 +113,7 @@ export default function CodeView() {
   );
 }
 
-/** The action that a text names: the script passes each action's name to its call. */
+/** Return the action named in a string: the script passes the names of actions to its calls. */
 function actionIn(text: string, byName: Map<string, string>): string {
   const name = text.replace(/^["']|["']$/g, "");
   return name !== text && byName.has(name) ? name : "";

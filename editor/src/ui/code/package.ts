@@ -1,11 +1,11 @@
-/** Reads one file out of a zip, with what browsers have: packages are small, and nothing else of them is wanted. */
+/** Read one file from a zip archive with browser functions. */
 
 import { t } from "@lingui/core/macro";
 
 const END_OF_DIRECTORY = 0x06054b50;
 const ENTRY = 0x02014b50;
 
-/** Give a text file out of a zip; undefined when it has none of that name. Rejects for what is no zip. */
+/** Return a text file of a zip archive; undefined if it is missing. Reject if the data is not a zip archive. */
 export async function textOfZip(content: ArrayBuffer, name: string): Promise<string | undefined> {
   const view = new DataView(content);
   let end = content.byteLength - 22;

@@ -1,19 +1,20 @@
-/** Python in pieces that are shown differently: words, texts, numbers, comments. */
+/** Split Python into tokens for highlighting: keywords, strings, numbers, comments. */
 
 export interface Piece {
   text: string;
   kind: "plain" | "word" | "text" | "number" | "comment" | "name";
 }
 
-const WORDS = new Set(
-  "and as assert async await break class continue def del elif else except finally for from global if import in is lambda None nonlocal not or pass raise return True False try while with yield".split(
-    " ",
-  ),
+const KEYWORDS = new Set(
+  (
+    "and as assert async await break class continue def del elif else except finally for from global " +
+    "if import in is lambda None nonlocal not or pass raise return True False try while with yield"
+  ).split(" "),
 );
 const TOKENS =
   /(#.*$)|("""[\s\S]*?"""|'''[\s\S]*?'''|"(?:[^"\\\n]|\\.)*"|'(?:[^'\\\n]|\\.)*')|(\b\d[\d._e+-]*\b)|([A-Za-z_]\w*)/gm;
 
-/** Lines of pieces; a text over several lines is a text in each of them. */
+/** Lines of tokens; a string over several lines has a token in each. */
 export function pieces(source: string): Piece[][] {
   const lines: Piece[][] = [[]];
   const add = (text: string, kind: Piece["kind"]) => {
@@ -34,7 +35,7 @@ export function pieces(source: string): Piece[][] {
           ? "text"
           : number !== undefined
             ? "number"
-            : WORDS.has(text)
+            : KEYWORDS.has(text)
               ? "word"
               : "name",
     );

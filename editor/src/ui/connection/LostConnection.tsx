@@ -1,4 +1,4 @@
-/** Says that the server is away. The view stays, and can be looked at; it comes back by itself. */
+/** Report that the server is disconnected. The view stays visible. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
@@ -12,7 +12,7 @@ export function LostConnection() {
   const { status, reason } = useEditor((state) => state.connection);
   const unsaved = useEditor((state) => state.doc?.unsaved ?? false);
   useEffect(() => {
-    // What is open is told before anybody is let in.
+    // The document is restored before the status becomes ready.
     if (status === "ready" && now().doc?.unsaved) tell("info", t`Your unsaved changes are still available.`);
   }, [status]);
   if (status === "ready") return null;

@@ -1,4 +1,4 @@
-/** One action in the graph, with the places at which steps begin: tap one, then the action that follows; or drag. */
+/** An action in the graph with its free branches: tap one, then the next action; or drag. */
 
 import { t } from "@lingui/core/macro";
 import { Handle, type Node, type NodeProps, Position } from "@xyflow/react";

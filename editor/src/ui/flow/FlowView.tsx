@@ -1,4 +1,4 @@
-/** The program as a graph. What is selected here is selected everywhere; a program that runs is followed. */
+/** The program as a graph. The selection is shared with the other views; a running program is followed. */
 
 import { t } from "@lingui/core/macro";
 import {
@@ -25,7 +25,7 @@ import { usePressed } from "./usePressed";
 import "../program/program.css";
 import "./flow.css";
 
-/** Below what lies over the view. */
+/** Space for the controls above the view. */
 const WHOLE = { padding: { top: "70px", right: "16px", bottom: "16px", left: "70px" }, maxZoom: 1.1 } as const;
 const NODE_TYPES = { box: FlowNode };
 const COLOURS = { always: "var(--ink-2)", true: "var(--good)", false: "var(--warn)", value: "var(--accent)" } as const;
@@ -109,7 +109,7 @@ function Flow() {
   useEffect(() => {
     if (follow && last !== undefined && known) void fitView({ nodes: [{ id: last }], maxZoom: 1, duration: 200 });
   }, [follow, last, known, fitView]);
-  // A graph that grew is seen whole again.
+  // Show the whole graph again after it grew.
   const size = graph.boxes.length;
   useEffect(() => {
     void fitView(WHOLE);
@@ -145,7 +145,7 @@ function Flow() {
         onEdgeClick={(_, { id }) => choose({ id, kind: "action", run: [] })}
         onPaneClick={() => (now().ui.connecting ? setUi({ connecting: null }) : select(null))}
         onNodesChange={(changes) => {
-          // By the keyboard: Enter on a node that has the focus.
+          // Enter selects the focused node.
           for (const change of changes)
             if (change.type === "select" && change.selected && change.id !== now().ui.selection?.id)
               choose(box(change.id));
@@ -175,7 +175,7 @@ function Flow() {
   );
 }
 
-/** What ended a step just now: the graph tells of one tap twice, as a tap and as another selection. */
+/** The node that ended a connection: the graph reports one tap twice, as a tap and as a selection. */
 let ended = "";
 
 function choose(box: Pick<Box, "id" | "kind" | "run">): void {
@@ -193,7 +193,7 @@ function choose(box: Pick<Box, "id" | "kind" | "run">): void {
   setUi({ tool: "" });
 }
 
-/** Only what was chosen is removed: its steps are taken care of by the command. */
+/** Remove only the selected node: the command removes its connections. */
 async function remove(nodes: string[], lines: string[]): Promise<void> {
   const why = notEditable(now(), "RemoveAction");
   if (why) return tell("info", why);

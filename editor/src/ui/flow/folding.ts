@@ -1,4 +1,4 @@
-/** Which runs of actions are folded into one node: as the user wants it on all his tablets, but for what is to be seen. */
+/** Sequences of actions that are folded into one node. The user's choice is stored on the server for all devices. */
 
 import { useMemo, useRef } from "react";
 import { keepView } from "../../commands/viewstate";
@@ -16,12 +16,12 @@ function wishedOf(kept: unknown): string[] {
 
 const keep = (ids: Iterable<string>): void => {
   const doc = now().doc;
-  // What is gone is forgotten.
+  // Remove folds of deleted actions.
   const known = [...new Set(ids)].filter((id) => doc && id in doc.actions);
   keepView("user", { [KEY]: known.length > 0 ? known : null });
 };
 
-/** All actions of a run are kept, so that it stays folded when its first one goes, or another comes before it. */
+/** Store all actions of a sequence, so that it stays folded when its first action changes. */
 export const fold = (run: readonly string[]): void => keep([...wishedOf(now().view.user[KEY]), ...run]);
 
 export const unfold = (run: readonly string[]): void =>
@@ -33,14 +33,14 @@ export function foldAll(on: boolean): void {
 }
 
 export interface Folds {
-  /** How many runs could be folded. */
+  /** Return the number of sequences that can be folded. */
   runs: number;
-  /** Some are wished folded. */
+  /** Return whether the user has folded any. */
   wished: boolean;
   folded: string[][];
 }
 
-/** What runs, was tried or selected last, or has a problem, is seen: its run is open meanwhile. */
+/** A sequence is unfolded while one of its actions is running, was run or selected last, or has a problem. */
 export function useFolds(problems: readonly Problem[]): Folds {
   const doc = useEditor((state) => state.doc);
   const kept = useEditor((state) => state.view.user[KEY]);
@@ -49,7 +49,7 @@ export function useFolds(problems: readonly Problem[]): Folds {
   const executing = useEditor((state) => state.live.executing);
   const selected = useEditor((state) => state.ui.selection?.id ?? "");
   const from = useEditor((state) => state.ui.connecting?.from ?? "");
-  // Between two actions none runs: what ran last stays open until the next one does.
+  // Between two actions none is running: keep the last one visible until the next one starts.
   const ran = useRef<string[]>(NONE);
   if (!active) ran.current = NONE;
   else if (running.length > 0) ran.current = running;

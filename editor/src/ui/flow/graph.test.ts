@@ -40,7 +40,7 @@ describe("straight runs", () => {
 
   test("end where ways part or meet, and are of three actions at least", () => {
     expect(runsOf(doc)).toEqual([["b", "c", "d"]]);
-    // A condition, or a second way in, ends one.
+    // A condition or a second predecessor ends a sequence.
     expect(
       runsOf(
         program({ a: "act", b: "ask", c: "act", d: "act" }, [

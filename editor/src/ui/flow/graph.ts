@@ -1,4 +1,4 @@
-/** The program as nodes and edges, laid out from top to bottom: pure. */
+/** The program as nodes and edges, laid out from top to bottom. Pure functions. */
 
 import { Graph, layout } from "@dagrejs/dagre";
 import { plural, t } from "@lingui/core/macro";
@@ -6,11 +6,11 @@ import { conditionWords, END, outgoing, placeOf, resultsOf, START } from "../../
 import type { OpenDocument, State } from "../../store/state";
 
 const NODE = { width: 230, height: 64 };
-/** What the places add at which steps begin. */
+/** Additional height for the free branches. */
 const WAYS = 22;
 const BORDER = { width: 132, height: 68 };
 
-/** A place at which a step begins: any way on, or one for a value of the result. */
+/** A free branch of an action: the next step, or one for a value of its result. */
 export interface Way {
   id: "next" | "true" | "false" | "branch";
   label: string;
@@ -24,7 +24,7 @@ export interface Box {
   name: string;
   detail: string;
   ways: Way[];
-  /** Actions that are folded into it, in their order. */
+  /** Folded actions in their order. */
   run: string[];
   x: number;
   y: number;
@@ -40,10 +40,10 @@ export interface Line {
   branch: "always" | "true" | "false" | "value";
 }
 
-/** As which node a folded run stands in the graph; no action has such an id. */
+/** Return the node id of a folded sequence; no action has such an id. */
 export const foldOf = (run: readonly string[]): string => `fold/${run[0] ?? ""}`;
 
-/** `folded` are the runs that are one node each. */
+/** `folded` are the folded sequences. */
 export function graphOf(
   doc: OpenDocument,
   types: State["types"],
@@ -79,7 +79,7 @@ export function graphOf(
         id: action.id,
         kind: "action" as const,
         name: action.name,
-        detail: t`${doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?"} at ${doc.points[action.pointId]?.name ?? "?"}`,
+        detail: detailOf(doc, action.type, action.pointId),
         run: [],
         ...sized(waysOf(doc, types, action.id)),
       })),
@@ -97,7 +97,14 @@ export function graphOf(
   return { boxes: bare.map((box) => ({ ...box, ...(places.get(box.id) ?? { x: 0, y: 0 }) })), lines };
 }
 
-/** The action from which steps lead on from a node, and the one to which they lead. */
+/** Return the device and the point of an action as text. */
+function detailOf(doc: OpenDocument, type: string, pointId: string): string {
+  const object = doc.objects[type.split("/")[0] ?? ""]?.name ?? "?";
+  const point = doc.points[pointId]?.name ?? "?";
+  return t`${object} at ${point}`;
+}
+
+/** Last and first action of a node. */
 export const lastIn = (box: Pick<Box, "id" | "kind" | "run">): string =>
   box.kind === "fold" ? (box.run.at(-1) ?? box.id) : box.id;
 export const firstIn = (box: Pick<Box, "id" | "kind" | "run">): string =>
@@ -107,7 +114,7 @@ function sized(ways: Way[]): Pick<Box, "ways" | "width" | "height"> {
   return { ways, width: NODE.width, height: NODE.height + (ways.length > 0 ? WAYS : 0) };
 }
 
-/** The ways on that are still free. */
+/** Return the free branches of an action. */
 export function waysOf(doc: OpenDocument, types: State["types"], id: string): Way[] {
   const action = doc.actions[id];
   if (!action) return [];

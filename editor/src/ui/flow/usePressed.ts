@@ -1,11 +1,11 @@
-/** A graph under a finger stands still: what is laid out anew meanwhile is shown when the finger is off. */
+/** Keep the graph unchanged while it is pressed; a new layout is shown after the release. */
 
 import { type RefObject, useEffect, useRef, useState } from "react";
 
-/** ms after the finger is off, so that the click that comes of it still meets what was pressed. */
+/** Delay after the release, ms, so that the click still hits the pressed node. */
 const AFTER = 60;
 
-/** Give the latest graph, but the one that was shown when a press began as long as that lasts. */
+/** Return the latest graph, or during a press the one at its start. */
 export function usePressed<T>(host: RefObject<HTMLElement | null>, latest: T): T {
   const [pressed, setPressed] = useState(false);
   const shown = useRef(latest);
@@ -19,7 +19,7 @@ export function usePressed<T>(host: RefObject<HTMLElement | null>, latest: T): T
       setPressed(true);
     };
     const up = (event: Event) => {
-      if (event.type === "blur" && event.target !== window) return; // of a control, which loses the focus by the press
+      if (event.type === "blur" && event.target !== window) return; // of a control that loses the focus by the press
       clearTimeout(timer);
       timer = setTimeout(() => setPressed(false), AFTER);
     };

@@ -1,4 +1,4 @@
-/** One scene, project or package, with what can be done to it. */
+/** A scene, project or package with its actions. */
 
 import { plural, t } from "@lingui/core/macro";
 import { useRef, useState } from "react";
@@ -49,9 +49,9 @@ interface CardProps {
   marked: boolean;
   /** Names of its kind. */
   taken: string[];
-  /** Show what belongs to it. */
+  /** Show the related entries. */
   onRelated: (kind: Entry["kind"], search: string) => void;
-  /** Begin a project on this scene. */
+  /** Create a project for this scene. */
   onProject: (scene: string) => void;
 }
 
@@ -247,7 +247,7 @@ function detail({ kind, from, projects, executed }: Entry, run: Run | undefined)
   return [from && t`from ${from.name}`, last ? t`last run ${last}` : t`not run yet`].filter(Boolean).join(" · ");
 }
 
-/** What it belongs to, or what belongs to it. */
+/** Show its scene, project or projects. */
 function Related({
   entry: { kind, name, from, projects },
   onRelated,

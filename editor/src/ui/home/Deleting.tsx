@@ -1,4 +1,4 @@
-/** Asks before something is deleted for good; what needs it is listed, and can be opened from here. */
+/** Confirm a deletion; list the projects that prevent it. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";

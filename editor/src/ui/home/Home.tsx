@@ -1,4 +1,4 @@
-/** What there is to open: scenes, projects, packages, kept up to date by the server's events. */
+/** The home screen: scenes, projects and packages. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -154,7 +154,7 @@ export function Home() {
   );
 }
 
-/** As the user sorts on every tablet. */
+/** Sort order of the user, stored on the server. */
 function sortOf(state: State): Sort {
   const kept = state.view.general.sort;
   return SORTS.find(([each]) => each === kept)?.[0] ?? "changed";
@@ -176,7 +176,7 @@ function Cards({ entries, found, search, empty, highlight, onRelated, onProject 
   if (found.length === 0)
     return (
       <p className="empty quiet">
-        {search.trim() ? t`No match for “${search.trim()}”.` : t`No favorites yet. Tap the star of an item to add it.`}
+        {search.trim() ? t`No match for “${search.trim()}”.` : t`No favorites yet. Tap the star of an entry.`}
       </p>
     );
   const taken = entries.map((each) => each.name);

@@ -1,4 +1,4 @@
-/** A name or description that is written where it stands: Enter keeps it, Escape leaves it. */
+/** A text field in place of a name or description: Enter saves, Escape cancels. */
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
@@ -8,7 +8,7 @@ import { RefusedText, useAsking } from "../points/Doing";
 interface InlineProps {
   label: string;
   value: string;
-  /** Names that there are already. */
+  /** Existing names. */
   taken?: string[];
   many?: boolean;
   onSave: (value: string) => Promise<string>;

@@ -1,4 +1,4 @@
-/** Asks for the name and the scene of a new project. */
+/** Ask for the name and the scene of a new project. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";

@@ -1,4 +1,4 @@
-/** Asks for the name of a new scene, and what it begins with. */
+/** Ask for the name and the template of a new scene. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";

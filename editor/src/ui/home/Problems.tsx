@@ -1,4 +1,4 @@
-/** All that is wrong with a scene or project, and the way to mend it: as it is, the server does not open it. */
+/** Problems of a scene or project that prevent opening it, and their repair. */
 
 import { plural, t } from "@lingui/core/macro";
 import { useState } from "react";
@@ -15,7 +15,7 @@ import { Confirm } from "../kit/loaded";
 interface ProblemsProps {
   entry: Entry;
   whyOpen: string;
-  /** Show the scene of a project among the scenes. */
+  /** Show the scene of a project in the list of scenes. */
   onScene: () => void;
 }
 

@@ -1,4 +1,4 @@
-/** What a new scene or project begins with: nothing, or a copy of a template; not there where there is no template. */
+/** Choice of a template for a new scene or project; absent without templates. */
 
 import { t } from "@lingui/core/macro";
 import { useEditor } from "../../store/store";

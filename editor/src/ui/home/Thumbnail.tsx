@@ -1,9 +1,9 @@
-/** The picture of a workplace as it was when it was saved last; asked for when the tile is seen, and anew when it was saved. */
+/** The thumbnail of a document; loaded when the tile becomes visible, and again after a save. */
 
 import { useEffect, useRef } from "react";
 import { readThumbnail, useThumbnails } from "../../commands/thumbnail";
 
-/** When the document was saved of which the picture was asked for. */
+/** Save times of the documents whose thumbnail was requested. */
 const asked = new Map<string, string>();
 
 export function Thumbnail({ id, time }: { id: string; time: string }) {
@@ -16,7 +16,7 @@ export function Thumbnail({ id, time }: { id: string; time: string }) {
       if (!seen.some((each) => each.isIntersecting)) return;
       watch.disconnect();
       asked.set(id, time);
-      readThumbnail(id).catch(() => asked.delete(id)); // the tile stays without one, or with the old one
+      readThumbnail(id).catch(() => asked.delete(id)); // the tile keeps the old picture, or none
     });
     watch.observe(element);
     return () => watch.disconnect();

@@ -1,4 +1,4 @@
-/** Takes a package from a file of this device. */
+/** Upload a package from a file. */
 
 import { t } from "@lingui/core/macro";
 import { useRef, useState } from "react";
@@ -32,7 +32,7 @@ export function UploadPackage() {
         aria-hidden="true"
         onChange={(event) => {
           void take(event.target.files?.[0]);
-          event.target.value = ""; // the same file can be taken again
+          event.target.value = ""; // the same file can be selected again
         }}
       />
     </>

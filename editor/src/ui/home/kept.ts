@@ -13,7 +13,7 @@ export function recentOf(state: State): Opened {
   return openedMemo(state.view.general);
 }
 
-/** Store that the user opened a document. Each document has its own key, so that two devices do not overwrite each other. */
+/** Store that the user opened a document; each has its own key, so that two devices do not conflict. */
 export function keepRecent(id: string): void {
   const forgotten = beyond(recentOf(now()), id).map((each) => [`opened/${each}`, null] as const);
   keepGeneral({ ...Object.fromEntries(forgotten), [`opened/${id}`]: Date.now() });

@@ -1,4 +1,4 @@
-/** How others join: the address, as a code that a tablet's camera reads, and the fingerprint to compare. */
+/** How others can join: the address as a QR code, and the fingerprint to compare. */
 
 import { t } from "@lingui/core/macro";
 import encodeQR from "qr";
@@ -7,7 +7,7 @@ import { howToJoin, type Joining } from "../../commands/joining";
 import { Waiting } from "../kit/kit";
 import "./invitation.css";
 
-/** Modules left white around a code, as its standard asks. */
+/** Quiet zone of a QR code, modules. */
 const QUIET = 4;
 
 export function Invitation() {
@@ -27,7 +27,7 @@ export function Invitation() {
       <h3>{t`Others join at`}</h3>
       {best === undefined ? (
         <p className="small">
-          {t`The server at ${location.origin} accepts connections from this computer only. To let others join, start it with:`}
+          {t`The server accepts connections from this computer only. To let others join, start it with:`}
           <code>arcor2-hw serve --host 0.0.0.0</code>
           {t`It then requires TLS and a token per user. Create a token with:`}
           <code>arcor2-hw token add</code>
@@ -56,7 +56,7 @@ export function Invitation() {
   );
 }
 
-/** Black on white in dark colours, too: not every camera reads it the other way round. */
+/** Black on white in the dark theme too: not every camera reads inverted codes. */
 function Code({ text }: { text: string }) {
   const rows = encodeQR(text, "raw", { ecc: "medium", border: QUIET });
   const path = rows.flatMap((row, y) => row.map((black, x) => (black ? `M${x} ${y}h1v1h-1z` : ""))).join("");

@@ -1,4 +1,4 @@
-/** The first screen: a name, and a token where the server asks for one. The name is remembered. */
+/** The first screen: name, and token if the server requires one. The name is remembered. */
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";

@@ -1,4 +1,4 @@
-/** Windows over all others; a chunk of its own. `kit.tsx` has what most need of them. */
+/** Dialogs; a separate chunk. */
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, type ReactNode, useState } from "react";
@@ -13,7 +13,7 @@ interface WindowProps {
   role?: "dialog" | "alertdialog";
 }
 
-/** A window over all others. `onClose` is called by Escape and by a tap beside it, too. */
+/** A modal dialog. `onClose` is called by Escape and by a tap outside, too. */
 export function Window({ title, onClose, children, role = "dialog" }: WindowProps) {
   return (
     <ModalOverlay isOpen isDismissable onOpenChange={(open) => open || onClose()} className="overlay">
@@ -29,7 +29,7 @@ export function Window({ title, onClose, children, role = "dialog" }: WindowProp
   );
 }
 
-/** Asks before something that cannot be taken back. */
+/** Ask for confirmation of an action that cannot be undone. */
 export function Confirm({ title, children, yes, not = "", onYes, onClose }: ConfirmProps) {
   return (
     <Window title={title} onClose={onClose} role="alertdialog">
@@ -53,7 +53,7 @@ export function Confirm({ title, children, yes, not = "", onYes, onClose }: Conf
   );
 }
 
-/** Asks for a name. */
+/** Ask for a name. */
 export function AskName({
   title,
   label = t`Name`,

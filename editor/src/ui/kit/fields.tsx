@@ -1,4 +1,4 @@
-/** Choices and amounts in panels: one of a few, a number with its unit, more or less of something, on or off. */
+/** Form fields in panels: one of a few, a number with its unit, a slider, a switch. */
 
 import { t } from "@lingui/core/macro";
 import { type KeyboardEvent, type ReactNode, useId, useState } from "react";
@@ -10,11 +10,11 @@ interface OneOfProps<T extends string> {
   value: T;
   choices: readonly (readonly [T, ReactNode])[];
   onChange: (value: T) => void;
-  /** The label is read, not shown. */
+  /** The label is for screen readers only. */
   quiet?: boolean;
 }
 
-/** One of a few, side by side. */
+/** One of a few, next to each other. */
 export function OneOf<T extends string>({ label, value, choices, onChange, quiet = false }: OneOfProps<T>) {
   const id = useId();
   return (
@@ -51,7 +51,7 @@ interface PickProps {
   isDisabled?: boolean;
 }
 
-/** One of many, as the device shows lists. */
+/** One of many, as a native select. */
 export function Pick({ label, value, choices, onChange, isDisabled = false }: PickProps) {
   const id = useId();
   return (
@@ -72,17 +72,17 @@ interface AmountProps {
   label: string;
   unit: string;
   value: number;
-  /** Called when it is to hold: by Enter, and when the field is left. */
+  /** Called on Enter, and when the field loses the focus. */
   onChange: (value: number) => void;
   digits?: number;
   least?: number;
   most?: number;
-  /** What an arrow key adds. */
+  /** Change by an arrow key. */
   step?: number;
   isDisabled?: boolean;
 }
 
-/** A number with its unit. `+5` adds to what is there, `-=5` takes away; `-5` is that number. */
+/** A number with its unit. `+5` adds to the present value, `-=5` subtracts; `-5` is that number. */
 export function Amount({
   label,
   unit,
@@ -155,7 +155,7 @@ function round(value: number, digits: number): string {
   return Number(text) === 0 ? (0).toFixed(digits) : text;
 }
 
-/** A number as people write it, or a change of the one that is there; null when it is neither. */
+/** Return a typed number, or the present value with a typed change; null if it is invalid. */
 export function parsed(text: string, value: number): number | null {
   const clean = text.trim().replace(",", ".");
   const change = /^([+-])=?\s*(\d*\.?\d+)$/.exec(clean);

@@ -1,4 +1,4 @@
-/** Icons, drawn for 24 × 24 in the colour of the text. They always stand beside a word, or have a label. */
+/** Icons on a grid of 24 × 24 in the colour of the text, used next to a word or with a label. */
 
 const PATHS = {
   home: "M4 11l8-7 8 7v9h-5v-6H9v6H4z",

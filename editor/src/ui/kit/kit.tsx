@@ -20,7 +20,7 @@ interface PlainButtonProps extends Omit<ButtonProps, "children" | "className"> {
   icon?: IconName;
   children?: ReactNode;
   className?: string;
-  /** Why it cannot be pressed now, as a sentence: it looks so, and says it when it is pressed. Empty: it can. */
+  /** Why it is not available, as a sentence that is shown when it is pressed; empty if it is available. */
   why?: string;
 }
 

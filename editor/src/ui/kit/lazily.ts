@@ -1,11 +1,11 @@
-/** Parts of the page that are loaded when they are needed, also when the server is away just then. */
+/** Parts of the page that are loaded when they are needed, with retries while the server is disconnected. */
 
 import { type ComponentType, type LazyExoticComponent, lazy } from "react";
 
-/** Pauses in s before each further attempt; the last one again and again. */
+/** Delays before each further attempt, s; the last one is repeated. */
 const PAUSES = [0.5, 1, 2, 4];
 
-/** Load until it succeeds: a lazy component that failed once would fail for good. */
+/** Repeat until the module is loaded: a lazy component that failed once would fail for good. */
 export async function persistently<T>(load: () => Promise<T>): Promise<T> {
   for (let attempt = 0; ; attempt++) {
     try {

@@ -1,4 +1,4 @@
-/** The list that `More` of kit.tsx opens; a chunk of its own. */
+/** The menu of `More`; a separate chunk. */
 
 import { Menu, MenuItem, MenuTrigger, Popover } from "react-aria-components";
 import { Icon } from "./icons";

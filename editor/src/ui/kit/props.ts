@@ -8,7 +8,7 @@ export type Look = "" | "primary" | "plain" | "danger";
 export interface ConfirmProps {
   title: string;
   children: ReactNode;
-  /** What the button says that does it. */
+  /** Text of the button that confirms. */
   yes: string;
   /** Why it cannot be done now, as a sentence. */
   not?: string;
@@ -21,7 +21,7 @@ export interface AskNameProps {
   label?: string;
   initial?: string;
   yes: string;
-  /** Names that there are already. */
+  /** Existing names. */
   taken?: string[];
   children?: ReactNode;
   onYes: (name: string) => void;
@@ -32,7 +32,7 @@ export interface Choice {
   id: string;
   label: string;
   icon?: IconName;
-  /** Why it cannot be chosen now. */
+  /** Why it is not available. */
   not?: string;
   act: () => void;
 }

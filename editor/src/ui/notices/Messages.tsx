@@ -1,4 +1,4 @@
-/** All that was told since the page is open, with times, the newest first: also what went by itself. */
+/** All messages since the page was opened, with times, newest first. */
 
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";

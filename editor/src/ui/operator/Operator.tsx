@@ -166,7 +166,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
               <p className="quiet">
                 {users.length > 0
                   ? why
-                  : t`${opened} was left open in the editor. It is set aside while the program runs and keeps its unsaved changes.`}
+                  : t`${opened} is open in the editor. It is closed during the run and keeps unsaved changes.`}
               </p>
             )}
           </section>

@@ -1,4 +1,4 @@
-/** Asks before the locks of a user who left are released: what is locked, by whom, and since when. */
+/** Confirm that the locks of a user who left are released: list the locked items. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
@@ -76,7 +76,7 @@ function called({ object_id, name }: LockHolder["locks"][number]): string {
   return name || nameOf(now(), object_id) || t`an item that is not open`;
 }
 
-/** "12:31 (5 minutes ago)". */
+/** Return "12:31 (5 minutes ago)". */
 function when(time: string): string {
   return `${clock(time)} (${ago(time)})`;
 }

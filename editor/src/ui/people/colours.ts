@@ -1,4 +1,4 @@
-/** A colour per person, the same on every tablet; dark enough for white letters. */
+/** A colour per user, the same on every device; dark enough for white letters. */
 
 const COLOURS = ["#0b5c8a", "#8a3b0b", "#5b3b9c", "#0f6b46", "#9c2b57", "#5c5a00", "#7a2e2e", "#2f4f9c"];
 

@@ -1,4 +1,4 @@
-/** A point copied with all that hangs on it: once, or in a row. */
+/** Copy a point with its children: once, or in a row. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";

@@ -1,8 +1,8 @@
-/** What was refused is shown where it was asked for. */
+/** Show a refusal next to the control that caused it. */
 
 import { useState } from "react";
 
-/** Ask, and keep why it was refused until something else is asked. */
+/** Send a request and keep its refusal until the next request. */
 export function useAsking(): { refused: string; busy: boolean; ask: (work: Promise<string>) => Promise<boolean> } {
   const [refused, setRefused] = useState("");
   const [busy, setBusy] = useState(false);

@@ -1,4 +1,4 @@
-/** The robot sent to what is taught: shown by a ghost first, then moved. */
+/** Move the robot to an orientation or joints; preview with the ghost first. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
@@ -19,7 +19,7 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
   const chosen = useEditor(chosenRobot);
   const joints = useEditor((state) => state.doc?.joints[id]);
   const orientation = useEditor((state) => state.doc?.orientations[id]);
-  // Joints belong to their robot, whichever is in hand.
+  // Joints belong to their robot, not to the active one.
   const robotId = joints?.robot_id ?? chosen?.robotId ?? "";
   const name = useEditor((state) => nameOf(state, robotId));
   const cannotAsk = useEditor((state) =>
@@ -40,7 +40,7 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
   if (!chosen) return <p className="quiet">{t`The scene has no robot.`}</p>;
   const show = () => {
     const { doc } = now();
-    // A ghost that nobody sees would tell nothing.
+    // Show the ghost only if it is visible.
     if (theEngine()?.item(robotId)?.visible === false) theEngine()?.focus(robotId);
     if (joints) {
       const known = now().reach;

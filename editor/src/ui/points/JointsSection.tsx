@@ -1,4 +1,4 @@
-/** Joints kept at a point: their values within the limits, taken over from the robot, or computed anew when the point moved. */
+/** Joints of a point: values and limits, update from the robot, recompute after the point moved. */
 
 import { t } from "@lingui/core/macro";
 import { removeJoints, renameJoints, setJoints, setJointsToRobot, solveJoints } from "../../commands/points";

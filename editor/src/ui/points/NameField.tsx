@@ -1,4 +1,4 @@
-/** A name that is changed where it stands: it holds when the field is left, or by Enter. */
+/** A name that is edited in place: saved on Enter or when the field loses the focus. */
 
 import { useId, useState } from "react";
 import { RefusedText, useAsking } from "./Doing";

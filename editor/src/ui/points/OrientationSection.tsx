@@ -1,4 +1,4 @@
-/** An orientation: its name, its angles, which robots get there, and the robot's own taken over. */
+/** An orientation: name, angles, reachability, update from the robot. */
 
 import { t } from "@lingui/core/macro";
 import { removeOrientation, renameOrientation, turnOrientation, turnOrientationToRobot } from "../../commands/points";

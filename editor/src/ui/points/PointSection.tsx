@@ -1,4 +1,4 @@
-/** A point: its name, what it hangs on, a note, and its place taken over from the robot. */
+/** A point: name, parent, note, update from the robot. */
 
 import { plural, t } from "@lingui/core/macro";
 import { useState } from "react";
@@ -78,7 +78,7 @@ const PointSection: Section["Body"] = ({ selection: { id } }) => {
 
 export default PointSection;
 
-/** What hangs on a point goes with it; what uses it keeps it there, and the server says so. */
+/** Children are removed too; the server refuses to remove a point that is used. */
 export const RemovePoint: Section["Body"] = ({ selection: { id } }) => {
   const doc = useEditor((state) => state.doc);
   const why = useWhyNot(id, "RemoveActionPoint");
@@ -98,7 +98,7 @@ export const RemovePoint: Section["Body"] = ({ selection: { id } }) => {
   );
 };
 
-/** What people write down about a point; all see it. The protocol has no request for a point's description. */
+/** A note about a point for all users. The protocol has no request for a point's description. */
 function Note({ id }: { id: string }) {
   const key = `note/${id}`;
   const kept = useEditor((state) => state.view.shared[key]);

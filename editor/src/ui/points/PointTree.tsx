@@ -1,4 +1,4 @@
-/** All points below what they hang on; one is dragged onto another, or into the world, to hang there. */
+/** All points below their parents; dragging a point onto an item changes its parent. */
 
 import { t } from "@lingui/core/macro";
 import { useMemo } from "react";

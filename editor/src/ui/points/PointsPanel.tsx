@@ -1,4 +1,4 @@
-/** Points of the project: added on a surface that is tapped, at the cross, by numbers, or where the robot is. */
+/** Points of the project: added by a tap on a surface, at the crosshair, by numbers, or at the robot. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
@@ -22,7 +22,10 @@ import { RefusedText, useAsking } from "./Doing";
 import { PointTree } from "./PointTree";
 import "./points.css";
 
-/** What a new point may hang on: the selected object or point; that of the selected orientation, joints or action. */
+/**
+ * Return possible parents of a new point: the selected object or point, or that of the selected orientation, joints or
+ * action.
+ */
 function parentOfSelection(): string {
   const { doc, ui } = now();
   const id = ui.selection?.id ?? "";
@@ -136,7 +139,7 @@ export default function PointsPanel() {
   );
 }
 
-/** In the middle of the view, as long as there is something to aim for. */
+/** The middle of the view, if there is a surface. */
 function Cross() {
   const view = theEngine() && document.querySelector(".view");
   return view && createPortal(<span className="aim-cross" aria-hidden="true" />, view);

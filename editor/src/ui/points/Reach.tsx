@@ -1,4 +1,4 @@
-/** Whether robots get there: a word and a sign of its own for each answer, not the colour alone. */
+/** Reachability as a word and a symbol, not as a colour only. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -35,7 +35,7 @@ interface Answer extends ReachOfItem {
   robot: string;
 }
 
-/** What each robot, arm and end effector says of an orientation or joints. */
+/** Reachability of an orientation or joints by robot, arm and end effector. */
 function answers(state: State, id: string): Answer[] {
   const found: Answer[] = [];
   for (const one of Object.values(state.reach)) {
@@ -49,7 +49,7 @@ function answers(state: State, id: string): Answer[] {
   return found;
 }
 
-/** Small, for lists: of the robot that gets there best; of an action, of its own robot. */
+/** For lists: the best robot; for an action, its own robot. */
 export function ReachBadge({ id }: { id: string }) {
   const reach = useEditor((state) => {
     const action = state.doc?.actions[id];
@@ -64,7 +64,7 @@ export function ReachBadge({ id }: { id: string }) {
   );
 }
 
-/** All answers, with the reason where one does not get there. */
+/** All results, with the reason if it is not reachable. */
 export function ReachAnswers({ id }: { id: string }) {
   const reach = useEditor((state) => state.reach);
   const doc = useEditor((state) => state.doc);
@@ -84,7 +84,7 @@ export function ReachAnswers({ id }: { id: string }) {
   );
 }
 
-/** Of an action, in words: whether its robot gets where it is told to go, and what stands against it. */
+/** Reachability of the targets of an action, in words with the reason. */
 export function ReachOfAction({ id }: { id: string }) {
   const reach = useEditor((state) => state.reach);
   const action = useEditor((state) => state.doc?.actions[id]);

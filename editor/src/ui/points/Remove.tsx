@@ -1,4 +1,4 @@
-/** Takes a point, an orientation or joints away: says what goes with it, and how to have it back. */
+/** Remove a point, an orientation or joints; list what is removed with it. */
 
 import { t } from "@lingui/core/macro";
 import { tell } from "../../store/store";

@@ -1,4 +1,4 @@
-/** What is taught at a point: orientations and joints, with whether robots get there. */
+/** Orientations and joints of a point, with their reachability. */
 
 import { t } from "@lingui/core/macro";
 import {
@@ -130,7 +130,7 @@ export const JointsList: Section["Body"] = ({ selection: { id } }) => {
   );
 };
 
-/** Opens it; shown in the view while the pointer is on it. */
+/** Selects it; the view highlights it under the pointer. */
 function Taught({ kind, id, name }: { kind: Kind; id: string; name: string }) {
   return (
     <Button

@@ -1,4 +1,4 @@
-/** Why something of the open document cannot be changed by this user just now. */
+/** Why an item of the open document cannot be changed by this user now. */
 
 import { t } from "@lingui/core/macro";
 import type { Requests } from "../../protocol/types";

@@ -1,4 +1,4 @@
-/** What the panel shows of points, orientations and joints. */
+/** Sections of the panel about points, orientations and joints. */
 
 import { msg } from "@lingui/core/macro";
 import type { Kind } from "../../store/state";

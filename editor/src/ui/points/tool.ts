@@ -1,4 +1,4 @@
-/** Points of the project: to add them, and what there is. */
+/** Points of the project: list and add. */
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";

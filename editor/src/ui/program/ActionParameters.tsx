@@ -1,4 +1,4 @@
-/** What an action is told: each parameter from a value, the result of an earlier action, or a parameter of the project. */
+/** Parameters of an action: a value, the result of an earlier action, or a project parameter. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -155,7 +155,7 @@ function One({
   );
 }
 
-/** Stands for the choice to make a project parameter on the spot; no id is JSON's null. */
+/** Stands for the choice of a new project parameter; no id is the JSON null. */
 const NEW = "null";
 
 async function sharedFrom(
@@ -201,7 +201,7 @@ function Literal({ state, actionId, wanted, json, field, onSet }: LiteralProps) 
   );
 }
 
-/** Poses, positions and joints of the project that may be chosen, those of the action's own point first. */
+/** Return poses, positions and joints to choose from, those of the action's point first. */
 function placesFor(state: State, actionId: string, type: string): Choice[] | undefined {
   const { doc } = state;
   if (!doc) return undefined;
@@ -241,14 +241,14 @@ interface Known {
   value: string;
 }
 
-/** What a parameter is given, where that is known before it runs; null for the result of another action. */
+/** Return the value of a parameter if it is known before the run; null for results. */
 function knownValue(state: State, parameter: ActionParameter | undefined): string | null {
   if (!parameter || parameter.type === "link") return null;
   if (parameter.type !== "project_parameter") return parameter.value;
   return state.doc?.parameters[String(decoded(parameter.value))]?.value ?? null;
 }
 
-/** The values of a dynamic parameter: asked of the device while it is online, else as they were last. */
+/** Return the choices of a dynamic parameter: requested while the device is online, otherwise the last known ones. */
 function useDynamic(state: State, actionId: string, wanted: ParameterMeta): { choices?: Choice[]; note?: string } {
   const action = state.doc?.actions[actionId];
   const objectId = action?.type.split("/")[0] ?? "";

@@ -1,6 +1,6 @@
 /**
- * Every action that can be added, by its device, with search and what was used last. One tap adds it: on the point that
- * is selected, or on a new one where the cross in the view is. What it needs (a point, an orientation) is made with it.
+ * All actions by device, with search and recently used ones. One tap adds an action to the selected point, or to a new
+ * one at the crosshair, with the point and orientation that it needs.
  */
 
 import { t } from "@lingui/core/macro";
@@ -132,13 +132,13 @@ export function AddAction() {
   );
 }
 
-/** Marks the place in the middle of the view. */
+/** Marks the middle of the view. */
 function Cross() {
   const view = document.querySelector(".view");
   return view && createPortal(<span className="crosshair" aria-hidden="true" />, view);
 }
 
-/** The point that is selected, or on which what is selected is; empty when there is none. */
+/** Return the selected point, or that of the selected item; an empty string without one. */
 function pointOfSelection(state: State): string {
   const { selection } = state.ui;
   const { doc } = state;
@@ -179,7 +179,7 @@ function offersOf(state: State, pointId: string): Offer[] {
   });
 }
 
-/** Why an action cannot be added just now; empty when it can. */
+/** Return why an action cannot be added now; an empty string if it can. */
 function whyNot(state: State, objectId: string, meta: ObjectAction, pointId: string): string {
   if (meta.disabled) return meta.problem ?? t`Not available.`;
   const needsJoints = meta.parameters.some((each) => each.type === "joints");

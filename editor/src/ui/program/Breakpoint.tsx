@@ -1,4 +1,4 @@
-/** The breakpoint of a point: the program pauses before every action that uses a pose or joints of it. */
+/** The breakpoint of a point: the program pauses before every action that uses its pose or joints. */
 
 import { t } from "@lingui/core/macro";
 import { breakAt } from "../../commands/run";

@@ -1,4 +1,4 @@
-/** Says that the next tap ends a step, and how to give it up: by Escape, or the button. */
+/** Report that the next tap ends a connection, with a button to cancel. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";

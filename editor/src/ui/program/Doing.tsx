@@ -1,4 +1,4 @@
-/** What can be done with an action: try it, run to it, rename, duplicate, remove; and how the last tries ended. */
+/** Commands for an action: try, run to it, rename, duplicate, remove; and the results of the last tries. */
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";

@@ -1,4 +1,4 @@
-/** The steps that lead on from an action, and the buttons that begin another one: then a tap says where it leads. */
+/** The next steps of an action, and buttons to connect further ones. */
 
 import { plural, t } from "@lingui/core/macro";
 import { beginStep, endStep, notEditable, removeStep } from "../../commands/program";
@@ -95,7 +95,7 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
           icon="list"
           onPress={() => {
             fold(run);
-            select(null); // what is selected is seen
+            select(null); // a sequence with the selected action stays unfolded
           }}
         >
           {plural(run.length, { one: "Fold # action in the graph", other: "Fold # actions in the graph" })}
@@ -109,7 +109,7 @@ export default Next;
 export const branchOf = (condition: ProjectLogicIf | undefined): string =>
   !condition ? "always" : condition.value === "true" || condition.value === "false" ? condition.value : "value";
 
-/** Where a step can lead, for who does not tap in the view. */
+/** List of possible next steps, for users who do not tap in the view. */
 function Targets({ from }: { from: string }) {
   const state = useEditor((each) => each);
   const { doc } = state;

@@ -1,4 +1,4 @@
-/** Values of the whole program: its parameters, where they are used, and settings of devices that it replaces. */
+/** Variables: project parameters with their users, and device settings overridden by the project. */
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
@@ -29,7 +29,7 @@ export function Parameters() {
   );
 }
 
-/** The server keeps these itself, for scripts. */
+/** The server maintains these for scripts. */
 const OWN = new Set(["scene_id", "project_id"]);
 
 function One({ id }: { id: string }) {

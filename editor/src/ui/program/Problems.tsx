@@ -1,4 +1,4 @@
-/** What is wrong with the program; a tap leads to the fault. */
+/** Problems of the program; a tap selects the faulty item. */
 
 import { t } from "@lingui/core/macro";
 import { Button as AriaButton } from "react-aria-components";

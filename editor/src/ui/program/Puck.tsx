@@ -1,4 +1,4 @@
-/** Where the disc of an action, or Start and End, is drawn: with its point, or where somebody has put it for all. */
+/** Position of the puck of an action, Start or End: at its point, or where a user moved it. */
 
 import { t } from "@lingui/core/macro";
 import { aimedPlace } from "../../commands/aimed";

@@ -1,4 +1,4 @@
-/** What an action tells: names by which other actions and steps use it, and who does. */
+/** Results of an action: their names, and the actions that use them. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";

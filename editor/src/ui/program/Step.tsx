@@ -1,4 +1,4 @@
-/** One step: from where to where, and the result on which it depends. Changing it never takes it away meanwhile. */
+/** A connection: its ends and its condition. It is updated by one request. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";

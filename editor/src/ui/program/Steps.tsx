@@ -1,4 +1,4 @@
-/** All actions in the order in which they are run, those that are never run last; with breakpoints. */
+/** All actions in the order of execution, unreachable ones last; with breakpoints. */
 
 import { t } from "@lingui/core/macro";
 import { useMemo } from "react";
@@ -82,7 +82,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
   );
 }
 
-/** Breadth first from START, then what cannot be reached. */
+/** Return the actions breadth-first from START, then unreachable ones. */
 export function ordered(doc: OpenDocument): string[] {
   const found: string[] = [];
   const waiting = [START];

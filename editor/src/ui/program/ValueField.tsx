@@ -1,6 +1,6 @@
 /**
- * The field for one value, by its type. What is typed is taken over when the field is left or Enter is pressed; what is
- * chosen, at once. A value that cannot be, or that the server refuses, stays in the field with the reason below.
+ * The field of a value by its type. Typed values are sent on Enter or when the field loses the focus, choices at once.
+ * An invalid or refused value stays in the field with the reason below.
  */
 
 import { t } from "@lingui/core/macro";
@@ -16,19 +16,19 @@ export interface Choice {
 
 interface ValueFieldProps {
   label: ReactNode;
-  /** For who does not see the label's place. */
+  /** Context for screen readers. */
   name: string;
   type: string;
   json: string | undefined;
   extra?: Extra;
-  /** For what is chosen out of a list. */
+  /** Choices of a list. */
   choices?: Choice[];
   hint?: string;
-  /** The value is never shown: the server sends a placeholder, which stands for the stored one. */
+  /** A secret value: the server sends a placeholder for it. */
   secret?: boolean;
-  /** Why it cannot be changed; empty when it can. */
+  /** Why it cannot be changed; empty if it can. */
   why?: string;
-  /** Take it over; gives why not. */
+  /** Send the value; return why it was refused. */
   onSet: (json: string) => Promise<string>;
   children?: ReactNode;
 }
@@ -51,7 +51,7 @@ export function ValueField({
   const [text, setText] = useState(known);
   const [problem, setProblem] = useState("");
   const id = useId();
-  // Somebody else changed it, or it was taken over.
+  // The value was changed by another user, or accepted.
   useEffect(() => {
     setText(known);
     setProblem("");

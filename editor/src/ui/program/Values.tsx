@@ -1,9 +1,9 @@
-/** Values with their names, as an action got or gave them. */
+/** Values of an action with their names. */
 
 import { t } from "@lingui/core/macro";
 import { plain } from "../../viewmodel/items";
 
-/** Longer ones can be opened. */
+/** Longer values can be expanded. */
 const SHORT = 60;
 
 export function Values({ names, values }: { names: string[]; values: string[] }) {
@@ -34,7 +34,7 @@ function Value({ json }: { json: string }) {
   );
 }
 
-/** A picture travels as base64 of JPEG or PNG in a string. */
+/** Pictures are base64-encoded JPEG or PNG. */
 function pictureOf(json: string): string | null {
   const found = /^"((?:\/9j\/|iVBOR)[A-Za-z0-9+/=]+)"$/.exec(json);
   if (!found?.[1]) return null;

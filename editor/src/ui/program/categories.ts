@@ -1,4 +1,4 @@
-/** An icon for each kind of device, beside its word. */
+/** Icons of device categories. */
 
 import type { IconName } from "../kit/icons";
 

@@ -1,4 +1,4 @@
-/** Sections of the panel about actions, steps, START and END. Their bodies are loaded when they are needed. */
+/** Sections of the panel about actions, connections, START and END; their bodies are loaded when they are needed. */
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";

@@ -1,4 +1,4 @@
-/** The program: add actions, its steps in order, what is wrong with it, its parameters. */
+/** The program: add actions, list them, problems, variables. */
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";

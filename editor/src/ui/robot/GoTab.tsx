@@ -1,4 +1,4 @@
-/** A pose that is dragged in the view, typed, tapped or taken over, shown by a ghost before the robot goes there. */
+/** A target pose: dragged in the view, typed, tapped or copied from an item, and previewed by the ghost. */
 
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -160,7 +160,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
   );
 }
 
-/** How the straight way to the goal is, in words. */
+/** Describe the straight path to the target. */
 function WayWords({ answer }: { answer: GoalAnswer | null }) {
   const { linear } = useManner();
   const name = useEditor((state) => (answer?.met ? nameOf(state, answer.met) : ""));
@@ -176,7 +176,7 @@ function WayWords({ answer }: { answer: GoalAnswer | null }) {
   );
 }
 
-/** The straight way from where the tool is now, in the view. */
+/** Show the straight path from the current tool position in the view. */
 function useWay(chosen: Chosen, goal: Pose | null, answer: GoalAnswer | null): void {
   const { linear } = useManner();
   const tool = useTelemetry(chosen.robotId, () => effectorPose(chosen));
@@ -187,7 +187,7 @@ function useWay(chosen: Chosen, goal: Pose | null, answer: GoalAnswer | null): v
   useEffect(() => () => theEngine()?.showWay(null), []);
 }
 
-/** What stands against a goal; null while nothing was asked. */
+/** Why the target cannot be reached; null before the check. */
 export function Answer({ answer }: { answer: string | null }) {
   if (answer === null) return null;
   return (

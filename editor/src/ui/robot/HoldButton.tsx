@@ -1,6 +1,6 @@
 /**
- * A button that acts as long as it is held, by finger, mouse or key. It lets go when anything takes the hand from it;
- * what else ends a hold (the page hidden, the connection lost) is in holds.ts.
+ * A button that acts while it is held, by finger, mouse or key. Other causes that end it (page hidden, disconnect) are
+ * in holds.ts.
  */
 
 import { t } from "@lingui/core/macro";
@@ -9,13 +9,13 @@ import type { Held } from "../../commands/holds";
 import { tell } from "../../store/store";
 
 interface HoldButtonProps {
-  /** What a screen reader calls it. */
+  /** Label for screen readers. */
   label: string;
-  /** Why it cannot be held now; empty: it can. */
+  /** Why it is not available; empty if it is. */
   why?: string;
   className?: string;
   onHold: () => Held;
-  /** Called when it is over: with why, where it was not simply let go. */
+  /** Called at the end, with the reason if it was not released. */
   onOver?: (reason: string) => void;
   children: ReactNode;
 }

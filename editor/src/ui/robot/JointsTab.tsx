@@ -19,7 +19,7 @@ import { useTelemetry } from "./useTelemetry";
 const DEGREES = 180 / Math.PI;
 
 export interface ShownJoint extends Joint {
-  /** °, or mm where prismatic, per unit of the value. */
+  /** Degrees, or millimetres if prismatic, per unit of the value. */
   scale: number;
   unit: string;
   lower: number;
@@ -165,7 +165,8 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
 
 function beyond({ name, lower, upper, scale, unit }: ShownJoint, value: number): string {
   if (value >= lower && value <= upper) return "";
-  return t`Limits of ${name.replaceAll("_", " ")}: ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}.`;
+  const [shownName, least, most] = [name.replaceAll("_", " "), (lower * scale).toFixed(0), (upper * scale).toFixed(0)];
+  return t`Limits of ${shownName}: ${least} to ${most} ${unit}.`;
 }
 
 /** Show the position of a joint between its limits. */

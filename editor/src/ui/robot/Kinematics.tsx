@@ -1,4 +1,4 @@
-/** Whether poses of a robot are computed with what its controller told of the very arm, or as its type is made. */
+/** Which kinematics a robot uses: calibrated in its controller, or nominal. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
@@ -9,7 +9,7 @@ import { ago } from "../times";
 
 export function Kinematics({ robotId }: { robotId: string }) {
   const tells = useEditor((state) => featuresOf(state, robotId)?.kinematic_calibration ?? false);
-  // Another calibration comes into force while the robot is there, which a notification tells of.
+  // The calibration can change while the robot is online, which a notification reports.
   const told = useEditor((state) => state.notices.at(-1)?.id);
   const scene = useEditor((state) => state.live.state);
   const [found, setFound] = useState<RobotKinematics | null>(null);

@@ -1,4 +1,4 @@
-/** How fast, on a straight line or not, and whether collisions are looked for: of every motion asked for in panels. */
+/** Options of all motions: speed, straight line, collision check. */
 
 import { t } from "@lingui/core/macro";
 import { MoreOrLess, OnOff } from "../kit/fields";

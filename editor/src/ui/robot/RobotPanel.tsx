@@ -1,4 +1,4 @@
-/** The active robot: its state, and the ways to move it. */
+/** The active robot: its state, and its control. */
 
 import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";

@@ -24,7 +24,7 @@ test("a goal that is turned by a ring stays where it is", () => {
     angle: Math.PI / 2,
   });
   expect(position).toEqual(START.position);
-  // Looking down, and a quarter turn about the vertical: still looking down.
+  // Tool down, turned a quarter about the vertical: still down.
   expect(1 - 2 * (orientation.x ** 2 + orientation.y ** 2)).toBeCloseTo(-1);
   expect(Math.abs(orientation.x)).toBeCloseTo(Math.SQRT1_2);
 });

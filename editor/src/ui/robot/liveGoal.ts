@@ -1,19 +1,19 @@
-/** Asks how the robot would stand at a goal that is dragged: of the newest goal alone, one question at a time. */
+/** Check a target while it is dragged: only the latest one, one request at a time. */
 
 import { type Chosen, effectorPose, showAt } from "../../commands/robot";
 import type { WayState } from "../../engine/way";
 import type { Pose } from "../../protocol/types";
 import { metBy } from "../../session/lines";
 
-/** ms between two questions. */
+/** Time between two requests, ms. */
 export const PAUSE = 100;
 
 export interface GoalAnswer {
-  /** What it is the answer to. */
+  /** The target that was checked. */
   goal: Pose;
-  /** What stands against the goal; empty when nothing does. */
+  /** Why the target cannot be reached; empty if it can. */
   problem: string;
-  /** How the straight way there is, and the id of what stands in it. */
+  /** State of the straight path, and the id of the obstacle. */
   way: WayState;
   met: string;
 }
@@ -25,7 +25,7 @@ export class LiveGoal {
   private last = -Infinity;
   private timer: ReturnType<typeof setTimeout> | undefined;
 
-  /** `straight`: whether the robot would go straight there, so that the way can be looked at. */
+  /** `straight`: whether the motion is straight, so that the path can be checked. */
   constructor(
     private readonly chosen: Chosen,
     private readonly straight: () => boolean,
@@ -37,7 +37,7 @@ export class LiveGoal {
     this.next();
   }
 
-  /** Ask no more of what is not asked yet, and show nothing of what is. */
+  /** Cancel requests that wait, and ignore the running one. */
   forget(): void {
     this.wanted = null;
     this.ended = true;

@@ -1,18 +1,18 @@
-/** How the user moves robots: frame, size of a step, speed. Kept while the page is open. */
+/** How the user moves robots: frame, step size, speed. Stored while the page is open. */
 
 import { useStore } from "zustand";
 import { createStore } from "zustand/vanilla";
 import type { Manner } from "../../commands/robot";
 
-/** `selected`: the axes of what is selected. */
+/** `selected`: the frame of the selected item. */
 export type FrameName = "world" | "robot" | "tool" | "selected";
 
 export interface Jogging extends Manner {
   frame: FrameName;
-  /** A tap is a step, or the robot moves as long as it is held. */
+  /** Step per press, or hold to move. */
   way: "step" | "hold";
   what: "position" | "orientation";
-  /** m and rad. */
+  /** Step sizes, m and rad. */
   distance: number;
   angle: number;
 }
@@ -22,7 +22,7 @@ const RAD = Math.PI / 180;
 export const DISTANCES = [0.0001, 0.001, 0.01, 0.05, 0.1] as const;
 export const ANGLES = [0.1 * RAD, RAD, 5 * RAD, 10 * RAD, 45 * RAD] as const;
 
-/** Velocities at full speed of the slider, m/s and rad/s: held motion is slow anyway. */
+/** Velocities at full speed, m/s and rad/s; held motions are slow. */
 export const FASTEST = { linear: 0.25, angular: 0.8, joint: 0.6 } as const;
 
 export const manner = createStore<Jogging>(() => ({

@@ -1,4 +1,4 @@
-/** Puts the gizmo at a goal, and moves and turns the goal by it. */
+/** Put the gizmo at the target; dragging it moves the target. */
 
 import { useEffect, useRef } from "react";
 import type { Engine } from "../../engine/engine";
@@ -9,7 +9,7 @@ import { store } from "../../store/store";
 import { plusOf, turnedAbout } from "../../transform/placing";
 import { ORIGIN } from "../../viewmodel/frames";
 
-/** Where a goal is that was dragged from `start`. */
+/** Return a target that was dragged from `start`. */
 export function dragged(
   start: Pose,
   { handle, translation, axis, angle }: Pick<Drag, "handle" | "translation" | "axis" | "angle">,
@@ -18,7 +18,7 @@ export function dragged(
   return { ...start, position: plusOf(start.position, translation, 1) };
 }
 
-/** `axes`: along those of the goal, or of the world. Nothing is shown without a goal. */
+/** `axes`: of the target, or of the world. Hidden without a target. */
 export function useGoalGizmo(
   goal: Pose | null,
   mode: "move" | "turn",
@@ -36,13 +36,13 @@ export function useGoalGizmo(
       const { current } = latest;
       if (one.phase === "start") start = current.goal;
       else if (start && current.goal) {
-        // At its end a new one, too: the gizmo goes there.
+        // At the end the gizmo moves to the new target.
         current.onDrag(
           one.phase === "move" ? dragged(start, one) : { ...(one.phase === "cancel" ? start : current.goal) },
         );
       }
     };
-    // The view may be made anew meanwhile, with another quality.
+    // The view may be recreated meanwhile with another quality.
     const bind = () => {
       const engine = theEngine();
       if (engine === bound) return;

@@ -1,4 +1,4 @@
-/** While it is on, the next tap in the view gives a place instead of selecting. */
+/** While it is on, the next tap in the view returns a position instead of selecting. */
 
 import { useEffect, useRef } from "react";
 import type { Position } from "../../protocol/types";
@@ -6,9 +6,9 @@ import { takeTaps } from "../../session/taps";
 
 export interface TappedPlace {
   position: Position;
-  /** Out of the surface; null where there is none. */
+  /** Outward normal; null without a surface. */
   normal: Position | null;
-  /** What was tapped; empty for the floor. */
+  /** Id of the tapped item; empty for the floor. */
   id: string;
 }
 
@@ -20,7 +20,7 @@ export function usePlaceTap(on: boolean, onPlace: (place: TappedPlace) => void):
     return takeTaps((hits, floor) => {
       const hit = hits.find((each) => each.normal !== null);
       const point = hit?.point ?? floor;
-      if (!point) return true; // the sky: it asks for a place, so nothing else is meant
+      if (!point) return true; // nothing was hit, but the tap is still handled
       const normal = hit?.normal ?? (hit ? null : { x: 0, y: 0, z: 1 });
       latest.current({
         position: { x: point.x, y: point.y, z: point.z },

@@ -1,12 +1,12 @@
-/** What robots report, for read-outs: as often as people can read, not as often as it comes. */
+/** Telemetry for numbers on the screen, at a readable rate. */
 
 import { useEffect, useState } from "react";
 import { telemetry } from "../../store/telemetry";
 
-/** s between two looks. */
+/** Time between two updates, s. */
 const PAUSE = 0.1;
 
-/** Look at a robot's reports; the component is drawn again a few times a second while they come. */
+/** Return a value of a robot's telemetry; the component is rendered a few times per second. */
 export function useTelemetry<T>(robotId: string | undefined, look: () => T): T {
   const [, again] = useState(0);
   useEffect(() => {

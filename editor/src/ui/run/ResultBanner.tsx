@@ -21,7 +21,10 @@ export default function ResultBanner() {
       <Icon name={ICONS[result.tone]} />
       <p>
         <strong>{result.title}</strong>{" "}
-        <span className="small">{`${result.name}, ${ago(run.ended ?? run.started)}. ${withNames(now(), result.detail)}`}</span>
+        <span className="small">
+          {`${result.name}, ${ago(run.ended ?? run.started)}. `}
+          {withNames(now(), result.detail)}
+        </span>
       </p>
       {result.tone === "bad" && <ShowAction id={result.actionId} />}
       <Button

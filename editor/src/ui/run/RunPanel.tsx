@@ -109,7 +109,7 @@ export default function RunPanel() {
   );
 }
 
-/** Whether the camera goes where the program is. */
+/** Whether the camera follows the running action. */
 function Follow() {
   const on = useEditor((state) => state.ui.follow);
   return (

@@ -1,4 +1,4 @@
-/** What the program has done, the newest first: each action with parameters, results and how long it took. */
+/** The trace of the program, newest first: actions with parameters, results and durations. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
@@ -11,7 +11,7 @@ import { Values } from "../program/Values";
 import { clock } from "../times";
 import "../program/program.css";
 
-/** So many are drawn; the rest on request. */
+/** Number of entries shown at first. */
 const SHOWN = 30;
 
 export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {

@@ -1,4 +1,4 @@
-/** Running the program: start, follow, what it has done, how earlier runs ended. */
+/** Run the program: start, follow, trace, history. */
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";

@@ -1,4 +1,4 @@
-/** Uploads a mesh as an object: how large it is stands there before, since many files do not say in which unit they are. */
+/** Upload a mesh as an object. Its size is shown first, since many files do not state the unit. */
 
 import { plural, t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";

@@ -1,4 +1,4 @@
-/** A form made from the settings of a type. What is wrong is told where it is, before and after the server has seen it. */
+/** The form of a type's settings, with problems next to the fields. */
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
@@ -35,7 +35,7 @@ export function AddObject({ type, why, onBack }: { type: ObjectTypeMeta; why: st
       <Button look="primary" icon="plus" type="submit" why={why} isDisabled={busy}>
         {busy ? t`Adding…` : t`Add`}
       </Button>
-      {/* Below the button: what goes when a field is left must not move it from under the finger. */}
+      {/** Below the button, so that the button does not move when a field loses the focus. */}
       {tried && lacking.length > 0 && <RefusedText>{t`Required: ${lacking.map(words).join(", ")}.`}</RefusedText>}
       <RefusedText>{refused}</RefusedText>
       <TypeUse type={type} onDeleted={onBack} />

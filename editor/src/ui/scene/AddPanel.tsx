@@ -1,4 +1,4 @@
-/** What can be added to the scene: shapes and meshes by one tap, devices by a form of their settings. */
+/** Add shapes and meshes with one tap, and devices with a form. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -101,12 +101,12 @@ export default function AddPanel() {
   );
 }
 
-/** Abstract types cannot be added; shapes have buttons of their own, and each its own type. */
+/** Return whether it is a device: abstract types cannot be added, and shapes have their own buttons. */
 function isDevice({ abstract, base, disabled, problem }: ObjectTypeMeta): boolean {
   return base !== "VirtualCollisionObject" && (!abstract || (disabled && problem !== undefined));
 }
 
-/** The first sentence. */
+/** Return the first sentence. */
 function first(text: string): string {
   return text.split(/(?<=\.)\s/)[0] ?? "";
 }

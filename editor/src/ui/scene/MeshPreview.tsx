@@ -1,10 +1,10 @@
-/** How a mesh looks before it is uploaded: seen from above and the side, drawn once. */
+/** Preview of a mesh before the upload, drawn once. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useRef } from "react";
 import type { BufferGeometry } from "three";
 
-/** Triangles that are drawn at most: beyond, each so-and-so-manyth. */
+/** Largest number of drawn triangles; of larger meshes every n-th is drawn. */
 const MOST = 20_000;
 
 export function MeshPreview({ geometry }: { geometry: BufferGeometry }) {
@@ -25,7 +25,7 @@ export function MeshPreview({ geometry }: { geometry: BufferGeometry }) {
   );
 }
 
-/** An axonometric drawing: the farther a triangle, the earlier it is drawn; the steeper it stands, the darker it is. */
+/** Axonometric drawing with the painter's algorithm; steep triangles are darker. */
 function draw(context: CanvasRenderingContext2D, geometry: BufferGeometry): void {
   const { width, height } = context.canvas;
   context.clearRect(0, 0, width, height);

@@ -1,4 +1,4 @@
-/** The selected object as a thing of the scene: its name, copies, what needs it, and how it is seen. */
+/** The selected object: name, copies, users, visibility. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
@@ -31,7 +31,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   if (!object) return null;
   const remove = async () => {
     const projects = await projectsUsing(id).catch(() => []);
-    // What nobody needs goes at once: undo brings it back.
+    // An unused object is removed at once; undo restores it.
     if (projects.length === 0) await removeObject(id);
     else setNeeding(projects);
   };
@@ -71,7 +71,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   );
 };
 
-/** How the user sees it; the others see it as they like. */
+/** Visibility for this user only. */
 function Seeing({ id }: { id: string }) {
   const aside = useEditor(
     (state) => Array.isArray(state.view.user.blocklist) && state.view.user.blocklist.includes(id),

@@ -1,4 +1,4 @@
-/** Fields for the settings of an object: what has no default comes first, the rest below. */
+/** Fields of the settings of an object: required ones first, advanced ones below. */
 
 import { t } from "@lingui/core/macro";
 import { words } from "../../program/naming";
@@ -6,17 +6,17 @@ import { extraOf } from "../../program/values";
 import type { Parameter, ParameterMeta } from "../../protocol/types";
 import { ValueField } from "../program/ValueField";
 
-/** JSON of each setting that is not left at its default. */
+/** JSON of each setting that differs from its default. */
 export type Values = Record<string, string>;
 
-/** Values as the server takes them. */
+/** Values in the format of the server. */
 export function parametersOf(settings: ParameterMeta[], values: Values): Parameter[] {
   return settings.flatMap(({ name, type }) =>
     values[name] === undefined ? [] : [{ name, type, value: values[name] }],
   );
 }
 
-/** Names of settings that nobody has said and that have no default. */
+/** Names of required settings without a value. */
 export function missing(settings: ParameterMeta[], values: Values): string[] {
   return settings
     .filter(

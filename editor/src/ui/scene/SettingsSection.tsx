@@ -1,4 +1,4 @@
-/** The settings of the selected object: changed together, checked, and saved by one request. */
+/** The settings of the selected object: changed together and saved by one request. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";

@@ -1,4 +1,4 @@
-/** Where a kind of object is used; one that was uploaded and is used nowhere can be deleted. */
+/** Where an object type is used; an unused uploaded type can be deleted. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
@@ -29,7 +29,7 @@ export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: 
     };
   }, [type.type]);
   if (!scenes) return null;
-  // What belongs to an installed driver is not for users to delete; only what was uploaded has a date.
+  // Types of installed drivers cannot be deleted; only uploaded types have a date.
   const installed = type.built_in || type.modified === undefined;
   return (
     <div className="type-use">

@@ -1,4 +1,4 @@
-/** Sections about objects of the scene; each is loaded when an object is selected first. */
+/** Sections about objects of the scene, loaded when they are needed. */
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";

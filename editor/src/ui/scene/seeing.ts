@@ -1,4 +1,4 @@
-/** What a user has put aside: not shown to him, and not aimed at. */
+/** Objects that a user has hidden: neither drawn nor picked for them. */
 
 import { keepView } from "../../commands/viewstate";
 import type { State } from "../../store/state";

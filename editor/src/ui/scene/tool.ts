@@ -1,4 +1,4 @@
-/** Adds devices, shapes and meshes to the scene. */
+/** Add devices, shapes and meshes to the scene. */
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../kit/lazily";

@@ -1,4 +1,4 @@
-/** What this is, how others join, and which keys there are; a chunk of its own. */
+/** About: versions, invitation, keys. A separate chunk. */
 
 import { t } from "@lingui/core/macro";
 import { version } from "../../../package.json";

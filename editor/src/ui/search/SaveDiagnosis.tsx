@@ -1,4 +1,4 @@
-/** One press: a file for whoever helps. */
+/** A button that saves the diagnosis file. */
 
 import { t } from "@lingui/core/macro";
 import { saveDiagnosis } from "../../commands/diagnosis";
@@ -8,14 +8,14 @@ import { Button } from "../kit/kit";
 import { RefusedText, useAsking } from "../points/Doing";
 
 export function SaveDiagnosis() {
-  // The role of who changes scenes: addresses and settings of devices are in it.
+  // It needs the role that edits scenes, since it contains addresses and settings of devices.
   const why = useEditor((state) => barred(state, "SaveScene"));
   const { refused, busy, ask } = useAsking();
   return (
     <section aria-label={t`Diagnosis`}>
       <h3>{t`Something went wrong?`}</h3>
       <p className="quiet small">
-        {t`A file with the open document, devices, versions and the end of the log, without secrets. It is saved on this computer only.`}
+        {t`Saves the open document, devices, versions and the end of the log in a file, without secrets.`}
       </p>
       <Button icon="save" why={why} isDisabled={busy} onPress={() => void ask(saveDiagnosis())}>
         {busy ? t`Collecting…` : t`Save diagnosis file`}

@@ -1,4 +1,4 @@
-/** All that the search finds: commands of the screen, tools, things, and what can be opened, each as words. */
+/** Entries of the search: commands, tools, items and documents. */
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";

@@ -1,4 +1,4 @@
-/** What the search finds, and in which order. */
+/** Results of the search, and their order. */
 
 import { expect, test } from "vitest";
 import { type Entry, found } from "./found";

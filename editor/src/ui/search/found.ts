@@ -1,19 +1,19 @@
-/** Which entries of the search fit what is typed. */
+/** Filter and order of the search. */
 
 export interface Entry {
   id: string;
   words: string;
-  /** What kind of thing it is, or how it stands. */
+  /** Kind or state of the entry. */
   detail: string;
-  /** Why it cannot be done now; empty: it can. */
+  /** Why it is not available; empty if it is. */
   why: string;
   act: () => void;
 }
 
-/** Most things at once: who wants another types more. */
+/** Largest number of results. */
 const MOST = 40;
 
-/** Give all that fits the words, those first that begin with them, what was used last first where nothing is typed. */
+/** Return the matching entries: those that start with the text first; recently used ones first without a text. */
 export function found(entries: readonly Entry[], search: string, recent: readonly string[]): Entry[] {
   const parts = search.trim().toLowerCase().split(/\s+/).filter(Boolean);
   if (parts.length === 0) {

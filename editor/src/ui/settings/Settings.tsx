@@ -1,4 +1,4 @@
-/** How the screen looks, on this device only; and the way out. */
+/** Display settings of this device, and Leave. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -24,7 +24,7 @@ export function useTheme(): "light" | "dark" {
   return wanted === "system" ? (system ? "dark" : "light") : wanted;
 }
 
-/** Take over what this browser remembers, and follow the device's colours. */
+/** Apply the settings stored in this browser, and follow the system theme. */
 export function useScreenSettings(): void {
   const theme = useTheme();
   const left = useEditor((state) => state.ui.leftHanded);

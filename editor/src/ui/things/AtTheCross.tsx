@@ -1,4 +1,4 @@
-/** What the cross in the middle of the view may mean, the likeliest first: exact where things stand close together. */
+/** List of the items at the crosshair, most likely first. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
@@ -55,7 +55,7 @@ export function AtTheCross() {
   );
 }
 
-/** The name of what a thing hangs on. */
+/** Return the name of an item's parent. */
 function parentOf(state: State, id: string): string {
   const { doc } = state;
   const on = doc?.points[id]?.parent ?? doc?.actions[id]?.pointId ?? doc?.orientations[id]?.pointId;

@@ -1,4 +1,4 @@
-/** How all things together are seen, for this user: seen through, faded beside what is looked for, with lines to parents. */
+/** Display of all items for this user: transparency, fading, lines to parents. */
 
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -9,7 +9,7 @@ import { parentLines } from "../../viewmodel/items";
 import { fadesOthers, opacityOfAll } from "../../viewmodel/seeing";
 import { MoreOrLess, OnOff } from "../kit/fields";
 
-/** What is drawn unless the user hides it, by the key under which the server keeps that. */
+/** Parts of the view that users can hide, with the keys under which the server stores that. */
 const SIGHTS = [
   ["hide_orientations", msg`Orientation arrows`],
   ["hide_axes", msg`End effector axes`],

@@ -1,4 +1,4 @@
-/** From the selected thing to the one before and after it in the list of things, as that is narrowed. */
+/** Buttons to the previous and next item of the object list, as filtered. */
 
 import { t } from "@lingui/core/macro";
 import { useMemo } from "react";

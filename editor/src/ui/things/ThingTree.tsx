@@ -1,4 +1,4 @@
-/** Things with what hangs on them below; each can be folded, which the user finds so on every tablet. */
+/** Tree of items; which are collapsed is stored on the server for the user. */
 
 import { t } from "@lingui/core/macro";
 import { Button, Collection, Tree, TreeItem, TreeItemContent } from "react-aria-components";
@@ -28,7 +28,7 @@ function foldedOf(kept: unknown): string[] {
   return Array.isArray(kept) ? kept.filter((each) => typeof each === "string") : NOTHING;
 }
 
-/** Select a thing of a list, and bring it into the view. */
+/** Select an item of a list, and bring it into the view. */
 export function goTo(id: string): void {
   select(selectionOf(now(), id));
   setUi({ tool: "" });
@@ -38,7 +38,7 @@ export function goTo(id: string): void {
 interface ThingTreeProps {
   label: string;
   rows: readonly Row[];
-  /** All is unfolded: what was looked for is to be seen. */
+  /** A search expands everything. */
   unfolded: boolean;
 }
 
@@ -51,7 +51,7 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
   const fold = (keys: ReadonlySet<unknown>) => {
     if (unfolded) return;
     const mine = parents.map((row) => row.id);
-    // What is gone from the workplace is not kept for good.
+    // Forget collapsed items that no longer exist.
     const rest = folded.filter((id) => !mine.includes(id) && selectionOf(now(), id) !== null);
     const next = [...rest, ...mine.filter((id) => !keys.has(id))];
     keepView("user", { collapsed: next.length > 0 ? next : null });

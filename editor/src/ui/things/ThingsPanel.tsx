@@ -1,4 +1,4 @@
-/** All that is in the workplace, to find something: by kind and name, by what hangs on what, or at the cross. */
+/** All items of the workplace: by kind and name, by parents, or at the crosshair. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";

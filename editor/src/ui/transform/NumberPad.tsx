@@ -1,4 +1,4 @@
-/** Keys for a number, large enough for fingers, with units and changes; the keyboard writes into the same field. */
+/** A number pad for fingers, with units and relative changes; the keyboard writes into the same field. */
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useId, useState } from "react";
@@ -7,12 +7,12 @@ import { Button } from "../kit/kit";
 
 interface NumberPadProps {
   label: string;
-  /** m or rad. */
+  /** Value, m or rad. */
   value: number;
   unit: Unit;
-  /** What is typed is a change. */
+  /** Whether the number is relative. */
   by: boolean;
-  /** Absolute values make no sense here. */
+  /** Only relative changes are possible. */
   onlyBy?: boolean;
   onUnit: (unit: Unit) => void;
   onBy: (by: boolean) => void;
@@ -45,7 +45,7 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
       <div className="pad-field">
         <input
           id={id}
-          // The device's own keyboard would cover what is moved.
+          // The on-screen keyboard of the system would cover the item.
           inputMode="none"
           autoComplete="off"
           autoFocus

@@ -1,4 +1,4 @@
-/** Where the selected thing stands, and all ways to put it elsewhere: by hand in the view, by steps, by numbers. */
+/** Pose of the selected item, and the ways to change it: drag in the view, steps, numbers. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -51,7 +51,7 @@ const SNAPS: readonly (readonly [Snap, MessageDescriptor])[] = [
   ["point", msg`other objects`],
 ];
 const keep = (change: Partial<ToolSettings>) => keepGeneral({ [TOOL]: { ...toolSettings(now()), ...change } });
-/** A step that is none of the table's. */
+/** Stands for a custom step. */
 const FREE = "free";
 
 export default function Place({ selection }: { selection: Selection }) {
@@ -60,7 +60,7 @@ export default function Place({ selection }: { selection: Selection }) {
   return <Placing key={selection.id} selection={selection} target={target} />;
 }
 
-/** The target, drawn anew when something about it changed. */
+/** The target; rendered again after each change. */
 function useTarget(selection: Selection): Target | null {
   useEditor((state) => state.doc);
   useEditor((state) => state.ui.draft);
@@ -162,7 +162,7 @@ interface CoordinateProps {
   target: Target;
   settings: ToolSettings;
   frame: Pose;
-  /** The frame goes with the thing, or the viewer: only changes make sense. */
+  /** The frame moves with the item or the camera: only relative changes are possible. */
   relative: boolean;
   why: string;
   selection: Selection;
@@ -273,7 +273,7 @@ function Sizes({ model, target, settings, why, open, onOpen }: SizesProps) {
   ));
 }
 
-/** The step of the wheel: one of the table's, or any. */
+/** The step of the wheel: a predefined or a custom one. */
 function Steps({ settings, turn }: { settings: ToolSettings; turn: boolean }) {
   const [free, setFree] = useState(false);
   const steps = turn ? ANGLE_STEPS : LENGTH_STEPS;
@@ -314,7 +314,7 @@ function framesOf(state: State, target: Target): [FrameName, string][] {
   if (parent) choices.push(["parent", nameOf(state, parent)]);
   if (robots) choices.push(["robot", t`Robot base`]);
   choices.push(["own", t`Object`], ["view", t`View`]);
-  // A frame that was chosen elsewhere and is none here: it counts as the world's.
+  // A frame that does not exist here counts as the world.
   const { frame } = toolSettings(state);
   if (!choices.some(([each]) => each === frame)) choices.push([frame, t`World (no parent)`]);
   return choices;
@@ -326,7 +326,7 @@ async function copy(pose: Pose): Promise<void> {
     await navigator.clipboard.writeText(text);
     tell("info", t`Copied the pose in the world: position in m and quaternion.`);
   } catch {
-    tell("info", text); // without https there is no clipboard: it can be marked and copied by hand
+    tell("info", text); // without HTTPS there is no clipboard: the text can be selected and copied
   }
 }
 

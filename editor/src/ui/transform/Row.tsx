@@ -1,4 +1,7 @@
-/** One coordinate: a step less, the value, a step more. The value is a wheel: it is rolled or dragged by steps, a tap opens the keys. */
+/**
+ * One coordinate with buttons for a step down and up. The value is a wheel: drag or scroll to change it by steps, tap
+ * to type.
+ */
 
 import { t } from "@lingui/core/macro";
 import { type KeyboardEvent, type PointerEvent, useEffect, useRef } from "react";
@@ -16,7 +19,7 @@ interface RowProps {
   onOpen: () => void;
 }
 
-/** px of the wheel that are one step. */
+/** Distance of the wheel per step, px. */
 const NOTCH = 14;
 
 export function Row({ label, value, unit, step, why, open, onSteps, onOpen }: RowProps) {
@@ -27,7 +30,7 @@ export function Row({ label, value, unit, step, why, open, onSteps, onOpen }: Ro
   turn.current = onSteps;
   const words = stepWords(step, isAngle(unit) ? "angle" : "length");
 
-  // React listens to wheels passively: the panel would scroll meanwhile.
+  // React's wheel listeners are passive, so the panel would scroll too.
   useEffect(() => {
     const element = wheel.current;
     if (!element || why) return;

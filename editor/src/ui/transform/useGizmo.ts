@@ -1,4 +1,4 @@
-/** Puts the gizmo at the selected thing, and does what the hand does with it. */
+/** Put the gizmo at the selected item, and apply its drags. */
 
 import { useEffect } from "react";
 import { type Moving, moving } from "../../commands/moving";
@@ -18,9 +18,9 @@ import { frameOf, notMovable, notSizable, type Target, targetOf } from "../../tr
 import { toolSettings } from "../../transform/tool";
 import { ORIGIN } from "../../viewmodel/frames";
 
-/** px within which the pointer catches another thing. */
+/** Distance within which the pointer snaps to another item, px. */
 const CATCH = 28;
-/** What a free pull is rounded to, m and rad: nobody means less. */
+/** Precision of free drags, m and rad. */
 const FINE = 0.0001;
 const FINE_TURN = Math.PI / 1800;
 
@@ -29,7 +29,7 @@ export function viewPose(): Pose {
   return camera ? worldPose(camera) : ORIGIN;
 }
 
-/** Whose axes are meant now. */
+/** The frame of the axes. */
 export function toolFrame(state: State, target: Target): Pose {
   const { frame } = toolSettings(state);
   return frameOf(state, frame, target, chosenRobot(state)?.robotId ?? "", viewPose());
@@ -78,7 +78,7 @@ export function useGizmo(selection: Selection, mode: GizmoMode): void {
   }, [kind, id, mode]);
 }
 
-/** Follows one drag after the other. */
+/** Apply one drag after the other. */
 class Follower {
   private start: Target | null = null;
   private one: Moving | null = null;
@@ -103,7 +103,7 @@ class Follower {
   }
 
   private move(engine: Engine, drag: Drag, start: Target, one: Moving): void {
-    if (one.failed) return; // it was refused, which was told
+    if (one.failed) return; // refused: the user has been notified
     const state = now();
     const { snap, lengthStep, angleStep, length, angle } = toolSettings(state);
     const { handle } = drag;
@@ -143,7 +143,7 @@ class Follower {
     }
   }
 
-  /** Where a thing is that hangs on the pointer. */
+  /** Return the pose of an item that follows the pointer. */
   private freely(engine: Engine, drag: Drag, start: Target): Pose {
     const state = now();
     const { snap, lengthStep } = toolSettings(state);
@@ -179,5 +179,6 @@ function signed(text: string): string {
 }
 
 function way(by: Position, unit: ReturnType<typeof toolSettings>["length"]): string {
-  return `${(["x", "y", "z"] as const).map((axis) => `${axis.toUpperCase()} ${signed(show(rounded(by[axis], FINE), unit))}`).join("  ")} ${unit}`;
+  const part = (axis: "x" | "y" | "z") => `${axis.toUpperCase()} ${signed(show(rounded(by[axis], FINE), unit))}`;
+  return `${part("x")}  ${part("y")}  ${part("z")} ${unit}`;
 }

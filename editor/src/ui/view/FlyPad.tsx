@@ -1,4 +1,4 @@
-/** Buttons that move a camera that flies, for who has no keyboard: as long as they are held. */
+/** Buttons that fly the camera while they are held, for devices without a keyboard. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";

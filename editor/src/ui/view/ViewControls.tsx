@@ -1,4 +1,4 @@
-/** At the edge of the view: all of it, a cube to look from its sides, to fly or to turn, and views that were kept. */
+/** Controls of the view: show all, view cube, fly or orbit, saved views. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -21,7 +21,7 @@ import "./view.css";
 
 type Direction = [number, number, number];
 
-/** The sides of the cube: what is written there, where it faces, and where its words run and their upper edge points. */
+/** Faces of the cube: name, normal, and directions of the text and its upper edge. */
 const SIDES: [ViewName, MessageDescriptor, Direction, Direction, Direction][] = [
   ["top", msg`Top`, [0, 0, 1], [1, 0, 0], [0, 1, 0]],
   ["front", msg`Front`, [0, -1, 0], [1, 0, 0], [0, 0, 1]],
@@ -29,7 +29,7 @@ const SIDES: [ViewName, MessageDescriptor, Direction, Direction, Direction][] = 
   ["side", msg`Right`, [1, 0, 0], [0, 1, 0], [0, 0, 1]],
   ["left", msg`Left`, [-1, 0, 0], [0, -1, 0], [0, 0, 1]],
 ];
-/** Half of its edge, pixels. */
+/** Half edge, pixels. */
 const HALF = 30;
 
 const KEY = "bookmarks";
@@ -123,7 +123,7 @@ function switchCross(): void {
   keepGeneral({ aiming: !aimsAlways(now()) || null });
 }
 
-/** X: the cross comes and goes. */
+/** X shows or hides the crosshair. */
 function useCrossKey(): void {
   useEffect(() => {
     const key = (event: KeyboardEvent) => {
@@ -137,15 +137,15 @@ function useCrossKey(): void {
 }
 
 /**
- * Turns as the view does; a tap on a face looks from there. The menu has the same for the keyboard. Its faces are
- * slanted in the plane: a cube in space would be put together anew whenever anything on the page is drawn.
+ * A view cube: tap a face to look from there. The menu offers the same by keyboard. The faces are 2D transforms, since
+ * a 3D element would be composited again with every change of the page.
  */
 function Cube({ engine, onLook }: { engine: Engine; onLook: (from: ViewName) => void }) {
   const cube = useRef<HTMLDivElement>(null);
   useEffect(() => {
     const turn = () => {
       const e = engine.view.camera.matrixWorldInverse.elements;
-      // Right, down and towards the eye: how far a direction goes there.
+      // Return the components of a direction: right, down and towards the camera.
       const along = (row: number, [x, y, z]: Direction) =>
         (e[row] ?? 0) * x + (e[4 + row] ?? 0) * y + (e[8 + row] ?? 0) * z;
       SIDES.forEach(([, , faces, words, upper], n) => {

@@ -1,4 +1,4 @@
-/** The middle: the 3D view, the program as a graph, both, or its code. The 3D view stays behind what covers it. */
+/** The centre: 3D view, program graph, both, or code. The 3D view stays behind the others. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";

@@ -1,4 +1,6 @@
-/** The right side: the open tool, or the selected thing in sections. On a narrow screen it is a sheet from below. */
+/**
+ * The panel on the right: the open tool, or sections about the selected item. On narrow screens it is a bottom sheet.
+ */
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";

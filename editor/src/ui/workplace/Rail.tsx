@@ -1,4 +1,4 @@
-/** The tools: icon and word. One that cannot be used says why when it is tapped. */
+/** The tools: icon and word. A tool that is not available says why when it is tapped. */
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";

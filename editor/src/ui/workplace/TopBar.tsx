@@ -1,4 +1,4 @@
-/** Above the view: what is open and whether it is saved, undo, online or offline, who is here. */
+/** The top bar: document, save, undo and redo, online switch, users. */
 
 import { i18n } from "@lingui/core";
 import { msg, plural, t } from "@lingui/core/macro";

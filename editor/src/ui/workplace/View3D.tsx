@@ -1,4 +1,4 @@
-/** The view in the middle: gives the engine what to show, and takes its taps. The engine is loaded when it is needed. */
+/** The 3D view: passes the items to the engine, and handles taps. The engine is loaded when it is needed. */
 
 import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useRef, useState } from "react";
@@ -93,7 +93,7 @@ export function View3D() {
         key={quality}
         tabIndex={0}
         role="application"
-        aria-label={t`3D view of the workplace. Keys W, A, S, D, Q and E fly. The object list offers the same by keyboard.`}
+        aria-label={t`3D view. Keys W, A, S, D, Q and E fly. The object list offers the same by keyboard.`}
       />
       <div ref={labels} className="view-labels" aria-hidden="true" />
       {!engine && !failed && <Waiting>{t`Loading the view…`}</Waiting>}
@@ -111,7 +111,7 @@ export function View3D() {
   );
 }
 
-/** `?q=low` and `?q=high` choose; else a device with few cores gets the light one. */
+/** `?q=low` and `?q=high` select the quality; by default devices with few cores get the low one. */
 function chosen(quality: "auto" | Quality): Quality {
   if (quality !== "auto") return quality;
   const asked = new URLSearchParams(location.search).get("q");

@@ -1,4 +1,4 @@
-/** The frame around the open workplace: bar above, tools at the left, the view, a panel at the right. */
+/** The frame of the open workplace: top bar, tools on the left, view, panel on the right. */
 
 import { Suspense } from "react";
 import { useEditor } from "../../store/store";

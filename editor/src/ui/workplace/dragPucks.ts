@@ -1,13 +1,13 @@
-/** Drags a puck that is selected over the level on which it stands; where it is let go, all see it. */
+/** Drag the selected puck on its level; on release it is moved for all users. */
 
 import { notEditable, placePuck, showPuck } from "../../commands/program";
 import type { Engine } from "../../engine/engine";
 import { now } from "../../store/store";
 
-/** Pixels that a finger moves before it drags: less is a tap. */
+/** Distance after which a touch is a drag, pixels. */
 const BEGINS = 6;
 
-/** Listen on the canvas of the view; gives what ends that. */
+/** Listen on the canvas; return a function that ends it. */
 export function dragPucks(engine: Engine, canvas: HTMLCanvasElement): () => void {
   let held: {
     id: string;

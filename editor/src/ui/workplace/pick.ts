@@ -1,9 +1,9 @@
-/** What a pick in the view does: it says where a step leads while one is drawn, else it selects. */
+/** Handle a pick in the view: end a connection in progress, or select. */
 
 import { now, select, setUi } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 
-/** `ids` are what was meant, the likeliest first. A pick of what is selected goes to what is behind it. */
+/** `ids` are the candidates, most likely first. Picking the selected item again selects the one behind it. */
 export function pick(ids: readonly string[]): void {
   const state = now();
   const found = ids.map((id) => selectionOf(state, id)).filter((each) => each !== null);
@@ -12,7 +12,7 @@ export function pick(ids: readonly string[]): void {
     if (target) void import("../../commands/program").then(({ endStep }) => endStep(target.id));
     return;
   }
-  // So everything can be reached.
+  // So every item can be selected.
   const at = found.findIndex((each) => each.id === state.ui.selection?.id);
   const next = found[(at + 1) % Math.max(1, found.length)] ?? null;
   select(next);

@@ -1,4 +1,4 @@
-/** Ctrl+Z and Shift+Ctrl+Z (Ctrl+Y): the server's undo and redo. In a field they undo what is typed there. */
+/** Ctrl+Z and Shift+Ctrl+Z (Ctrl+Y): undo and redo on the server. In text fields the browser handles them. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
@@ -6,7 +6,7 @@ import * as documents from "../../commands/documents";
 import { barred } from "../../store/permissions";
 import { now, tell } from "../../store/store";
 
-/** ms after a step in which the news of what can be undone next may still be on the way. */
+/** Time after a step within which the event about the next one may still arrive, ms. */
 const NEWS = 1000;
 
 export function useUndoKeys(): void {

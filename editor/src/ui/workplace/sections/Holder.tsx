@@ -1,4 +1,4 @@
-/** Who else holds the selected thing, since when, and what can be done about it. */
+/** The user who has locked the selected item, since when, and the possible actions. */
 
 import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useState } from "react";

@@ -1,4 +1,4 @@
-/** What the selected thing is, who holds it, how it is. */
+/** About the selected item: type, lock, state. */
 
 import { msg, t } from "@lingui/core/macro";
 import { Suspense } from "react";
@@ -47,7 +47,7 @@ export const TONE: Record<string, string> = {
   connecting: "warn",
 };
 
-/** An action's name as words. */
+/** Return the name of an action as words. */
 function words(name: string): string {
   return name.replaceAll("_", " ");
 }

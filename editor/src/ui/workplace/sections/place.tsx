@@ -1,4 +1,4 @@
-/** Where the selected thing stands, and all ways to put it elsewhere. */
+/** Pose of the selected item, and the ways to change it. */
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../../kit/lazily";

@@ -1,4 +1,4 @@
-/** Each device's connection and condition, in words; one that failed can be tried again by itself. */
+/** Connection and health of each device; a failed one can be retried. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -29,7 +29,7 @@ export default function Panel() {
   const doc = useEditor((state) => state.doc);
   const cannot = useEditor((state) => barred(state, "RetryObject"));
   const troubled = (id: string) => live.objects[id]?.state === "failed" || live.objects[id]?.state === "lost";
-  // Boxes and tables are no devices.
+  // Boxes and tables are not devices.
   const inert = useEditor((state) =>
     Object.values(state.doc?.objects ?? {})
       .filter((each) => derivesFrom(state, each.type, "VirtualCollisionObject"))
@@ -39,7 +39,7 @@ export default function Panel() {
   const devices = Object.values(doc?.objects ?? {}).filter(
     (each) => troubled(each.id) || !inert.split(",").includes(each.id),
   );
-  // What is in trouble stands first.
+  // Faulty devices first.
   const objects = devices.sort(
     (a, b) => Number(troubled(b.id)) - Number(troubled(a.id)) || a.name.localeCompare(b.name),
   );

@@ -1,4 +1,4 @@
-/** Each device's connection and condition. */
+/** Connection and health of each device. */
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../../kit/lazily";

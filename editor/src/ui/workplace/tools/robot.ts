@@ -1,4 +1,4 @@
-/** The robot in hand. */
+/** The active robot. */
 
 import { msg, t } from "@lingui/core/macro";
 import { robotsOf } from "../../../session/streams";

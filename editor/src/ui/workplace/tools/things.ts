@@ -1,4 +1,4 @@
-/** The list of all that is in the workplace. */
+/** The object list. */
 
 import { msg } from "@lingui/core/macro";
 import { lazily } from "../../kit/lazily";
