@@ -3,10 +3,10 @@
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { loadCatalogue, preferredLanguage } from "./i18n/catalogue";
-import { remembered, takeTokenFromAddress } from "./session/memory";
+import { remembered, takeTokenFromAddress } from "./session/localStorage";
 import { session } from "./session/session";
 import { App } from "./ui/App";
-import { persistently } from "./ui/kit/lazily";
+import { persistently } from "./ui/kit/lazy";
 import "./ui/tokens.css";
 import "./ui/base.css";
 

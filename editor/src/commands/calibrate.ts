@@ -5,11 +5,11 @@ import { createStore } from "zustand/vanilla";
 import type { Pivot, Pose, Position } from "../protocol/types";
 import { refusedWith } from "../session/assets";
 import { call } from "../session/connection";
-import { remembered } from "../session/memory";
+import { remembered } from "../session/localStorage";
 import { now, setUi, store } from "../store/store";
 import { FLIPPED, pivotOffset } from "../transform/pivots";
 import { composed } from "../viewmodel/frames";
-import { held, refusal } from "./asking";
+import { held, refusal } from "./requests";
 import { type Chosen, robotArg } from "./robot";
 
 /** Set the pose of an object from the robot tool; `pivot` is the touched part of the object. */

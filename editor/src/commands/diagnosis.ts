@@ -3,11 +3,11 @@
 import { t } from "@lingui/core/macro";
 import { version } from "../../package.json";
 import { refusedWith } from "../session/assets";
-import { diary } from "../session/diary";
-import { remembered } from "../session/memory";
+import { remembered } from "../session/localStorage";
+import { diary } from "../session/log";
 import { now } from "../store/store";
-import { refusal } from "./asking";
 import { saveAs } from "./files";
+import { refusal } from "./requests";
 
 /** Save the file on this device. Return why it failed, or an empty string. */
 export function saveDiagnosis(): Promise<string> {

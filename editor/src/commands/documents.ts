@@ -2,7 +2,7 @@
 
 import { call } from "../session/connection";
 import { now, store } from "../store/store";
-import { ask, held, refusal } from "./asking";
+import { ask, held, refusal } from "./requests";
 import { keepThumbnail } from "./thumbnail";
 
 export const openScene = (id: string) => ask("OpenScene", { id });

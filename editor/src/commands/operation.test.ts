@@ -3,7 +3,7 @@ import { beforeEach, expect, test, vi } from "vitest";
 const call = vi.fn();
 vi.mock("../session/connection", () => ({ call, serves: () => true }));
 const endHolds = vi.fn();
-vi.mock("./holds", () => ({ endHolds }));
+vi.mock("./holdToRun", () => ({ endHolds }));
 const tell = vi.fn();
 vi.mock("../store/store", () => ({ tell, now: () => ({}) }));
 const { stopMotion } = await import("./operation");

@@ -3,8 +3,8 @@
 import { t } from "@lingui/core/macro";
 import { call, serves } from "../session/connection";
 import { tell } from "../store/store";
-import { ask, sentence } from "./asking";
-import { endHolds } from "./holds";
+import { endHolds } from "./holdToRun";
+import { ask, sentence } from "./requests";
 
 /** Go online; devices that fail are left out if the server supports it. */
 export const goOnline = () => ask(serves("StartSceneKeepGoing") ? "StartSceneKeepGoing" : "StartScene");

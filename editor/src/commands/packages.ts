@@ -2,10 +2,10 @@
 
 import { t } from "@lingui/core/macro";
 import { refusedWith } from "../session/assets";
-import { remembered } from "../session/memory";
+import { remembered } from "../session/localStorage";
 import { now } from "../store/store";
-import { refusal } from "./asking";
 import { saveAs } from "./files";
+import { refusal } from "./requests";
 
 const headers = (): HeadersInit => {
   const token = remembered("token");

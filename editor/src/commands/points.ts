@@ -6,7 +6,7 @@ import { call } from "../session/connection";
 import type { State } from "../store/state";
 import { now, select, store } from "../store/store";
 import { relativeTo, worldOf } from "../viewmodel/frames";
-import { held, refusal } from "./asking";
+import { held, refusal } from "./requests";
 import { type Chosen, robotArg } from "./robot";
 
 /** Time within which the event of an added item arrives after the answer, s. */

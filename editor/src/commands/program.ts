@@ -20,7 +20,7 @@ import { put } from "../store/records";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
 import { now, select, setUi, store, tell } from "../store/store";
-import { ask, held, refusal, sentence } from "./asking";
+import { ask, held, refusal, sentence } from "./requests";
 
 /** Time within which the event of an added item arrives, s. */
 const TOLD_WITHIN = 5;

@@ -1,4 +1,4 @@
-/** The active robot: selection, motion, and the ghost that shows it elsewhere. Held motions: holds.ts. */
+/** The active robot: selection, motion, and the ghost that shows it elsewhere. Held motions: holdToRun.ts. */
 
 import { t } from "@lingui/core/macro";
 import type { Joint, Pose, RobotArg, RobotFeatures, StepAxis, StepMode, StepWhat } from "../protocol/types";
@@ -9,7 +9,7 @@ import { barred } from "../store/permissions";
 import type { Arm, Ghost, State } from "../store/state";
 import { now, setUi } from "../store/store";
 import { telemetry } from "../store/telemetry";
-import { held, refusal, sentence } from "./asking";
+import { held, refusal, sentence } from "./requests";
 import { keepView } from "./viewstate";
 
 /** A robot, its arm (empty if it has one) and its end effector (empty if unknown). */

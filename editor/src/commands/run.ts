@@ -6,7 +6,7 @@ import { barred } from "../store/permissions";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
 import { now, tell } from "../store/store";
-import { ask, sentence } from "./asking";
+import { ask, sentence } from "./requests";
 
 /** Time limit, s. A build copies the code of the drivers, which takes time on a busy computer. */
 const BUILT_WITHIN = 120;

@@ -14,9 +14,9 @@ import type { State } from "../store/state";
 import { now, select, setUi, tell } from "../store/store";
 import { lifted } from "../transform/sizes";
 import { ORIGIN, plus, rotated } from "../viewmodel/frames";
-import { aimedPlace } from "./aimed";
-import { ask, held, refusal } from "./asking";
+import { aimedPlace } from "./crosshair";
 import { awaited } from "./program";
+import { ask, held, refusal } from "./requests";
 
 /** Return why objects cannot be added, removed or configured now; an empty string if they can. */
 export function notBuildable(state: State, request: Parameters<typeof barred>[1] = "AddObjectToScene"): string {

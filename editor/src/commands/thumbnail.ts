@@ -7,7 +7,7 @@ import { theEngine } from "../session/engine";
 import { barred } from "../store/permissions";
 import { openId } from "../store/selectors";
 import { now } from "../store/store";
-import { refusal } from "./asking";
+import { refusal } from "./requests";
 
 /** Size in pixels, and largest number of characters. */
 const WIDTH = 320;

@@ -4,13 +4,15 @@ import { Box3, Fog, GridHelper, PCFShadowMap, Scene, SRGBColorSpace, Vector3, We
 import type { Telemetry } from "../store/telemetry";
 import { Batches } from "./batches";
 import { View } from "./camera";
-import { DropLine, heightWords } from "./drop";
+import { DropLine, heightWords } from "./dropLine";
 import { Gizmo } from "./gizmo/gizmo";
 import type { Item } from "./items";
+import { labelsOf } from "./labelling";
 import { Labels } from "./labels";
 import { light } from "./light";
-import { labelsOf } from "./naming";
 import { DARK, LIGHT, type Palette } from "./palette";
+import { Ties } from "./parentLines";
+import { type Way, WayLine } from "./pathLine";
 import { type Hit, onFloor, pick } from "./picking";
 import { followPointer } from "./pointer";
 import { type Probe, probe } from "./probe";
@@ -18,8 +20,6 @@ import type { Quality } from "./surface";
 import type { Context, Thing } from "./thing";
 import { make } from "./things/make";
 import { type JointLimit, RobotThing } from "./things/robot";
-import { Ties } from "./ties";
-import { type Way, WayLine } from "./way";
 
 export type { Quality };
 

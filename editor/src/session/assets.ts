@@ -1,7 +1,7 @@
 /** Assets of the server: meshes and robot models. */
 
 import { t } from "@lingui/core/macro";
-import { remembered } from "./memory";
+import { remembered } from "./localStorage";
 
 /** Return an asset as binary glTF, prepared by the server; reject with the server's sentence. */
 export async function readShown(id: string): Promise<ArrayBuffer> {

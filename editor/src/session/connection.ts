@@ -3,7 +3,7 @@
 import { type CallOptions, ProtocolClient } from "../protocol/client";
 import type { Requests } from "../protocol/types";
 import { now } from "../store/store";
-import { note } from "./diary";
+import { note } from "./log";
 
 export const client = new ProtocolClient({ open: () => new WebSocket(address()) as never });
 

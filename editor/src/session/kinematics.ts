@@ -1,6 +1,6 @@
 /** Kinematics used for a robot (docs/protocol.md). */
 
-import { remembered } from "./memory";
+import { remembered } from "./localStorage";
 
 export interface RobotKinematics {
   object_id: string;

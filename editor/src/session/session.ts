@@ -12,12 +12,12 @@ import { applyEvent, now, setConnection, store, tell } from "../store/store";
 import { telemetry } from "../store/telemetry";
 import { RobotArms } from "./arms";
 import { call, client } from "./connection";
-import { note } from "./diary";
+import { DocumentDetails } from "./documentDetails";
 import type { Follower } from "./follower";
-import { DocumentDetails } from "./following";
 import { loadLists, loadTypes } from "./lists";
+import { note } from "./log";
 import { PresenceReporter } from "./presence";
-import { ProgramDetails } from "./programs";
+import { ProgramDetails } from "./programDetails";
 import { RobotStreams } from "./streams";
 
 /** WebSocket close code of the server for a missing or invalid token. */

@@ -2,15 +2,15 @@
 
 import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useState, useSyncExternalStore } from "react";
-import { rememberPerson } from "../session/memory";
+import { rememberPerson } from "../session/localStorage";
 import { isLive, isRunning, openId } from "../store/selectors";
 import { now, useEditor } from "../store/store";
 import { LostConnection } from "./connection/LostConnection";
 import { Dock } from "./dock/Dock";
-import { keepRecent } from "./home/kept";
+import { keepRecent } from "./home/recent";
 import { Join } from "./join/Join";
 import { Waiting } from "./kit/kit";
-import { lazily } from "./kit/lazily";
+import { lazily } from "./kit/lazy";
 import { Overlays } from "./search/Overlays";
 import { useScreenSettings } from "./settings/Settings";
 import { Workplace } from "./workplace/Workplace";

@@ -6,7 +6,7 @@ import { reachOfAction, worse } from "../program/reach";
 import type { LogicItem, ObjectTypeMeta, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import type { Draft, Ghost, OpenDocument, State } from "../store/state";
-import { faintness } from "./seeing";
+import { faintness } from "./visibility";
 
 export const START = "START";
 export const END = "END";

@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
 import { opened } from "../store/document";
 import { initialState, type State } from "../store/state";
-import { faintness } from "./seeing";
 import { allOf, counts, fitting, flat, narrowed, neighbour, thingsOf } from "./things";
+import { faintness } from "./visibility";
 
 const UPRIGHT = { x: 0, y: 0, z: 0, w: 1 };
 const POSE = { position: { x: 0, y: 0, z: 0 }, orientation: UPRIGHT };

@@ -3,7 +3,7 @@
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import type { Kind, State } from "../store/state";
-import { GROUPS, type Group } from "./seeing";
+import { GROUPS, type Group } from "./visibility";
 
 export interface Row {
   id: string;

@@ -9,7 +9,7 @@ import { now, useEditor } from "../../store/store";
 import { notMovable } from "../../transform/target";
 import { apart } from "../../viewmodel/frames";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Doing";
+import { RefusedText, useAsking } from "../points/Refusal";
 
 /** Smallest change, m and degrees; less is numerical noise. */
 const NOTHING = 1e-6;

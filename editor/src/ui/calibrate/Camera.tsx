@@ -2,14 +2,14 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { sentence } from "../../commands/asking";
 import { calibrateCamera, takePicture } from "../../commands/calibrate";
+import { sentence } from "../../commands/requests";
 import { notReady } from "../../commands/robot";
 import { useEditor } from "../../store/store";
 import { OnOff } from "../kit/fields";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Doing";
 import { useWhyNot } from "../points/editing";
+import { RefusedText, useAsking } from "../points/Refusal";
 import type { Section } from "../workplace/section";
 import { Records } from "./Records";
 import "./calibrate.css";

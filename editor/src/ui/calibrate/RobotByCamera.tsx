@@ -9,8 +9,8 @@ import { useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { OnOff, Pick } from "../kit/fields";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Doing";
 import { useWhyNot } from "../points/editing";
+import { RefusedText, useAsking } from "../points/Refusal";
 import type { Section } from "../workplace/section";
 import { Records } from "./Records";
 

@@ -4,7 +4,7 @@ import { msg } from "@lingui/core/macro";
 import type { SceneObject } from "../../protocol/types";
 import { derivesFrom } from "../../store/selectors";
 import type { Selection, State } from "../../store/state";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
 /** For objects of an open scene, not of a project. */

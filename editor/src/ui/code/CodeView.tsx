@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { useCallback, useEffect, useMemo, useState } from "react";
 import * as documents from "../../commands/documents";
-import { remembered } from "../../session/memory";
+import { remembered } from "../../session/localStorage";
 import { barred } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import { select, tell, useEditor } from "../../store/store";

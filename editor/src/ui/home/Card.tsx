@@ -14,15 +14,15 @@ import { isRunning } from "../../store/selectors";
 import { now, tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { AskName, More } from "../kit/loaded";
+import { AskName, More } from "../kit/lazyControls";
 import type { Choice } from "../kit/props";
 import { endName } from "../run/History";
 import { ago } from "../times";
 import { Deleting } from "./Deleting";
+import { starsOf } from "./favorites";
 import { Inline } from "./Inline";
-import { isTemplate, keepRecent, keepTemplate } from "./kept";
 import { Problems } from "./Problems";
-import { starsOf } from "./stars";
+import { isTemplate, keepRecent, keepTemplate } from "./recent";
 import { Thumbnail } from "./Thumbnail";
 
 type Doing = "open" | "copy" | "rename" | "describe" | "remove";

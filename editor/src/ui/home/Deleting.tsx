@@ -5,7 +5,7 @@ import { useEffect, useState } from "react";
 import * as documents from "../../commands/documents";
 import type { Entry } from "../../home/entries";
 import { Button } from "../kit/kit";
-import { Confirm } from "../kit/loaded";
+import { Confirm } from "../kit/lazyControls";
 
 const DELETE = { scene: documents.deleteScene, project: documents.deleteProject, package: documents.deletePackage };
 

@@ -14,10 +14,10 @@ import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
 import { Card } from "./Card";
-import { recentOf } from "./kept";
+import { starsOf } from "./favorites";
 import { NewProject } from "./NewProject";
 import { NewScene } from "./NewScene";
-import { starsOf } from "./stars";
+import { recentOf } from "./recent";
 import { UploadPackage } from "./UploadPackage";
 import "./home.css";
 

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Doing";
+import { RefusedText, useAsking } from "../points/Refusal";
 
 interface InlineProps {
   label: string;

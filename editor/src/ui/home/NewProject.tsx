@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import * as documents from "../../commands/documents";
 import { useEditor } from "../../store/store";
-import { AskName } from "../kit/loaded";
+import { AskName } from "../kit/lazyControls";
 import { StartFrom } from "./StartFrom";
 
 export function NewProject({ initial = "", onClose }: { initial?: string; onClose: () => void }) {

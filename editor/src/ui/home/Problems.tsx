@@ -2,15 +2,15 @@
 
 import { plural, t } from "@lingui/core/macro";
 import { useState } from "react";
-import { sentence } from "../../commands/asking";
 import * as documents from "../../commands/documents";
-import { faultyObjects, takeOut } from "../../commands/mend";
+import { faultyObjects, takeOut } from "../../commands/repair";
+import { sentence } from "../../commands/requests";
 import type { Entry } from "../../home/entries";
 import { barred } from "../../store/permissions";
 import { tell, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { Confirm } from "../kit/loaded";
+import { Confirm } from "../kit/lazyControls";
 
 interface ProblemsProps {
   entry: Entry;

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useEditor } from "../../store/store";
-import { isTemplate } from "./kept";
+import { isTemplate } from "./recent";
 
 interface StartFromProps {
   of: readonly { id: string; name: string }[];

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import encodeQR from "qr";
 import { useEffect, useState } from "react";
-import { howToJoin, type Joining } from "../../commands/joining";
+import { howToJoin, type Joining } from "../../commands/invitation";
 import { Waiting } from "../kit/kit";
 import "./invitation.css";
 

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
-import { peopleHere, remember, remembered } from "../../session/memory";
+import { peopleHere, remember, remembered } from "../../session/localStorage";
 import { session } from "../../session/session";
 import { useEditor } from "../../store/store";
 import { Button, Field, Waiting } from "../kit/kit";

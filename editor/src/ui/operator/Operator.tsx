@@ -9,7 +9,7 @@ import * as commands from "../../commands/run";
 import { keepGeneral } from "../../commands/viewstate";
 import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
 import { session } from "../../session/session";
-import { usersOfDocument } from "../../store/left";
+import { usersOfDocument } from "../../store/absentUsers";
 import { barred } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";

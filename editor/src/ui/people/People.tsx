@@ -3,12 +3,12 @@
 import { plural, t } from "@lingui/core/macro";
 import { Suspense, useState } from "react";
 import { serves } from "../../session/connection";
-import { goneHolders } from "../../store/left";
+import { goneHolders } from "../../store/absentUsers";
 import { now, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import { colourOf, initials } from "./colours";
 import "./people.css";
 

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { ask } from "../../commands/asking";
+import { ask } from "../../commands/requests";
 import type { LockHolder } from "../../protocol/types";
 import { barred } from "../../store/permissions";
 import { now, tell, useEditor } from "../../store/store";

@@ -7,8 +7,8 @@ import type { Position } from "../../protocol/types";
 import { Amount } from "../kit/fields";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
-import { RefusedText, useAsking } from "./Doing";
 import { useWhyNot } from "./editing";
+import { RefusedText, useAsking } from "./Refusal";
 
 const CopiesSection: Section["Body"] = ({ selection: { id } }) => {
   const [count, setCount] = useState(1);

@@ -1,7 +1,7 @@
 /** A name that is edited in place: saved on Enter or when the field loses the focus. */
 
 import { useId, useState } from "react";
-import { RefusedText, useAsking } from "./Doing";
+import { RefusedText, useAsking } from "./Refusal";
 
 export function NameField({
   label,

@@ -10,10 +10,10 @@ import { rollPitchYaw } from "../../viewmodel/rotations";
 import { Amount } from "../kit/fields";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
-import { RefusedText, useAsking } from "./Doing";
 import { useWhyNot } from "./editing";
 import { NameField } from "./NameField";
 import { ReachAnswers } from "./Reach";
+import { RefusedText, useAsking } from "./Refusal";
 import { Remove } from "./Remove";
 import "./points.css";
 

@@ -2,7 +2,7 @@
 
 import { plural, t } from "@lingui/core/macro";
 import { useState } from "react";
-import { holdHandTeaching } from "../../commands/holds";
+import { holdHandTeaching } from "../../commands/holdToRun";
 import { movePointToRobot, possibleParents, removePoint, renamePoint, setParent } from "../../commands/points";
 import { chosenRobot, featuresOf, notReady } from "../../commands/robot";
 import { keepView } from "../../commands/viewstate";
@@ -12,9 +12,9 @@ import { Pick } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { HoldButton } from "../robot/HoldButton";
 import type { Section } from "../workplace/section";
-import { RefusedText, useAsking } from "./Doing";
 import { useWhyNot } from "./editing";
 import { NameField } from "./NameField";
+import { RefusedText, useAsking } from "./Refusal";
 import { Remove } from "./Remove";
 import "./points.css";
 

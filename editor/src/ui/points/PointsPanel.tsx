@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { createPortal } from "react-dom";
-import { against, aimedPlace } from "../../commands/aimed";
+import { against, aimedPlace } from "../../commands/crosshair";
 import { addPoint, addPointFromRobot } from "../../commands/points";
 import { chosenRobot, notReady } from "../../commands/robot";
 import { keepGeneral } from "../../commands/viewstate";
@@ -18,8 +18,8 @@ import { nameOf } from "../../viewmodel/names";
 import { Amount, MoreOrLess, OneOf, OnOff } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { usePlaceTap } from "../robot/usePlaceTap";
-import { RefusedText, useAsking } from "./Doing";
 import { PointTree } from "./PointTree";
+import { RefusedText, useAsking } from "./Refusal";
 import "./points.css";
 
 /**

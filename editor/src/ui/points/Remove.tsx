@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { tell } from "../../store/store";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "./Doing";
+import { RefusedText, useAsking } from "./Refusal";
 
 export function Remove({
   name,

@@ -16,11 +16,11 @@ import { relativeTo, worldOf } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { More } from "../kit/loaded";
+import { More } from "../kit/lazyControls";
 import type { Section } from "../workplace/section";
-import { RefusedText, useAsking } from "./Doing";
 import { useWhyNot } from "./editing";
 import { ReachBadge } from "./Reach";
+import { RefusedText, useAsking } from "./Refusal";
 
 const DOWN = { x: 1, y: 0, z: 0, w: 0 };
 

@@ -2,7 +2,7 @@
 
 import { msg } from "@lingui/core/macro";
 import type { Kind } from "../../store/state";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
 const of =
@@ -19,7 +19,7 @@ export const pointSections: readonly Section[] = [
     Body: lazily(() => import("./OrientationSection")),
   },
   { id: "joints", title: msg`Joints`, applies: of("joints"), Body: lazily(() => import("./JointsSection")) },
-  { id: "go", title: msg`Robot`, applies: of("orientation", "joints"), Body: lazily(() => import("./GoThere")) },
+  { id: "go", title: msg`Robot`, applies: of("orientation", "joints"), Body: lazily(() => import("./MoveRobot")) },
   {
     id: "orientations",
     title: msg`Orientations`,

@@ -1,7 +1,7 @@
 /** Points of the project: list and add. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import type { Tool } from "../workplace/tool";
 
 export const points: Tool = {

@@ -14,7 +14,7 @@ import {
   ToggleButtonGroup,
 } from "react-aria-components";
 import { createPortal } from "react-dom";
-import { aimedPlace } from "../../commands/aimed";
+import { aimedPlace } from "../../commands/crosshair";
 import { addAction, notEditable, type Where } from "../../commands/program";
 import { words } from "../../program/naming";
 import type { ObjectAction } from "../../protocol/types";

@@ -1,7 +1,7 @@
 /** Position of the puck of an action, Start or End: at its point, or where a user moved it. */
 
 import { t } from "@lingui/core/macro";
-import { aimedPlace } from "../../commands/aimed";
+import { aimedPlace } from "../../commands/crosshair";
 import { notEditable, placePuck } from "../../commands/program";
 import { tell, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";

@@ -1,13 +1,13 @@
 /** Sections of the panel about actions, connections, START and END; their bodies are loaded when they are needed. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
 const isAction: Section["applies"] = ({ kind }) => kind === "action";
 
 export const programSections: readonly Section[] = [
-  { id: "try", title: msg`Do`, applies: isAction, Body: lazily(() => import("./Doing")) },
+  { id: "try", title: msg`Do`, applies: isAction, Body: lazily(() => import("./ActionCommands")) },
   {
     id: "parameters",
     title: msg`Parameters`,

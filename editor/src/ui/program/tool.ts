@@ -1,7 +1,7 @@
 /** The program: add actions, list them, problems, variables. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import type { Tool } from "../workplace/tool";
 
 export const program: Tool = {

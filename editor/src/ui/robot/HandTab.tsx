@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
-import { holdHandTeaching } from "../../commands/holds";
+import { holdHandTeaching } from "../../commands/holdToRun";
 import { type Chosen, featuresOf, notReady } from "../../commands/robot";
 import { useEditor } from "../../store/store";
 import { HoldButton } from "./HoldButton";

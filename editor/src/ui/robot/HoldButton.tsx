@@ -5,7 +5,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type ReactNode, useEffect, useRef, useState } from "react";
-import type { Held } from "../../commands/holds";
+import type { Held } from "../../commands/holdToRun";
 import { tell } from "../../store/store";
 
 interface HoldButtonProps {

@@ -3,7 +3,7 @@
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
-import { holdJog } from "../../commands/holds";
+import { holdJog } from "../../commands/holdToRun";
 import { type Chosen, featuresOf, moveToJoints, notReady } from "../../commands/robot";
 import type { Joint } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
@@ -12,7 +12,7 @@ import { telemetry } from "../../store/telemetry";
 import { Amount, OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { HoldButton } from "./HoldButton";
-import { FASTEST, mannerNow, setManner, useManner } from "./manner";
+import { FASTEST, mannerNow, setManner, useManner } from "./motionOptions";
 import { HOLD_HINT, PadDock } from "./PadDock";
 import { useTelemetry } from "./useTelemetry";
 

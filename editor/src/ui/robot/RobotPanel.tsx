@@ -11,7 +11,7 @@ import { GoTab } from "./GoTab";
 import { HandTab } from "./HandTab";
 import { JointsTab } from "./JointsTab";
 import { Kinematics } from "./Kinematics";
-import { MannerFields } from "./MannerFields";
+import { MannerFields } from "./MotionFields";
 import { PadPlace } from "./PadDock";
 import { RobotChooser } from "./RobotChooser";
 import { Status } from "./Status";

@@ -3,7 +3,7 @@
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
-import { holdJog } from "../../commands/holds";
+import { holdJog } from "../../commands/holdToRun";
 import {
   alignDown,
   type Chosen,
@@ -20,7 +20,7 @@ import { nameOf } from "../../viewmodel/names";
 import { Amount, OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { HoldButton } from "./HoldButton";
-import { ANGLES, DISTANCES, FASTEST, type FrameName, mannerNow, setManner, useManner } from "./manner";
+import { ANGLES, DISTANCES, FASTEST, type FrameName, mannerNow, setManner, useManner } from "./motionOptions";
 import { HOLD_HINT, PadDock } from "./PadDock";
 
 const AXES: readonly StepAxis[] = ["x", "y", "z"];

@@ -1,9 +1,9 @@
 /** Check a target while it is dragged: only the latest one, one request at a time. */
 
 import { type Chosen, effectorPose, showAt } from "../../commands/robot";
-import type { WayState } from "../../engine/way";
+import type { WayState } from "../../engine/pathLine";
 import type { Pose } from "../../protocol/types";
-import { metBy } from "../../session/lines";
+import { metBy } from "../../session/paths";
 
 /** Time between two requests, ms. */
 export const PAUSE = 100;

@@ -9,7 +9,7 @@ import { isRunning } from "../../store/selectors";
 import { select, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
-import { AskName } from "../kit/loaded";
+import { AskName } from "../kit/lazyControls";
 import { History } from "./History";
 import { LastResult } from "./Result";
 import { phaseName, RunButtons } from "./RunBar";

@@ -1,7 +1,7 @@
 /** Run the program: start, follow, trace, history. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import type { Tool } from "../workplace/tool";
 
 export const run: Tool = {

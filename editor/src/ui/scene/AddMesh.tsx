@@ -7,7 +7,7 @@ import type { MeshFile } from "../../scene/meshes";
 import { LENGTH_UNITS, type LengthUnit, show, WORTH } from "../../transform/amounts";
 import { OneOf } from "../kit/fields";
 import { Button, Field } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Doing";
+import { RefusedText, useAsking } from "../points/Refusal";
 import { MeshPreview } from "./MeshPreview";
 
 export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {

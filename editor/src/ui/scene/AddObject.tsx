@@ -6,7 +6,7 @@ import { addObject, freeObjectName } from "../../commands/scene";
 import { words } from "../../program/naming";
 import type { ObjectTypeMeta } from "../../protocol/types";
 import { Button, Field } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Doing";
+import { RefusedText, useAsking } from "../points/Refusal";
 import { missing, parametersOf, SettingsFields, type Values } from "./Settings";
 import { TypeUse } from "./TypeUse";
 

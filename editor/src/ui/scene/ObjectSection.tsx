@@ -8,10 +8,10 @@ import { heldBy } from "../../store/selectors";
 import { now, useEditor } from "../../store/store";
 import { MoreOrLess, OnOff } from "../kit/fields";
 import { Button } from "../kit/kit";
-import { Confirm } from "../kit/loaded";
+import { Confirm } from "../kit/lazyControls";
 import { NameField } from "../points/NameField";
 import type { Section } from "../workplace/section";
-import { putAside } from "./seeing";
+import { putAside } from "./hidden";
 import "./scene.css";
 
 const Body: Section["Body"] = ({ selection: { id } }) => {

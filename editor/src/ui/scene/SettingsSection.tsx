@@ -6,7 +6,7 @@ import { notBuildable, setParameters } from "../../commands/scene";
 import { heldBy } from "../../store/selectors";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Doing";
+import { RefusedText, useAsking } from "../points/Refusal";
 import type { Section } from "../workplace/section";
 import { missing, parametersOf, SettingsFields, type Values } from "./Settings";
 

@@ -2,14 +2,14 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { whyNot } from "../../commands/asking";
+import { whyNot } from "../../commands/requests";
 import { deleteType, scenesUsing } from "../../commands/scene";
 import type { ObjectTypeMeta } from "../../protocol/types";
 import { barred } from "../../store/permissions";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
-import { Confirm } from "../kit/loaded";
-import { RefusedText, useAsking } from "../points/Doing";
+import { Confirm } from "../kit/lazyControls";
+import { RefusedText, useAsking } from "../points/Refusal";
 
 export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: () => void }) {
   const [scenes, setScenes] = useState<string[] | null>(null);

@@ -1,7 +1,7 @@
 /** Sections about objects of the scene, loaded when they are needed. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
 export const objectSections: readonly Section[] = [

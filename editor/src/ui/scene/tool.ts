@@ -1,7 +1,7 @@
 /** Add devices, shapes and meshes to the scene. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import type { Tool } from "../workplace/tool";
 
 export const add: Tool = {

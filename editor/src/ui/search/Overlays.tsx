@@ -1,7 +1,7 @@
 /** Dialogs that open over every screen: search ("/"), about and keys ("?"), messages. */
 
 import { Suspense, useEffect } from "react";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import { isTyping, type Overlay, openOverlay, useOverlay } from "./overlay";
 
 const Palette = lazily(() => import("./Palette"));

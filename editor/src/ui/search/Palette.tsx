@@ -6,7 +6,7 @@ import { Autocomplete, Input, Label, ListBox, ListBoxItem, SearchField } from "r
 import { setUi, tell, useEditor } from "../../store/store";
 import { Window } from "../kit/dialogs";
 import { entriesOf } from "./entries";
-import { found } from "./found";
+import { found } from "./matches";
 import "./search.css";
 
 /** Number of commands that are offered again. */

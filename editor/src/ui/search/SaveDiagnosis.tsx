@@ -5,7 +5,7 @@ import { saveDiagnosis } from "../../commands/diagnosis";
 import { barred } from "../../store/permissions";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Doing";
+import { RefusedText, useAsking } from "../points/Refusal";
 
 export function SaveDiagnosis() {
   // It needs the role that edits scenes, since it contains addresses and settings of devices.

@@ -7,7 +7,7 @@ import { goOffline, goOnline, stopMotion } from "../../commands/operation";
 import { keepGeneral } from "../../commands/viewstate";
 import { aimsAlways } from "../../session/aiming";
 import { theEngine } from "../../session/engine";
-import { remember } from "../../session/memory";
+import { remember } from "../../session/localStorage";
 import { session } from "../../session/session";
 import { barred } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
@@ -16,7 +16,7 @@ import { now, select, setUi } from "../../store/store";
 import { kindName, selectionOf } from "../../viewmodel/names";
 import { allOf, thingsOf } from "../../viewmodel/things";
 import { TOOLS } from "../workplace/tools";
-import type { Entry } from "./found";
+import type { Entry } from "./matches";
 import { openOverlay } from "./overlay";
 
 export function entriesOf(state: State): Entry[] {

@@ -3,11 +3,11 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useEffect } from "react";
-import { remember, remembered } from "../../session/memory";
+import { remember, remembered } from "../../session/localStorage";
 import { session } from "../../session/session";
 import type { Ui } from "../../store/state";
 import { setUi, useEditor } from "../../store/store";
-import { More } from "../kit/loaded";
+import { More } from "../kit/lazyControls";
 import type { Choice } from "../kit/props";
 import { openOverlay } from "../search/overlay";
 

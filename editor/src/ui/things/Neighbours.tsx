@@ -3,8 +3,8 @@
 import { t } from "@lingui/core/macro";
 import { useMemo } from "react";
 import { select, useEditor } from "../../store/store";
-import { groupsOf } from "../../viewmodel/seeing";
 import { allOf, fitting, neighbour, thingsOf } from "../../viewmodel/things";
+import { groupsOf } from "../../viewmodel/visibility";
 import { Button } from "../kit/kit";
 
 export default function Neighbours({ id }: { id: string }) {

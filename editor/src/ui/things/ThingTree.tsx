@@ -10,7 +10,7 @@ import { now, select, setUi, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 import { flat, type Row } from "../../viewmodel/things";
 import { Icon, type IconName } from "../kit/icons";
-import { asideOf } from "../scene/seeing";
+import { asideOf } from "../scene/hidden";
 
 export const ICONS: Record<Kind, IconName> = {
   object: "box",

@@ -6,13 +6,13 @@ import { useMemo, useState } from "react";
 import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import { keepView } from "../../commands/viewstate";
 import { useEditor } from "../../store/store";
-import { GROUPS, type Group } from "../../viewmodel/seeing";
 import { allOf, counts, fitting, narrowed, type Row, thingsOf } from "../../viewmodel/things";
+import { GROUPS, type Group } from "../../viewmodel/visibility";
 import { OneOf } from "../kit/fields";
-import { asideOf } from "../scene/seeing";
-import { AtTheCross } from "./AtTheCross";
-import { InTheView } from "./InTheView";
+import { asideOf } from "../scene/hidden";
+import { AtTheCross } from "./AtCrosshair";
 import { ThingTree } from "./ThingTree";
+import { InTheView } from "./ViewSettings";
 import "./things.css";
 
 const WORDS: Record<Group, MessageDescriptor> = {

@@ -3,7 +3,7 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
-import { moving, place, step } from "../../commands/moving";
+import { moving, place, step } from "../../commands/move";
 import { keepGeneral } from "../../commands/viewstate";
 import type { GizmoMode } from "../../engine/gizmo/handles";
 import { translated } from "../../i18n/choices";

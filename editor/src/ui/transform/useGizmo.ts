@@ -1,7 +1,7 @@
 /** Put the gizmo at the selected item, and apply its drags. */
 
 import { useEffect } from "react";
-import { type Moving, moving } from "../../commands/moving";
+import { type Moving, moving } from "../../commands/move";
 import { chosenRobot } from "../../commands/robot";
 import type { Engine } from "../../engine/engine";
 import type { Drag } from "../../engine/gizmo/gizmo";

@@ -12,7 +12,7 @@ import { now, useEditor } from "../../store/store";
 import { Aim } from "../aim/Aim";
 import { OffScreen } from "../aim/OffScreen";
 import { Button } from "../kit/kit";
-import { AskName, More } from "../kit/loaded";
+import { AskName, More } from "../kit/lazyControls";
 import type { Choice } from "../kit/props";
 import { isTyping } from "../search/overlay";
 import { FlyPad } from "./FlyPad";

@@ -8,7 +8,7 @@ import { isRunning } from "../../store/selectors";
 import type { Mode } from "../../store/state";
 import { setUi, useEditor } from "../../store/store";
 import { Waiting } from "../kit/kit";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import { View3D } from "./View3D";
 import "../run/run.css";
 import "./centre.css";

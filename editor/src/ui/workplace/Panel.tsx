@@ -8,7 +8,7 @@ import { Suspense, useState } from "react";
 import { select, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Button, Waiting } from "../kit/kit";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import { SECTIONS } from "./sections";
 import { TOOLS } from "./tools";
 

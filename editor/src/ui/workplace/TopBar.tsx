@@ -9,7 +9,7 @@ import { barred } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import { tell, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
-import { Confirm } from "../kit/loaded";
+import { Confirm } from "../kit/lazyControls";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
 import { useUndoKeys } from "./useUndoKeys";

@@ -10,7 +10,7 @@ import { now, store, tell, useEditor } from "../../store/store";
 import { telemetry } from "../../store/telemetry";
 import { ItemMaker } from "../../viewmodel/items";
 import { Waiting } from "../kit/kit";
-import { lazily, persistently } from "../kit/lazily";
+import { lazily, persistently } from "../kit/lazy";
 import { useTheme } from "../settings/Settings";
 import { pick } from "./pick";
 

@@ -2,7 +2,7 @@
 
 import { Suspense } from "react";
 import { useEditor } from "../../store/store";
-import { lazily } from "../kit/lazily";
+import { lazily } from "../kit/lazy";
 import { Notices } from "../notices/Notices";
 import { Centre } from "./Centre";
 import { Rail } from "./Rail";

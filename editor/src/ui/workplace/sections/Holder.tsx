@@ -9,7 +9,7 @@ import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { Icon } from "../../kit/icons";
 import { Button } from "../../kit/kit";
-import { lazily } from "../../kit/lazily";
+import { lazily } from "../../kit/lazy";
 import { ago, clock } from "../../times";
 
 const TakeOver = lazily(() => import("../../people/TakeOver"));

@@ -7,7 +7,7 @@ import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { kindName, nameOf } from "../../../viewmodel/names";
 import { Button } from "../../kit/kit";
-import { lazily } from "../../kit/lazily";
+import { lazily } from "../../kit/lazy";
 import type { Section } from "../section";
 
 const Holder = lazily(() => import("./Holder"));

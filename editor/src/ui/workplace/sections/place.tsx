@@ -1,7 +1,7 @@
 /** Pose of the selected item, and the ways to change it. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../../kit/lazily";
+import { lazily } from "../../kit/lazy";
 import type { Section } from "../section";
 
 export const place: Section = {

@@ -1,7 +1,7 @@
 /** Connection and health of each device. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../../kit/lazily";
+import { lazily } from "../../kit/lazy";
 import type { Tool } from "../tool";
 
 export const devices: Tool = {

@@ -2,7 +2,7 @@
 
 import { msg, t } from "@lingui/core/macro";
 import { robotsOf } from "../../../session/streams";
-import { lazily } from "../../kit/lazily";
+import { lazily } from "../../kit/lazy";
 import type { Tool } from "../tool";
 
 export const robot: Tool = {

@@ -1,6 +1,6 @@
 /** How other users can join this server. */
 
-import { remembered } from "../session/memory";
+import { remembered } from "../session/localStorage";
 
 export interface Joining {
   /** Addresses, best first; empty if only this computer can reach the server. */

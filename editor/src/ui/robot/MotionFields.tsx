@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { MoreOrLess, OnOff } from "../kit/fields";
-import { setManner, useManner } from "./manner";
+import { setManner, useManner } from "./motionOptions";
 
 export function MannerFields() {
   const { speed, safe, linear } = useManner();

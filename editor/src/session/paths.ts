@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import type { Position } from "../protocol/types";
 import { refusedWith } from "./assets";
-import { remembered } from "./memory";
+import { remembered } from "./localStorage";
 
 /** Return the id of the first obstacle on a straight path; null if it is free. Reject with a sentence. */
 export async function metBy(from: Position, to: Position): Promise<string | null> {

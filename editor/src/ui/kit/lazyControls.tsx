@@ -2,7 +2,7 @@
 
 import { Suspense } from "react";
 import { Button } from "./kit";
-import { lazily } from "./lazily";
+import { lazily } from "./lazy";
 import type { AskNameProps, ConfirmProps, MoreProps } from "./props";
 
 const ConfirmDialog = lazily(() => import("./dialogs").then((module) => ({ default: module.Confirm })));

@@ -6,7 +6,7 @@ import { useState } from "react";
 import { keepGeneral, keepView } from "../../commands/viewstate";
 import { useEditor } from "../../store/store";
 import { parentLines } from "../../viewmodel/items";
-import { fadesOthers, opacityOfAll } from "../../viewmodel/seeing";
+import { fadesOthers, opacityOfAll } from "../../viewmodel/visibility";
 import { MoreOrLess, OnOff } from "../kit/fields";
 
 /** Parts of the view that users can hide, with the keys under which the server stores that. */

@@ -9,7 +9,7 @@ import { now, setUi, store } from "../store/store";
 import { same } from "../transform/placing";
 import type { Target } from "../transform/target";
 import { relativeTo } from "../viewmodel/frames";
-import { ask, holding } from "./asking";
+import { ask, holding } from "./requests";
 
 /** Time between two previews, s. */
 const PREVIEW = 1 / 30;

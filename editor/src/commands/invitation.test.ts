@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { isHere } from "./joining";
+import { isHere } from "./invitation";
 
 test.each(["localhost", "cell.localhost", "127.0.0.1", "127.83.1.7", "[::1]", "0.0.0.0"])(
   "%s leads others nowhere",

@@ -1,7 +1,7 @@
 /** Results of the search, and their order. */
 
 import { expect, test } from "vitest";
-import { type Entry, found } from "./found";
+import { type Entry, found } from "./matches";
 
 const entry = (id: string, words: string, detail = "command"): Entry => ({ id, words, detail, why: "", act: () => {} });
 const ALL = [

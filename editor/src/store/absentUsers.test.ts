@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { goneHolders, usersOfDocument } from "./left";
+import { goneHolders, usersOfDocument } from "./absentUsers";
 import { initialState, type State } from "./state";
 
 function state(users: State["users"], locks: Record<string, string> = {}): State {

@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { diary, note } from "./diary";
+import { diary, note } from "./log";
 
 it("keeps the newest, each up to a length", () => {
   for (let n = 0; n < 500; n++) note("event", `SceneChanged ${n}`);

@@ -6,8 +6,8 @@
 import type { JogRobotArgs } from "../protocol/types";
 import { call } from "../session/connection";
 import { store } from "../store/store";
-import { held, sentence } from "./asking";
 import { Lease, type LeaseRequest } from "./lease";
+import { held, sentence } from "./requests";
 
 export type JogWhat = Omit<JogRobotArgs, "robot_id" | "hold" | "sent_ms" | "valid_ms">;
 

@@ -9,10 +9,10 @@ import { worldOf } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 import { Answer } from "../robot/GoTab";
-import { MannerFields } from "../robot/MannerFields";
-import { mannerNow, useManner } from "../robot/manner";
+import { MannerFields } from "../robot/MotionFields";
+import { mannerNow, useManner } from "../robot/motionOptions";
 import type { Section } from "../workplace/section";
-import { RefusedText, useAsking } from "./Doing";
+import { RefusedText, useAsking } from "./Refusal";
 import "../robot/robot.css";
 
 const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { against } from "./aimed";
+import { against } from "./crosshair";
 
 test("a tool that stands on a surface looks against its normal", () => {
   for (const normal of [

@@ -4,9 +4,9 @@ import { t } from "@lingui/core/macro";
 import { refusedWith } from "../session/assets";
 import { call } from "../session/connection";
 import { loadLists } from "../session/lists";
-import { remembered } from "../session/memory";
+import { remembered } from "../session/localStorage";
 import { now } from "../store/store";
-import { refusal } from "./asking";
+import { refusal } from "./requests";
 
 /** Return the objects that the problems of a scene name: the server starts each problem with the object's name. */
 export const atFault = (problems: readonly string[], names: readonly string[]): string[] =>
