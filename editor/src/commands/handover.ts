@@ -2,16 +2,16 @@
 
 import { t } from "@lingui/core/macro";
 import { handOver, keyOf } from "../store/handover";
-import { now, store, tell } from "../store/store";
+import { notify, now, store } from "../store/store";
 import { nameOf } from "../viewmodel/names";
-import { keepView } from "./viewstate";
+import { storeViewState } from "./viewstate";
 
 export function askFor(id: string): void {
-  keepView("shared", { [keyOf(id)]: { by: now().connection.user, at: Date.now() } });
+  storeViewState("shared", { [keyOf(id)]: { by: now().connection.user, at: Date.now() } });
 }
 
 export function noLongerAsk(id: string): void {
-  keepView("shared", { [keyOf(id)]: null });
+  storeViewState("shared", { [keyOf(id)]: null });
 }
 
 /** Notify the user of requests from now on. Return a function that ends it. */
@@ -19,9 +19,9 @@ export function followWishes(): () => void {
   return store.subscribe((state, before) => {
     const { wanted, free } = handOver(state, before);
     for (const { id, by } of wanted)
-      tell("warn", t`${by} asks for ${nameOf(state, id)}, which you are using. Finish your change to release it.`);
+      notify("warn", t`${by} asks for ${nameOf(state, id)}, which you are using. Finish your change to release it.`);
     for (const id of free) {
-      tell("info", t`${nameOf(state, id)} is free now.`);
+      notify("info", t`${nameOf(state, id)} is free now.`);
       noLongerAsk(id);
     }
   });

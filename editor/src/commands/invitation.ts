@@ -10,7 +10,7 @@ export interface Joining {
 }
 
 /** Request it from the server; an older server does not know it, so the address of this page is returned. */
-export async function howToJoin(): Promise<Joining> {
+export async function loadInvitation(): Promise<Joining> {
   const token = remembered("token");
   const here = isHere(location.hostname) ? [] : [location.origin];
   try {

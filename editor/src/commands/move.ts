@@ -37,7 +37,7 @@ export class Moving {
     const decided = new Promise<boolean>((resolve) => (this.end = resolve));
     const work = async () => {
       this.held = true;
-      if (!this.finishing) this.tell(); // otherwise the edit itself notifies the users
+      if (!this.finishing) this.notify(); // otherwise the edit itself notifies the users
       return !(await decided) || (await this.store());
     };
     const before = latest;
@@ -65,7 +65,7 @@ export class Moving {
     const state = now();
     const type = this.model && target.type ? { model: this.model, type: state.types.byName[target.type] } : {};
     setUi({ draft: { id: target.id, of: known(state, target.id), pose: this.stored, ...type } });
-    this.tell();
+    this.notify();
   }
 
   /** End the change and send the edit. */
@@ -92,7 +92,7 @@ export class Moving {
   }
 
   /** Send the current pose to the other users; older ones are dropped. */
-  private tell(): void {
+  private notify(): void {
     if (!this.held || !this.stored || this.failed || this.telling !== undefined || !serves("PreviewMove")) return;
     const wait = Math.max(0, this.told + PREVIEW * 1000 - performance.now());
     this.telling = setTimeout(() => {

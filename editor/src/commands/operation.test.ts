@@ -4,8 +4,8 @@ const call = vi.fn();
 vi.mock("../session/connection", () => ({ call, serves: () => true }));
 const endHolds = vi.fn();
 vi.mock("./holdToRun", () => ({ endHolds }));
-const tell = vi.fn();
-vi.mock("../store/store", () => ({ tell, now: () => ({}) }));
+const notify = vi.fn();
+vi.mock("../store/store", () => ({ notify, now: () => ({}) }));
 const { stopMotion } = await import("./operation");
 
 beforeEach(() => vi.clearAllMocks());
@@ -18,7 +18,7 @@ test("Stop sends one request, ends holds at once, and reports nothing if everyth
   expect(endHolds).toHaveBeenCalledOnce();
   answer({ outcomes: [{ kind: "device", id: "obj_1", name: "ur5e", stopped: true }] });
   await stopped;
-  expect(tell).not.toHaveBeenCalled();
+  expect(notify).not.toHaveBeenCalled();
 });
 
 test("What was not stopped is named, with what to do", async () => {
@@ -30,11 +30,11 @@ test("What was not stopped is named, with what to do", async () => {
     ],
   });
   await stopMotion();
-  expect(tell).toHaveBeenCalledWith("error", `Not stopped: ${reason}. Use the emergency stop.`);
+  expect(notify).toHaveBeenCalledWith("error", `Not stopped: ${reason}. Use the emergency stop.`);
 });
 
 test("A stop that could not be sent is told", async () => {
   call.mockRejectedValue(new Error("The connection is lost."));
   await stopMotion();
-  expect(tell).toHaveBeenCalledWith("error", "Not stopped: The connection is lost. Use the emergency stop.");
+  expect(notify).toHaveBeenCalledWith("error", "Not stopped: The connection is lost. Use the emergency stop.");
 });

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { call, serves } from "../session/connection";
-import { tell } from "../store/store";
+import { notify } from "../store/store";
 import { endHolds } from "./holdToRun";
 import { ask, sentence } from "./requests";
 
@@ -28,7 +28,7 @@ export async function stopMotion(): Promise<void> {
     reasons = [sentence(error)];
   }
   if (reasons.length > 0)
-    tell(
+    notify(
       "error",
       t`Not stopped: ${reasons.map((each) => each.replace(/\.$/, "")).join("; ")}. Use the emergency stop.`,
     );

@@ -192,18 +192,19 @@ export const removeJoints = (id: string) =>
 export function solveJoints(id: string, orientationId: string): Promise<string> {
   return refusal(async () => {
     const { doc, live } = now();
-    const kept = doc?.joints[id];
-    if (!doc || !kept) return;
+    const stored = doc?.joints[id];
+    if (!doc || !stored) return;
     const effector =
-      kept.end_effector_id ?? live.arms[kept.robot_id]?.find((each) => each.id === (kept.arm_id ?? ""))?.effectors[0];
+      stored.end_effector_id ??
+      live.arms[stored.robot_id]?.find((each) => each.id === (stored.arm_id ?? ""))?.effectors[0];
     if (effector === undefined) throw new Error(t`Go online first. The end effectors are unknown offline.`);
     const joints = await call("InverseKinematics", {
-      robot_id: kept.robot_id,
+      robot_id: stored.robot_id,
       end_effector_id: effector,
       pose: worldOf(doc, orientationId),
-      start_joints: kept.joints,
-      ...(kept.arm_id ? { arm_id: kept.arm_id } : {}),
+      start_joints: stored.joints,
+      ...(stored.arm_id ? { arm_id: stored.arm_id } : {}),
     });
-    await held(kept.pointId, () => call("UpdateActionPointJoints", { joints_id: id, joints }));
+    await held(stored.pointId, () => call("UpdateActionPointJoints", { joints_id: id, joints }));
   });
 }

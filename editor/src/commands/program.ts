@@ -15,11 +15,11 @@ import type {
   Requests,
 } from "../protocol/types";
 import { call } from "../session/connection";
-import { barred } from "../store/permissions";
+import { whyUnavailable } from "../store/permissions";
 import { put } from "../store/records";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
-import { now, select, setUi, store, tell } from "../store/store";
+import { notify, now, select, setUi, store } from "../store/store";
 import { ask, held, refusal, sentence } from "./requests";
 
 /** Time within which the event of an added item arrives, s. */
@@ -28,7 +28,7 @@ const TOLD_WITHIN = 5;
 /** Return why a request cannot edit the program now; an empty string if it can. */
 export function notEditable(state: State, request: keyof Requests = "UpdateAction"): string {
   if (!state.doc?.project) return t`Open a project first. A scene has no program.`;
-  return barred(state, request) || (isRunning(state) ? t`Stop the program first.` : "");
+  return whyUnavailable(state, request) || (isRunning(state) ? t`Stop the program first.` : "");
 }
 
 /** Wait until an event brings something into the store. Reject if it does not arrive. */
@@ -71,7 +71,7 @@ export async function addAction(objectId: string, meta: ObjectAction, where: Whe
     setUi({ tool: "" });
     return added.id;
   } catch (error) {
-    tell("error", sentence(error));
+    notify("error", sentence(error));
     return undefined;
   }
 }
@@ -242,7 +242,7 @@ export async function removeAction(id: string): Promise<void> {
   if (!doc || name === undefined) return;
   const steps = outgoing(doc, id).length + incoming(doc, id).length;
   if (await ask("RemoveAction", { id, with_steps: true }))
-    tell(
+    notify(
       "info",
       steps > 0
         ? t`Removed ${name} with its steps. Press Undo to restore.`
@@ -276,11 +276,11 @@ export async function connect(from: string, to: string, condition?: ProjectLogic
   const { doc, types } = now();
   if (!doc) return;
   const why = cannotLead(doc, from, to);
-  if (why) return tell("info", why);
+  if (why) return notify("info", why);
   let given = condition;
   if (!given) {
     const free = freeStep(doc, types, from);
-    if (typeof free === "string") return tell("info", free);
+    if (typeof free === "string") return notify("info", free);
     given = free.condition;
     if (
       free.first &&

@@ -42,8 +42,8 @@ export function takeOut(id: string, name: string, objects: readonly string[]): P
     for (let number = 2; taken.has(copy); number++) copy = t`${name} backup ${number}`;
     const scene = await read(id);
     await call("CopyScene", { source_id: id, target_name: copy });
-    const kept = { ...scene, objects: scene.objects.filter((each) => !objects.includes(each.name)) };
-    await stored("/scenes", { method: "PUT", body: JSON.stringify(kept) });
+    const remaining = { ...scene, objects: scene.objects.filter((each) => !objects.includes(each.name)) };
+    await stored("/scenes", { method: "PUT", body: JSON.stringify(remaining) });
     await loadLists(); // no event reports problems
   });
 }

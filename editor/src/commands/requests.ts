@@ -4,7 +4,7 @@ import type { CallOptions } from "../protocol/client";
 import { ConnectionLost, Refused } from "../protocol/errors";
 import type { Requests } from "../protocol/types";
 import { call } from "../session/connection";
-import { tell } from "../store/store";
+import { notify } from "../store/store";
 
 /** Send a request. Return undefined after notifying the user if it was refused, lost or too late. */
 export async function ask<N extends keyof Requests>(
@@ -15,7 +15,7 @@ export async function ask<N extends keyof Requests>(
   try {
     return { data: await call(request, args, options) };
   } catch (error) {
-    tell(error instanceof ConnectionLost ? "warn" : "error", sentence(error));
+    notify(error instanceof ConnectionLost ? "warn" : "error", sentence(error));
     return undefined;
   }
 }
@@ -60,17 +60,17 @@ async function take(id: string, tree: boolean): Promise<() => Promise<void>> {
 
 /** Do something while holding the write lock of an item, and release it afterwards. */
 export async function holding<T>(id: string, work: () => Promise<T | undefined>, tree = false): Promise<T | undefined> {
-  let giveBack: () => Promise<void>;
+  let releaseLock: () => Promise<void>;
   try {
-    giveBack = await take(id, tree);
+    releaseLock = await take(id, tree);
   } catch (error) {
-    tell(error instanceof ConnectionLost ? "warn" : "error", sentence(error));
+    notify(error instanceof ConnectionLost ? "warn" : "error", sentence(error));
     return undefined;
   }
   try {
     return await work();
   } finally {
-    await giveBack();
+    await releaseLock();
   }
 }
 
@@ -86,11 +86,11 @@ export async function refusal(work: () => Promise<unknown>): Promise<string> {
 
 /** Like `holding`, but reject with the refusal instead of notifying the user: for `refusal`. */
 export async function held<T>(id: string, work: () => Promise<T>, tree = false): Promise<T> {
-  const giveBack = await take(id, tree);
+  const releaseLock = await take(id, tree);
   try {
     return await work();
   } finally {
-    await giveBack();
+    await releaseLock();
   }
 }
 

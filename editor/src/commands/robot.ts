@@ -5,12 +5,12 @@ import type { Joint, Pose, RobotArg, RobotFeatures, StepAxis, StepMode, StepWhat
 import { call } from "../session/connection";
 import { robotsOf } from "../session/streams";
 import { stable } from "../store/memo";
-import { barred } from "../store/permissions";
+import { whyUnavailable } from "../store/permissions";
 import type { Arm, Ghost, State } from "../store/state";
 import { now, setUi } from "../store/store";
 import { telemetry } from "../store/telemetry";
 import { held, refusal, sentence } from "./requests";
-import { keepView } from "./viewstate";
+import { storeViewState } from "./viewstate";
 
 /** A robot, its arm (empty if it has one) and its end effector (empty if unknown). */
 export interface Chosen {
@@ -20,7 +20,7 @@ export interface Chosen {
 }
 
 /** Options of a motion; `speed` is relative to the maximum of the robot. */
-export interface Manner {
+export interface MotionOptions {
   speed: number;
   safe: boolean;
   linear: boolean;
@@ -45,7 +45,7 @@ function found(state: State): Chosen | null {
 
 export function chooseRobot(chosen: Chosen): void {
   setUi({ ghost: null });
-  keepView("user", { last_robot: chosen });
+  storeViewState("user", { last_robot: chosen });
 }
 
 export function armOf(state: State, { robotId, armId }: Chosen): Arm | undefined {
@@ -74,7 +74,7 @@ export function effectorPose({ robotId, armId, effector }: Chosen): Pose | undef
 export function notReady(
   state: State,
   chosen: Chosen | null,
-  request: Parameters<typeof barred>[1] = "MoveToPose",
+  request: Parameters<typeof whyUnavailable>[1] = "MoveToPose",
 ): string {
   if (!chosen) return t`The scene has no robot.`;
   const name = state.doc?.objects[chosen.robotId]?.name ?? t`The robot`;
@@ -86,7 +86,7 @@ export function notReady(
   if (hold && hold.user !== state.connection.user) return t`${hold.user} is moving ${name}.`;
   const owner = state.locks[chosen.robotId];
   if (owner && owner !== state.connection.user) return t`${name} is in use by ${owner}.`;
-  return barred(state, request);
+  return whyUnavailable(state, request);
 }
 
 // ------------------------------------------------------------------------------------------------ motion
@@ -104,7 +104,7 @@ export interface Step {
 export function stepEffector(
   { robotId, armId, effector }: Chosen,
   { pose, ...step }: Step,
-  manner: Manner,
+  manner: MotionOptions,
 ): Promise<string> {
   const args = {
     robot_id: robotId,
@@ -117,13 +117,17 @@ export function stepEffector(
   return refusal(() => held(robotId, () => call("StepRobotEef", args, { deadline: 30 })));
 }
 
-export function alignDown({ robotId, armId, effector }: Chosen, manner: Manner): Promise<string> {
+export function alignDown({ robotId, armId, effector }: Chosen, manner: MotionOptions): Promise<string> {
   const args = { robot_id: robotId, end_effector_id: effector, ...manner, ...ofArm(armId) };
   return refusal(() => held(robotId, () => call("SetEefPerpendicularToWorld", args, { deadline: 30 })));
 }
 
 /** Move to a pose in the world; omitted parts stay. */
-export function moveToPose({ robotId, armId, effector }: Chosen, pose: Partial<Pose>, manner: Manner): Promise<string> {
+export function moveToPose(
+  { robotId, armId, effector }: Chosen,
+  pose: Partial<Pose>,
+  manner: MotionOptions,
+): Promise<string> {
   return refusal(() =>
     call(
       "MoveToPose",
@@ -133,7 +137,11 @@ export function moveToPose({ robotId, armId, effector }: Chosen, pose: Partial<P
   );
 }
 
-export function moveToJoints({ robotId, armId }: Chosen, joints: Joint[], { speed, safe }: Manner): Promise<string> {
+export function moveToJoints(
+  { robotId, armId }: Chosen,
+  joints: Joint[],
+  { speed, safe }: MotionOptions,
+): Promise<string> {
   return refusal(() =>
     call("MoveToJoints", { robot_id: robotId, joints, speed, safe, ...ofArm(armId) }, { deadline: 30 }),
   );
@@ -143,7 +151,7 @@ export function moveToJoints({ robotId, armId }: Chosen, joints: Joint[], { spee
 export function moveToTaught(
   { robotId, armId, effector }: Chosen,
   goal: { orientation_id: string } | { joints_id: string },
-  manner: Manner,
+  manner: MotionOptions,
 ): Promise<string> {
   const to = "orientation_id" in goal ? { ...goal, end_effector_id: effector } : goal;
   return refusal(() =>

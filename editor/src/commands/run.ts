@@ -2,10 +2,10 @@
 
 import { t } from "@lingui/core/macro";
 import { call, serves } from "../session/connection";
-import { barred } from "../store/permissions";
+import { whyUnavailable } from "../store/permissions";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
-import { now, tell } from "../store/store";
+import { notify, now } from "../store/store";
 import { ask, sentence } from "./requests";
 
 /** Time limit, s. A build copies the code of the drivers, which takes time on a busy computer. */
@@ -18,7 +18,7 @@ export function notRunnable(state: State): string {
   if (state.live.state === "starting" || state.live.state === "stopping")
     return t`Wait until the devices are online or offline.`;
   if (state.live.executing) return t`An action is running. Wait until it ends, or press Stop motion.`;
-  return barred(state, "TemporaryPackage");
+  return whyUnavailable(state, "TemporaryPackage");
 }
 
 /** Run the open project; save it first if necessary. Return whether it was started. */
@@ -31,7 +31,7 @@ export async function run({ paused = false } = {}): Promise<boolean> {
     await call("TemporaryPackage", { start_paused: paused, ...shared }, { deadline: BUILT_WITHIN });
     return true;
   } catch (error) {
-    tell("error", t`Not started. ${sentence(error)}`);
+    notify("error", t`Not started. ${sentence(error)}`);
     return false;
   }
 }
@@ -58,7 +58,7 @@ export async function build(name: string): Promise<boolean> {
     { project_id: doc.project.id, package_name: name },
     { deadline: BUILT_WITHIN },
   );
-  if (built) tell("info", t`Package ${name} created.`);
+  if (built) notify("info", t`Package ${name} created.`);
   return built !== undefined;
 }
 

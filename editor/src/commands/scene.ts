@@ -8,10 +8,10 @@ import { freeName } from "../program/naming";
 import type { ObjectModel, ObjectTypeMeta, Parameter, Pose, SceneObject } from "../protocol/types";
 import { uploadAsset } from "../session/assets";
 import { call } from "../session/connection";
-import { barred } from "../store/permissions";
+import { whyUnavailable } from "../store/permissions";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
-import { now, select, setUi, tell } from "../store/store";
+import { notify, now, select, setUi } from "../store/store";
 import { lifted } from "../transform/sizes";
 import { ORIGIN, plus, rotated } from "../viewmodel/frames";
 import { aimedPlace } from "./crosshair";
@@ -19,12 +19,12 @@ import { awaited } from "./program";
 import { ask, held, refusal } from "./requests";
 
 /** Return why objects cannot be added, removed or configured now; an empty string if they can. */
-export function notBuildable(state: State, request: Parameters<typeof barred>[1] = "AddObjectToScene"): string {
+export function notBuildable(state: State, request: Parameters<typeof whyUnavailable>[1] = "AddObjectToScene"): string {
   if (!state.doc) return t`No scene or project is open.`;
   if (state.doc.project) return t`Objects belong to the scene. Close the project and open the scene.`;
   if (isRunning(state)) return t`Stop the program first.`;
   if (state.live.state !== "stopped") return t`Go offline first. Devices can only be changed offline.`;
-  return barred(state, request);
+  return whyUnavailable(state, request);
 }
 
 /** Return a name that no other object and no type has. */
@@ -74,7 +74,7 @@ export function shapeModel(kind: ShapeKind, id: string): ObjectModel {
 export async function addShape(kind: ShapeKind): Promise<void> {
   const name = freeObjectName(kind);
   const why = await addModel(name, shapeModel(kind, name));
-  if (why) tell("error", why);
+  if (why) notify("error", why);
 }
 
 function addModel(name: string, model: ObjectModel, pose = newPlace(model)): Promise<string> {

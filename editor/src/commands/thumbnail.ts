@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { create } from "zustand";
 import { call, serves } from "../session/connection";
 import { theEngine } from "../session/engine";
-import { barred } from "../store/permissions";
+import { whyUnavailable } from "../store/permissions";
 import { openId } from "../store/selectors";
 import { now } from "../store/store";
 import { refusal } from "./requests";
@@ -24,7 +24,7 @@ export const useThumbnails = create<Record<string, string>>(() => ({}));
 /** Take a thumbnail of the open document and store it, even if the document is closed meanwhile. */
 export async function keepThumbnail(): Promise<void> {
   const document = openId(now());
-  const blob = barred(now(), "SaveProject") || !serves("SetViewState") ? null : await theEngine()?.picture();
+  const blob = whyUnavailable(now(), "SaveProject") || !serves("SetViewState") ? null : await theEngine()?.picture();
   if (!blob) return;
   const thumbnail = await smaller(blob);
   if (!thumbnail) return;

@@ -6,11 +6,11 @@ import { openId } from "../store/selectors";
 import { now, store } from "../store/store";
 
 /** Store values of the open document by their keys; null removes one. They take effect at once. */
-export function keepView(scope: ViewScope, values: Record<string, unknown>): void {
+export function storeViewState(scope: ViewScope, values: Record<string, unknown>): void {
   store.setState((state) => {
-    const kept = { ...state.view[scope], ...values };
-    for (const [key, value] of Object.entries(values)) if (value === null) delete kept[key];
-    return { view: { ...state.view, [scope]: kept } };
+    const stored = { ...state.view[scope], ...values };
+    for (const [key, value] of Object.entries(values)) if (value === null) delete stored[key];
+    return { view: { ...state.view, [scope]: stored } };
   });
   if (!serves("SetViewState")) return;
   // Lost with the connection: after the reconnect the server sends the old values.
@@ -18,11 +18,11 @@ export function keepView(scope: ViewScope, values: Record<string, unknown>): voi
 }
 
 /** Store values that belong to no document, by their keys: of the user, such as favorites, or of all users. */
-export function keepGeneral(values: Record<string, unknown>, scope: ViewScope = "user"): void {
+export function storeGeneralState(values: Record<string, unknown>, scope: ViewScope = "user"): void {
   store.setState((state) => {
-    const kept = { ...state.view.general, ...values };
-    for (const [key, value] of Object.entries(values)) if (value === null) delete kept[key];
-    return { view: { ...state.view, general: kept } };
+    const stored = { ...state.view.general, ...values };
+    for (const [key, value] of Object.entries(values)) if (value === null) delete stored[key];
+    return { view: { ...state.view, general: stored } };
   });
   if (!serves("SetViewState")) return;
   call("SetViewState", { scope, values }).catch(() => {}); // as above

@@ -11,8 +11,8 @@ import { labelsOf } from "./labelling";
 import { Labels } from "./labels";
 import { light } from "./light";
 import { DARK, LIGHT, type Palette } from "./palette";
-import { Ties } from "./parentLines";
-import { type Way, WayLine } from "./pathLine";
+import { ParentLines } from "./parentLines";
+import { PathLine, type Way } from "./pathLine";
 import { type Hit, onFloor, pick } from "./picking";
 import { followPointer } from "./pointer";
 import { type Probe, probe } from "./probe";
@@ -61,7 +61,7 @@ export class Engine {
   /** Frames of items may have changed since the last frame. */
   private dirty = true;
   /** Robots whose joints changed since the last frame. */
-  private readonly stirred = new Set<RobotThing>();
+  private readonly movedRobots = new Set<RobotThing>();
   private width = 1;
   private height = 1;
   private hovered = "";
@@ -69,11 +69,11 @@ export class Engine {
   private fitted: Vector3 | null = null;
   private readonly notes = new Map<string, string>();
   /** Text shown next to an item while it is moved, instead of its height. */
-  private said = { id: "", text: "" };
+  private messageLog = { id: "", text: "" };
   private readonly drop: DropLine;
   /** Lines from points to their parents. */
-  readonly ties: Ties;
-  private readonly wayLine: WayLine;
+  readonly parentLines: ParentLines;
+  private readonly pathLine: PathLine;
   private readonly ends: (() => void)[] = [];
 
   constructor(private readonly options: EngineOptions) {
@@ -108,8 +108,8 @@ export class Engine {
       loaded: () => this.loaded(),
     };
     this.drop = new DropLine(this.scene);
-    this.ties = new Ties(this.scene);
-    this.wayLine = new WayLine(this.scene);
+    this.parentLines = new ParentLines(this.scene);
+    this.pathLine = new PathLine(this.scene);
     this.gizmo = new Gizmo({
       canvas,
       scene: this.scene,
@@ -120,8 +120,8 @@ export class Engine {
     this.ends.push(light(this.scene, quality === "high"));
     this.setDark(options.dark);
     this.ends.push(options.telemetry.subscribe((id) => this.reported(id)));
-    const ageing = setInterval(() => this.checkAges(), 250);
-    this.ends.push(() => clearInterval(ageing));
+    const ageTimer = setInterval(() => this.checkAges(), 250);
+    this.ends.push(() => clearInterval(ageTimer));
     const watch = new ResizeObserver(() => this.resize());
     watch.observe(canvas.parentElement ?? canvas);
     this.ends.push(() => watch.disconnect());
@@ -165,17 +165,17 @@ export class Engine {
 
   /** Show a text next to the name of an item; an empty text removes it. */
   note(id: string, text: string): void {
-    this.said = { id: text ? id : "", text };
+    this.messageLog = { id: text ? id : "", text };
     this.draw();
   }
 
   /** Show the straight path of the tool instead of the previous one; null hides it. */
-  showWay(way: Way | null): void {
-    if (this.wayLine.show(way, this.palette)) this.draw();
+  showPath(way: Way | null): void {
+    if (this.pathLine.show(way, this.palette)) this.draw();
   }
 
   get way(): Way | null {
-    return this.wayLine.shown;
+    return this.pathLine.shown;
   }
 
   /** Show the label of the item under the pointer. */
@@ -285,15 +285,15 @@ export class Engine {
     this.labels.dispose();
     this.gizmo.dispose();
     this.drop.dispose();
-    this.ties.dispose();
-    this.wayLine.dispose();
+    this.parentLines.dispose();
+    this.pathLine.dispose();
     this.grid?.dispose();
     this.view.dispose();
     this.renderer.dispose();
   }
 
   private remove(id: string, thing: Thing): void {
-    if (thing instanceof RobotThing) this.stirred.delete(thing);
+    if (thing instanceof RobotThing) this.movedRobots.delete(thing);
     // Children get another frame by `hang`, or are removed themselves.
     for (const other of this.things.values()) if (other.root.parent === thing.root) other.root.removeFromParent();
     thing.dispose();
@@ -310,7 +310,7 @@ export class Engine {
   private reported(id: string): void {
     const thing = this.things.get(id);
     if (!(thing instanceof RobotThing) || !thing.moved()) return;
-    this.stirred.add(thing);
+    this.movedRobots.add(thing);
     this.draw();
   }
 
@@ -348,11 +348,11 @@ export class Engine {
 
   /** Update all frames, or only those of robots, whose joints have no children. */
   private place(): void {
-    const stirred = [...this.stirred];
-    this.stirred.clear();
+    const movedRobots = [...this.movedRobots];
+    this.movedRobots.clear();
     if (!this.dirty) {
-      for (const robot of stirred) {
-        if (robot.frame()) this.stirred.add(robot);
+      for (const robot of movedRobots) {
+        if (robot.frame()) this.movedRobots.add(robot);
         robot.root.updateMatrixWorld();
         this.renderer.shadowMap.needsUpdate = true;
       }
@@ -360,13 +360,14 @@ export class Engine {
     }
     this.dirty = false;
     this.scene.updateMatrixWorld();
-    for (const thing of this.things.values()) if (thing instanceof RobotThing && thing.frame()) this.stirred.add(thing);
+    for (const thing of this.things.values())
+      if (thing instanceof RobotThing && thing.frame()) this.movedRobots.add(thing);
     this.scene.updateMatrixWorld();
     for (const thing of this.things.values()) if (thing.item.kind !== "logic") thing.placed();
     for (const thing of this.things.values()) if (thing.item.kind === "logic") thing.placed();
     this.scene.updateMatrixWorld();
     this.batches.refresh();
-    this.ties.show(this.things, this.palette);
+    this.parentLines.show(this.things, this.palette);
     this.renderer.shadowMap.needsUpdate = true;
   }
 
@@ -384,7 +385,7 @@ export class Engine {
       this.height,
     );
     for (const watcher of this.watchers) watcher();
-    if (this.stirred.size > 0) this.draw();
+    if (this.movedRobots.size > 0) this.draw();
   }
 
   /** Show the line below the selected item, and its height. */
@@ -394,6 +395,6 @@ export class Engine {
     const at = chosen && chosen.item.faint < 1 ? chosen.root.getWorldPosition(new Vector3()) : null;
     const height = this.drop.show(at, this.palette);
     if (chosen) this.notes.set(chosen.item.id, heightWords(height));
-    if (this.said.id) this.notes.set(this.said.id, this.said.text);
+    if (this.messageLog.id) this.notes.set(this.messageLog.id, this.messageLog.text);
   }
 }

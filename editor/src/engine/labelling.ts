@@ -37,10 +37,10 @@ export function labelsOf(
       item.kind === "object" ||
       (item.kind === "action" && (item.running || item.role !== "action"));
     const small = item.kind === "point" || item.kind === "action";
-    const told = item.selected || under || badge !== "";
-    if (!always && !small && !told) continue;
+    const important = item.selected || under || badge !== "";
+    if (!always && !small && !important) continue;
     const distance = thing.anchor(place).distanceTo(eye);
-    if (!always && !told && distance > NEAR) continue;
+    if (!always && !important && distance > NEAR) continue;
     const faded = item.faint > 0.5 ? -30 : 0;
     const weight =
       (item.selected ? 1000 : 0) +

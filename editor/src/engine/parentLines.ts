@@ -14,7 +14,7 @@ import type { Thing } from "./thing";
 
 const place = new Vector3();
 
-export class Ties {
+export class ParentLines {
   private readonly lines = new LineSegments(
     new BufferGeometry(),
     new LineBasicMaterial({ transparent: true, opacity: 0.75 }),

@@ -14,18 +14,18 @@ import type { Position } from "../protocol/types";
 import type { Palette } from "./palette";
 
 /** `unknown`: not checked, or the motion is not straight. */
-export type WayState = "free" | "blocked" | "unknown";
+export type PathState = "free" | "blocked" | "unknown";
 
 export interface Way {
   from: Position;
   to: Position;
-  state: WayState;
+  state: PathState;
 }
 
 /** Half thickness, shortest drawn length, lengths of a dash and of a gap, m. */
 const RADIUS = 0.003;
 const SHORTEST = 0.005;
-const DASHES: Record<WayState, readonly [number, number] | null> = {
+const DASHES: Record<PathState, readonly [number, number] | null> = {
   free: null,
   unknown: [0.02, 0.012],
   blocked: [0.008, 0.012],
@@ -33,7 +33,7 @@ const DASHES: Record<WayState, readonly [number, number] | null> = {
 const MOST_DASHES = 60;
 const up = new Vector3(0, 1, 0);
 
-export class WayLine {
+export class PathLine {
   shown: Way | null = null;
   private wanted: Way | null = null;
   private readonly material = new MeshBasicMaterial({ transparent: true, opacity: 0.85 });

@@ -186,7 +186,7 @@ describe("whether a robot gets there", () => {
     type: "ur/move",
     parameters: parameters.map(([type, id], n) => ({ name: `p${n}`, type, value: JSON.stringify(id) })),
   });
-  const told = (robot_id: string, end_effector_id: string, ...items: [string, Reach, string?][]) => ({
+  const reachability = (robot_id: string, end_effector_id: string, ...items: [string, Reach, string?][]) => ({
     [`${robot_id}//${end_effector_id}`]: {
       robot_id,
       end_effector_id,
@@ -197,8 +197,8 @@ describe("whether a robot gets there", () => {
 
   test("of each goal the end effector counts that gets there best, of all goals the worst", () => {
     const reach = {
-      ...told("ur", "grip", ["a", "out_of_reach", "too far"], ["b", "in_collision", "table"]),
-      ...told("ur", "cup", ["a", "reachable"], ["b", "out_of_reach", "too far"]),
+      ...reachability("ur", "grip", ["a", "out_of_reach", "too far"], ["b", "in_collision", "table"]),
+      ...reachability("ur", "cup", ["a", "reachable"], ["b", "out_of_reach", "too far"]),
     };
     expect(reachOfAction(action(["pose", "a"]), reach)?.reach).toBe("reachable");
     expect(reachOfAction(action(["pose", "a"], ["joints", "b"]), reach)).toEqual({
@@ -209,9 +209,9 @@ describe("whether a robot gets there", () => {
   });
 
   test("another robot does not count, nor what is no goal or not known", () => {
-    const reach = told("other", "grip", ["a", "out_of_reach"]);
+    const reach = reachability("other", "grip", ["a", "out_of_reach"]);
     expect(reachOfAction(action(["pose", "a"]), reach)).toBeNull();
-    expect(reachOfAction(action(["position", "a"]), told("ur", "grip", ["a", "reachable"]))).toBeNull();
-    expect(reachOfAction(action(["pose", "z"]), told("ur", "grip", ["a", "reachable"]))).toBeNull();
+    expect(reachOfAction(action(["position", "a"]), reachability("ur", "grip", ["a", "reachable"]))).toBeNull();
+    expect(reachOfAction(action(["pose", "z"]), reachability("ur", "grip", ["a", "reachable"]))).toBeNull();
   });
 });

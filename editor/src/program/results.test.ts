@@ -26,7 +26,7 @@ const FAILED: Run = {
 /** Time of the events, ms since 1970. */
 const NOW = 1_700_000_000_000;
 
-function told(state: State, ...runs: Run[]): State {
+function withHistory(state: State, ...runs: Run[]): State {
   for (const data of runs) state = { ...state, ...reduce(state, { event: "RunChanged", data } as never, NOW) };
   return state;
 }
@@ -46,16 +46,16 @@ describe("the result of a run", () => {
   });
 
   it("is shown until it is dismissed or the next run starts", () => {
-    let state = told(initialState(), RUN);
+    let state = withHistory(initialState(), RUN);
     expect(undismissedRun(state)).toBeNull();
-    state = told(state, FAILED);
+    state = withHistory(state, FAILED);
     expect(undismissedRun(state)).toEqual(FAILED);
     const dismissed = { ...state, view: { ...state.view, general: dismissal(FAILED) } };
     expect(undismissedRun(dismissed)).toBeNull();
     expect(lastRun(dismissed)).toEqual(FAILED);
-    expect(undismissedRun(told(state, { ...RUN, number: 8 }))).toBeNull();
+    expect(undismissedRun(withHistory(state, { ...RUN, number: 8 }))).toBeNull();
     expect(undismissedRun({ ...state, program: { ...state.program, state: "started" } })).toBeNull();
-    expect(undismissedRun(told(dismissed, { ...FAILED, number: 8 }))?.number).toBe(8);
+    expect(undismissedRun(withHistory(dismissed, { ...FAILED, number: 8 }))?.number).toBe(8);
   });
 
   it("is shown to users who come later only if the run failed or was interrupted", () => {
@@ -63,11 +63,11 @@ describe("the result of a run", () => {
     expect(undismissedRun(later(FAILED))).toEqual(FAILED);
     expect(undismissedRun(later({ ...FAILED, end: "lost" }))).not.toBeNull();
     expect(undismissedRun(later({ ...RUN, end: "finished" }))).toBeNull();
-    expect(undismissedRun(told(initialState(), RUN, { ...RUN, end: "finished" }))).not.toBeNull();
+    expect(undismissedRun(withHistory(initialState(), RUN, { ...RUN, end: "finished" }))).not.toBeNull();
   });
 
   it("is that of the open project where one is asked for", () => {
-    const state = told(initialState(), FAILED, { ...FAILED, number: 8, project_id: "other" });
+    const state = withHistory(initialState(), FAILED, { ...FAILED, number: 8, project_id: "other" });
     expect(lastRun(state)?.number).toBe(8);
     expect(lastRun(state, "pro")?.number).toBe(7);
     expect(lastRun(state, "none")).toBeUndefined();

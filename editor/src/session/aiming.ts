@@ -38,9 +38,9 @@ export function nextCandidate(by: 1 | -1 = 1): void {
  * Update the candidates with each frame; return a function that ends it. A chosen candidate is kept as long as it is
  * near the crosshair. `drawn` is called after each update.
  */
-export function followCross(engine: Engine, drawn: () => void): () => void {
+export function followCrosshair(engine: Engine, drawn: () => void): () => void {
   let best = "";
-  let told = "";
+  let reported = "";
   const look = () => {
     const { things, height } = engine.shown();
     const { ray, cone } = middle(engine.view.camera, height);
@@ -53,8 +53,8 @@ export function followCross(engine: Engine, drawn: () => void): () => void {
       useAiming.setState({ candidates: ids, chosen: next });
     engine.hover(next);
     drawn();
-    if (next === told) return;
-    told = next;
+    if (next === reported) return;
+    reported = next;
     setUi({ aimed: next || undefined });
   };
   const end = engine.watch(look);

@@ -8,7 +8,7 @@ import type { ConnectionState } from "../protocol/client";
 import { Refused } from "../protocol/errors";
 import { ADDITIONAL_EVENTS, ROLES, type ServerEvent } from "../protocol/types";
 import { OFFLINE, type State } from "../store/state";
-import { applyEvent, now, setConnection, store, tell } from "../store/store";
+import { applyEvent, notify, now, setConnection, store } from "../store/store";
 import { telemetry } from "../store/telemetry";
 import { RobotArms } from "./arms";
 import { call, client } from "./connection";
@@ -127,7 +127,7 @@ class Session {
         client.stop(t`The server refused the user.`);
         setConnection({ status: "refused", reason: error.message });
       } else {
-        tell("error", error instanceof Error ? error.message : String(error));
+        notify("error", error instanceof Error ? error.message : String(error));
       }
     }
   }

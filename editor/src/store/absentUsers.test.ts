@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { goneHolders, usersOfDocument } from "./absentUsers";
+import { absentLockHolders, usersOfDocument } from "./absentUsers";
 import { initialState, type State } from "./state";
 
 function state(users: State["users"], locks: Record<string, string> = {}): State {
@@ -18,9 +18,9 @@ const user = (name: string, role: string, document?: string) => ({
 
 test("a user who is not connected and holds locks is gone", () => {
   const users = user("Eva", "programmer");
-  expect(goneHolders(state(users, { arm: "Eva", box: "Adam", lid: "Adam", tip: "Olga" }))).toEqual(["Adam"]);
+  expect(absentLockHolders(state(users, { arm: "Eva", box: "Adam", lid: "Adam", tip: "Olga" }))).toEqual(["Adam"]);
   const joining = state(users, { box: "Adam" });
-  expect(goneHolders({ ...joining, connection: { ...joining.connection, status: "joining" } })).toEqual([]);
+  expect(absentLockHolders({ ...joining, connection: { ...joining.connection, status: "joining" } })).toEqual([]);
 });
 
 test("who has the document open: whoever says so, holds a lock, or does not say and may edit", () => {

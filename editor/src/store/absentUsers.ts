@@ -3,7 +3,7 @@
 import type { State } from "./state";
 
 /** Return users who hold locks but are not connected. */
-export function goneHolders(state: State): string[] {
+export function absentLockHolders(state: State): string[] {
   if (state.connection.status !== "ready") return [];
   const owners = new Set(Object.values(state.locks));
   return [...owners].filter((name) => name !== state.connection.user && !state.users[name]?.online).sort();

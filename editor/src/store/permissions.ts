@@ -5,7 +5,7 @@ import { LEAST_ROLE, type Requests } from "../protocol/types";
 import type { State } from "./state";
 
 /** Return why the user cannot send a request now; an empty string if they can. */
-export function barred(state: State, request: keyof Requests): string {
+export function whyUnavailable(state: State, request: keyof Requests): string {
   if (state.connection.status !== "ready") return t`There is no connection to the server.`;
   if (state.connection.role < LEAST_ROLE[request]) return t`Your role does not allow this.`;
   return "";

@@ -206,7 +206,7 @@ describe("operation", () => {
     });
     expect(state.live.moving).toEqual({});
     expect(state.notices.map((each) => [each.level, each.text])).toEqual([["error", "too far"]]);
-    expect(state.said).toEqual(state.notices);
+    expect(state.messageLog).toEqual(state.notices);
   });
 
   test("a program's actions run until they are told to have ended, and none after it stopped", () => {

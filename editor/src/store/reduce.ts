@@ -18,9 +18,12 @@ export function notice(
   level: Notice["level"],
   text: string,
   time: number,
-): Pick<State, "notices" | "said"> {
-  const added = { id: (state.said.at(-1)?.id ?? 0) + 1, level, text, time };
-  return { notices: [...state.notices, added].slice(-NOTICES), said: [...state.said, added].slice(-NOTICES) };
+): Pick<State, "notices" | "messageLog"> {
+  const added = { id: (state.messageLog.at(-1)?.id ?? 0) + 1, level, text, time };
+  return {
+    notices: [...state.notices, added].slice(-NOTICES),
+    messageLog: [...state.messageLog, added].slice(-NOTICES),
+  };
 }
 
 /** Reset what belongs to the open document. */
@@ -37,7 +40,7 @@ const CLOSED = {
 export function reduce(state: State, event: ServerEvent, time: number): Partial<State> {
   if (state.doc) {
     const doc = changed(state.doc, event);
-    if (doc !== state.doc) return { doc, ...lists(state, event), ui: stillThere(state, doc) };
+    if (doc !== state.doc) return { doc, ...lists(state, event), ui: keepSelection(state, doc) };
   }
   switch (event.event) {
     case "OpenScene":
@@ -119,20 +122,24 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
 }
 
 /** Add a finished task to the stored messages. */
-function over(state: State, { title, state: how, message }: TaskStateData, time: number): Pick<State, "said"> | object {
+function over(
+  state: State,
+  { title, state: how, message }: TaskStateData,
+  time: number,
+): Pick<State, "messageLog"> | object {
   if (how === "running") return {};
-  const { said } = notice(
+  const { messageLog } = notice(
     state,
     how === "failed" ? "error" : "info",
     message ? t`${title}: ${how}. ${message}` : t`${title}: ${how}.`,
     time,
   );
-  return { said };
+  return { messageLog };
 }
 
 function open(state: State, doc: NonNullable<State["doc"]>): Partial<State> {
   const same = state.doc?.scene.id === doc.scene.id && state.doc.project?.id === doc.project?.id;
-  if (same) return { doc, ui: stillThere(state, doc) };
+  if (same) return { doc, ui: keepSelection(state, doc) };
   return { ...CLOSED, doc, ui: shut(state) };
 }
 
@@ -142,7 +149,7 @@ function shut(state: State): State["ui"] {
 }
 
 /** Return the screen state, without the selection if the selected item no longer exists. */
-function stillThere(state: State, doc: NonNullable<State["doc"]>): State["ui"] {
+function keepSelection(state: State, doc: NonNullable<State["doc"]>): State["ui"] {
   const selection = state.ui.selection;
   if (!selection) return state.ui;
   const { id } = selection;

@@ -246,7 +246,7 @@ export interface State {
   tasks: Record<string, TaskStateData>;
   notices: Notice[];
   /** All messages since the page was opened, including dismissed ones and finished tasks; newest last. */
-  said: Notice[];
+  messageLog: Notice[];
   ui: Ui;
 }
 
@@ -293,7 +293,7 @@ export function initialState(): State {
     tried: [],
     tasks: {},
     notices: [],
-    said: [],
+    messageLog: [],
     dynamicValues: {},
     ui: {
       selection: null,

@@ -31,7 +31,7 @@ export function select(selection: Selection | null): void {
   setUi({ selection });
 }
 
-export function tell(level: Notice["level"], text: string): void {
+export function notify(level: Notice["level"], text: string): void {
   store.setState((state) => notice(state, level, text, Date.now()));
 }
 

@@ -63,13 +63,13 @@ describe("joints", () => {
     telemetry.takeJoints(joints(0));
     go(2);
     expect(telemetry.age("r")).toBeCloseTo(2);
-    const told: string[] = [];
-    const end = telemetry.subscribe((id) => told.push(id));
+    const ids: string[] = [];
+    const end = telemetry.subscribe((id) => ids.push(id));
     telemetry.clear();
-    expect(told).toEqual(["r"]);
+    expect(ids).toEqual(["r"]);
     expect(telemetry.interpolated("r")).toBeUndefined();
     end();
     telemetry.takeJoints(joints(1));
-    expect(told).toEqual(["r"]);
+    expect(ids).toEqual(["r"]);
   });
 });

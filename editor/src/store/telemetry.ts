@@ -33,12 +33,12 @@ export class Telemetry {
     const read = data.time_ms === undefined ? at : data.time_ms / 1000;
     const sample = { at, read, joints: new Map(data.joints.map((one) => [one.name, one.value])) };
     this.joints.set(data.robot_id, [this.joints.get(data.robot_id)?.[1] ?? null, sample]);
-    this.tell(data.robot_id);
+    this.notify(data.robot_id);
   }
 
   takeEef(data: RobotEefData): void {
     this.eefs.set(data.robot_id, { at: this.clock(), poses: data.end_effectors });
-    this.tell(data.robot_id);
+    this.notify(data.robot_id);
   }
 
   /** Return the last reported joints; undefined if unknown. */
@@ -91,10 +91,10 @@ export class Telemetry {
     const known = new Set([...this.joints.keys(), ...this.eefs.keys()]);
     this.joints.clear();
     this.eefs.clear();
-    for (const id of known) this.tell(id);
+    for (const id of known) this.notify(id);
   }
 
-  private tell(robotId: string): void {
+  private notify(robotId: string): void {
     for (const listener of this.listeners) listener(robotId);
   }
 }

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import type { ObjectModel, Pose } from "../protocol/types";
-import { barred } from "../store/permissions";
+import { whyUnavailable } from "../store/permissions";
 import { heldBy, isOnline, isRunning } from "../store/selectors";
 import type { Selection, State } from "../store/state";
 import { composed, ORIGIN, worldOf } from "../viewmodel/frames";
@@ -86,7 +86,7 @@ export function notMovable(state: State, { kind, id }: Pick<Target, "kind" | "id
     return t`A robot cannot be moved in the scene while it is online.`;
   const holder = heldBy(state, id);
   if (holder) return t`In use by ${holder}.`;
-  return barred(state, REQUESTS[kind]);
+  return whyUnavailable(state, REQUESTS[kind]);
 }
 
 /** Return why it cannot be resized now. */
@@ -94,7 +94,7 @@ export function notSizable(state: State, target: Pick<Target, "kind" | "id">): s
   return (
     notMovable(state, target) ||
     (state.live.state !== "stopped" ? t`Go offline to change its size.` : "") ||
-    barred(state, "UpdateObjectModel")
+    whyUnavailable(state, "UpdateObjectModel")
   );
 }
 

@@ -45,8 +45,8 @@ export function toolSettings(state: State): ToolSettings {
   return settingsMemo(state.view.general[TOOL]);
 }
 
-function understood(kept: unknown): Partial<ToolSettings> {
-  const given = (kept ?? {}) as Partial<Record<keyof ToolSettings, unknown>>;
+function understood(stored: unknown): Partial<ToolSettings> {
+  const given = (stored ?? {}) as Partial<Record<keyof ToolSettings, unknown>>;
   const found: Partial<ToolSettings> = {};
   const step = (value: unknown): value is number => typeof value === "number" && value > 0 && value < 100;
   if (LENGTH_UNITS.includes(given.length as LengthUnit)) found.length = given.length as LengthUnit;

@@ -7,18 +7,18 @@ import { isLive, isRunning, openId } from "../store/selectors";
 import { now, useEditor } from "../store/store";
 import { LostConnection } from "./connection/LostConnection";
 import { Dock } from "./dock/Dock";
-import { keepRecent } from "./home/recent";
+import { storeOpened } from "./home/recent";
 import { Join } from "./join/Join";
 import { Waiting } from "./kit/kit";
-import { lazily } from "./kit/lazy";
+import { lazyComponent } from "./kit/lazy";
 import { Overlays } from "./search/Overlays";
 import { useScreenSettings } from "./settings/Settings";
 import { Workplace } from "./workplace/Workplace";
 
 /** Screens that most users see one of: a chunk each. */
-const Home = lazily(() => import("./home/Home").then((module) => ({ default: module.Home })));
-const Operator = lazily(() => import("./operator/Operator"));
-const ResultBanner = lazily(() => import("./run/ResultBanner"));
+const Home = lazyComponent(() => import("./home/Home").then((module) => ({ default: module.Home })));
+const Operator = lazyComponent(() => import("./operator/Operator"));
+const ResultBanner = lazyComponent(() => import("./run/ResultBanner"));
 
 /** The hash of the address, which selects the editor or the operator screen. */
 function useHash(): string {
@@ -41,7 +41,7 @@ export function App() {
     state.connection.status === "ready" && !isRunning(state) ? openId(state) : "",
   );
   useEffect(() => {
-    if (document) keepRecent(document);
+    if (document) storeOpened(document);
   }, [document]);
   useEffect(() => {
     if (status === "ready") rememberPerson(now().connection.user);

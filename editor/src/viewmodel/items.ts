@@ -33,9 +33,9 @@ export class ItemMaker {
       const known = before.get(id);
       const same =
         known && known.inputs.length === inputs.length && known.inputs.every((each, n) => each === inputs[n]);
-      const kept = same ? known : { inputs, item: make() };
-      this.known.set(id, kept);
-      found.push(kept.item);
+      const stored = same ? known : { inputs, item: make() };
+      this.known.set(id, stored);
+      found.push(stored.item);
     };
     const { selection, draft } = state.ui;
     const me = state.connection.user;
@@ -47,7 +47,7 @@ export class ItemMaker {
       lockedBy: lockedBy(state, id, me),
       faint: faint(id),
     });
-    const tell = (id: string) => [selection?.id === id, lockedBy(state, id, me), faint(id)];
+    const notify = (id: string) => [selection?.id === id, lockedBy(state, id, me), faint(id)];
 
     const axes = state.view.user.hide_axes !== true;
     for (const object of Object.values(doc.objects)) {
@@ -61,7 +61,7 @@ export class ItemMaker {
       const ghost = state.ui.ghost?.robotId === object.id ? state.ui.ghost : null;
       add(
         object.id,
-        [object, type, robot, trouble, robot && online, preview, model, ghost, robot && axes, ...tell(object.id)],
+        [object, type, robot, trouble, robot && online, preview, model, ghost, robot && axes, ...notify(object.id)],
         () => {
           const pose = {
             position: preview?.position ?? object.pose?.position ?? NO_PLACE,
@@ -87,7 +87,7 @@ export class ItemMaker {
       const preview = (drafted(draft, point) ?? state.previews[point.id])?.position;
       const breakpoint = point.id in state.breakpoints;
       const tied = point.parent !== undefined && (lines || selection?.id === point.id);
-      add(point.id, [point, size, preview, breakpoint, tied, ...tell(point.id)], () => ({
+      add(point.id, [point, size, preview, breakpoint, tied, ...notify(point.id)], () => ({
         ...common(point.id, point.name),
         kind: "point",
         size,
@@ -100,7 +100,7 @@ export class ItemMaker {
     const reach = bestReach(state);
     for (const one of Object.values(doc.orientations)) {
       const preview = (drafted(draft, one) ?? state.previews[one.id])?.orientation;
-      add(one.id, [one, preview, reach[one.id], ...tell(one.id)], () => ({
+      add(one.id, [one, preview, reach[one.id], ...notify(one.id)], () => ({
         ...common(one.id, one.name),
         kind: "orientation",
         parent: one.pointId,
@@ -108,10 +108,10 @@ export class ItemMaker {
         reach: reach[one.id] ?? "",
       }));
     }
-    this.pucks(state, doc, add, common, tell);
+    this.pucks(state, doc, add, common, notify);
     if (state.view.user.hide_steps === true && state.ui.connecting === null) return found;
     for (const item of Object.values(doc.logic)) {
-      add(item.id, [item, ...tell(item.id)], () => link(item, common(item.id, "")));
+      add(item.id, [item, ...notify(item.id)], () => link(item, common(item.id, "")));
     }
     return found;
   }
@@ -124,7 +124,7 @@ export class ItemMaker {
       id: string,
       name: string,
     ) => Omit<Item, "kind"> & { id: string; name: string; selected: boolean; lockedBy: string; faint: number },
-    tell: (id: string) => unknown[],
+    notify: (id: string) => unknown[],
   ): void {
     const levels = new Map<string, number>();
     const counts = new Map<string, number>();
@@ -139,7 +139,7 @@ export class ItemMaker {
       const colour = Math.max(0, colours.indexOf(action.type.split("/")[0] ?? ""));
       const place = state.view.shared[`place/${action.id}`];
       const reach = reachOfAction(action, state.reach)?.reach ?? "";
-      add(action.id, [action, level, count, running, breakpoint, colour, place, reach, ...tell(action.id)], () => ({
+      add(action.id, [action, level, count, running, breakpoint, colour, place, reach, ...notify(action.id)], () => ({
         ...common(action.id, action.name),
         kind: "action",
         ...(isPosition(place) ? { position: place } : { parent: action.pointId }),
@@ -158,7 +158,7 @@ export class ItemMaker {
       [END, "end"],
     ] as const) {
       const place = state.view.shared[`place/${id}`];
-      add(id, [place, ...tell(id)], () => ({
+      add(id, [place, ...notify(id)], () => ({
         ...common(id, role === "start" ? t`Start` : t`End`),
         kind: "action",
         position: isPosition(place) ? place : (PLACES[id] ?? NO_PLACE),
@@ -176,8 +176,8 @@ export class ItemMaker {
 
 /** Return the size of points, relative: a setting of the user. */
 export function pointSize(state: State): number {
-  const kept = state.view.general.point_size;
-  return typeof kept === "number" ? Math.min(4, Math.max(0.5, kept)) : 1;
+  const stored = state.view.general.point_size;
+  return typeof stored === "number" ? Math.min(4, Math.max(0.5, stored)) : 1;
 }
 
 /** Return whether lines connect all points to their parents, not only the selected one. */

@@ -11,8 +11,8 @@ const FADED = 0.85;
 
 /** Kinds shown in the object list; empty: all. */
 export function groupsOf(state: State): Group[] {
-  const kept = state.view.user.filters;
-  return Array.isArray(kept) ? GROUPS.filter((each) => kept.includes(each)) : [];
+  const stored = state.view.user.filters;
+  return Array.isArray(stored) ? GROUPS.filter((each) => stored.includes(each)) : [];
 }
 
 /** Whether other kinds fade in the view. */
@@ -20,8 +20,8 @@ export const fadesOthers = (state: State): boolean => state.view.user.fade_other
 
 /** Opacity of all objects except robots, from 0 to 1. */
 export function opacityOfAll(state: State): number {
-  const kept = state.view.user.opacity_all;
-  return typeof kept === "number" ? Math.min(1, Math.max(0, kept)) : 1;
+  const stored = state.view.user.opacity_all;
+  return typeof stored === "number" ? Math.min(1, Math.max(0, stored)) : 1;
 }
 
 /** Return the transparency of each item; at 1 it is neither drawn nor picked. */

@@ -24,7 +24,7 @@ interface Accessor {
   normalized?: boolean;
 }
 
-interface Told {
+interface GltfJson {
   scenes: { extras?: Partial<RobotExtras> }[];
   meshes?: { name: string; primitives: { attributes: Record<string, number>; indices: number }[] }[];
   accessors?: Accessor[];
@@ -41,14 +41,14 @@ export function readGlb(content: ArrayBuffer): Shown {
   if (content.byteLength < 20 || head.getUint32(0, true) !== 0x46546c67)
     throw new Error(t`The model is not a binary glTF file.`);
   const length = head.getUint32(12, true);
-  const told = JSON.parse(new TextDecoder().decode(new Uint8Array(content, 20, length))) as Told;
+  const json = JSON.parse(new TextDecoder().decode(new Uint8Array(content, 20, length))) as GltfJson;
   const start = 20 + length + 8;
 
   const attribute = (number: number): BufferAttribute => {
     // biome-ignore lint/correctness/noUnsafeOptionalChaining: a damaged file throws, and is reported.
-    const { bufferView, componentType, count, type, normalized } = told.accessors?.[number] as Accessor;
+    const { bufferView, componentType, count, type, normalized } = json.accessors?.[number] as Accessor;
     // biome-ignore lint/correctness/noUnsafeOptionalChaining: a damaged file throws, and is reported.
-    const { byteOffset, byteStride } = told.bufferViews?.[bufferView] as { byteOffset: number; byteStride?: number };
+    const { byteOffset, byteStride } = json.bufferViews?.[bufferView] as { byteOffset: number; byteStride?: number };
     const kind = ARRAYS[componentType];
     // Padded attributes keep their padding: shaders ignore it.
     const size = byteStride ? byteStride / kind.BYTES_PER_ELEMENT : SIZES[type];
@@ -56,7 +56,7 @@ export function readGlb(content: ArrayBuffer): Shown {
   };
 
   const meshes = new Map<string, BufferGeometry>();
-  for (const { name, primitives } of told.meshes ?? []) {
+  for (const { name, primitives } of json.meshes ?? []) {
     const [primitive] = primitives;
     if (!primitive) continue;
     const geometry = new BufferGeometry();
@@ -66,7 +66,7 @@ export function readGlb(content: ArrayBuffer): Shown {
     }
     meshes.set(name, geometry.setIndex(attribute(primitive.indices)));
   }
-  return { meshes, extras: told.scenes[0]?.extras ?? {} };
+  return { meshes, extras: json.scenes[0]?.extras ?? {} };
 }
 
 /** Return the only mesh of an asset that is not a robot. */

@@ -143,9 +143,9 @@ export class RobotThing extends Thing<RobotItem> {
   private paint(): void {
     const { palette } = this.context;
     const { selected, trouble, faint } = this.item;
-    const told = selected ? palette.selected : trouble ? palette.trouble : this.stale ? palette.locked : null;
-    this.material.color.copy(told ?? palette.robot);
-    if (told) this.coloured.color.copy(told);
+    const highlight = selected ? palette.selected : trouble ? palette.trouble : this.stale ? palette.locked : null;
+    this.material.color.copy(highlight ?? palette.robot);
+    if (highlight) this.coloured.color.copy(highlight);
     else this.coloured.color.setRGB(1, 1, 1);
     // Its joints are unknown: only its base is shown.
     const vague = this.stale || (this.robot !== null && this.shown.size === 0);

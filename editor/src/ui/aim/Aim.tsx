@@ -3,10 +3,10 @@
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useEffect, useRef } from "react";
-import { keepGeneral } from "../../commands/viewstate";
+import { storeGeneralState } from "../../commands/viewstate";
 import { bearingOf } from "../../engine/bearing";
 import type { Engine } from "../../engine/engine";
-import { followCross, nextCandidate, useAiming } from "../../session/aiming";
+import { followCrosshair, nextCandidate, useAiming } from "../../session/aiming";
 import { now, useEditor } from "../../store/store";
 import { kindName, nameOf, selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
@@ -26,7 +26,7 @@ export function Aim({ engine }: { engine: Engine }) {
   const mark = useRef<HTMLSpanElement>(null);
   useEffect(
     () =>
-      followCross(engine, () => {
+      followCrosshair(engine, () => {
         const { chosen: at } = useAiming.getState();
         const place = at ? bearingOf(engine, at) : null;
         if (!mark.current) return;
@@ -98,7 +98,7 @@ export function Aim({ engine }: { engine: Engine }) {
             look="plain"
             icon="close"
             aria-label={t`Close the crosshair`}
-            onPress={() => keepGeneral({ aiming: null })}
+            onPress={() => storeGeneralState({ aiming: null })}
           />
         )}
       </div>

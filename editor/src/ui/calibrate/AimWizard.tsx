@@ -30,10 +30,10 @@ interface Aim {
   aiming: Aiming | null;
   done: number[];
   touched: Record<number, Position>;
-  fit: Fit | null;
+  loadFit: Fit | null;
 }
 
-const NONE: Aim = { id: "", aiming: null, done: [], touched: {}, fit: null };
+const NONE: Aim = { id: "", aiming: null, done: [], touched: {}, loadFit: null };
 /** The running measurement; it continues while other panels are open. */
 const aim = createStore<Aim>(() => NONE);
 
@@ -41,7 +41,7 @@ const aim = createStore<Aim>(() => NONE);
 const NEEDED = 3;
 
 /** Request the fit of the recorded points. */
-async function fit(known: readonly Position[]): Promise<void> {
+async function loadFit(known: readonly Position[]): Promise<void> {
   const { touched, aiming } = aim.getState();
   const of = Object.keys(touched).map(Number);
   if (of.length < NEEDED) return;
@@ -49,7 +49,7 @@ async function fit(known: readonly Position[]): Promise<void> {
     of.map((n) => known[n] ?? { x: 0, y: 0, z: 0 }),
     of.map((n) => touched[n] ?? { x: 0, y: 0, z: 0 }),
   );
-  if (aim.getState().aiming === aiming && aim.getState().touched === touched) aim.setState({ fit: { of, found } });
+  if (aim.getState().aiming === aiming && aim.getState().touched === touched) aim.setState({ loadFit: { of, found } });
 }
 
 const AimWizard: Section["Body"] = ({ selection: { id } }) => {
@@ -60,13 +60,13 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
   const points = known?.length ?? 0;
   const why = useWhyNot(id, "ObjectAimingStart");
   const noRobot = useEditor((state) => notReady(state, chosen, "ObjectAimingStart"));
-  const { id: aimedAt, aiming: current, done, fit: fitted } = useStore(aim);
+  const { id: aimedAt, aiming: current, done, loadFit: fitted } = useStore(aim);
   const aiming = aimedAt === id ? current : null;
   const [refused, setRefused] = useState("");
-  const [told, setTold] = useState("");
+  const [result, setResult] = useState("");
   const trying = async (work: () => Promise<void>) => {
     setRefused("");
-    setTold("");
+    setResult("");
     try {
       await work();
     } catch (error) {
@@ -90,9 +90,9 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
         >
           {t`Start`}
         </Button>
-        {told && (
+        {result && (
           <p className="small good" role="status">
-            {told}
+            {result}
           </p>
         )}
         <RefusedText>{refused}</RefusedText>
@@ -103,12 +103,12 @@ const AimWizard: Section["Body"] = ({ selection: { id } }) => {
     // The server reads the tool position itself; this one is for the preview of the fit.
     const tool = chosen && effectorPose(chosen);
     aim.setState({ done: await aiming.add(n) });
-    if (tool) aim.setState((so) => ({ touched: { ...so.touched, [n]: tool.position }, fit: null }));
-    await fit((known ?? []).map((each) => each.position));
+    if (tool) aim.setState((so) => ({ touched: { ...so.touched, [n]: tool.position }, loadFit: null }));
+    await loadFit((known ?? []).map((each) => each.position));
   };
   const end = (words: string) => {
     aim.setState(NONE);
-    setTold(words);
+    setResult(words);
     theEngine()?.focus(id);
   };
   return (

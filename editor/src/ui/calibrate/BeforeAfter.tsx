@@ -9,7 +9,7 @@ import { now, useEditor } from "../../store/store";
 import { notMovable } from "../../transform/target";
 import { apart } from "../../viewmodel/frames";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Refusal";
+import { RefusedText, useRefusal } from "../points/Refusal";
 
 /** Smallest change, m and degrees; less is numerical noise. */
 const NOTHING = 1e-6;
@@ -19,7 +19,7 @@ export function BeforeAfter({ id }: { id: string }) {
   const pose = useEditor((state) => state.doc?.objects[id]?.pose);
   const isRobot = useEditor((state) => (state.doc?.objects[id]?.type ?? "") in state.types.robots);
   const why = useEditor((state) => notMovable(state, { kind: "object", id }));
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   const moved = of === id && was && pose ? apart(was, pose) : null;
   const shown = moved !== null && (moved.distance > NOTHING || moved.degrees > NOTHING);
   useEffect(() => {

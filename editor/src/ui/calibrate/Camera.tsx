@@ -9,7 +9,7 @@ import { useEditor } from "../../store/store";
 import { OnOff } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { useWhyNot } from "../points/editing";
-import { RefusedText, useAsking } from "../points/Refusal";
+import { RefusedText, useRefusal } from "../points/Refusal";
 import type { Section } from "../workplace/section";
 import { Records } from "./Records";
 import "./calibrate.css";
@@ -23,7 +23,7 @@ const Camera: Section["Body"] = ({ selection: { id } }) => {
   const [picture, setPicture] = useState("");
   const [follow, setFollow] = useState(false);
   const [failed, setFailed] = useState("");
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   useEffect(() => () => URL.revokeObjectURL(picture), [picture]);
   useEffect(() => {
     setPicture("");

@@ -14,7 +14,7 @@ import { OneOf, OnOff } from "../kit/fields";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { useWhyNot } from "../points/editing";
-import { RefusedText, useAsking } from "../points/Refusal";
+import { RefusedText, useRefusal } from "../points/Refusal";
 import { RobotChooser } from "../robot/RobotChooser";
 import { useTelemetry } from "../robot/useTelemetry";
 import "../points/points.css";
@@ -32,7 +32,7 @@ const PlaceByRobot: Section["Body"] = ({ selection: { id } }) => {
   const why = useWhyNot(id, "UpdateObjectPoseUsingRobot");
   const noRobot = useEditor((state) => notReady(state, chosen, "UpdateObjectPoseUsingRobot"));
   const [pivot, setPivot] = useState<Pivot>("top");
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   return (
     <>
       <RobotChooser />
@@ -80,7 +80,7 @@ function ThreePoints({ id, why }: { id: string; why: string }) {
   const chosen = useEditor(chosenRobot);
   const [touched, setTouched] = useState<(Position | undefined)[]>([]);
   const [verdict, setVerdict] = useState("");
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   const touch = (step: number) => {
     const pose = chosen && effectorPose(chosen);
     if (!pose) return;

@@ -10,7 +10,7 @@ import { nameOf } from "../../viewmodel/names";
 import { OnOff, Pick } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { useWhyNot } from "../points/editing";
-import { RefusedText, useAsking } from "../points/Refusal";
+import { RefusedText, useRefusal } from "../points/Refusal";
 import type { Section } from "../workplace/section";
 import { Records } from "./Records";
 
@@ -32,7 +32,7 @@ const RobotByCamera: Section["Body"] = ({ selection: { id } }) => {
   const ids = cameras ? cameras.split("\n") : [];
   const [wanted, setWanted] = useState("");
   const [moves, setMoves] = useState(false);
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   const camera = ids.includes(wanted) ? wanted : (ids[0] ?? "");
   return (
     <>

@@ -4,7 +4,7 @@ import { msg } from "@lingui/core/macro";
 import type { SceneObject } from "../../protocol/types";
 import { derivesFrom } from "../../store/selectors";
 import type { Selection, State } from "../../store/state";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
 /** For objects of an open scene, not of a project. */
@@ -25,13 +25,13 @@ export const calibrateSections: readonly Section[] = [
       const object = state.doc?.objects[id];
       return object !== undefined && isCamera(state, object);
     },
-    Body: lazily(() => import("./Camera")),
+    Body: lazyComponent(() => import("./Camera")),
   },
   {
     id: "robot-by-camera",
     title: msg`Calibration`,
     applies: inScene(isRobot),
-    Body: lazily(() => import("./RobotByCamera")),
+    Body: lazyComponent(() => import("./RobotByCamera")),
   },
   {
     id: "aim",
@@ -42,12 +42,12 @@ export const calibrateSections: readonly Section[] = [
         hasRobots(state) &&
         (state.types.byName[type]?.object_model?.mesh?.focus_points?.length ?? 0) > 0,
     ),
-    Body: lazily(() => import("./AimWizard")),
+    Body: lazyComponent(() => import("./AimWizard")),
   },
   {
     id: "place-by-robot",
     title: msg`Set pose with robot`,
     applies: inScene((state, object) => object.pose !== undefined && hasRobots(state) && !isRobot(state, object)),
-    Body: lazily(() => import("./PlaceByRobot")),
+    Body: lazyComponent(() => import("./PlaceByRobot")),
   },
 ];

@@ -4,9 +4,9 @@ import { t } from "@lingui/core/macro";
 import { useCallback, useEffect, useMemo, useState } from "react";
 import * as documents from "../../commands/documents";
 import { remembered } from "../../session/localStorage";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
-import { select, tell, useEditor } from "../../store/store";
+import { notify, select, useEditor } from "../../store/store";
 import { Button, Waiting } from "../kit/kit";
 import { textOfZip } from "./package";
 import { pieces } from "./python";
@@ -19,8 +19,8 @@ async function scriptOf(projectId: string): Promise<Code> {
   const headers: HeadersInit = token ? { Authorization: `Bearer ${token}` } : {};
   const response = await fetch(`/project/publish?projectId=${encodeURIComponent(projectId)}`, { headers });
   if (!response.ok) {
-    const said = (await response.json().catch(() => null)) as { message?: string } | null;
-    return { problem: said?.message ?? t`The program cannot be loaded (${response.status}).` };
+    const messageLog = (await response.json().catch(() => null)) as { message?: string } | null;
+    return { problem: messageLog?.message ?? t`The program cannot be loaded (${response.status}).` };
   }
   const source = await textOfZip(await response.arrayBuffer(), "script.py");
   return source === undefined ? { problem: t`The package has no script.` } : { source };
@@ -36,7 +36,7 @@ export default function CodeView() {
     state.program.running.map((each) => state.doc?.actions[each]?.name ?? "").join("\n"),
   );
   const cannotSave = useEditor(
-    (state) => barred(state, "SaveProject") || (isRunning(state) ? t`The program is running.` : ""),
+    (state) => whyUnavailable(state, "SaveProject") || (isRunning(state) ? t`The program is running.` : ""),
   );
   const [code, setCode] = useState<Code | null>(null);
   const load = useCallback(() => {
@@ -77,8 +77,8 @@ export default function CodeView() {
             <Button
               onPress={() => {
                 navigator.clipboard?.writeText(code.source).then(
-                  () => tell("info", t`Copied.`),
-                  () => tell("warn", t`The browser blocks copying.`),
+                  () => notify("info", t`Copied.`),
+                  () => notify("warn", t`The browser blocks copying.`),
                 );
               }}
             >

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { Handle, type Node, type NodeProps, Position } from "@xyflow/react";
 import { beginStep, notEditable } from "../../commands/program";
-import { now, tell } from "../../store/store";
+import { notify, now } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { ReachBadge } from "../points/Reach";
 import { type Box, lastIn, type Way } from "./graph";
@@ -71,6 +71,6 @@ export function conditionOf(way: Way) {
 
 function begin(id: string, way: Way): void {
   const why = notEditable(now(), "AddLogicItem");
-  if (why) tell("info", why);
+  if (why) notify("info", why);
   else beginStep(id, conditionOf(way));
 }

@@ -16,7 +16,7 @@ import "@xyflow/react/dist/base.css";
 import { connect, endStep, notEditable, removeAction, removeStep } from "../../commands/program";
 import { cannotLead } from "../../program/logic";
 import { problemsOf } from "../../program/problems";
-import { now, select, setUi, tell, useEditor } from "../../store/store";
+import { notify, now, select, setUi, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 import { conditionOf, FlowNode, type FlowNodeType } from "./FlowNode";
 import { foldAll, unfold, useFolds } from "./folding";
@@ -137,7 +137,7 @@ function Flow() {
         }
         onConnect={({ source, target, sourceHandle }) => {
           const why = notEditable(now(), "AddLogicItem");
-          if (why) return tell("info", why);
+          if (why) return notify("info", why);
           const way = box(source).ways.find((each) => each.id === sourceHandle);
           void connect(lastIn(box(source)), firstIn(box(target)), way && conditionOf(way));
         }}
@@ -196,7 +196,7 @@ function choose(box: Pick<Box, "id" | "kind" | "run">): void {
 /** Remove only the selected node: the command removes its connections. */
 async function remove(nodes: string[], lines: string[]): Promise<void> {
   const why = notEditable(now(), "RemoveAction");
-  if (why) return tell("info", why);
+  if (why) return notify("info", why);
   const { doc } = now();
   for (const id of nodes) if (doc && id in doc.actions) await removeAction(id);
   if (nodes.length === 0) for (const id of lines) await removeStep(id);

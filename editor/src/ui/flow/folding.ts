@@ -1,7 +1,7 @@
 /** Sequences of actions that are folded into one node. The user's choice is stored on the server for all devices. */
 
 import { useMemo, useRef } from "react";
-import { keepView } from "../../commands/viewstate";
+import { storeViewState } from "../../commands/viewstate";
 import type { Problem } from "../../program/problems";
 import { foldedRuns, runsOf } from "../../program/runs";
 import { isRunning } from "../../store/selectors";
@@ -10,15 +10,15 @@ import { now, useEditor } from "../../store/store";
 const KEY = "folded";
 const NONE: string[] = [];
 
-function wishedOf(kept: unknown): string[] {
-  return Array.isArray(kept) && kept.length > 0 ? kept.filter((each) => typeof each === "string") : NONE;
+function wishedOf(stored: unknown): string[] {
+  return Array.isArray(stored) && stored.length > 0 ? stored.filter((each) => typeof each === "string") : NONE;
 }
 
 const keep = (ids: Iterable<string>): void => {
   const doc = now().doc;
   // Remove folds of deleted actions.
   const known = [...new Set(ids)].filter((id) => doc && id in doc.actions);
-  keepView("user", { [KEY]: known.length > 0 ? known : null });
+  storeViewState("user", { [KEY]: known.length > 0 ? known : null });
 };
 
 /** Store all actions of a sequence, so that it stays folded when its first action changes. */
@@ -43,7 +43,7 @@ export interface Folds {
 /** A sequence is unfolded while one of its actions is running, was run or selected last, or has a problem. */
 export function useFolds(problems: readonly Problem[]): Folds {
   const doc = useEditor((state) => state.doc);
-  const kept = useEditor((state) => state.view.user[KEY]);
+  const stored = useEditor((state) => state.view.user[KEY]);
   const running = useEditor((state) => state.program.running);
   const active = useEditor(isRunning);
   const executing = useEditor((state) => state.live.executing);
@@ -56,7 +56,7 @@ export function useFolds(problems: readonly Problem[]): Folds {
   const last = ran.current;
   return useMemo(() => {
     if (!doc) return { runs: 0, wished: false, folded: [] };
-    const wished = wishedOf(kept);
+    const wished = wishedOf(stored);
     const runs = runsOf(doc);
     const seen = new Set([...last, executing, selected, from, ...problems.map((each) => each.id)]);
     return {
@@ -64,5 +64,5 @@ export function useFolds(problems: readonly Problem[]): Folds {
       wished: runs.some((run) => run.some((id) => wished.includes(id))),
       folded: foldedRuns(doc, new Set(wished), seen),
     };
-  }, [doc, kept, last, executing, selected, from, problems]);
+  }, [doc, stored, last, executing, selected, from, problems]);
 }

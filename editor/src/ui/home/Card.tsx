@@ -6,12 +6,12 @@ import * as documents from "../../commands/documents";
 import { downloadPackage } from "../../commands/packages";
 import { runPackage } from "../../commands/run";
 import { keepOwnPicture, useOwn } from "../../commands/thumbnail";
-import { keepGeneral } from "../../commands/viewstate";
+import { storeGeneralState } from "../../commands/viewstate";
 import type { Entry } from "../../home/entries";
 import type { Requests, Run } from "../../protocol/types";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
-import { now, tell, useEditor } from "../../store/store";
+import { notify, now, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { AskName, More } from "../kit/lazyControls";
@@ -19,14 +19,14 @@ import type { Choice } from "../kit/props";
 import { endName } from "../run/History";
 import { ago } from "../times";
 import { Deleting } from "./Deleting";
-import { starsOf } from "./favorites";
+import { favoritesOf } from "./favorites";
 import { Inline } from "./Inline";
 import { Problems } from "./Problems";
-import { isTemplate, keepRecent, keepTemplate } from "./recent";
+import { isTemplate, storeOpened, storeTemplate } from "./recent";
 import { Thumbnail } from "./Thumbnail";
 
-type Doing = "open" | "copy" | "rename" | "describe" | "remove";
-const DO: Record<Entry["kind"], Partial<Record<Doing, keyof Requests>>> = {
+type ActionCommands = "open" | "copy" | "rename" | "describe" | "remove";
+const DO: Record<Entry["kind"], Partial<Record<ActionCommands, keyof Requests>>> = {
   scene: {
     open: "OpenScene",
     copy: "CopyScene",
@@ -60,12 +60,12 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   const [doing, setDoing] = useState<"" | "copy" | "rename" | "describe" | "remove">("");
   const connection = useEditor((state) => state.connection);
   const owner = useEditor((state) => state.locks[id]);
-  const starred = useEditor((state) => starsOf(state).has(id));
+  const isFavorite = useEditor((state) => favoritesOf(state).has(id));
   const running = useEditor(isRunning);
-  const why = (what: Doing) => {
+  const why = (what: ActionCommands) => {
     const request = DO[kind][what];
     if (owner && owner !== connection.user && what !== "open" && what !== "copy") return t`In use by ${owner}.`;
-    return request ? barred({ ...now(), connection }, request) : "";
+    return request ? whyUnavailable({ ...now(), connection }, request) : "";
   };
   const whyOpen = why("open") || (running ? t`Stop the program first.` : "");
   const whyThis = whyOpen || (problems.length > 0 ? t`Fix its problems first, then open it.` : "");
@@ -75,10 +75,10 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
   const template = useEditor((state) => isTemplate(state, id));
   const own = useOwn((all) => all[id] ?? false);
   const picture = useRef<HTMLInputElement>(null);
-  const keepPicture = (file: File | null) =>
-    void keepOwnPicture(id, file).then((wrong) => wrong && tell("error", wrong));
+  const storePicture = (file: File | null) =>
+    void keepOwnPicture(id, file).then((wrong) => wrong && notify("error", wrong));
   const open = (paused = false) => {
-    if (kind === "package") keepRecent(id);
+    if (kind === "package") storeOpened(id);
     void (kind === "scene"
       ? documents.openScene(id)
       : kind === "project"
@@ -86,8 +86,8 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
         : runPackage(id, paused));
   };
   const star = () => {
-    const others = [...starsOf(now())].filter((each) => each !== id);
-    keepGeneral({ stars: starred ? others : [...others, id] });
+    const others = [...favoritesOf(now())].filter((each) => each !== id);
+    storeGeneralState({ stars: isFavorite ? others : [...others, id] });
   };
   const close = () => setDoing("");
   const choices: Choice[] = [
@@ -96,7 +96,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           {
             id: "project",
             label: t`New project…`,
-            not: barred({ ...now(), connection }, "NewProject"),
+            not: whyUnavailable({ ...now(), connection }, "NewProject"),
             act: () => onProject(id),
           },
         ]
@@ -107,7 +107,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           {
             id: "download",
             label: t`Download`,
-            act: () => void downloadPackage(id, name).then((wrong) => wrong && tell("error", wrong)),
+            act: () => void downloadPackage(id, name).then((wrong) => wrong && notify("error", wrong)),
           },
         ]
       : [
@@ -125,7 +125,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
                   id: "view",
                   label: t`Use the 3D view as picture`,
                   not: why("describe"),
-                  act: () => keepPicture(null),
+                  act: () => storePicture(null),
                 },
               ]
             : []),
@@ -133,7 +133,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
             id: "template",
             label: template ? t`Remove from templates` : t`Use as a template`,
             not: why("describe"),
-            act: () => keepTemplate(id, !template),
+            act: () => storeTemplate(id, !template),
           },
         ]),
     { id: "rename", label: t`Rename…`, not: why("rename"), act: () => setDoing("rename") },
@@ -153,7 +153,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           aria-label={t`Picture of ${name}`}
           onChange={(event) => {
             const file = event.target.files?.[0];
-            if (file) keepPicture(file);
+            if (file) storePicture(file);
             event.target.value = "";
           }}
         />
@@ -174,11 +174,11 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
           <Button
             look="plain"
             className="star"
-            aria-pressed={starred}
-            aria-label={starred ? t`Remove ${name} from favorites` : t`Add ${name} to favorites`}
+            aria-pressed={isFavorite}
+            aria-label={isFavorite ? t`Remove ${name} from favorites` : t`Add ${name} to favorites`}
             onPress={star}
           >
-            <span aria-hidden="true">{starred ? "★" : "☆"}</span>
+            <span aria-hidden="true">{isFavorite ? "★" : "☆"}</span>
           </Button>
         </div>
         <p className="quiet small">

@@ -4,9 +4,9 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
-import { keepGeneral } from "../../commands/viewstate";
+import { storeGeneralState } from "../../commands/viewstate";
 import { chosen, type Entry, entriesOf, SORTS, type Sort } from "../../home/entries";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
 import { Button, Waiting } from "../kit/kit";
@@ -14,7 +14,7 @@ import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
 import { Card } from "./Card";
-import { starsOf } from "./favorites";
+import { favoritesOf } from "./favorites";
 import { NewProject } from "./NewProject";
 import { NewScene } from "./NewScene";
 import { recentOf } from "./recent";
@@ -43,14 +43,14 @@ const SHOWN: Record<State["lists"]["shown"], TabName> = {
 
 export function Home() {
   const lists = useEditor((state) => state.lists);
-  const noRight = useEditor((state) => barred(state, "NewProject"));
-  const noScene = useEditor((state) => barred(state, "NewScene"));
+  const noRight = useEditor((state) => whyUnavailable(state, "NewProject"));
+  const noScene = useEditor((state) => whyUnavailable(state, "NewScene"));
   const [tab, setTab] = useState<TabName>(SHOWN[lists.shown]);
   const [search, setSearch] = useState("");
   const [asking, setAsking] = useState<"" | "scene" | "project">("");
   const [scene, setScene] = useState("");
   const [onlyStars, setOnlyStars] = useState(false);
-  const stars = useEditor(starsOf);
+  const stars = useEditor(favoritesOf);
   const sort = useEditor(sortOf);
   const recent = useEditor(recentOf);
   const entries = Object.fromEntries(TABS.map((each) => [each, entriesOf(lists, KINDS[each])])) as Record<
@@ -97,7 +97,7 @@ export function Home() {
           </SearchField>
           <div className="field sorting">
             <label htmlFor="sort">{t`Sort by`}</label>
-            <select id="sort" value={sort} onChange={(event) => keepGeneral({ sort: event.target.value })}>
+            <select id="sort" value={sort} onChange={(event) => storeGeneralState({ sort: event.target.value })}>
               {SORTS.map(([each, words]) => (
                 <option key={each} value={each}>
                   {i18n._(words)}
@@ -156,8 +156,8 @@ export function Home() {
 
 /** Sort order of the user, stored on the server. */
 function sortOf(state: State): Sort {
-  const kept = state.view.general.sort;
-  return SORTS.find(([each]) => each === kept)?.[0] ?? "changed";
+  const stored = state.view.general.sort;
+  return SORTS.find(([each]) => each === stored)?.[0] ?? "changed";
 }
 
 interface ListProps {

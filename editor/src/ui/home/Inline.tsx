@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Refusal";
+import { RefusedText, useRefusal } from "../points/Refusal";
 
 interface InlineProps {
   label: string;
@@ -17,7 +17,7 @@ interface InlineProps {
 
 export function Inline({ label, value, taken = [], many = false, onSave, onClose }: InlineProps) {
   const [text, setText] = useState(value);
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   const clean = text.trim();
   const problem = clean !== value && taken.includes(clean) ? t`This name is already in use.` : "";
   const save = (event?: FormEvent) => {

@@ -6,8 +6,8 @@ import * as documents from "../../commands/documents";
 import { faultyObjects, takeOut } from "../../commands/repair";
 import { sentence } from "../../commands/requests";
 import type { Entry } from "../../home/entries";
-import { barred } from "../../store/permissions";
-import { tell, useEditor } from "../../store/store";
+import { whyUnavailable } from "../../store/permissions";
+import { notify, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
@@ -21,7 +21,7 @@ interface ProblemsProps {
 
 export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, onScene }: ProblemsProps) {
   const [faulty, setFaulty] = useState<string[] | null>(null);
-  const noScene = useEditor((state) => barred(state, "SaveScene"));
+  const noScene = useEditor((state) => whyUnavailable(state, "SaveScene"));
   const ofScene = useEditor((state) => state.lists.scenes?.find((each) => each.id === from?.id)?.problems?.length ?? 0);
   return (
     <details className="problems">
@@ -55,7 +55,7 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
         <Button
           why={noScene}
           aria-label={t`Repair ${name}`}
-          onPress={() => void faultyObjects(id, problems).then(setFaulty, (error) => tell("error", sentence(error)))}
+          onPress={() => void faultyObjects(id, problems).then(setFaulty, (error) => notify("error", sentence(error)))}
         >
           {t`Mend`}
         </Button>
@@ -68,7 +68,7 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
           onClose={() => setFaulty(null)}
           onYes={() =>
             void takeOut(id, name, faulty).then((wrong) =>
-              wrong ? tell("error", wrong) : tell("info", t`${name} can be opened again.`),
+              wrong ? notify("error", wrong) : notify("info", t`${name} can be opened again.`),
             )
           }
         >

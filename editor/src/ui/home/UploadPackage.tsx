@@ -3,20 +3,20 @@
 import { t } from "@lingui/core/macro";
 import { useRef, useState } from "react";
 import { uploadPackage } from "../../commands/packages";
-import { barred } from "../../store/permissions";
-import { tell, useEditor } from "../../store/store";
+import { whyUnavailable } from "../../store/permissions";
+import { notify, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 
 export function UploadPackage() {
   const input = useRef<HTMLInputElement>(null);
   const [busy, setBusy] = useState(false);
-  const why = useEditor((state) => barred(state, "UploadPackage"));
+  const why = useEditor((state) => whyUnavailable(state, "UploadPackage"));
   const take = async (file: File | undefined) => {
     if (!file) return;
     setBusy(true);
     const wrong = await uploadPackage(file);
     setBusy(false);
-    tell(wrong ? "error" : "info", wrong || t`Uploaded ${file.name}.`);
+    notify(wrong ? "error" : "info", wrong || t`Uploaded ${file.name}.`);
   };
   return (
     <>

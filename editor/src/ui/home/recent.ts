@@ -1,6 +1,6 @@
 /** Documents opened recently by the user, and templates shared by all users. Both are stored on the server. */
 
-import { keepGeneral } from "../../commands/viewstate";
+import { storeGeneralState } from "../../commands/viewstate";
 import { beyond, type Opened, openedOf } from "../../home/opened";
 import { memoized } from "../../store/memo";
 import type { State } from "../../store/state";
@@ -14,11 +14,11 @@ export function recentOf(state: State): Opened {
 }
 
 /** Store that the user opened a document; each has its own key, so that two devices do not conflict. */
-export function keepRecent(id: string): void {
+export function storeOpened(id: string): void {
   const forgotten = beyond(recentOf(now()), id).map((each) => [`opened/${each}`, null] as const);
-  keepGeneral({ ...Object.fromEntries(forgotten), [`opened/${id}`]: Date.now() });
+  storeGeneralState({ ...Object.fromEntries(forgotten), [`opened/${id}`]: Date.now() });
 }
 
 const key = (id: string) => `template/${id}`;
 export const isTemplate = (state: State, id: string): boolean => state.view.general[key(id)] === true;
-export const keepTemplate = (id: string, on: boolean): void => keepGeneral({ [key(id)]: on || null }, "shared");
+export const storeTemplate = (id: string, on: boolean): void => storeGeneralState({ [key(id)]: on || null }, "shared");

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import encodeQR from "qr";
 import { useEffect, useState } from "react";
-import { howToJoin, type Joining } from "../../commands/invitation";
+import { type Joining, loadInvitation } from "../../commands/invitation";
 import { Waiting } from "../kit/kit";
 import "./invitation.css";
 
@@ -14,7 +14,7 @@ export function Invitation() {
   const [joining, setJoining] = useState<Joining | null>(null);
   useEffect(() => {
     let over = false;
-    void howToJoin().then((found) => over || setJoining(found));
+    void loadInvitation().then((found) => over || setJoining(found));
     return () => {
       over = true;
     };

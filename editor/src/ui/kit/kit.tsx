@@ -11,7 +11,7 @@ import {
   TextField,
   type TextFieldProps,
 } from "react-aria-components";
-import { tell } from "../../store/store";
+import { notify } from "../../store/store";
 import { Icon, type IconName } from "./icons";
 import type { Look } from "./props";
 
@@ -25,7 +25,7 @@ interface PlainButtonProps extends Omit<ButtonProps, "children" | "className"> {
 }
 
 export function Button({ look = "", icon, children, className, why = "", onPress, ...rest }: PlainButtonProps) {
-  const press: ButtonProps["onPress"] = why ? () => tell("info", why) : onPress;
+  const press: ButtonProps["onPress"] = why ? () => notify("info", why) : onPress;
   return (
     <AriaButton
       {...rest}

@@ -18,6 +18,8 @@ export async function persistently<T>(load: () => Promise<T>): Promise<T> {
 }
 
 // biome-ignore lint/suspicious/noExplicitAny: a component with any properties.
-export function lazily<C extends ComponentType<any>>(load: () => Promise<{ default: C }>): LazyExoticComponent<C> {
+export function lazyComponent<C extends ComponentType<any>>(
+  load: () => Promise<{ default: C }>,
+): LazyExoticComponent<C> {
   return lazy(() => persistently(load));
 }

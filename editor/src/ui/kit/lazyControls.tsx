@@ -2,12 +2,12 @@
 
 import { Suspense } from "react";
 import { Button } from "./kit";
-import { lazily } from "./lazy";
+import { lazyComponent } from "./lazy";
 import type { AskNameProps, ConfirmProps, MoreProps } from "./props";
 
-const ConfirmDialog = lazily(() => import("./dialogs").then((module) => ({ default: module.Confirm })));
-const AskNameDialog = lazily(() => import("./dialogs").then((module) => ({ default: module.AskName })));
-const MoreMenu = lazily(() => import("./menu"));
+const ConfirmDialog = lazyComponent(() => import("./dialogs").then((module) => ({ default: module.Confirm })));
+const AskNameDialog = lazyComponent(() => import("./dialogs").then((module) => ({ default: module.AskName })));
+const MoreMenu = lazyComponent(() => import("./menu"));
 
 /** Ask for confirmation of an action that cannot be undone. */
 export function Confirm(props: ConfirmProps) {

@@ -6,7 +6,7 @@ import { Button } from "./kit";
 import type { MoreProps } from "./props";
 
 export default function MoreMenu({ label, choices, icon = "more", children, look = "plain" }: MoreProps) {
-  const barred = choices.filter((each) => each.not).map((each) => each.id);
+  const whyUnavailable = choices.filter((each) => each.not).map((each) => each.id);
   return (
     <MenuTrigger>
       <Button look={look} icon={icon} aria-label={label}>
@@ -17,7 +17,7 @@ export default function MoreMenu({ label, choices, icon = "more", children, look
           className="menu"
           aria-label={label}
           onAction={(key) => choices.find((each) => each.id === key)?.act()}
-          disabledKeys={barred}
+          disabledKeys={whyUnavailable}
         >
           {choices.map((each) => (
             <MenuItem key={each.id} id={each.id} className="menu-item" textValue={each.label}>

@@ -12,12 +12,12 @@ import "./messages.css";
 const WORDS = { info: msg`note`, warn: msg`warning`, error: msg`error` };
 
 export default function Messages({ onClose }: { onClose: () => void }) {
-  const said = useEditor((state) => state.said);
+  const messageLog = useEditor((state) => state.messageLog);
   return (
     <Window title={t`Messages`} onClose={onClose}>
-      {said.length === 0 && <p className="quiet">{t`No messages yet.`}</p>}
+      {messageLog.length === 0 && <p className="quiet">{t`No messages yet.`}</p>}
       <ol className="messages" tabIndex={0} aria-label={t`Messages, newest first`}>
-        {[...said].reverse().map(({ id, level, text, time }) => (
+        {[...messageLog].reverse().map(({ id, level, text, time }) => (
           <li key={id} className={level}>
             <Icon name={level === "info" ? "info" : "warn"} size={18} />
             <time className="quiet" dateTime={new Date(time).toISOString()}>

@@ -6,11 +6,11 @@
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import * as commands from "../../commands/run";
-import { keepGeneral } from "../../commands/viewstate";
+import { storeGeneralState } from "../../commands/viewstate";
 import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
 import { session } from "../../session/session";
 import { usersOfDocument } from "../../store/absentUsers";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
@@ -76,7 +76,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
     ? t`No packages yet. Build one in the editor.`
     : opened && users.length > 0
       ? t`${opened} is open in the editor (${users.join(", ")}). Ask them to close it.`
-      : barred(state, "RunPackage");
+      : whyUnavailable(state, "RunPackage");
   const start = async () => {
     if (!known) return;
     setStarting(true);
@@ -120,7 +120,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
             {idle && !run && <LastRun />}
           </div>
           {run && (
-            <Button className="operator-dismiss" onPress={() => keepGeneral(dismissal(run))}>
+            <Button className="operator-dismiss" onPress={() => storeGeneralState(dismissal(run))}>
               {t`Dismiss`}
             </Button>
           )}

@@ -3,16 +3,16 @@
 import { plural, t } from "@lingui/core/macro";
 import { Suspense, useState } from "react";
 import { serves } from "../../session/connection";
-import { goneHolders } from "../../store/absentUsers";
+import { absentLockHolders } from "../../store/absentUsers";
 import { now, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import { colourOf, initials } from "./colours";
 import "./people.css";
 
-const TakeOver = lazily(() => import("./TakeOver"));
+const TakeOver = lazyComponent(() => import("./TakeOver"));
 
 export function People() {
   const users = useEditor((state) => state.users);
@@ -66,7 +66,7 @@ export function People() {
 /** Users who left and still hold locks; pressing one offers to take over. */
 function Gone() {
   // Joined to a text: a selector has to return the same value for the same state.
-  const gone = useEditor((state) => goneHolders(state).join("\n"));
+  const gone = useEditor((state) => absentLockHolders(state).join("\n"));
   const [asked, setAsked] = useState("");
   if (!serves("TakeOverLocks")) return null;
   return (

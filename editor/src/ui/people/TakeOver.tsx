@@ -4,8 +4,8 @@ import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { ask } from "../../commands/requests";
 import type { LockHolder } from "../../protocol/types";
-import { barred } from "../../store/permissions";
-import { now, tell, useEditor } from "../../store/store";
+import { whyUnavailable } from "../../store/permissions";
+import { notify, now, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Confirm } from "../kit/dialogs";
 import { ago, clock } from "../times";
@@ -13,7 +13,7 @@ import { ago, clock } from "../times";
 export default function TakeOver({ user, onClose }: { user: string; onClose: () => void }) {
   const [holder, setHolder] = useState<LockHolder | null>(null);
   const [missing, setMissing] = useState(false);
-  const cannot = useEditor((state) => barred(state, "TakeOverLocks"));
+  const cannot = useEditor((state) => whyUnavailable(state, "TakeOverLocks"));
   const present = useEditor((state) => state.users[user]?.online === true);
   useEffect(() => {
     let shown = true;
@@ -37,7 +37,7 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
           : t`Wait until the locks are listed.`);
   const takeOver = async () => {
     const answer = await ask("TakeOverLocks", { user });
-    if (answer) tell("info", t`You took over from ${user}: ${answer.data.locks.map(called).join(", ")}.`);
+    if (answer) notify("info", t`You took over from ${user}: ${answer.data.locks.map(called).join(", ")}.`);
   };
   return (
     <Confirm

@@ -8,13 +8,13 @@ import { Amount } from "../kit/fields";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
 import { useWhyNot } from "./editing";
-import { RefusedText, useAsking } from "./Refusal";
+import { RefusedText, useRefusal } from "./Refusal";
 
 const CopiesSection: Section["Body"] = ({ selection: { id } }) => {
   const [count, setCount] = useState(1);
   const [step, setStep] = useState<Position>({ x: 0.05, y: 0, z: 0 });
   const why = useWhyNot(id, "CopyActionPoint");
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   return (
     <details className="by-numbers">
       <summary>{t`Copies in a row`}</summary>

@@ -13,42 +13,42 @@ import type { Section } from "../workplace/section";
 import { useWhyNot } from "./editing";
 import { NameField } from "./NameField";
 import { ReachAnswers } from "./Reach";
-import { RefusedText, useAsking } from "./Refusal";
+import { RefusedText, useRefusal } from "./Refusal";
 import { Remove } from "./Remove";
 import "./points.css";
 import "../robot/robot.css";
 
 const JointsSection: Section["Body"] = ({ selection: { id } }) => {
-  const kept = useEditor((state) => state.doc?.joints[id]);
+  const stored = useEditor((state) => state.doc?.joints[id]);
   const all = useEditor((state) => state.doc?.orientations);
-  const point = useEditor((state) => (kept ? nameOf(state, kept.pointId) : ""));
-  const robot = useEditor((state) => (kept ? nameOf(state, kept.robot_id) : ""));
-  const why = useWhyNot(kept?.pointId ?? "", "UpdateActionPointJoints");
+  const point = useEditor((state) => (stored ? nameOf(state, stored.pointId) : ""));
+  const robot = useEditor((state) => (stored ? nameOf(state, stored.robot_id) : ""));
+  const why = useWhyNot(stored?.pointId ?? "", "UpdateActionPointJoints");
   const noRobot = useEditor((state) =>
     notReady(
       state,
-      kept ? { robotId: kept.robot_id, armId: kept.arm_id ?? "", effector: "" } : null,
+      stored ? { robotId: stored.robot_id, armId: stored.arm_id ?? "", effector: "" } : null,
       "UpdateActionPointJointsUsingRobot",
     ),
   );
-  const { refused, busy, ask } = useAsking();
-  if (!kept) return null;
-  const orientations = Object.values(all ?? {}).filter((each) => each.pointId === kept.pointId);
+  const { refused, busy, ask } = useRefusal();
+  if (!stored) return null;
+  const orientations = Object.values(all ?? {}).filter((each) => each.pointId === stored.pointId);
   const [only] = orientations;
-  const shown = shownJoints(kept.robot_id, kept.joints);
+  const shown = shownJoints(stored.robot_id, stored.joints);
   return (
     <>
       <NameField
         key={id}
         label={t`Joints name`}
-        name={kept.name}
+        name={stored.name}
         why={why}
         onRename={(name) => renameJoints(id, name)}
       />
-      <Button look="plain" icon="point" onPress={() => select({ kind: "point", id: kept.pointId })}>
+      <Button look="plain" icon="point" onPress={() => select({ kind: "point", id: stored.pointId })}>
         {t`${robot} at ${point}`}
       </Button>
-      {!kept.is_valid && <p className="tag warn">{t`The point has moved. These joints no longer reach it.`}</p>}
+      {!stored.is_valid && <p className="tag warn">{t`The point has moved. These joints no longer reach it.`}</p>}
       <ul className="joints">
         {shown.map((joint) => (
           <li key={joint.name} className="kept">
@@ -67,7 +67,7 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
                 void ask(
                   setJoints(
                     id,
-                    kept.joints.map((each) =>
+                    stored.joints.map((each) =>
                       each.name === joint.name ? { ...each, value: next / joint.scale } : each,
                     ),
                   ),
@@ -108,7 +108,7 @@ const JointsSection: Section["Body"] = ({ selection: { id } }) => {
       </div>
       <RefusedText>{refused}</RefusedText>
       <ReachAnswers id={id} />
-      <Remove key={`remove ${id}`} name={kept.name} why={why} along="" onRemove={() => removeJoints(id)} />
+      <Remove key={`remove ${id}`} name={stored.name} why={why} along="" onRemove={() => removeJoints(id)} />
     </>
   );
 };

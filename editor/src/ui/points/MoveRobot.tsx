@@ -9,13 +9,13 @@ import { worldOf } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 import { Answer } from "../robot/GoTab";
-import { MannerFields } from "../robot/MotionFields";
-import { mannerNow, useManner } from "../robot/motionOptions";
+import { MotionFields } from "../robot/MotionFields";
+import { motionOptions, useMotionOptions } from "../robot/motionOptions";
 import type { Section } from "../workplace/section";
-import { RefusedText, useAsking } from "./Refusal";
+import { RefusedText, useRefusal } from "./Refusal";
 import "../robot/robot.css";
 
-const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
+const MoveRobot: Section["Body"] = ({ selection: { kind, id } }) => {
   const chosen = useEditor(chosenRobot);
   const joints = useEditor((state) => state.doc?.joints[id]);
   const orientation = useEditor((state) => state.doc?.orientations[id]);
@@ -30,9 +30,9 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
       : t`There is no connection to the server.`,
   );
   const why = useEditor((state) => notReady(state, chosen && { ...chosen, robotId }, "MoveToActionPoint"));
-  const { speed } = useManner();
+  const { speed } = useMotionOptions();
   const [answer, setAnswer] = useState<string | null>(null);
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   useEffect(() => {
     setAnswer(null);
     return hideGhost;
@@ -67,7 +67,7 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
               moveToTaught(
                 joints ? { ...chosen, robotId, armId: joints.arm_id ?? "" } : chosen,
                 kind === "joints" ? { joints_id: id } : { orientation_id: id },
-                mannerNow(),
+                motionOptions(),
               ),
             )
           }
@@ -79,10 +79,10 @@ const GoThere: Section["Body"] = ({ selection: { kind, id } }) => {
       <RefusedText>{refused}</RefusedText>
       <details className="by-numbers">
         <summary>{t`Speed: ${Math.round(speed * 100)} %`}</summary>
-        <MannerFields />
+        <MotionFields />
       </details>
     </>
   );
 };
 
-export default GoThere;
+export default MoveRobot;

@@ -1,7 +1,7 @@
 /** A name that is edited in place: saved on Enter or when the field loses the focus. */
 
 import { useId, useState } from "react";
-import { RefusedText, useAsking } from "./Refusal";
+import { RefusedText, useRefusal } from "./Refusal";
 
 export function NameField({
   label,
@@ -16,7 +16,7 @@ export function NameField({
 }) {
   const id = useId();
   const [text, setText] = useState<string | null>(null);
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   const commit = () => {
     const wanted = (text ?? name).trim().replaceAll(" ", "_");
     if (text === null) return;

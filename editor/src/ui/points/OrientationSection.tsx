@@ -13,7 +13,7 @@ import type { Section } from "../workplace/section";
 import { useWhyNot } from "./editing";
 import { NameField } from "./NameField";
 import { ReachAnswers } from "./Reach";
-import { RefusedText, useAsking } from "./Refusal";
+import { RefusedText, useRefusal } from "./Refusal";
 import { Remove } from "./Remove";
 import "./points.css";
 
@@ -23,7 +23,7 @@ const OrientationSection: Section["Body"] = ({ selection: { id } }) => {
   const chosen = useEditor(chosenRobot);
   const why = useWhyNot(id, "UpdateActionPointOrientation");
   const noRobot = useEditor((state) => notReady(state, chosen, "UpdateActionPointOrientationUsingRobot"));
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   if (!one) return null;
   const angles = rollPitchYaw(one.orientation);
   return (

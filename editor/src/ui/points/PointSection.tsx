@@ -5,7 +5,7 @@ import { useState } from "react";
 import { holdHandTeaching } from "../../commands/holdToRun";
 import { movePointToRobot, possibleParents, removePoint, renamePoint, setParent } from "../../commands/points";
 import { chosenRobot, featuresOf, notReady } from "../../commands/robot";
-import { keepView } from "../../commands/viewstate";
+import { storeViewState } from "../../commands/viewstate";
 import { useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Pick } from "../kit/fields";
@@ -14,7 +14,7 @@ import { HoldButton } from "../robot/HoldButton";
 import type { Section } from "../workplace/section";
 import { useWhyNot } from "./editing";
 import { NameField } from "./NameField";
-import { RefusedText, useAsking } from "./Refusal";
+import { RefusedText, useRefusal } from "./Refusal";
 import { Remove } from "./Remove";
 import "./points.css";
 
@@ -32,7 +32,7 @@ const PointSection: Section["Body"] = ({ selection: { id } }) => {
   const byHand = useEditor((state) =>
     chosen && featuresOf(state, chosen.robotId)?.hand_teaching ? "" : t`This robot does not support hand teaching.`,
   );
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   if (!point) return null;
   const labels = names.split("\n");
   const choices = parents ? parents.split("\n").map((each, n) => [each, labels[n] ?? ""] as const) : [];
@@ -101,7 +101,7 @@ export const RemovePoint: Section["Body"] = ({ selection: { id } }) => {
 /** A note about a point for all users. The protocol has no request for a point's description. */
 function Note({ id }: { id: string }) {
   const key = `note/${id}`;
-  const kept = useEditor((state) => state.view.shared[key]);
+  const stored = useEditor((state) => state.view.shared[key]);
   const why = useEditor((state) =>
     state.connection.status === "ready" && state.connection.role >= 2 ? "" : t`read only`,
   );
@@ -113,10 +113,10 @@ function Note({ id }: { id: string }) {
         className="note"
         maxLength={2000}
         readOnly={why !== ""}
-        value={text ?? (typeof kept === "string" ? kept : "")}
+        value={text ?? (typeof stored === "string" ? stored : "")}
         onChange={(event) => setText(event.target.value)}
         onBlur={() => {
-          if (text !== null) keepView("shared", { [key]: text.trim() || null });
+          if (text !== null) storeViewState("shared", { [key]: text.trim() || null });
           setText(null);
         }}
       />

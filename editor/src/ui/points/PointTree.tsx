@@ -6,7 +6,7 @@ import { type DropItem, isTextDropItem, ListBox, ListBoxItem, useDragAndDrop } f
 import { possibleParents, setParent } from "../../commands/points";
 import { theEngine } from "../../session/engine";
 import type { OpenDocument } from "../../store/state";
-import { now, select, setUi, tell, useEditor } from "../../store/store";
+import { notify, now, select, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { ReachBadge } from "./Reach";
@@ -108,9 +108,9 @@ async function hang(id: string, target: string): Promise<void> {
   const state = now();
   if ((state.doc?.points[id]?.parent ?? "") === parent) return;
   if (parent && !possibleParents(state, id).includes(parent)) {
-    tell("info", t`${nameOf(state, parent)} is a child of ${nameOf(state, id)} and cannot be its parent.`);
+    notify("info", t`${nameOf(state, parent)} is a child of ${nameOf(state, id)} and cannot be its parent.`);
     return;
   }
   const refused = await setParent(id, parent);
-  if (refused) tell("error", refused);
+  if (refused) notify("error", refused);
 }

@@ -6,12 +6,12 @@ import { createPortal } from "react-dom";
 import { against, aimedPlace } from "../../commands/crosshair";
 import { addPoint, addPointFromRobot } from "../../commands/points";
 import { chosenRobot, notReady } from "../../commands/robot";
-import { keepGeneral } from "../../commands/viewstate";
+import { storeGeneralState } from "../../commands/viewstate";
 import type { Position } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
-import { now, setUi, tell, useEditor } from "../../store/store";
+import { notify, now, setUi, useEditor } from "../../store/store";
 import { composed, ORIGIN, worldOf } from "../../viewmodel/frames";
 import { pointSize } from "../../viewmodel/items";
 import { nameOf } from "../../viewmodel/names";
@@ -19,7 +19,7 @@ import { Amount, MoreOrLess, OneOf, OnOff } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { usePlaceTap } from "../robot/usePlaceTap";
 import { PointTree } from "./PointTree";
-import { RefusedText, useAsking } from "./Refusal";
+import { RefusedText, useRefusal } from "./Refusal";
 import "./points.css";
 
 /**
@@ -39,14 +39,16 @@ export default function PointsPanel() {
   const selected = useEditor((state) => state.ui.selection?.id);
   const candidate = selected === undefined ? "" : parentOfSelection();
   const parentName = useEditor((state) => (candidate ? nameOf(state, candidate) : ""));
-  const why = useEditor((state) => (isRunning(state) ? t`A program is running.` : barred(state, "AddActionPoint")));
+  const why = useEditor((state) =>
+    isRunning(state) ? t`A program is running.` : whyUnavailable(state, "AddActionPoint"),
+  );
   const noRobot = useEditor((state) => notReady(state, chosen, "AddApUsingRobot"));
   const [on, setOn] = useState<"parent" | "world">("parent");
   const [tapping, setTapping] = useState(false);
   const [standing, setStanding] = useState(true);
   const [typed, setTyped] = useState<Position>(ORIGIN.position);
   const size = useEditor(pointSize);
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   const parent = candidate && on === "parent" ? candidate : "";
   const added = (work: Promise<string>) =>
     void ask(work).then((done) => {
@@ -62,7 +64,7 @@ export default function PointsPanel() {
   const atCross = () => {
     const place = aimedPlace();
     if (place) added(addPoint(place.position, parent, standing ? place.orientation : undefined));
-    else tell("info", t`Nothing at the crosshair. Aim at the table or an object.`);
+    else notify("info", t`Nothing at the crosshair. Aim at the table or an object.`);
   };
   return (
     <>
@@ -133,7 +135,7 @@ export default function PointsPanel() {
         most={4}
         step={0.25}
         words={(value) => `${Math.round(value * 100)} %`}
-        onChange={(next) => keepGeneral({ point_size: next })}
+        onChange={(next) => storeGeneralState({ point_size: next })}
       />
     </>
   );

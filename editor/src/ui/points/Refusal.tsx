@@ -3,7 +3,7 @@
 import { useState } from "react";
 
 /** Send a request and keep its refusal until the next request. */
-export function useAsking(): { refused: string; busy: boolean; ask: (work: Promise<string>) => Promise<boolean> } {
+export function useRefusal(): { refused: string; busy: boolean; ask: (work: Promise<string>) => Promise<boolean> } {
   const [refused, setRefused] = useState("");
   const [busy, setBusy] = useState(false);
   const ask = async (work: Promise<string>): Promise<boolean> => {

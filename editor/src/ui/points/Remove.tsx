@@ -1,9 +1,9 @@
 /** Remove a point, an orientation or joints; list what is removed with it. */
 
 import { t } from "@lingui/core/macro";
-import { tell } from "../../store/store";
+import { notify } from "../../store/store";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "./Refusal";
+import { RefusedText, useRefusal } from "./Refusal";
 
 export function Remove({
   name,
@@ -16,7 +16,7 @@ export function Remove({
   along: string;
   onRemove: () => Promise<string>;
 }) {
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   return (
     <div className="remove">
       <Button
@@ -27,7 +27,7 @@ export function Remove({
           void ask(onRemove()).then(
             (done) =>
               done &&
-              tell(
+              notify(
                 "info",
                 along
                   ? t`Removed ${name} with ${along}. Press Undo to restore.`

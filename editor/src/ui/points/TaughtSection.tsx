@@ -20,7 +20,7 @@ import { More } from "../kit/lazyControls";
 import type { Section } from "../workplace/section";
 import { useWhyNot } from "./editing";
 import { ReachBadge } from "./Reach";
-import { RefusedText, useAsking } from "./Refusal";
+import { RefusedText, useRefusal } from "./Refusal";
 
 const DOWN = { x: 1, y: 0, z: 0, w: 0 };
 
@@ -29,7 +29,7 @@ export const Orientations: Section["Body"] = ({ selection: { id } }) => {
   const chosen = useEditor(chosenRobot);
   const why = useWhyNot(id, "AddActionPointOrientation");
   const noRobot = useEditor((state) => notReady(state, chosen, "AddActionPointOrientationUsingRobot"));
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   const taught = Object.values(doc?.orientations ?? {}).filter((each) => each.pointId === id);
   const down = () => {
     const open = now().doc;
@@ -95,7 +95,7 @@ export const JointsList: Section["Body"] = ({ selection: { id } }) => {
       .map((each) => nameOf(state, each.robot_id))
       .join("\n"),
   ).split("\n");
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   const taught = Object.values(doc?.joints ?? {})
     .map((each, n) => ({ ...each, robot: robots[n] ?? "" }))
     .filter((each) => each.pointId === id);

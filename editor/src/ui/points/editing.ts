@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import type { Requests } from "../../protocol/types";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { heldBy, isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
@@ -11,7 +11,7 @@ export function whyNotNow(state: State, id: string, request: keyof Requests): st
   if (isRunning(state)) return t`A program is running.`;
   const holder = heldBy(state, id);
   if (holder) return t`In use by ${holder}.`;
-  return barred(state, request);
+  return whyUnavailable(state, request);
 }
 
 export const useWhyNot = (id: string, request: keyof Requests): string =>

@@ -2,7 +2,7 @@
 
 import { msg } from "@lingui/core/macro";
 import type { Kind } from "../../store/state";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
 const of =
@@ -11,32 +11,37 @@ const of =
     kinds.includes(kind);
 
 export const pointSections: readonly Section[] = [
-  { id: "point", title: msg`Point`, applies: of("point"), Body: lazily(() => import("./PointSection")) },
+  { id: "point", title: msg`Point`, applies: of("point"), Body: lazyComponent(() => import("./PointSection")) },
   {
     id: "orientation",
     title: msg`Orientation`,
     applies: of("orientation"),
-    Body: lazily(() => import("./OrientationSection")),
+    Body: lazyComponent(() => import("./OrientationSection")),
   },
-  { id: "joints", title: msg`Joints`, applies: of("joints"), Body: lazily(() => import("./JointsSection")) },
-  { id: "go", title: msg`Robot`, applies: of("orientation", "joints"), Body: lazily(() => import("./MoveRobot")) },
+  { id: "joints", title: msg`Joints`, applies: of("joints"), Body: lazyComponent(() => import("./JointsSection")) },
+  {
+    id: "go",
+    title: msg`Robot`,
+    applies: of("orientation", "joints"),
+    Body: lazyComponent(() => import("./MoveRobot")),
+  },
   {
     id: "orientations",
     title: msg`Orientations`,
     applies: of("point"),
-    Body: lazily(() => import("./TaughtSection").then((module) => ({ default: module.Orientations }))),
+    Body: lazyComponent(() => import("./TaughtSection").then((module) => ({ default: module.Orientations }))),
   },
   {
     id: "joints-list",
     title: msg`Joints`,
     applies: of("point"),
-    Body: lazily(() => import("./TaughtSection").then((module) => ({ default: module.JointsList }))),
+    Body: lazyComponent(() => import("./TaughtSection").then((module) => ({ default: module.JointsList }))),
   },
-  { id: "copies", title: msg`Copies`, applies: of("point"), Body: lazily(() => import("./CopiesSection")) },
+  { id: "copies", title: msg`Copies`, applies: of("point"), Body: lazyComponent(() => import("./CopiesSection")) },
   {
     id: "remove-point",
     title: msg`Remove`,
     applies: of("point"),
-    Body: lazily(() => import("./PointSection").then((module) => ({ default: module.RemovePoint }))),
+    Body: lazyComponent(() => import("./PointSection").then((module) => ({ default: module.RemovePoint }))),
   },
 ];

@@ -1,7 +1,7 @@
 /** Points of the project: list and add. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import type { Tool } from "../workplace/tool";
 
 export const points: Tool = {
@@ -9,5 +9,5 @@ export const points: Tool = {
   label: msg`Points`,
   icon: "point",
   shown: (state) => state.doc?.project != null,
-  Panel: lazily(() => import("./PointsPanel")),
+  Panel: lazyComponent(() => import("./PointsPanel")),
 };

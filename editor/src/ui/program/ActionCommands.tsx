@@ -6,7 +6,7 @@ import { stopMotion } from "../../commands/operation";
 import { duplicateAction, notEditable, removeAction, renameAction } from "../../commands/program";
 import { breakAt, cancel, execute, notRunnable, runTo } from "../../commands/run";
 import { metaOf } from "../../program/logic";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { useEditor } from "../../store/store";
 import { Button, Field } from "../kit/kit";
 import { ago } from "../times";
@@ -14,7 +14,7 @@ import type { Section } from "../workplace/section";
 import { Values } from "./Values";
 import "./program.css";
 
-const Doing: Section["Body"] = ({ selection: { id } }) => {
+const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
   const state = useEditor((each) => each);
   const [renaming, setRenaming] = useState(false);
   const { doc, types, live, tried, breakpoints } = state;
@@ -48,7 +48,7 @@ const Doing: Section["Body"] = ({ selection: { id } }) => {
         </Button>
         <Button
           aria-pressed={id in breakpoints}
-          why={barred(state, "SetBreakpoints")}
+          why={whyUnavailable(state, "SetBreakpoints")}
           onPress={() => void breakAt(id, !(id in breakpoints))}
         >
           <span className="breakpoint-dot" data-on={id in breakpoints} aria-hidden="true" />{" "}
@@ -92,7 +92,7 @@ const Doing: Section["Body"] = ({ selection: { id } }) => {
     </>
   );
 };
-export default Doing;
+export default ActionCommands;
 
 function Rename({ id, name, onClose }: { id: string; name: string; onClose: () => void }) {
   const [text, setText] = useState(name);

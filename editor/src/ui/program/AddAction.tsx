@@ -19,7 +19,7 @@ import { addAction, notEditable, type Where } from "../../commands/program";
 import { words } from "../../program/naming";
 import type { ObjectAction } from "../../protocol/types";
 import type { State } from "../../store/state";
-import { now, setUi, tell, useEditor } from "../../store/store";
+import { notify, now, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { CATEGORY_ICONS } from "./categories";
@@ -59,9 +59,9 @@ export function AddAction() {
 
   const add = async (offer: Offer) => {
     const why = cannot || offer.why;
-    if (why) return tell("info", `${words(offer.meta.name)}: ${why}`);
+    if (why) return notify("info", `${words(offer.meta.name)}: ${why}`);
     const where = placeFor(onPoint);
-    if (!where) return tell("info", t`Nothing at the crosshair. Aim at the table or an object.`);
+    if (!where) return notify("info", t`Nothing at the crosshair. Aim at the table or an object.`);
     setBusy(offer.key);
     setUi({ recentActions: [offer.key, ...recent.filter((each) => each !== offer.key)].slice(0, RECENT) });
     await addAction(offer.objectId, offer.meta, where);

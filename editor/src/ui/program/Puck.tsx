@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { aimedPlace } from "../../commands/crosshair";
 import { notEditable, placePuck } from "../../commands/program";
-import { tell, useEditor } from "../../store/store";
+import { notify, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
 import "./program.css";
@@ -14,7 +14,7 @@ const Puck: Section["Body"] = ({ selection: { id, kind } }) => {
   const move = () => {
     const place = aimedPlace();
     if (place) void placePuck(id, { ...place.position, z: place.position.z + 0.02 });
-    else tell("info", t`Nothing at the crosshair.`);
+    else notify("info", t`Nothing at the crosshair.`);
   };
   return (
     <>

@@ -4,13 +4,13 @@ import { t } from "@lingui/core/macro";
 import { useMemo } from "react";
 import { Button as AriaButton, ToggleButton } from "react-aria-components";
 import { breakAt } from "../../commands/run";
-import { keepView } from "../../commands/viewstate";
+import { storeViewState } from "../../commands/viewstate";
 import { conditionWords, incoming, outgoing, placeOf, START } from "../../program/logic";
 import type { Problem } from "../../program/problems";
 import { theEngine } from "../../session/engine";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import type { OpenDocument } from "../../store/state";
-import { select, setUi, tell, useEditor } from "../../store/store";
+import { notify, select, setUi, useEditor } from "../../store/store";
 import { nameOf, withNames } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { ReachBadge } from "../points/Reach";
@@ -19,7 +19,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
   const state = useEditor((each) => each);
   const { doc, types, breakpoints, program } = state;
   const order = useMemo(() => (doc ? ordered(doc) : []), [doc]);
-  const cannot = barred(state, "SetBreakpoints");
+  const cannot = whyUnavailable(state, "SetBreakpoints");
   if (!doc) return null;
   if (order.length === 0) return <p className="quiet">{t`No actions yet. Add one under “Add”.`}</p>;
   return (
@@ -28,7 +28,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
         <input
           type="checkbox"
           checked={state.view.user.hide_steps !== true}
-          onChange={(event) => keepView("user", { hide_steps: event.target.checked ? null : true })}
+          onChange={(event) => storeViewState("user", { hide_steps: event.target.checked ? null : true })}
         />
         <span>{t`Show steps in the 3D view`}</span>
       </label>
@@ -47,7 +47,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
                 className="breakpoint"
                 aria-label={t`Pause before ${action.name}`}
                 isSelected={id in breakpoints}
-                onChange={(on) => (cannot ? tell("info", cannot) : void breakAt(id, on))}
+                onChange={(on) => (cannot ? notify("info", cannot) : void breakAt(id, on))}
               >
                 <span className="breakpoint-dot" aria-hidden="true" />
               </ToggleButton>

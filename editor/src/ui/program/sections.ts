@@ -1,43 +1,43 @@
 /** Sections of the panel about actions, connections, START and END; their bodies are loaded when they are needed. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
 const isAction: Section["applies"] = ({ kind }) => kind === "action";
 
 export const programSections: readonly Section[] = [
-  { id: "try", title: msg`Do`, applies: isAction, Body: lazily(() => import("./ActionCommands")) },
+  { id: "try", title: msg`Do`, applies: isAction, Body: lazyComponent(() => import("./ActionCommands")) },
   {
     id: "parameters",
     title: msg`Parameters`,
     applies: isAction,
-    Body: lazily(() => import("./ActionParameters")),
+    Body: lazyComponent(() => import("./ActionParameters")),
   },
   {
     id: "next",
     title: msg`Next step`,
     applies: ({ kind, id }, state) =>
       state.doc?.project?.has_logic === true && (kind === "action" || (kind === "terminal" && id === "START")),
-    Body: lazily(() => import("./Next")),
+    Body: lazyComponent(() => import("./Next")),
   },
-  { id: "results", title: msg`Results`, applies: isAction, Body: lazily(() => import("./Results")) },
+  { id: "results", title: msg`Results`, applies: isAction, Body: lazyComponent(() => import("./Results")) },
   {
     id: "step",
     title: msg`Condition`,
     applies: ({ kind }) => kind === "logic",
-    Body: lazily(() => import("./Step")),
+    Body: lazyComponent(() => import("./Step")),
   },
   {
     id: "breakpoint",
     title: msg`Breakpoint`,
     applies: ({ kind }, state) => kind === "point" && state.doc?.project != null,
-    Body: lazily(() => import("./Breakpoint")),
+    Body: lazyComponent(() => import("./Breakpoint")),
   },
   {
     id: "puck",
     title: msg`In the view`,
     applies: ({ kind }) => kind === "terminal" || kind === "action",
-    Body: lazily(() => import("./Puck")),
+    Body: lazyComponent(() => import("./Puck")),
   },
 ];

@@ -1,7 +1,7 @@
 /** The program: add actions, list them, problems, variables. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import type { Tool } from "../workplace/tool";
 
 export const program: Tool = {
@@ -9,5 +9,5 @@ export const program: Tool = {
   label: msg`Program`,
   icon: "action",
   shown: (state) => state.doc?.project !== null && state.doc !== null,
-  Panel: lazily(() => import("./ProgramPanel")),
+  Panel: lazyComponent(() => import("./ProgramPanel")),
 };

@@ -4,7 +4,7 @@ import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useCallback, useEffect, useRef, useState } from "react";
 import { type Chosen, effectorPose, hideGhost, moveToPose, notReady } from "../../commands/robot";
-import type { WayState } from "../../engine/pathLine";
+import type { PathState } from "../../engine/pathLine";
 import type { Pose } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
 import { now, useEditor } from "../../store/store";
@@ -14,7 +14,7 @@ import { rollPitchYaw } from "../../viewmodel/rotations";
 import { Amount, OneOf, OnOff } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { type GoalAnswer, LiveGoal } from "./liveGoal";
-import { mannerNow, useManner } from "./motionOptions";
+import { motionOptions, useMotionOptions } from "./motionOptions";
 import { PadDock } from "./PadDock";
 import { useGoalGizmo } from "./useGoalGizmo";
 import { usePlaceTap } from "./usePlaceTap";
@@ -25,7 +25,7 @@ const ANGLES = [msg`Roll`, msg`Pitch`, msg`Yaw`] as const;
 
 export function GoTab({ chosen }: { chosen: Chosen }) {
   const why = useEditor((state) => notReady(state, chosen));
-  const { safe } = useManner();
+  const { safe } = useMotionOptions();
   const selection = useEditor((state) => state.ui.selection);
   const selected = useEditor((state) =>
     selection && selection.kind !== "logic" && selection.kind !== "joints" && selection.id !== chosen.robotId
@@ -39,7 +39,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
   const [refused, setRefused] = useState("");
   const live = useRef<LiveGoal | null>(null);
   useEffect(() => {
-    const one = new LiveGoal(chosen, () => mannerNow().linear, setAnswer);
+    const one = new LiveGoal(chosen, () => motionOptions().linear, setAnswer);
     live.current = one;
     return () => {
       one.forget();
@@ -51,7 +51,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
     setRefused("");
     live.current?.ask(next);
   }, []);
-  const giveUp = () => {
+  const cancelGoal = () => {
     live.current?.forget();
     hideGhost();
     setAnswer(null);
@@ -134,11 +134,11 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
           <Button
             look="primary"
             why={why || notYet}
-            onPress={() => void moveToPose(chosen, goal, mannerNow()).then(setRefused)}
+            onPress={() => void moveToPose(chosen, goal, motionOptions()).then(setRefused)}
           >
             {t`Move there`}
           </Button>
-          <Button onPress={giveUp}>{t`Reset to tool`}</Button>
+          <Button onPress={cancelGoal}>{t`Reset to tool`}</Button>
           {selected && (
             <Button
               onPress={() => {
@@ -162,7 +162,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
 
 /** Describe the straight path to the target. */
 function WayWords({ answer }: { answer: GoalAnswer | null }) {
-  const { linear } = useManner();
+  const { linear } = useMotionOptions();
   const name = useEditor((state) => (answer?.met ? nameOf(state, answer.met) : ""));
   if (!answer || answer.problem) return null;
   if (!linear)
@@ -178,13 +178,13 @@ function WayWords({ answer }: { answer: GoalAnswer | null }) {
 
 /** Show the straight path from the current tool position in the view. */
 function useWay(chosen: Chosen, goal: Pose | null, answer: GoalAnswer | null): void {
-  const { linear } = useManner();
+  const { linear } = useMotionOptions();
   const tool = useTelemetry(chosen.robotId, () => effectorPose(chosen));
-  const state: WayState = !answer ? "unknown" : linear || answer.problem ? answer.way : "unknown";
+  const state: PathState = !answer ? "unknown" : linear || answer.problem ? answer.way : "unknown";
   useEffect(() => {
-    theEngine()?.showWay(goal && answer && tool ? { from: tool.position, to: goal.position, state } : null);
+    theEngine()?.showPath(goal && answer && tool ? { from: tool.position, to: goal.position, state } : null);
   }, [goal, tool, answer, state]);
-  useEffect(() => () => theEngine()?.showWay(null), []);
+  useEffect(() => () => theEngine()?.showPath(null), []);
 }
 
 /** Why the target cannot be reached; null before the check. */

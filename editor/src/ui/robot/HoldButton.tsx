@@ -6,7 +6,7 @@
 import { t } from "@lingui/core/macro";
 import { type ReactNode, useEffect, useRef, useState } from "react";
 import type { Held } from "../../commands/holdToRun";
-import { tell } from "../../store/store";
+import { notify } from "../../store/store";
 
 interface HoldButtonProps {
   /** Label for screen readers. */
@@ -25,7 +25,7 @@ export function HoldButton({ label, why = "", className = "", onHold, onOver, ch
   const [down, setDown] = useState(false);
   const begin = () => {
     if (why) {
-      tell("info", why);
+      notify("info", why);
       return;
     }
     if (held.current) return;

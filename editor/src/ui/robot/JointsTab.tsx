@@ -12,7 +12,7 @@ import { telemetry } from "../../store/telemetry";
 import { Amount, OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { HoldButton } from "./HoldButton";
-import { FASTEST, mannerNow, setManner, useManner } from "./motionOptions";
+import { FASTEST, motionOptions, setMotionOptions, useMotionOptions } from "./motionOptions";
 import { HOLD_HINT, PadDock } from "./PadDock";
 import { useTelemetry } from "./useTelemetry";
 
@@ -44,7 +44,7 @@ export function shownJoints(robotId: string, joints: readonly Joint[]): ShownJoi
 
 export function JointsTab({ chosen }: { chosen: Chosen }) {
   const { robotId, armId } = chosen;
-  const { way, angle, distance, speed } = useManner();
+  const { way, angle, distance, speed } = useMotionOptions();
   const features = useEditor((state) => featuresOf(state, robotId));
   const why = useEditor((state) => notReady(state, chosen, "MoveToJoints"));
   const joints = useTelemetry(robotId, () => telemetry.latest(robotId)?.joints);
@@ -63,7 +63,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
     void moveToJoints(
       chosen,
       [...present].map(([each, was]) => ({ name: each, value: each === name ? value : was })),
-      mannerNow(),
+      motionOptions(),
     ).then(setRefused);
   };
   const jog = (name: string, sign: number, prismatic: boolean) => {
@@ -77,7 +77,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
         label={t`Mode`}
         quiet
         value={hold ? "hold" : "step"}
-        onChange={(next) => setManner({ way: next })}
+        onChange={(next) => setMotionOptions({ way: next })}
         choices={
           features?.jog
             ? [
@@ -95,7 +95,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
           value={angle * DEGREES}
           least={0.01}
           most={180}
-          onChange={(next) => setManner({ angle: next / DEGREES })}
+          onChange={(next) => setMotionOptions({ angle: next / DEGREES })}
         />
       )}
       <PadDock

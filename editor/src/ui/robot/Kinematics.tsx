@@ -8,18 +8,18 @@ import { useEditor } from "../../store/store";
 import { ago } from "../times";
 
 export function Kinematics({ robotId }: { robotId: string }) {
-  const tells = useEditor((state) => featuresOf(state, robotId)?.kinematic_calibration ?? false);
+  const reports = useEditor((state) => featuresOf(state, robotId)?.kinematic_calibration ?? false);
   // The calibration can change while the robot is online, which a notification reports.
-  const told = useEditor((state) => state.notices.at(-1)?.id);
+  const lastNotice = useEditor((state) => state.notices.at(-1)?.id);
   const scene = useEditor((state) => state.live.state);
   const [found, setFound] = useState<RobotKinematics | null>(null);
   useEffect(() => {
-    if (!tells) return;
+    if (!reports) return;
     const ended = new AbortController();
     readKinematics(robotId, ended.signal).then(setFound, () => setFound(null));
     return () => ended.abort();
-  }, [robotId, tells, told, scene]);
-  if (!tells || found?.object_id !== robotId) return null;
+  }, [robotId, reports, lastNotice, scene]);
+  if (!reports || found?.object_id !== robotId) return null;
   return <p className="quiet small">{sentence(found)}</p>;
 }
 

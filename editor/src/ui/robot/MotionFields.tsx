@@ -2,10 +2,10 @@
 
 import { t } from "@lingui/core/macro";
 import { MoreOrLess, OnOff } from "../kit/fields";
-import { setManner, useManner } from "./motionOptions";
+import { setMotionOptions, useMotionOptions } from "./motionOptions";
 
-export function MannerFields() {
-  const { speed, safe, linear } = useManner();
+export function MotionFields() {
+  const { speed, safe, linear } = useMotionOptions();
   return (
     <div className="manner">
       <MoreOrLess
@@ -15,12 +15,12 @@ export function MannerFields() {
         most={1}
         step={0.01}
         words={(value) => `${Math.round(value * 100)} %`}
-        onChange={(next) => setManner({ speed: next })}
+        onChange={(next) => setMotionOptions({ speed: next })}
       />
-      <OnOff isSelected={safe} onChange={(next) => setManner({ safe: next })}>
+      <OnOff isSelected={safe} onChange={(next) => setMotionOptions({ safe: next })}>
         {t`Check for collisions`}
       </OnOff>
-      <OnOff isSelected={linear} onChange={(next) => setManner({ linear: next })}>
+      <OnOff isSelected={linear} onChange={(next) => setMotionOptions({ linear: next })}>
         {t`Straight line`}
       </OnOff>
     </div>

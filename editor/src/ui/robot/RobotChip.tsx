@@ -5,7 +5,7 @@ import { useState } from "react";
 import { addPointFromRobot } from "../../commands/points";
 import { chosenRobot, notReady } from "../../commands/robot";
 import { isRunning } from "../../store/selectors";
-import { setUi, tell, useEditor } from "../../store/store";
+import { notify, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import "./chip.css";
@@ -24,13 +24,13 @@ export default function RobotChip() {
   const words = [name, chosen.armId, chosen.effector].filter(Boolean).join(" · ");
   const keep = () => {
     if (why) {
-      tell("info", why);
+      notify("info", why);
       return;
     }
     setAsking(true);
     void addPointFromRobot(chosen).then((refused) => {
       setAsking(false);
-      if (refused) tell("error", refused);
+      if (refused) notify("error", refused);
       else setUi({ tool: "" });
     });
   };

@@ -11,7 +11,7 @@ import { GoTab } from "./GoTab";
 import { HandTab } from "./HandTab";
 import { JointsTab } from "./JointsTab";
 import { Kinematics } from "./Kinematics";
-import { MannerFields } from "./MotionFields";
+import { MotionFields } from "./MotionFields";
 import { PadPlace } from "./PadDock";
 import { RobotChooser } from "./RobotChooser";
 import { Status } from "./Status";
@@ -55,7 +55,7 @@ export default function RobotPanel() {
         {tab === "joints" && <JointsTab chosen={chosen} />}
         {tab === "hand" && <HandTab chosen={chosen} />}
         {tab === "go" && <GoTab chosen={chosen} key={`${chosen.robotId}/${chosen.armId}/${chosen.effector}`} />}
-        {tab !== "hand" && <MannerFields />}
+        {tab !== "hand" && <MotionFields />}
         <Kinematics robotId={chosen.robotId} />
       </div>
       <div className="pad-dock" ref={setPlace} />

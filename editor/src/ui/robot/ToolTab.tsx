@@ -20,7 +20,15 @@ import { nameOf } from "../../viewmodel/names";
 import { Amount, OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { HoldButton } from "./HoldButton";
-import { ANGLES, DISTANCES, FASTEST, type FrameName, mannerNow, setManner, useManner } from "./motionOptions";
+import {
+  ANGLES,
+  DISTANCES,
+  FASTEST,
+  type FrameName,
+  motionOptions,
+  setMotionOptions,
+  useMotionOptions,
+} from "./motionOptions";
 import { HOLD_HINT, PadDock } from "./PadDock";
 
 const AXES: readonly StepAxis[] = ["x", "y", "z"];
@@ -32,7 +40,7 @@ function framed(kind: string | undefined): boolean {
 }
 
 export function ToolTab({ chosen }: { chosen: Chosen }) {
-  const { frame, way, what, distance, angle, speed } = useManner();
+  const { frame, way, what, distance, angle, speed } = useMotionOptions();
   const selection = useEditor((state) => state.ui.selection);
   const selected = useEditor((state) =>
     framed(selection?.kind) && selection && selection.id !== chosen.robotId ? nameOf(state, selection.id) : "",
@@ -49,9 +57,11 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
     setRefused("");
     const pose = poseOf(used, chosen);
     const mode = used === "world" || used === "robot" ? used : "relative";
-    void stepEffector(chosen, { what, axis, mode, step: sign * (turning ? angle : distance), pose }, mannerNow()).then(
-      setRefused,
-    );
+    void stepEffector(
+      chosen,
+      { what, axis, mode, step: sign * (turning ? angle : distance), pose },
+      motionOptions(),
+    ).then(setRefused);
   };
   const jog = (axis: StepAxis, sign: number) => {
     setRefused("");
@@ -83,7 +93,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
         label={t`Mode`}
         quiet
         value={hold ? "hold" : "step"}
-        onChange={(next) => setManner({ way: next })}
+        onChange={(next) => setMotionOptions({ way: next })}
         choices={
           features?.jog
             ? [
@@ -97,7 +107,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
         label={t`What`}
         quiet
         value={what}
-        onChange={(next) => setManner({ what: next })}
+        onChange={(next) => setMotionOptions({ what: next })}
         choices={[
           ["position", t`Move`],
           ["orientation", t`Turn`],
@@ -106,7 +116,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
       <OneOf
         label={t`Frame`}
         value={used}
-        onChange={(next) => setManner({ frame: next })}
+        onChange={(next) => setMotionOptions({ frame: next })}
         choices={[
           ["world", t`World`],
           ["robot", t`Robot`],
@@ -118,7 +128,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
       <div className="actions start">
         <Button
           why={why || (features?.inverse_kinematics ? "" : t`This robot has no inverse kinematics.`)}
-          onPress={() => void alignDown(chosen, mannerNow()).then(setRefused)}
+          onPress={() => void alignDown(chosen, motionOptions()).then(setRefused)}
         >
           {t`Tool straight down`}
         </Button>
@@ -129,7 +139,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
               void moveToPose(
                 chosen,
                 { orientation: poseOf("selected", chosen)?.orientation ?? { x: 0, y: 0, z: 0, w: 1 } },
-                mannerNow(),
+                motionOptions(),
               ).then(setRefused)
             }
           >
@@ -188,7 +198,7 @@ function Distances({ distance }: { distance: number }) {
       <OneOf
         label={t`Step, mm`}
         value={String(distance)}
-        onChange={(next) => setManner({ distance: Number(next) })}
+        onChange={(next) => setMotionOptions({ distance: Number(next) })}
         choices={DISTANCES.map((each) => [String(each), String(each * 1000)] as const)}
       />
       <Amount
@@ -198,7 +208,7 @@ function Distances({ distance }: { distance: number }) {
         value={distance * 1000}
         least={0.01}
         most={300}
-        onChange={(next) => setManner({ distance: next / 1000 })}
+        onChange={(next) => setMotionOptions({ distance: next / 1000 })}
       />
     </div>
   );
@@ -210,7 +220,7 @@ function Angles({ angle }: { angle: number }) {
       <OneOf
         label={t`Step, °`}
         value={String(angle)}
-        onChange={(next) => setManner({ angle: Number(next) })}
+        onChange={(next) => setMotionOptions({ angle: Number(next) })}
         choices={ANGLES.map((each) => [String(each), String(Math.round(each * DEGREES * 10) / 10)] as const)}
       />
       <Amount
@@ -220,7 +230,7 @@ function Angles({ angle }: { angle: number }) {
         value={angle * DEGREES}
         least={0.01}
         most={180}
-        onChange={(next) => setManner({ angle: next / DEGREES })}
+        onChange={(next) => setMotionOptions({ angle: next / DEGREES })}
       />
     </div>
   );

@@ -1,7 +1,7 @@
 /** Check a target while it is dragged: only the latest one, one request at a time. */
 
 import { type Chosen, effectorPose, showAt } from "../../commands/robot";
-import type { WayState } from "../../engine/pathLine";
+import type { PathState } from "../../engine/pathLine";
 import type { Pose } from "../../protocol/types";
 import { metBy } from "../../session/paths";
 
@@ -14,7 +14,7 @@ export interface GoalAnswer {
   /** Why the target cannot be reached; empty if it can. */
   problem: string;
   /** State of the straight path, and the id of the obstacle. */
-  way: WayState;
+  way: PathState;
   met: string;
 }
 
@@ -29,7 +29,7 @@ export class LiveGoal {
   constructor(
     private readonly chosen: Chosen,
     private readonly straight: () => boolean,
-    private readonly told: (answer: GoalAnswer) => void,
+    private readonly onAnswer: (answer: GoalAnswer) => void,
   ) {}
 
   ask(goal: Pose): void {
@@ -64,14 +64,14 @@ export class LiveGoal {
     const current = () => !this.ended;
     const problem = await showAt(this.chosen, goal, { current, keep: true });
     const from = effectorPose(this.chosen);
-    let way: WayState = "unknown";
+    let way: PathState = "unknown";
     let met = "";
     if (from && this.straight() && current()) {
       const found = await metBy(from.position, goal.position).catch(() => undefined);
       if (found !== undefined) [way, met] = [found === null ? "free" : "blocked", found ?? ""];
     }
     this.busy = false;
-    if (current()) this.told({ goal, problem, way: problem ? "blocked" : way, met });
+    if (current()) this.onAnswer({ goal, problem, way: problem ? "blocked" : way, met });
     this.next();
   }
 }

@@ -2,12 +2,12 @@
 
 import { useStore } from "zustand";
 import { createStore } from "zustand/vanilla";
-import type { Manner } from "../../commands/robot";
+import type { MotionOptions } from "../../commands/robot";
 
 /** `selected`: the frame of the selected item. */
 export type FrameName = "world" | "robot" | "tool" | "selected";
 
-export interface Jogging extends Manner {
+export interface Jogging extends MotionOptions {
   frame: FrameName;
   /** Step per press, or hold to move. */
   way: "step" | "hold";
@@ -36,9 +36,9 @@ export const manner = createStore<Jogging>(() => ({
   linear: true,
 }));
 
-export const useManner = (): Jogging => useStore(manner);
-export const setManner = (change: Partial<Jogging>): void => manner.setState(change);
-export const mannerNow = (): Manner => {
+export const useMotionOptions = (): Jogging => useStore(manner);
+export const setMotionOptions = (change: Partial<Jogging>): void => manner.setState(change);
+export const motionOptions = (): MotionOptions => {
   const { speed, safe, linear } = manner.getState();
   return { speed, safe, linear };
 };

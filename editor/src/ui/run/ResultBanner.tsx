@@ -1,7 +1,7 @@
 /** The result of the last run, above every screen of the editor until the user dismisses it or starts another run. */
 
 import { t } from "@lingui/core/macro";
-import { keepGeneral } from "../../commands/viewstate";
+import { storeGeneralState } from "../../commands/viewstate";
 import { dismissal, resultOf, undismissedRun } from "../../program/results";
 import { now, useEditor } from "../../store/store";
 import { withNames } from "../../viewmodel/names";
@@ -31,7 +31,7 @@ export default function ResultBanner() {
         look="plain"
         icon="close"
         aria-label={t`Dismiss the result`}
-        onPress={() => keepGeneral(dismissal(run))}
+        onPress={() => storeGeneralState(dismissal(run))}
       />
     </div>
   );

@@ -3,7 +3,7 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import * as commands from "../../commands/run";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
@@ -45,7 +45,7 @@ export default function RunBar() {
 /** Pause, resume, step and stop, as far as the state allows. */
 export function RunButtons() {
   const phase = useEditor((state) => state.program.state);
-  const why = useEditor((state) => barred(state, "StopPackage"));
+  const why = useEditor((state) => whyUnavailable(state, "StopPackage"));
   return (
     <>
       {phase === "running" && (

@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { notEditable } from "../../commands/program";
 import { breakAt, build, notRunnable, run } from "../../commands/run";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import { select, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
@@ -78,7 +78,7 @@ export default function RunPanel() {
                   look="plain"
                   icon="close"
                   aria-label={t`Remove breakpoint at ${nameOf(state, id)}`}
-                  why={barred(state, "SetBreakpoints")}
+                  why={whyUnavailable(state, "SetBreakpoints")}
                   onPress={() => void breakAt(id, false)}
                 >
                   {nameOf(state, id)}

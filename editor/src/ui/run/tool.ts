@@ -1,7 +1,7 @@
 /** Run the program: start, follow, trace, history. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import type { Tool } from "../workplace/tool";
 
 export const run: Tool = {
@@ -9,5 +9,5 @@ export const run: Tool = {
   label: msg`Run`,
   icon: "play",
   shown: (state) => state.doc?.project != null,
-  Panel: lazily(() => import("./RunPanel")),
+  Panel: lazyComponent(() => import("./RunPanel")),
 };

@@ -7,7 +7,7 @@ import type { MeshFile } from "../../scene/meshes";
 import { LENGTH_UNITS, type LengthUnit, show, WORTH } from "../../transform/amounts";
 import { OneOf } from "../kit/fields";
 import { Button, Field } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Refusal";
+import { RefusedText, useRefusal } from "../points/Refusal";
 import { MeshPreview } from "./MeshPreview";
 
 export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
@@ -15,7 +15,7 @@ export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
   const [unit, setUnit] = useState<LengthUnit>("m");
   const [name, setName] = useState("");
   const [wrong, setWrong] = useState("");
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   const read = async (file: File | undefined) => {
     setWrong("");
     setMesh(null);

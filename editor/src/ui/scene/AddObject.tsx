@@ -6,7 +6,7 @@ import { addObject, freeObjectName } from "../../commands/scene";
 import { words } from "../../program/naming";
 import type { ObjectTypeMeta } from "../../protocol/types";
 import { Button, Field } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Refusal";
+import { RefusedText, useRefusal } from "../points/Refusal";
 import { missing, parametersOf, SettingsFields, type Values } from "./Settings";
 import { TypeUse } from "./TypeUse";
 
@@ -14,7 +14,7 @@ export function AddObject({ type, why, onBack }: { type: ObjectTypeMeta; why: st
   const [name, setName] = useState(() => freeObjectName(type.type.replace(/([a-z])([A-Z])/g, "$1_$2").toLowerCase()));
   const [values, setValues] = useState<Values>({});
   const [tried, setTried] = useState(false);
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   const lacking = missing(type.settings, values);
   const submit = (event: FormEvent) => {
     event.preventDefault();

@@ -6,7 +6,7 @@ import { useState } from "react";
 import { Input, Label, SearchField } from "react-aria-components";
 import { addShape, notBuildable, type ShapeKind } from "../../commands/scene";
 import type { ObjectTypeMeta } from "../../protocol/types";
-import { tell, useEditor } from "../../store/store";
+import { notify, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { CATEGORY_ICONS } from "../program/categories";
@@ -69,7 +69,7 @@ export default function AddPanel() {
                     aria-disabled={each.disabled || undefined}
                     onClick={() =>
                       each.disabled
-                        ? tell(
+                        ? notify(
                             "info",
                             each.problem
                               ? t`${each.type} cannot be used: ${each.problem}`

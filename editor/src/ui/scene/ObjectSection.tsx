@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { duplicateObject, notBuildable, projectsUsing, removeObject, renameObject } from "../../commands/scene";
-import { keepView } from "../../commands/viewstate";
+import { storeViewState } from "../../commands/viewstate";
 import { heldBy } from "../../store/selectors";
 import { now, useEditor } from "../../store/store";
 import { MoreOrLess, OnOff } from "../kit/fields";
@@ -84,7 +84,7 @@ function Seeing({ id }: { id: string }) {
     const rest = { ...(now().view.user.opacity as Record<string, number> | undefined) };
     if (value >= 1) delete rest[id];
     else rest[id] = value;
-    keepView("user", { opacity: rest });
+    storeViewState("user", { opacity: rest });
   };
   return (
     <>

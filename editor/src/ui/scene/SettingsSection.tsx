@@ -6,7 +6,7 @@ import { notBuildable, setParameters } from "../../commands/scene";
 import { heldBy } from "../../store/selectors";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Refusal";
+import { RefusedText, useRefusal } from "../points/Refusal";
 import type { Section } from "../workplace/section";
 import { missing, parametersOf, SettingsFields, type Values } from "./Settings";
 
@@ -17,7 +17,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   const cannot = useEditor((state) => notBuildable(state, "UpdateObjectParameters"));
   const overlaid = useEditor((state) => state.live.objects[id]?.overlaid);
   const [draft, setDraft] = useState<Values | null>(null);
-  const { refused, busy, ask } = useAsking();
+  const { refused, busy, ask } = useRefusal();
   if (!object || !settings) return null;
   const known: Values = Object.fromEntries(object.parameters.map((each) => [each.name, each.value]));
   const values = draft ?? known;

@@ -5,18 +5,18 @@ import { useEffect, useState } from "react";
 import { whyNot } from "../../commands/requests";
 import { deleteType, scenesUsing } from "../../commands/scene";
 import type { ObjectTypeMeta } from "../../protocol/types";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
-import { RefusedText, useAsking } from "../points/Refusal";
+import { RefusedText, useRefusal } from "../points/Refusal";
 
 export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: () => void }) {
   const [scenes, setScenes] = useState<string[] | null>(null);
   const [why, setWhy] = useState("…");
   const [sure, setSure] = useState(false);
-  const cannot = useEditor((state) => barred(state, "DeleteObjectTypes"));
-  const { refused, ask } = useAsking();
+  const cannot = useEditor((state) => whyUnavailable(state, "DeleteObjectTypes"));
+  const { refused, ask } = useRefusal();
   useEffect(() => {
     let here = true;
     void scenesUsing(type.type).then(

@@ -1,7 +1,7 @@
 /** Sections about objects of the scene, loaded when they are needed. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
 export const objectSections: readonly Section[] = [
@@ -9,7 +9,7 @@ export const objectSections: readonly Section[] = [
     id: "object",
     title: msg`Object`,
     applies: ({ kind }) => kind === "object",
-    Body: lazily(() => import("./ObjectSection")),
+    Body: lazyComponent(() => import("./ObjectSection")),
   },
 ];
 
@@ -19,6 +19,6 @@ export const settingsSections: readonly Section[] = [
     title: msg`Settings`,
     applies: ({ kind, id }, state) =>
       kind === "object" && (state.types.byName[state.doc?.objects[id]?.type ?? ""]?.settings.length ?? 0) > 0,
-    Body: lazily(() => import("./SettingsSection")),
+    Body: lazyComponent(() => import("./SettingsSection")),
   },
 ];

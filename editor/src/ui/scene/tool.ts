@@ -1,7 +1,7 @@
 /** Add devices, shapes and meshes to the scene. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import type { Tool } from "../workplace/tool";
 
 export const add: Tool = {
@@ -9,5 +9,5 @@ export const add: Tool = {
   label: msg`Add`,
   icon: "plus",
   shown: (state) => state.doc !== null && state.doc.project === null,
-  Panel: lazily(() => import("./AddPanel")),
+  Panel: lazyComponent(() => import("./AddPanel")),
 };

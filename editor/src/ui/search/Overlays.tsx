@@ -1,12 +1,12 @@
 /** Dialogs that open over every screen: search ("/"), about and keys ("?"), messages. */
 
 import { Suspense, useEffect } from "react";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import { isTyping, type Overlay, openOverlay, useOverlay } from "./overlay";
 
-const Palette = lazily(() => import("./Palette"));
-const About = lazily(() => import("./About"));
-const Messages = lazily(() => import("../notices/Messages"));
+const Palette = lazyComponent(() => import("./Palette"));
+const About = lazyComponent(() => import("./About"));
+const Messages = lazyComponent(() => import("../notices/Messages"));
 
 export function Overlays() {
   const open = useOverlay();

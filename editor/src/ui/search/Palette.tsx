@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { useMemo, useState } from "react";
 import { Autocomplete, Input, Label, ListBox, ListBoxItem, SearchField } from "react-aria-components";
-import { setUi, tell, useEditor } from "../../store/store";
+import { notify, setUi, useEditor } from "../../store/store";
 import { Window } from "../kit/dialogs";
 import { entriesOf } from "./entries";
 import { found } from "./matches";
@@ -23,7 +23,7 @@ export default function Palette({ onClose }: { onClose: () => void }) {
     if (!entry) return;
     onClose();
     if (entry.why) {
-      tell("info", `${entry.words}: ${entry.why}`);
+      notify("info", `${entry.words}: ${entry.why}`);
       return;
     }
     setUi({ recentCommands: [id, ...recent.filter((each) => each !== id)].slice(0, REMEMBERED) });

@@ -2,15 +2,15 @@
 
 import { t } from "@lingui/core/macro";
 import { saveDiagnosis } from "../../commands/diagnosis";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
-import { RefusedText, useAsking } from "../points/Refusal";
+import { RefusedText, useRefusal } from "../points/Refusal";
 
 export function SaveDiagnosis() {
   // It needs the role that edits scenes, since it contains addresses and settings of devices.
-  const why = useEditor((state) => barred(state, "SaveScene"));
-  const { refused, busy, ask } = useAsking();
+  const why = useEditor((state) => whyUnavailable(state, "SaveScene"));
+  const { refused, busy, ask } = useRefusal();
   return (
     <section aria-label={t`Diagnosis`}>
       <h3>{t`Something went wrong?`}</h3>

@@ -4,12 +4,12 @@ import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import * as documents from "../../commands/documents";
 import { goOffline, goOnline, stopMotion } from "../../commands/operation";
-import { keepGeneral } from "../../commands/viewstate";
+import { storeGeneralState } from "../../commands/viewstate";
 import { aimsAlways } from "../../session/aiming";
 import { theEngine } from "../../session/engine";
 import { remember } from "../../session/localStorage";
 import { session } from "../../session/session";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { now, select, setUi } from "../../store/store";
@@ -33,15 +33,21 @@ function ofWorkplace(state: State): Entry[] {
     act: () => void act(),
   });
   const cannotSave =
-    barred(state, state.doc?.project ? "SaveProject" : "SaveScene") ||
+    whyUnavailable(state, state.doc?.project ? "SaveProject" : "SaveScene") ||
     (state.doc?.unsaved ? "" : t`No unsaved changes.`);
-  const cannotUndo = barred(state, "Undo");
-  const cannotSwitch = barred(state, "StartScene") || (isRunning(state) ? t`A program is running.` : "");
+  const cannotUndo = whyUnavailable(state, "Undo");
+  const cannotSwitch = whyUnavailable(state, "StartScene") || (isRunning(state) ? t`A program is running.` : "");
   const online = live.state === "started";
   return [
     ...(online ? [entry("stop", t`Stop motion`, "", stopMotion, t`command, not an emergency stop`)] : []),
     ...TOOLS.filter((tool) => tool.shown?.(state) ?? true).map((tool) =>
-      entry(`tool/${tool.id}`, i18n._(tool.label), tool.barred?.(state) ?? "", () => setUi({ tool: tool.id }), "tool"),
+      entry(
+        `tool/${tool.id}`,
+        i18n._(tool.label),
+        tool.whyUnavailable?.(state) ?? "",
+        () => setUi({ tool: tool.id }),
+        "tool",
+      ),
     ),
     entry("save", t`Save`, cannotSave, documents.save),
     entry(
@@ -65,7 +71,7 @@ function ofWorkplace(state: State): Entry[] {
           goOnline,
         ),
     entry("cross", aimsAlways(state) ? t`Close the crosshair` : t`Select with crosshair`, "", () =>
-      keepGeneral({ aiming: !aimsAlways(state) || null }),
+      storeGeneralState({ aiming: !aimsAlways(state) || null }),
     ),
     entry("all", t`Show all in the view`, "", () => theEngine()?.focus()),
     ...(state.ui.selection
@@ -94,7 +100,7 @@ function ofHome(state: State): Entry[] {
     id,
     words: t`Open ${name}`,
     detail: kind === "scene" ? t`scene` : t`project`,
-    why: barred(state, kind === "scene" ? "OpenScene" : "OpenProject"),
+    why: whyUnavailable(state, kind === "scene" ? "OpenScene" : "OpenProject"),
     act: () => void (kind === "scene" ? documents.openScene(id) : documents.openProject(id)),
   });
   return [

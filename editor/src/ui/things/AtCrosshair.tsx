@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { ListBox, ListBoxItem } from "react-aria-components";
-import { keepGeneral } from "../../commands/viewstate";
+import { storeGeneralState } from "../../commands/viewstate";
 import { aimsAlways, listAimed, useAiming } from "../../session/aiming";
 import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
@@ -13,7 +13,7 @@ import { Icon } from "../kit/icons";
 import { pick } from "../workplace/pick";
 import { ICONS } from "./ThingTree";
 
-export function AtTheCross() {
+export function AtCrosshair() {
   const { candidates, chosen } = useAiming();
   const always = useEditor(aimsAlways);
   useEffect(listAimed, []);
@@ -48,7 +48,7 @@ export function AtTheCross() {
           );
         }}
       </ListBox>
-      <OnOff isSelected={always} onChange={(on) => keepGeneral({ aiming: on || null })}>
+      <OnOff isSelected={always} onChange={(on) => storeGeneralState({ aiming: on || null })}>
         {t`Keep the crosshair when this is closed`}
       </OnOff>
     </>

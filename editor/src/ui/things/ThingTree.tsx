@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { Button, Collection, Tree, TreeItem, TreeItemContent } from "react-aria-components";
-import { keepView } from "../../commands/viewstate";
+import { storeViewState } from "../../commands/viewstate";
 import { theEngine } from "../../session/engine";
 import { heldBy } from "../../store/selectors";
 import type { Kind } from "../../store/state";
@@ -24,8 +24,8 @@ export const ICONS: Record<Kind, IconName> = {
 
 const NOTHING: string[] = [];
 
-function foldedOf(kept: unknown): string[] {
-  return Array.isArray(kept) ? kept.filter((each) => typeof each === "string") : NOTHING;
+function foldedOf(stored: unknown): string[] {
+  return Array.isArray(stored) ? stored.filter((each) => typeof each === "string") : NOTHING;
 }
 
 /** Select an item of a list, and bring it into the view. */
@@ -54,7 +54,7 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
     // Forget collapsed items that no longer exist.
     const rest = folded.filter((id) => !mine.includes(id) && selectionOf(now(), id) !== null);
     const next = [...rest, ...mine.filter((id) => !keys.has(id))];
-    keepView("user", { collapsed: next.length > 0 ? next : null });
+    storeViewState("user", { collapsed: next.length > 0 ? next : null });
   };
   const item = (row: Row) => {
     const holder = heldBy(now(), row.id);

@@ -4,15 +4,15 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useMemo, useState } from "react";
 import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
-import { keepView } from "../../commands/viewstate";
+import { storeViewState } from "../../commands/viewstate";
 import { useEditor } from "../../store/store";
 import { allOf, counts, fitting, narrowed, type Row, thingsOf } from "../../viewmodel/things";
 import { GROUPS, type Group } from "../../viewmodel/visibility";
 import { OneOf } from "../kit/fields";
 import { asideOf } from "../scene/hidden";
-import { AtTheCross } from "./AtCrosshair";
+import { AtCrosshair } from "./AtCrosshair";
 import { ThingTree } from "./ThingTree";
-import { InTheView } from "./ViewSettings";
+import { ViewSettings } from "./ViewSettings";
 import "./things.css";
 
 const WORDS: Record<Group, MessageDescriptor> = {
@@ -39,7 +39,7 @@ export default function ThingsPanel() {
         ]}
         onChange={setBy}
       />
-      {by === "list" ? <All /> : <AtTheCross />}
+      {by === "list" ? <All /> : <AtCrosshair />}
     </>
   );
 }
@@ -47,7 +47,7 @@ export default function ThingsPanel() {
 function All() {
   const doc = useEditor((state) => state.doc);
   const types = useEditor((state) => state.types);
-  const kept = useEditor((state) => state.view.user.filters);
+  const stored = useEditor((state) => state.view.user.filters);
   const aside = useEditor(asideOf);
   const [search, setSearch] = useState("");
   const things = useMemo(() => thingsOf({ doc, types }), [doc, types]);
@@ -55,8 +55,8 @@ function All() {
   const number = useMemo(() => counts(rows), [rows]);
   const hidden = rows.filter((row) => aside.includes(row.id)).length;
   const groups = new Set<string>(
-    Array.isArray(kept)
-      ? kept.filter((each) =>
+    Array.isArray(stored)
+      ? stored.filter((each) =>
           each === HIDDEN ? hidden > 0 : GROUPS.includes(each as Group) && number[each as Group] > 0,
         )
       : [],
@@ -81,7 +81,7 @@ function All() {
         aria-label={t`Only these kinds`}
         selectionMode="multiple"
         selectedKeys={groups}
-        onSelectionChange={(keys) => keepView("user", { filters: keys.size > 0 ? [...keys] : null })}
+        onSelectionChange={(keys) => storeViewState("user", { filters: keys.size > 0 ? [...keys] : null })}
       >
         {GROUPS.filter((group) => number[group] > 0).map((group) => (
           <ToggleButton key={group} id={group} className="button chip">
@@ -109,7 +109,7 @@ function All() {
               : t`No match.`}
         </p>
       )}
-      <InTheView narrowed={groupsOfAny(groups)} />
+      <ViewSettings narrowed={groupsOfAny(groups)} />
     </>
   );
 }

@@ -3,7 +3,7 @@
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
-import { keepGeneral, keepView } from "../../commands/viewstate";
+import { storeGeneralState, storeViewState } from "../../commands/viewstate";
 import { useEditor } from "../../store/store";
 import { parentLines } from "../../viewmodel/items";
 import { fadesOthers, opacityOfAll } from "../../viewmodel/visibility";
@@ -16,7 +16,7 @@ const SIGHTS = [
   ["hide_steps", msg`Program steps`],
 ] as const;
 
-export function InTheView({ narrowed }: { narrowed: boolean }) {
+export function ViewSettings({ narrowed }: { narrowed: boolean }) {
   const opacity = useEditor(opacityOfAll);
   const fades = useEditor(fadesOthers);
   const lines = useEditor(parentLines);
@@ -25,7 +25,7 @@ export function InTheView({ narrowed }: { narrowed: boolean }) {
   return (
     <section className="section" aria-label={t`In the view`}>
       <h3>{t`In the view`}</h3>
-      <OnOff isSelected={fades} onChange={(on) => keepView("user", { fade_others: on || null })}>
+      <OnOff isSelected={fades} onChange={(on) => storeViewState("user", { fade_others: on || null })}>
         {t`Fade other kinds`}
       </OnOff>
       {fades && !narrowed && <p className="quiet small">{t`Choose kinds above first.`}</p>}
@@ -38,7 +38,7 @@ export function InTheView({ narrowed }: { narrowed: boolean }) {
         words={(value) => `${Math.round(value * 100)} %`}
         onChange={(value) => setMoved(1 - value)}
         onEnd={(value) => {
-          keepView("user", { opacity_all: value > 0 ? 1 - value : null });
+          storeViewState("user", { opacity_all: value > 0 ? 1 - value : null });
           setMoved(null);
         }}
       />
@@ -46,12 +46,12 @@ export function InTheView({ narrowed }: { narrowed: boolean }) {
         <OnOff
           key={key}
           isSelected={view[key] !== true}
-          onChange={(on) => keepView("user", { [key]: on ? null : true })}
+          onChange={(on) => storeViewState("user", { [key]: on ? null : true })}
         >
           {i18n._(words)}
         </OnOff>
       ))}
-      <OnOff isSelected={lines} onChange={(on) => keepGeneral({ parent_lines: on || null })}>
+      <OnOff isSelected={lines} onChange={(on) => storeGeneralState({ parent_lines: on || null })}>
         {t`Lines from points to their parents`}
       </OnOff>
     </section>

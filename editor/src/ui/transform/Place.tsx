@@ -4,12 +4,12 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { moving, place, step } from "../../commands/move";
-import { keepGeneral } from "../../commands/viewstate";
+import { storeGeneralState } from "../../commands/viewstate";
 import type { GizmoMode } from "../../engine/gizmo/handles";
 import { translated } from "../../i18n/choices";
 import type { ObjectModel, Pose } from "../../protocol/types";
 import type { Selection, State } from "../../store/state";
-import { now, tell, useEditor } from "../../store/store";
+import { notify, now, useEditor } from "../../store/store";
 import {
   ANGLE_STEPS,
   type AngleUnit,
@@ -50,7 +50,7 @@ const SNAPS: readonly (readonly [Snap, MessageDescriptor])[] = [
   ["surface", msg`surfaces`],
   ["point", msg`other objects`],
 ];
-const keep = (change: Partial<ToolSettings>) => keepGeneral({ [TOOL]: { ...toolSettings(now()), ...change } });
+const keep = (change: Partial<ToolSettings>) => storeGeneralState({ [TOOL]: { ...toolSettings(now()), ...change } });
 /** Stands for a custom step. */
 const FREE = "free";
 
@@ -190,7 +190,7 @@ function Coordinate({ axis, mode, target, settings, frame, relative, why, select
         step={size}
         why={why}
         open={open}
-        onOpen={() => (why ? tell("info", why) : onOpen(!open))}
+        onOpen={() => (why ? notify("info", why) : onOpen(!open))}
         onSteps={(steps) => {
           const latest = targetOf(now(), selection);
           if (latest) step(latest, by(latest.pose, steps * size));
@@ -248,7 +248,7 @@ function Sizes({ model, target, settings, why, open, onOpen }: SizesProps) {
         step={settings.lengthStep}
         why={why}
         open={open === label}
-        onOpen={() => (why ? tell("info", why) : onOpen(open === label ? "" : label))}
+        onOpen={() => (why ? notify("info", why) : onOpen(open === label ? "" : label))}
         onSteps={(steps) => {
           const { at, measure } = latest(label);
           if (!measure) return;
@@ -324,17 +324,20 @@ async function copy(pose: Pose): Promise<void> {
   const text = poseText(pose);
   try {
     await navigator.clipboard.writeText(text);
-    tell("info", t`Copied the pose in the world: position in m and quaternion.`);
+    notify("info", t`Copied the pose in the world: position in m and quaternion.`);
   } catch {
-    tell("info", text); // without HTTPS there is no clipboard: the text can be selected and copied
+    notify("info", text); // without HTTPS there is no clipboard: the text can be selected and copied
   }
 }
 
 async function paste(target: Target, settle: (pose: Pose) => void): Promise<void> {
   const text = await navigator.clipboard.readText().catch(() => null);
-  if (text === null) return tell("info", t`The browser blocks the clipboard. Enter the numbers instead.`);
+  if (text === null) return notify("info", t`The browser blocks the clipboard. Enter the numbers instead.`);
   const pose = poseFrom(text, target.pose);
   if (pose) settle(pose);
   else
-    tell("info", t`The clipboard contains no pose. Copy 3 numbers (position in m), 4 (quaternion), or 6 or 7 (both).`);
+    notify(
+      "info",
+      t`The clipboard contains no pose. Copy 3 numbers (position in m), 4 (quaternion), or 6 or 7 (both).`,
+    );
 }

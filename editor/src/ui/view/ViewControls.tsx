@@ -4,7 +4,7 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useEffect, useRef, useState } from "react";
 import { followWishes } from "../../commands/handover";
-import { keepGeneral, keepView } from "../../commands/viewstate";
+import { storeGeneralState, storeViewState } from "../../commands/viewstate";
 import type { ViewMode, ViewName, Viewpoint } from "../../engine/camera";
 import type { Engine } from "../../engine/engine";
 import { aimsAlways, useAiming } from "../../session/aiming";
@@ -38,26 +38,26 @@ interface Bookmark extends Viewpoint {
   name: string;
 }
 
-function bookmarksOf(kept: unknown): Bookmark[] {
-  if (!Array.isArray(kept)) return [];
+function bookmarksOf(stored: unknown): Bookmark[] {
+  if (!Array.isArray(stored)) return [];
   const triple = (value: unknown) =>
     Array.isArray(value) &&
     value.length === 3 &&
     value.every((each) => typeof each === "number" && Number.isFinite(each));
-  return kept.filter(
+  return stored.filter(
     (each: Partial<Bookmark> | null): each is Bookmark =>
       typeof each?.name === "string" && triple(each.position) && triple(each.target),
   );
 }
 
 export default function ViewControls({ engine }: { engine: Engine }) {
-  const kept = useEditor((state) => state.view.user[KEY]);
+  const stored = useEditor((state) => state.view.user[KEY]);
   const [mode, setMode] = useState<ViewMode>("orbit");
   const [naming, setNaming] = useState(false);
-  const bookmarks = bookmarksOf(kept);
+  const bookmarks = bookmarksOf(stored);
   const always = useEditor(aimsAlways);
   const listed = useAiming((state) => state.listed);
-  useCrossKey();
+  useCrosshairKey();
   useEffect(followWishes, []);
   const change = (next: ViewMode) => {
     engine.view.setMode(next);
@@ -77,7 +77,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
       id: "cross",
       label: always ? t`Close the crosshair` : t`Select with crosshair ( X )`,
       icon: "point",
-      act: switchCross,
+      act: switchCrosshair,
     },
     { id: "keep", label: t`Save view…`, icon: "plus", act: () => setNaming(true) },
     ...bookmarks.map((each, n) => ({
@@ -92,7 +92,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
       id: `drop ${n}`,
       label: t`Delete ${each.name}`,
       icon: "close" as const,
-      act: () => keepView("user", { [KEY]: bookmarks.filter((_, other) => other !== n) }),
+      act: () => storeViewState("user", { [KEY]: bookmarks.filter((_, other) => other !== n) }),
     })),
   ];
   return (
@@ -112,24 +112,24 @@ export default function ViewControls({ engine }: { engine: Engine }) {
           initial={t`View ${bookmarks.length + 1}`}
           taken={bookmarks.map((each) => each.name)}
           onClose={() => setNaming(false)}
-          onYes={(name) => keepView("user", { [KEY]: [...bookmarks, { name, ...engine.view.viewpoint }] })}
+          onYes={(name) => storeViewState("user", { [KEY]: [...bookmarks, { name, ...engine.view.viewpoint }] })}
         />
       )}
     </>
   );
 }
 
-function switchCross(): void {
-  keepGeneral({ aiming: !aimsAlways(now()) || null });
+function switchCrosshair(): void {
+  storeGeneralState({ aiming: !aimsAlways(now()) || null });
 }
 
 /** X shows or hides the crosshair. */
-function useCrossKey(): void {
+function useCrosshairKey(): void {
   useEffect(() => {
     const key = (event: KeyboardEvent) => {
       if (event.key.toLowerCase() !== "x" || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
       if (isTyping(event.target) || document.querySelector(".overlay")) return;
-      switchCross();
+      switchCrosshair();
     };
     window.addEventListener("keydown", key);
     return () => window.removeEventListener("keydown", key);

@@ -8,16 +8,16 @@ import { isRunning } from "../../store/selectors";
 import type { Mode } from "../../store/state";
 import { setUi, useEditor } from "../../store/store";
 import { Waiting } from "../kit/kit";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import { View3D } from "./View3D";
 import "../run/run.css";
 import "./centre.css";
 
-const RobotChip = lazily(() => import("../robot/RobotChip"));
-const FlowView = lazily(() => import("../flow/FlowView"));
-const ConnectingBanner = lazily(() => import("../program/ConnectingBanner"));
-const RunBar = lazily(() => import("../run/RunBar"));
-const CodeView = lazily(() => import("../code/CodeView"));
+const RobotChip = lazyComponent(() => import("../robot/RobotChip"));
+const FlowView = lazyComponent(() => import("../flow/FlowView"));
+const ConnectingBanner = lazyComponent(() => import("../program/ConnectingBanner"));
+const RunBar = lazyComponent(() => import("../run/RunBar"));
+const CodeView = lazyComponent(() => import("../code/CodeView"));
 const WORDS: Record<Mode, MessageDescriptor> = { "3d": msg`3D`, flow: msg`Flow`, split: msg`Split`, code: msg`Code` };
 
 export function Centre() {

@@ -8,11 +8,11 @@ import { Suspense, useState } from "react";
 import { select, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Button, Waiting } from "../kit/kit";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import { SECTIONS } from "./sections";
 import { TOOLS } from "./tools";
 
-const Neighbours = lazily(() => import("../things/Neighbours"));
+const Neighbours = lazyComponent(() => import("../things/Neighbours"));
 
 export default function Panel() {
   const toolId = useEditor((state) => state.ui.tool);

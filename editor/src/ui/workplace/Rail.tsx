@@ -3,7 +3,7 @@
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { ToggleButton } from "react-aria-components";
-import { setUi, tell, useEditor } from "../../store/store";
+import { notify, setUi, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { TOOLS } from "./tools";
 
@@ -13,7 +13,7 @@ export function Rail() {
   return (
     <nav className="rail" aria-label={t`Tools`}>
       {TOOLS.filter((tool) => tool.shown?.(state) ?? true).map((tool) => {
-        const why = tool.barred?.(state) ?? "";
+        const why = tool.whyUnavailable?.(state) ?? "";
         return (
           <ToggleButton
             key={tool.id}
@@ -21,7 +21,7 @@ export function Rail() {
             isSelected={open === tool.id}
             aria-disabled={why !== "" || undefined}
             onChange={(on) => {
-              if (why) tell("info", `${i18n._(tool.label)}: ${why}`);
+              if (why) notify("info", `${i18n._(tool.label)}: ${why}`);
               else setUi({ tool: on ? tool.id : "" });
             }}
           >

@@ -5,9 +5,9 @@ import { msg, plural, t } from "@lingui/core/macro";
 import { useState } from "react";
 import * as documents from "../../commands/documents";
 import { goOffline, goOnline } from "../../commands/operation";
-import { barred } from "../../store/permissions";
+import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
-import { tell, useEditor } from "../../store/store";
+import { notify, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
 import { People } from "../people/People";
@@ -19,8 +19,8 @@ export function TopBar() {
   const history = useEditor((state) => state.history);
   const live = useEditor((state) => state.live.state);
   const running = useEditor(isRunning);
-  const cannotSave = useEditor((state) => barred(state, state.doc?.project ? "SaveProject" : "SaveScene"));
-  const cannotUndo = useEditor((state) => barred(state, "Undo"));
+  const cannotSave = useEditor((state) => whyUnavailable(state, state.doc?.project ? "SaveProject" : "SaveScene"));
+  const cannotUndo = useEditor((state) => whyUnavailable(state, "Undo"));
   const [asking, setAsking] = useState(false);
   useUndoKeys();
   if (!doc) return null;
@@ -33,7 +33,7 @@ export function TopBar() {
         aria-label={t`Close`}
         onPress={() => {
           const why = running ? t`Stop the program first.` : live !== "stopped" ? t`Go offline first.` : cannotSave;
-          if (why) tell("info", why);
+          if (why) notify("info", why);
           else if (unsaved) setAsking(true);
           else void documents.close(false);
         }}
@@ -96,7 +96,7 @@ const WORDS = {
 function LiveSwitch() {
   const live = useEditor((state) => state.live.state);
   const running = useEditor(isRunning);
-  const cannot = useEditor((state) => barred(state, "StartScene"));
+  const cannot = useEditor((state) => whyUnavailable(state, "StartScene"));
   const objects = useEditor((state) => state.live.objects);
   const wrong = Object.values(objects).filter(
     (each) => each.state === "failed" || each.state === "lost" || each.answering === false,

@@ -6,15 +6,15 @@ import type { Engine, Quality } from "../../engine/engine";
 import { readShown } from "../../session/assets";
 import { setEngine } from "../../session/engine";
 import { tapTaken } from "../../session/taps";
-import { now, store, tell, useEditor } from "../../store/store";
+import { notify, now, store, useEditor } from "../../store/store";
 import { telemetry } from "../../store/telemetry";
 import { ItemMaker } from "../../viewmodel/items";
 import { Waiting } from "../kit/kit";
-import { lazily, persistently } from "../kit/lazy";
+import { lazyComponent, persistently } from "../kit/lazy";
 import { useTheme } from "../settings/Settings";
 import { pick } from "./pick";
 
-const ViewControls = lazily(() => import("../view/ViewControls"));
+const ViewControls = lazyComponent(() => import("../view/ViewControls"));
 
 export function View3D() {
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -29,10 +29,10 @@ export function View3D() {
     let ended = false;
     let made: Engine | null = null;
     const maker = new ItemMaker();
-    const told = new Set<string>();
+    const reportedTroubles = new Set<string>();
     const once = (sentence: string) => {
-      if (!told.has(sentence)) tell("error", sentence);
-      told.add(sentence);
+      if (!reportedTroubles.has(sentence)) notify("error", sentence);
+      reportedTroubles.add(sentence);
     };
     let stop = () => {};
     const begin = async () => {

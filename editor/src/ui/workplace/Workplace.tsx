@@ -2,7 +2,7 @@
 
 import { Suspense } from "react";
 import { useEditor } from "../../store/store";
-import { lazily } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import { Notices } from "../notices/Notices";
 import { Centre } from "./Centre";
 import { Rail } from "./Rail";
@@ -10,7 +10,7 @@ import { TopBar } from "./TopBar";
 import "./workplace.css";
 
 /** Loaded soon after the view, before a user can open it. */
-const Panel = lazily(() => import("./Panel"));
+const Panel = lazyComponent(() => import("./Panel"));
 
 export function Workplace() {
   const panel = useEditor((state) => state.ui.tool !== "" || state.ui.selection !== null);

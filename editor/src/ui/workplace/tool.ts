@@ -12,6 +12,6 @@ export interface Tool {
   /** Whether the rail shows it; by default it does. */
   shown?: (state: State) => boolean;
   /** Return why it cannot be used now, as a sentence; an empty string if it can. */
-  barred?: (state: State) => string;
+  whyUnavailable?: (state: State) => string;
   Panel: ComponentType;
 }

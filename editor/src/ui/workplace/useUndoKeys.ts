@@ -3,8 +3,8 @@
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import * as documents from "../../commands/documents";
-import { barred } from "../../store/permissions";
-import { now, tell } from "../../store/store";
+import { whyUnavailable } from "../../store/permissions";
+import { notify, now } from "../../store/store";
 
 /** Time after a step within which the event about the next one may still arrive, ms. */
 const NEWS = 1000;
@@ -19,13 +19,13 @@ export function useUndoKeys(): void {
       const state = now();
       const step = state.history?.[wanted];
       const why =
-        barred(state, wanted === "undo" ? "Undo" : "Redo") ||
+        whyUnavailable(state, wanted === "undo" ? "Undo" : "Redo") ||
         (step || event.timeStamp - last < NEWS
           ? ""
           : wanted === "undo"
             ? t`There is nothing to undo.`
             : t`There is nothing to redo.`);
-      if (why) return tell("info", why);
+      if (why) return notify("info", why);
       last = event.timeStamp;
       void (wanted === "undo" ? documents.undo() : documents.redo());
     };

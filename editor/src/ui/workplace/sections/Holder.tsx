@@ -9,10 +9,10 @@ import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { Icon } from "../../kit/icons";
 import { Button } from "../../kit/kit";
-import { lazily } from "../../kit/lazy";
+import { lazyComponent } from "../../kit/lazy";
 import { ago, clock } from "../../times";
 
-const TakeOver = lazily(() => import("../../people/TakeOver"));
+const TakeOver = lazyComponent(() => import("../../people/TakeOver"));
 
 export default function Holder({ id }: { id: string }) {
   const holder = useEditor((state) => heldBy(state, id));

@@ -7,10 +7,10 @@ import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { kindName, nameOf } from "../../../viewmodel/names";
 import { Button } from "../../kit/kit";
-import { lazily } from "../../kit/lazy";
+import { lazyComponent } from "../../kit/lazy";
 import type { Section } from "../section";
 
-const Holder = lazily(() => import("./Holder"));
+const Holder = lazyComponent(() => import("./Holder"));
 
 const Body: Section["Body"] = ({ selection: { kind, id } }) => {
   const holder = useEditor((state) => heldBy(state, id));

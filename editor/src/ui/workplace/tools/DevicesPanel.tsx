@@ -4,7 +4,7 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { retryObject } from "../../../commands/operation";
 import { serves } from "../../../session/connection";
-import { barred } from "../../../store/permissions";
+import { whyUnavailable } from "../../../store/permissions";
 import { derivesFrom } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { Button } from "../../kit/kit";
@@ -27,7 +27,7 @@ function stateName(state: string): string {
 export default function Panel() {
   const live = useEditor((state) => state.live);
   const doc = useEditor((state) => state.doc);
-  const cannot = useEditor((state) => barred(state, "RetryObject"));
+  const cannot = useEditor((state) => whyUnavailable(state, "RetryObject"));
   const troubled = (id: string) => live.objects[id]?.state === "failed" || live.objects[id]?.state === "lost";
   // Boxes and tables are not devices.
   const inert = useEditor((state) =>

@@ -1,12 +1,12 @@
 /** Connection and health of each device. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../../kit/lazy";
+import { lazyComponent } from "../../kit/lazy";
 import type { Tool } from "../tool";
 
 export const devices: Tool = {
   id: "devices",
   label: msg`Devices`,
   icon: "plug",
-  Panel: lazily(() => import("./DevicesPanel")),
+  Panel: lazyComponent(() => import("./DevicesPanel")),
 };

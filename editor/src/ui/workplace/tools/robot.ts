@@ -2,13 +2,13 @@
 
 import { msg, t } from "@lingui/core/macro";
 import { robotsOf } from "../../../session/streams";
-import { lazily } from "../../kit/lazy";
+import { lazyComponent } from "../../kit/lazy";
 import type { Tool } from "../tool";
 
 export const robot: Tool = {
   id: "robot",
   label: msg`Robot`,
   icon: "robot",
-  barred: (state) => (robotsOf(state).length > 0 ? "" : t`The scene has no robot.`),
-  Panel: lazily(() => import("../../robot/RobotPanel")),
+  whyUnavailable: (state) => (robotsOf(state).length > 0 ? "" : t`The scene has no robot.`),
+  Panel: lazyComponent(() => import("../../robot/RobotPanel")),
 };

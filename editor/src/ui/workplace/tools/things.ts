@@ -1,12 +1,12 @@
 /** The object list. */
 
 import { msg } from "@lingui/core/macro";
-import { lazily } from "../../kit/lazy";
+import { lazyComponent } from "../../kit/lazy";
 import type { Tool } from "../tool";
 
 export const things: Tool = {
   id: "things",
   label: msg`Objects`,
   icon: "tree",
-  Panel: lazily(() => import("../../things/ThingsPanel")),
+  Panel: lazyComponent(() => import("../../things/ThingsPanel")),
 };
