@@ -85,9 +85,7 @@ export default function AddPanel() {
                         {each.disabled ? each.problem : first(each.description)}
                       </span>
                       {each.shadows && (
-                        <span className="small">
-                          replaces the installed type {each.type} ({each.shadows})
-                        </span>
+                        <span className="small">{t`replaces the installed type ${each.type} (${each.shadows})`}</span>
                       )}
                     </span>
                   </button>
