@@ -62,7 +62,7 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
         await tools.get_by_role("button", name=texts.ROBOT, exact=True).click()
         await page.get_by_role("complementary").get_by_text(texts.HOLD_TO_MOVE).wait_for()
         await take("teach")
-        await page.get_by_role("radio", name="Both", exact=True).click()
+        await page.get_by_role("radio", name="Split", exact=True).click()
         await tools.get_by_role("button", name=texts.PROGRAM, exact=True).click()
         await page.get_by_role("region", name=texts.GRAPH).wait_for()
         await take("program")

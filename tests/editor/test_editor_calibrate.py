@@ -83,8 +83,8 @@ async def test_object_is_placed_at_the_tool(cell: Cell, colleague: Client, brows
         assert math.dist(tuple(saved.pose.position), tuple(touched)) < 1e-3  # type: ignore[union-attr]
 
         # Three points at the same place define no frame: refused with the reason; nothing moves.
-        await page.get_by_text("By three points of its frame").click()
-        for name in ("Origin", "On its x axis", "In its xy plane"):
+        await page.get_by_text("With three points").click()
+        for name in ("Origin", "On the x axis", "In the xy plane"):
             await page.get_by_role("button", name=re.compile(name)).click()
         await page.get_by_role("button", name=texts.PUT_IT_THERE, exact=True).click()
         await expect(page.get_by_role("complementary").get_by_role("alert")).to_be_visible(timeout=15_000)
@@ -201,23 +201,23 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
             assert (await rest.put("/api/calibration/markers", json=configured)).status_code == 200
         before = await _stands(screen, ids["eye"])
         # The failed attempt does not hide the running one.
-        await asyncio.gather(panel.get_by_text("Under way: ").wait_for(), screen.press(texts.FIND_BY_MARKERS))
-        await panel.get_by_role("list", name="How it was calibrated").get_by_text("known to").wait_for()
+        await asyncio.gather(panel.get_by_text("In progress: ").wait_for(), screen.press(texts.FIND_BY_MARKERS))
+        await panel.get_by_role("list", name="Calibration history").get_by_text("known to").wait_for()
         millimetres, degrees = off(await _stands(screen, ids["eye"]), CAMERA)
         assert millimetres < 2.0
         assert degrees < 0.2
         change = panel.get_by_role("group", name="Before and after")
-        moved = re.search(r"It stands ([\d.]+) mm and [\d.]+° from", await change.inner_text())
+        moved = re.search(r"Moved by ([\d.]+) mm and [\d.]+°", await change.inner_text())
         assert moved is not None
         assert abs(float(moved[1]) - off(before, CAMERA)[0]) < 2.0
         assert await screen.faults() == []
         await screen.picture("calibrated camera")
         # Undo the calibration, and repeat it.
-        await change.get_by_role("button", name="Put it back").click()
+        await change.get_by_role("button", name="Restore the old pose").click()
         await expect(change).to_have_count(0)
         assert off(await _stands(screen, ids["eye"]), before)[0] < 0.01
         await screen.press(texts.FIND_BY_MARKERS)
-        await change.get_by_role("button", name="Keep the new place").click()
+        await change.get_by_role("button", name="Keep the new pose").click()
         await expect(change).to_have_count(0)
 
         await _choose(screen, "arm")
@@ -275,11 +275,11 @@ async def test_aiming_wizard_shows_how_well_the_points_fit(
         await _choose(screen, "part")
         # A preview on the tool; no request is sent.
         tool = await _tool(screen, ids["arm"])
-        place = panel.get_by_role("region", name="Place by the robot")
-        await place.get_by_role("radio", name="Its top").click()
+        place = panel.get_by_role("region", name="Set pose with robot")
+        await place.get_by_role("radio", name="Top").click()
         await place.get_by_text(texts.SHOW_ON_TOOL).click()
-        await place.get_by_role("alert").filter(has_text="use the middle").wait_for()
-        await place.get_by_role("radio", name="Its middle").click()
+        await place.get_by_role("alert").filter(has_text="Use the middle").wait_for()
+        await place.get_by_role("radio", name="Middle").click()
         await until(lambda: _near(screen, part, tool, 1e-3), "shown on the tool", 15)
         await screen.picture("on the tool")
         await place.get_by_text(texts.SHOW_ON_TOOL).click()
@@ -289,14 +289,14 @@ async def test_aiming_wizard_shows_how_well_the_points_fit(
         for number, (q, at) in enumerate(zip(TOUCHES, touched, strict=True), 1):
             await cell.tell("robot", "place", q=q)
             await until(functools.partial(_tool_at, screen, ids["arm"], at), "the tool is seen there", 15)
-            await screen.press(f"The tool is on point {number}")
-            await panel.get_by_role("button", name=f"Take point {number} again").wait_for()
+            await screen.press(f"Record point {number}")
+            await panel.get_by_role("button", name=f"Record point {number} again").wait_for()
         # Four points, one with an error of 4 mm: the fit is shown before anything is placed.
-        fit = panel.get_by_text(re.compile(r"The points fit within [0-2]\.\d mm"))
+        fit = panel.get_by_text(re.compile(r"RMS error [0-2]\.\d mm"))
         await fit.wait_for()
         await screen.picture("aimed")
         await screen.press(texts.PUT_IT_THERE)
-        await screen.sees("It stands where its points were found.")
+        await screen.sees("Pose updated.")
         saved = await _saved(client, ids["scene"], "part")
         assert saved.pose is not UNSET
         missed = [(saved.pose * point).position.distance_to(at) for point, at in zip(known, touched, strict=True)]

@@ -139,8 +139,8 @@ async def test_object_list_is_filtered_folded_and_stepped_through(place: Place, 
         await _tool(screen, texts.OBJECTS)
         tree = page.get_by_role("treegrid", name=texts.OBJECTS)
         # Objects without a pose are listed below a heading of their own.
-        await page.get_by_role("heading", name="Without a place").wait_for()
-        unplaced = page.get_by_role("treegrid", name="Without a place").get_by_role("row")
+        await page.get_by_role("heading", name="Without a pose").wait_for()
+        unplaced = page.get_by_role("treegrid", name="Without a pose").get_by_role("row")
         without = sorted(each.name for each in place.scene.objects if not isinstance(each.pose, Pose))
         assert without
         assert [row.split()[0] for row in await _labels(unplaced)] == without
@@ -219,7 +219,7 @@ async def test_selection_out_of_view_is_found_and_objects_are_faded(place: Place
         assert not close_by & set(await _names(screen))
         before = await _drawn(screen, point.id, near)
         await _tool(screen, texts.POINTS)
-        await page.get_by_role("slider", name="Size of points in the view").press("End")
+        await page.get_by_role("slider", name="Point size").press("End")
         await screen.until(_SCALE_OVER, [point.id, 3.9 * before])
 
         # Other kinds fade and objects become transparent, in the drawn picture, too.

@@ -22,7 +22,7 @@ RESTS_WITHIN = 0.5
 """Longest time from the release or loss until the robot is at standstill, s."""
 STAYS = 0.6
 """Time for which the robot must stay at standstill afterwards, s."""
-HOLD = "Move along +Z, as long as it is held"
+HOLD = "Hold to move along +Z"
 
 Loss = Callable[[Screen, CDPSession], Awaitable[object]]
 

@@ -98,7 +98,7 @@ async def test_scenes_are_created_renamed_described_copied_and_deleted(
         # The server stores it: the reloaded page has no memory.
         await screen.page.reload()
         await tab(screen, texts.SCENES)
-        await screen.page.get_by_role("button", name="Take the star of Cell 2 away").wait_for()
+        await screen.page.get_by_role("button", name="Remove Cell 2 from favorites").wait_for()
 
         # Deletions by other users are shown.
         await client.call("DeleteScene", rpc.IdArgs(second.id))
@@ -188,7 +188,7 @@ async def test_projects_of_a_scene_pictures_and_templates(
 
         await screen.press(f"Scene of {project.name}")
         await screen.page.get_by_role("button", name=texts.open_document(scene.name)).wait_for()
-        await more(screen, scene.name, "New project on it…")
+        await more(screen, scene.name, "New project…")
         await screen.page.get_by_label("Name").fill("From the scene")
         await screen.press(texts.CREATE)
         await screen.sees(f"on {scene.name} ·")
@@ -221,7 +221,7 @@ async def test_packages_are_listed_live_downloaded_uploaded_and_run(
     async with screen_of(browser, cell.url) as screen:
         await screen.join("Eva")
         await tab(screen, texts.PACKAGES)
-        await screen.sees("No package yet")
+        await screen.sees("No packages yet")
         await client.call("OpenProject", rpc.IdArgs(project.id))
         # Builds of other users are shown in the tray on every screen.
         tray = screen.page.get_by_role("region", name=texts.TRAY)
@@ -352,7 +352,7 @@ async def test_problems_are_shown_on_tiles_and_fixed_from_there(
             await screen.page.get_by_role("heading", name="lamps backup").wait_for()
             stored = {each.name: each for each in await client.call("ListScenes")}
             assert not stored["lamps"].problems
-            assert len(stored["lamps as it was"].problems) == 2
+            assert len(stored["lamps backup"].problems) == 2
             await tab(screen, texts.PROJECTS)
             await screen.page.get_by_label("Search").fill("")
             await screen.press("Open lighting")

@@ -89,7 +89,7 @@ async def test_name_in_use_is_refused_and_returning_users_join_by_one_tap(
         # On a shared tablet, returning users join with one tap.
         await two.press(texts.SETTINGS)
         await two.page.get_by_role("menuitem", name="Leave (you are Berta)").click()
-        people = two.page.get_by_role("group", name="Who was here with this device")
+        people = two.page.get_by_role("group", name="Recent users")
         assert await people.get_by_role("button").all_inner_texts() == ["Berta"]  # not the refused name
         assert await two.faults() == []
         await two.picture("who was here")

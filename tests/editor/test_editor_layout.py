@@ -149,7 +149,7 @@ async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> 
         await tools.filter(has_text=texts.ROBOT).click()
         await looks.at("online")
         await screen.press(texts.SETTINGS)
-        await page.get_by_role("menuitem", name="Controls for the left hand").click()
+        await page.get_by_role("menuitem", name="Left-handed controls").click()
         await looks.at("left hand")
         await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
         await screen.press(texts.LARGER_PANEL)

@@ -148,8 +148,8 @@ async def test_broken_meshes_are_replaced_with_the_reason(browser: Browser, plac
         screen.expected_errors = ("the server responded with a status of 400",)
         await screen.join("Eva")
         for name, words, badge in (
-            ("Broken", "The mesh broken.stl has no triangles", "its mesh cannot be shown"),
-            ("Ruin", "ruin.zip is not a zip archive", "cannot be shown as it looks"),
+            ("Broken", "The mesh broken.stl has no triangles", "model cannot be shown"),
+            ("Ruin", "ruin.zip is not a zip archive", "model cannot be shown"),
         ):
             await screen.until("id => window.__engine?.item(id)?.problem", place.ids[name])
             item = await screen.item(place.ids[name])

@@ -43,8 +43,8 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
     async with screen_of(browser, cell.url, touch=True) as screen:
         page = screen.page
         await at_the_machine(screen, kiosk=True)
-        await screen.sees("There is no package yet.")
-        assert await page.get_by_role("button", name="To the editor").count() == 0
+        await screen.sees("No packages yet.")
+        assert await page.get_by_role("button", name="Open the editor").count() == 0
         # A package built by another user appears by itself.
         _, project = await cell.open(colleague)
         await cell.build(colleague, project)
@@ -126,7 +126,7 @@ async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Brows
         await screen.sees("Run stopped by Olga")
         run = (await colleague.call("ListRuns")).runs[0]
         assert (run.end.value, run.stopped_by) == ("stopped", "Olga")
-        await screen.press("To the editor")
+        await screen.press("Open the editor")
         await page.get_by_role("heading", name=texts.HOME_HEADING).wait_for()
 
 
@@ -169,7 +169,7 @@ async def test_operator_takes_over_a_project_left_open_and_locked(
         await expect(gone).to_have_count(0)
         await screen.press("Start")
         await page.get_by_role("button", name=texts.STOP, exact=True).click(timeout=BEGUN)
-        await screen.sees(f"{project.name} was left open in the editor.")
+        await screen.sees(f"{project.name} is open in the editor. It is closed during the run")
         async with Client(cell.url, "Wendy", reconnect=False) as wendy:
             opened = (await wendy.next_event("OpenProject", timeout=10)).data.project
             assert "unsaved" in [each.name for each in opened.action_points]

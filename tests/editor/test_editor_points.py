@@ -118,11 +118,11 @@ async def place(online: Place) -> Place:
 async def test_point_at_the_robot_by_one_tap(place: Place) -> None:
     before = await place.saved()
     tool = (await place.screen.item(place.robot))["endEffectors"][0]
-    await place.button("Keep the robot's place as a point").click()  # the only one
+    await place.button("Save the robot pose as a point").click()  # the only one
     point = await place.new_point(before, lambda each: len(each.orientations) == len(each.robot_joints) == 1)
     assert math.dist(tuple(point.position), tuple(tool["position"].values())) < 1e-3
     # It is selected and can be renamed in the panel.
-    name = place.screen.page.get_by_label("Name of the point")
+    name = place.screen.page.get_by_label("Point name")
     await name.fill("home place")
     await name.press("Enter")
     await place.point("home_place")
@@ -175,11 +175,11 @@ async def test_point_by_numbers_gets_a_parent_without_moving(place: Place) -> No
     for axis, value in (("X", "400"), ("Y", "-100"), ("Z", "+250")):
         await page.get_by_label(f"{axis} mm").fill(value)
         await page.keyboard.press("Enter")
-    await place.button("Add the point").click()
+    await place.button("Add point").click()
     point = await place.new_point(before)
     assert tuple(point.position) == pytest.approx((0.4, -0.1, 0.25))
     tester = next(each for each in place.scene.objects if each.name == "tester")
-    await page.get_by_label("Hangs").select_option("on tester")
+    await page.get_by_label("Parent").select_option("tester")
     hung = await place.point(point.name, lambda each: each.parent == tester.id)
     assert tuple(hung.position) == pytest.approx((-0.1, -0.25, 0.2))  # relative to its parent now
     drawn = (await place.screen.item(point.id))["pose"]["position"]
@@ -190,7 +190,7 @@ async def test_orientations_are_added_rotated_and_checked_for_reachability(place
     page = place.screen.page
     point = await place.add_point("turned", Position(0.4, -0.1, 0.25))
     await place.select("turned")
-    await page.get_by_role("button", name="Add an orientation").click()
+    await page.get_by_role("button", name="Add orientation").click()
     await page.get_by_role("menuitem", name="Tool straight down").click()
     added = await place.point("turned", lambda each: len(each.orientations) == 1)
     orientation = added.orientations[0]
@@ -310,7 +310,7 @@ async def test_robot_is_previewed_and_moved_to_a_taught_orientation(place: Place
     before = (await screen.item(place.robot))["joints"]
     await page.get_by_text("Speed: 25 %").click()
     await page.get_by_role("slider", name="Speed").fill("1")
-    await place.button("Show robot there").click()
+    await place.button("Preview robot").click()
     await screen.sees(texts.CAN_GO_THERE)
     ghost = await screen.until("id => window.__engine.item(id).ghost", place.robot)
     real = (await screen.item(place.robot))["joints"]
@@ -344,7 +344,7 @@ async def test_robot_is_previewed_and_moved_to_a_taught_orientation(place: Place
     await screen.until(f"(ids) => ({as_taught})(ids).turned > 0.1", [place.robot, down])
     await page.get_by_role("button", name=re.compile("^Active robot")).click()
     await page.get_by_role("radiogroup", name=texts.HOW_TO_MOVE).get_by_role("radio", name="Tool", exact=True).click()
-    await place.button("Turn as down").click()
+    await place.button("Align with down").click()
     await until(reached, "the tool is turned as the orientation", 20)
     await place.button(texts.CLOSE_PANEL).click()
 
@@ -362,11 +362,11 @@ async def test_joints_of_a_moved_point_are_invalid_until_recomputed(place: Place
     await place.client.call("UpdateActionPointPosition", rpc.UpdateActionPointPositionArgs(point.id, point.position))
     await place.client.call("WriteUnlock", rpc.WriteUnlockArgs(point.id))
     await place.select("moved")
-    await expect(page.get_by_label("Name of the point")).to_have_value("moved")
+    await expect(page.get_by_label("Point name")).to_have_value("moved")
     await page.get_by_role("button", name=re.compile("^default · robot")).click()
     await place.screen.sees("The point has moved. These joints no longer reach it.")
     before = point.robot_joints[0].joints
-    await place.button("Compute anew").click()
+    await place.button("Recompute").click()
     # The saved point is older than the move until the editor has released its lock.
     solved = await place.point("moved", lambda each: each.position == point.position and each.robot_joints[0].is_valid)
     moved = max(abs(a.value - b.value) for a, b in zip(before, solved.robot_joints[0].joints, strict=True))

@@ -98,8 +98,8 @@ async def test_values_are_validated_by_field_and_server(work: Work) -> None:
     await expect(field).to_have_value("3")
     await work.client.call("WriteUnlock", rpc.WriteUnlockArgs(action))
     # It becomes a new project parameter.
-    await work.panel.get_by_role("radiogroup", name="Where number comes from").get_by_text("Project").click()
-    await field.select_option(label="New, with the present value…")
+    await work.panel.get_by_role("radiogroup", name="Source of number").get_by_text("Project").click()
+    await field.select_option(label="New variable…")
     made = (await work.told("ProjectParameterChanged")).data
     assert (made.name, made.type, made.value) == ("number", "integer", "3")
     await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
@@ -166,7 +166,7 @@ async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
     # A loop is refused without a request.
     await work.tap_button("on_no: next", graph)
     await node("check_input")
-    await screen.sees("It would close a loop.")
+    await screen.sees("This connection would create a loop.")
     # Branches differ by their dash pattern, not only by colour.
     await screen.until(
         """ids => {
@@ -369,7 +369,7 @@ async def test_program_fault_is_listed_and_leads_to_its_action(work: Work) -> No
 async def test_device_setting_is_overridden_in_one_project(work: Work) -> None:
     await work.tool(texts.PROGRAM)
     await work.mode(texts.VARIABLES)
-    settings = work.panel.get_by_role("region", name="Settings of devices in this project")
+    settings = work.panel.get_by_role("region", name="Device settings")
     await settings.get_by_label("Device").select_option(label="tester")
     field = settings.get_by_label("port", exact=True)
     scenes = await field.input_value()
@@ -425,7 +425,7 @@ async def test_code_view_shows_the_saved_program_and_selects_actions(work: Work)
 async def test_program_panel_layout(work: Work) -> None:
     page, screen = work.screen.page, work.screen
     found: dict[str, list[str]] = {}
-    for tab in ("Add", "Actions", "Check", "Values"):
+    for tab in ("Add", "Actions", "Check", "Variables"):
         await work.tool(texts.PROGRAM)
         await work.mode(tab)
         for name, size in (("tablet", (1280, 800)), ("phone", (390, 844))):

@@ -31,20 +31,20 @@ async def test_the_view_stays_while_the_server_is_gone_and_reconnects(browser: B
         assert (await screen.item(table))["pose"]["position"]["x"] == 0.2
         await cell.kill("server")
         await screen.sees(texts.NO_CONNECTION)
-        await screen.sees("What was changed and not saved, the server keeps.")
+        await screen.sees("Unsaved changes are kept on the server.")
         assert (await screen.item(table))["name"] == "table"
         assert await screen.page.get_by_role("button", name=texts.SAVE).is_disabled()
 
         await cell.restart_server()
         await screen.until("() => !document.querySelector('.lost')")
-        await screen.sees("What was changed and not saved is still here")
+        await screen.sees("Your unsaved changes are still available")
         # The selection is restored, from the journal of the killed server.
         assert (await screen.item(table))["pose"]["position"]["x"] == 0.2
         await screen.page.get_by_role("complementary").get_by_role("heading", name="table").wait_for()
         # A new tab shows the unsaved changes, too.
         async with screen_of(browser, cell.url) as again:
             await again.join("Eva's other tab")
-            await again.sees("What was changed and not saved is still here")
+            await again.sees("Your unsaved changes are still available")
             await again.sees(texts.NOT_SAVED)
             assert (await again.item(table))["name"] == "table"
         await screen.press(texts.SAVE)

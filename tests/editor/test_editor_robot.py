@@ -133,7 +133,7 @@ async def test_step_moves_the_tool_and_shows_the_outcome(place: Place) -> None:
     after = await place.stands()
     assert after.z - before.z == pytest.approx(-0.01, abs=5e-4)
     # The tool points down, so its +Z is the same direction.
-    await place.choose("Axes of", "Tool")
+    await place.choose("Frame", "Tool")
     await place.button("Move along +Z").click()
     await until(_lower(place, after.z - 0.009), "the tool went down")
     await place.choose("Frame", "World")
@@ -170,8 +170,8 @@ async def _hold(button: Locator, press: Hand, release: Hand, moved: Hand) -> Non
 async def test_hold_to_move_stops_on_release(place: Place) -> None:
     before = await place.stands()
     await place.robot_panel("Tool")
-    await place.choose("A press", texts.HOLD_TO_MOVE)
-    hold = place.button("Move along +Z, as long as it is held")
+    await place.choose("Mode", texts.HOLD_TO_MOVE)
+    hold = place.button("Hold to move along +Z")
     mouse = place.screen.page.mouse
     await hold.hover()
     await _hold(hold, mouse.down, mouse.up, _higher(place, before.z + 0.01))
@@ -203,8 +203,8 @@ async def test_hold_ends_on_blur_hidden_page_and_key_up(place: Place, taken: str
     page = place.screen.page
     before = await place.stands()
     await place.robot_panel("Tool")
-    await place.choose("A press", texts.HOLD_TO_MOVE)
-    hold = place.button("Move along −Z, as long as it is held")
+    await place.choose("Mode", texts.HOLD_TO_MOVE)
+    hold = place.button("Hold to move along −Z")
     await hold.focus()
     press, release = partial(page.keyboard.down, " "), partial(page.keyboard.up, " ")
     await _hold(hold, press, release, _lower(place, before.z - 0.005))
@@ -316,7 +316,7 @@ async def test_goal_is_dragged_and_the_ghost_follows(place: Place) -> None:
     await place.stands()
     assert await page.evaluate("__engine.way") is None, "there is no way left"
     # Dragged out of reach: the reason is shown, the ghost stays, and one tap resets the goal.
-    await place.choose("Drag the goal in the view", "Move it")
+    await place.choose("Drag the target", "Move")
     handle = await _handle(place, "axis z")
     await page.mouse.move(*handle)
     await page.mouse.down()

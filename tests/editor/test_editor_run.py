@@ -85,10 +85,10 @@ async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: B
     screen, page = work.screen, work.screen.page
     scan = work.action("scan").id
     # In the graph next to the view, a sequence is folded until one of its actions runs.
-    await work.mode("Both")
+    await work.mode("Split")
     graph = page.get_by_role("region", name=texts.GRAPH)
-    await graph.get_by_role("button", name="Fold straight runs").click()
-    await graph.locator('.react-flow__node[aria-label^="8 actions folded into one, scan, open"]').wait_for()
+    await graph.get_by_role("button", name="Fold sequences").click()
+    await graph.locator('.react-flow__node[aria-label^="8 actions, folded, scan, open"]').wait_for()
     await work.select("scan")
     looked_from = await page.evaluate("__engine.view.camera.position.toArray()")
     work.taps = 1  # the tap that selected it
@@ -100,7 +100,7 @@ async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: B
     await until(lambda: is_broken_at(work, scan), "the breakpoint is everybody's")
     assert await page.evaluate("__engine.view.camera.position.toArray()") == looked_from, "the view stays where it was"
     await work.tool(texts.RUN)
-    trace = work.panel.get_by_role("region", name="What it has done")
+    trace = work.panel.get_by_role("region", name="Trace")
     await trace.get_by_role("button", name="more_boards").click()
     # Parameters and results.
     await expect(trace).to_contain_text("times")
@@ -149,7 +149,7 @@ async def test_stop_ends_the_run_and_editing_is_possible_again(work: Work) -> No
     # Meanwhile editing is refused with the reason.
     await work.select("test")
     await work.panel.get_by_role("button", name=texts.DUPLICATE).click(force=True)
-    await work.screen.sees("The program runs: stop it first.")
+    await work.screen.sees("Stop the program first.")
     await work.tap_button(texts.STOP, bar)
     assert await page.get_by_role("alertdialog").count() == 0, "nobody is asked"
     await state(work, PackageStateEnum.STOPPED)
@@ -170,10 +170,10 @@ async def test_single_action_is_executed_and_another_cancelled(work: Work) -> No
     await expect(outcome).to_contain_text("no")
     await work.add("wait_long", "flow/wait", "fixture", seconds=ActionParameter("seconds", "double", "30.0"))
     await work.select("wait_long")
-    await work.tap_button("Try it", work.panel)
+    await work.tap_button("Try", work.panel)
     await work.tap_button(texts.CANCEL, work.panel)
     await work.told("ActionCancelled")
-    await work.panel.get_by_role("button", name="Try it").wait_for()
+    await work.panel.get_by_role("button", name="Try").wait_for()
     await go_offline(work)
 
 
@@ -196,7 +196,7 @@ async def test_choices_come_from_the_device_and_stay_when_it_is_offline(work: Wo
     stored = await work.parameters(fetch)
     assert (stored["shelf"].value, stored["board"].value) == ('"lower"', '"lower board 2"')
     await go_offline(work)
-    await expect(work.panel.get_by_text("as the device told last")).to_have_count(2)
+    await expect(work.panel.get_by_text("Last known choices.")).to_have_count(2)
     assert await board.locator("option").all_inner_texts() == [f"lower board {number}" for number in range(4)]
     # Nothing is known of another shelf.
     await shelf.get_by_text("cellar").click()

@@ -185,7 +185,7 @@ async def test_steps_and_typed_numbers_place_an_object_exactly(opened: Open, bro
         start = await opened.pose("feeder_box")
         before = await opened.client.call("History", rpc.HistoryArgs())
         # Two quick steps are one edit.
-        await place.get_by_role("button", name="Z 1 cm more").dblclick()
+        await place.get_by_role("button", name="Increase Z by 1 cm").dblclick()
         await until(lambda: _at(opened, "z", start.position.z + 0.02), "two steps up")
         edits = await opened.client.call("History", rpc.HistoryArgs())
         new = [edit for edit in edits.edits if edit not in before.edits]
@@ -201,7 +201,7 @@ async def test_steps_and_typed_numbers_place_an_object_exactly(opened: Open, bro
             await screen.page.keyboard.press("Enter")
             await until(lambda axis=axis, value=value: _at(opened, axis, value), typed)  # type: ignore[misc]
         # With the keys on the screen, in another unit, as a relative change.
-        await place.get_by_role("button", name=re.compile("^Z .*type it")).click()
+        await place.get_by_role("button", name=re.compile("^Z .*enter a value")).click()
         await place.get_by_role("button", name="Change by").click()
         for key in ("minus", "5", "in cm"):
             await place.get_by_role("button", name=key, exact=True).click()
@@ -280,11 +280,11 @@ async def test_shapes_are_added_resized_copied_and_removed(opened: Open, browser
         await tool(screen, texts.OBJECTS)
         await screen.page.get_by_role("row", name="tester").click()
         await screen.press(texts.REMOVE)
-        await screen.sees("These projects use it")
+        await screen.sees("These projects lose the actions")
         await screen.press(texts.CANCEL)
         assert await opened.has("tester")
         # An invalid name is refused with the server's message at the field.
-        name = panel.get_by_label("Name of the object")
+        name = panel.get_by_label("Object name")
         await name.fill("2nd tester")
         await name.press("Enter")
         await expect(panel.get_by_role("alert")).to_contain_text("cannot name an object")

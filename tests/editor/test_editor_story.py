@@ -100,7 +100,7 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
 
         # Add a point at the robot, then move the robot away, on the screen and in the simulation.
         await user.tool(texts.POINTS)
-        await screen.press("Where the robot is")
+        await screen.press("At the robot")
         await user.panel.get_by_role("region", name="Orientations").wait_for()
         point = await user.title()
         # The position is that of the configured tool, known once control is taken.

@@ -127,7 +127,7 @@ async def test_concurrent_edits_converge(cell: Cell, browser: Browser) -> None:
         # Points were added, and all locks are released.
         assert len((await opened()).action_points) > len(project.action_points)
         await client.call("WriteLock", rpc.WriteLockArgs(point.id))
-        await one.until("id => __engine.item(id).badge === 'locked by third'", point.id)
+        await one.until("id => __engine.item(id).badge === 'in use by third'", point.id)
         # The panel names the user who holds the lock.
         await one.page.get_by_role("complementary").get_by_text("third").first.wait_for()
         await client.call("WriteUnlock", rpc.WriteUnlockArgs(point.id))

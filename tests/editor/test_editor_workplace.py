@@ -197,7 +197,7 @@ async def test_edits_and_locks_of_another_user_are_shown(place: Place, browser: 
         await screen.until("id => window.__engine.item(id).badge === 'in use by colleague'", new)
         await client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"ViewStateChanged"}))
         await _tool(screen, texts.OBJECTS)
-        await screen.page.get_by_role("row", name="lonely colleague works on it").click()
+        await screen.page.get_by_role("row", name="lonely In use by colleague").click()
         # The panel shows who holds the lock, since when, and a button to ask for it.
         about = screen.page.get_by_role("region", name="About", exact=True)
         await about.get_by_text("just now. Available when colleague has finished").wait_for()
@@ -242,7 +242,7 @@ async def test_online_without_a_device_and_retry(place: Place, browser: Browser)
         try:
             await screen.press(texts.GO_ONLINE)
             tester = page.get_by_role("listitem").filter(has=page.get_by_text("tester", exact=True))
-            await expect(tester).to_contain_text("not reached", timeout=40_000)
+            await expect(tester).to_contain_text("not reachable", timeout=40_000)
             # The other devices are online; the failed one is listed first, with the reason.
             robot = page.get_by_role("listitem").filter(has=page.get_by_text("robot", exact=True))
             await expect(robot).to_contain_text("online", timeout=40_000)
@@ -252,14 +252,14 @@ async def test_online_without_a_device_and_retry(place: Place, browser: Browser)
             assert place.cell.at["tester"]["modbus"].split(":")[0] in await tester.inner_text()
         finally:
             await place.cell.tell("tester", "heal")
-        await screen.press("Try tester again")
-        await expect(tester).not_to_contain_text("not reached", timeout=40_000)
+        await screen.press("Retry tester")
+        await expect(tester).not_to_contain_text("not reachable", timeout=40_000)
         await page.get_by_role("button", name=texts.GO_OFFLINE).wait_for()
         await screen.picture("devices")
 
         # Past notices are listed with their time.
         await screen.press(texts.SETTINGS)
-        await page.get_by_role("menuitem", name="Messages, with times").click()
+        await page.get_by_role("menuitem", name="Messages").click()
         messages = page.get_by_role("dialog", name="Messages").get_by_role("listitem")
         began = messages.filter(has_text="Starting the scene")
         await expect(began).to_have_text(re.compile(r"^\d\d:\d\d:\d\dnote: .*: finished\. Not there: tester\.$"))
