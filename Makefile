@@ -26,15 +26,15 @@ test: .make/dev .make/editor .make/browser
 bench: .make/dev
 	$(BIN)/python -m benchmarks $(ARGS)
 
-# This checkout and another revision, measured in turns: make bench-compare ARGS="v0.1 requests documents"
+# Measure this checkout and another revision, alternating: make bench-compare ARGS="v0.1 requests documents"
 bench-compare: .make/dev
 	$(BIN)/python -m benchmarks.compare $(ARGS)
 
-# Every transport lost and back 300 times instead of 18, which takes half an hour.
+# Interrupt and restore every transport 300 times instead of 18; takes half an hour.
 bench-long: .make/dev
 	$(BIN)/python -m benchmarks --long recovery $(ARGS)
 
-# What the editor needs to load, to draw and to hear of others, in Chromium with software rendering.
+# Measure loading, drawing and event latency of the editor, in Chromium with software rendering.
 bench-editor: .make/dev .make/editor .make/browser
 	$(BIN)/python -m benchmarks.editor $(ARGS)
 
