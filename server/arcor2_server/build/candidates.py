@@ -30,7 +30,7 @@ class Candidates:
                 raise InvalidPackage(f"object type {name}: {error}") from error
 
     def analysis(self, name: str) -> TypeAnalysis:
-        """Return what the source of a type, or of a helper or mixin, says."""
+        """Return the analysis of the source of a type, helper or mixin."""
         if name not in self._library:
             raise NotFound(f"The object type {name} is neither in the package nor here.")
         return self._library.analyse(name)
@@ -60,7 +60,7 @@ class Candidates:
         return self.analysis(name).enumerations
 
     def facts(self, scene: Scene) -> dict[str, TypeFacts]:
-        """Return what a script needs of the types in a scene: all of their actions."""
+        """Return the facts that a script needs about the types in a scene: all their actions."""
         facts: dict[str, TypeFacts] = {}
         for name in {obj.type for obj in scene.objects}:
             found = self.analysis(name)

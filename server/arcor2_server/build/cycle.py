@@ -177,7 +177,7 @@ class Cycle:
         return kind.expression(parameter, References(self.frame, object_id, enumerations, method))
 
     def _arguments(self, node: int) -> tuple[list[ast.expr], list[ast.keyword]]:
-        """Give positional arguments, and by keyword those that have to be, or stand behind one left to its default."""
+        """Return positional arguments, and keyword arguments where required or after a default value."""
         action, (_, type_name, method, declared) = self.flow.actions[node], self.declared[node]
         by_name = self.frame.types[type_name].keyword_only
         given = {parameter.name: parameter for parameter in action.parameters}
@@ -207,7 +207,7 @@ class Cycle:
         return positional, keywords
 
     def _call(self, node: int) -> ast.stmt:
-        """Give the statement that runs an action and keeps its results."""
+        """Return the statement that runs an action and stores its results."""
         action = self.flow.actions[node]
         object_id, _, method, _ = self.declared[node]
         try:

@@ -139,7 +139,7 @@ class Frame:
 
     # ------------------------------------------------------------------------------------------------ actions
     def declared(self, action: Action) -> tuple[str, str, str, ObjectAction]:
-        """Return object id, type and method of an action, and what the type says of it.
+        """Return object id, type, method and metadata of an action.
 
         Raise InvalidProject or NotFound if that is impossible.
         """

@@ -152,7 +152,7 @@ def _model(files: Mapping[str, bytes], name: str) -> ObjectModel | Unset:
 
 
 def with_helpers_named(given: Imported, known: Iterable[str]) -> Imported:
-    """Return the package with helpers under the names by which they are known: a file tells only that of a module."""
+    """Return the package with helpers under their known names, since a file has only the name of its module."""
     modules = {module_name(name): name for name in known}
     names = {name: modules.get(name, name) for name in given.helpers}
     types = {names.get(name, name): one for name, one in given.types.items()}

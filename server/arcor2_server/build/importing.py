@@ -50,7 +50,7 @@ class ImportedIds(Data, frozen=True, rename="camel"):
 
 # ------------------------------------------------------------------------------------------------ checking
 def _check(given: Imported, types: Candidates) -> None:
-    """Refuse what could not be opened, or run, once it is saved."""
+    """Refuse documents that could not be opened or run after they are saved."""
     for name in given.types:
         if (problem := types.analysis(name).problem) is not None:
             raise InvalidPackage(f"The object type {name} of the package cannot be used: {problem}.")
@@ -75,7 +75,7 @@ def _check_logic(project: Project) -> None:
 
 
 def _checked(given: Imported, known: Sequence[SourceFile], options: ImportOptions) -> Imported:
-    """Return what is to be saved, when all of it is sound."""
+    """Return the documents to save, if all of them are valid."""
     types = Candidates(known, given.types)
     if options.update_project_from_script:
         given = msgspec.structs.replace(given, project=_from_script(given, types))
@@ -84,7 +84,7 @@ def _checked(given: Imported, known: Sequence[SourceFile], options: ImportOption
 
 
 def _from_script(given: Imported, types: Candidates) -> Project:
-    """Return the project as the script has it, with what calls leave to a default filled in, as editors do."""
+    """Return the project according to the script, with default values filled in, as editors do."""
     from arcor2_server.build.reading import from_script  # a start of the server does without the seven modules
 
     if given.needs_source:
@@ -126,7 +126,7 @@ class _Plan(Data, frozen=True):
 
 
 def _plan(given: Imported, saved: _Saved, options: ImportOptions) -> tuple[_Plan, list[str]]:
-    """Return what to write, and a sentence for each thing that must not be overwritten."""
+    """Return the plan, and a sentence for each item that must not be overwritten."""
     conflicts: list[str] = []
 
     def differs(what: str, option: str, allowed: bool) -> None:
@@ -212,7 +212,7 @@ class PackageImport:
         )
 
     def _open_conflicts(self, plan: _Plan, given: Imported) -> list[str]:
-        """Name what is open: saving it later would undo the import unseen."""
+        """Name the open documents: saving them later would silently undo the import."""
         session = self._session
         scene, project = session.scene, session.project
         found = []
@@ -257,7 +257,7 @@ class PackageImport:
         return ImportedIds(given.scene.id, given.project.id)
 
     async def _write(self, given: Imported, plan: _Plan) -> None:
-        """Save all, or nothing; clients are told of the types soon after, or when something is opened."""
+        """Save all documents in one transaction. Clients are notified of the types soon after."""
         storage = self._storage
         async with storage.together():
             for one in plan.types:

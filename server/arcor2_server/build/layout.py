@@ -32,7 +32,7 @@ class Tree:
         self._jumps: list[int] = []
 
     def add(self, parent: int) -> int:
-        """Add a leaf; the first one is the root, and its parent is not looked at. Gives its number."""
+        """Add a leaf and return its number. The first one is the root, whose parent is ignored."""
         node = len(self.parents)
         if node == 0:
             parent, depth, jump = 0, 0, 0
@@ -88,11 +88,11 @@ class Layout:
     _end: list[int]
 
     def always_before(self, earlier: int, later: int) -> bool:
-        """Return whether every way to `later` passes `earlier`. Holds for a layout without actions moved out."""
+        """Return whether every path to `later` passes `earlier`. Valid for a layout without moved actions."""
         return self._begin[earlier] <= self._begin[later] < self._end[earlier]
 
     def needs_note(self, source: int, target: int) -> bool:
-        """Return whether the way from `source` to the join `target` has to be noted."""
+        """Return whether the edge from `source` to the join `target` needs a note."""
         return target != self.placed[source].follow or self.placed[target].guarded
 
 
@@ -121,7 +121,7 @@ class _Placing:
         self._measure()
 
     def _measure(self) -> None:
-        """Find out of every subtree how many branchings it has and how far up the ways out of it lead."""
+        """Determine the number of branchings of each subtree, and how far up its exits lead."""
         count = len(self.edges)
         self.branchings = [0] * count
         self.leads_up_to = [count] * count
@@ -139,7 +139,7 @@ class _Placing:
                 self.leads_up_to[parent] = min(self.leads_up_to[parent], up)
 
     def _ends(self, target: int) -> bool:
-        """Tell whether every way into a branch ends the cycle, so that nothing passes what stands behind the branch."""
+        """Return whether every path into a branch ends the cycle, so that none reaches the code after it."""
         if target == END_NODE:
             return True
         return not self.is_join[target] and self.leads_up_to[target] >= self.tree.depths[target]

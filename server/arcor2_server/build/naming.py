@@ -11,7 +11,7 @@ _NO_PART_OF_A_NAME: Final = re.compile(r"\W", re.ASCII)
 
 
 def identifier(text: str) -> str:
-    """Return text as a Python identifier: what may stand in one stays as it is.
+    """Convert text to a Python identifier; valid characters are unchanged.
 
     No two leading underscores: inside a class Python would change such a name.
     """

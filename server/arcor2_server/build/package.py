@@ -47,9 +47,9 @@ def to_zip(files: Files) -> bytes:
 
 
 def from_zip(data: Path | bytes, wanted: Callable[[PurePosixPath], bool], largest: int = MAX_READ) -> dict[str, bytes]:
-    """Give the wanted files of a zip, together at most `largest` bytes; every path is checked, wanted or not.
+    """Return the wanted files of a zip, at most `largest` bytes in total. All paths are checked.
 
-    InvalidPackage when it is damaged, leads outside, holds a link or one file twice, or is too large; StorageError.
+    Raise InvalidPackage if it is damaged, too large, leads outside, or has links or duplicate files; StorageError.
     """
     found: dict[str, bytes] = {}
     left = largest
@@ -82,9 +82,9 @@ def from_zip(data: Path | bytes, wanted: Callable[[PurePosixPath], bool], larges
 
 
 def write(files: Files, directory: Path) -> None:
-    """Write the files as `directory`, which appears whole or not at all, and durably.
+    """Write the files as `directory`, atomically and durably.
 
-    StorageError when that is not possible.
+    Raise StorageError if that is impossible.
     """
     try:
         directory.parent.mkdir(parents=True, exist_ok=True)

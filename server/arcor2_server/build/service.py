@@ -41,7 +41,7 @@ class Ingredients(Data, frozen=True):
 
 
 def _facts(types: ObjectTypes, scene: Scene, project: Project, code: Iterable[PackageType]) -> dict[str, TypeFacts]:
-    """Return what the script needs of the types in the scene: their modules, and the actions that the project uses."""
+    """Return the facts that the script needs about the types: their modules, and the actions that the project uses."""
     carried = {one.name: one for one in code}
     type_of = {obj.id: obj.type for obj in scene.objects}
     actions: dict[str, dict[str, ObjectAction]] = {name: {} for name in type_of.values()}
@@ -126,7 +126,7 @@ class BuildService:
         self._types = types
 
     async def gather(self, project_id: str, package_name: str = "") -> Ingredients:
-        """Return what a package of a saved project is made of; without a name it gets the project's."""
+        """Return the parts of a package of a saved project. Without a name it has the name of the project."""
         storage, types = self._storage, self._types
         project = await storage.project(project_id)
         scene = await storage.scene(project.scene_id)

@@ -27,7 +27,7 @@ class _Imports(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def _imports(source: bytes) -> _Imports:
-    """Return what a source imports."""
+    """Return the imports of a source."""
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
@@ -98,7 +98,7 @@ def _check_own(one: PackageType, path: Path, content: bytes, own: str) -> None:
 
 
 def _given(one: PackageType, own: str, copied: str, inner: str, kinds: Iterable[Enumeration]) -> bytes:
-    """Return the module that stands for an installed type: its class, and the enumerations that its actions take."""
+    """Return the module for an installed type: its class, and the enumerations of its actions."""
     place = f".{copied}{'.' if inner else ''}{inner}"
     given = {one.entry_point.partition(":")[2] or one.name: place}
     for kind in kinds:
@@ -115,9 +115,9 @@ def _given(one: PackageType, own: str, copied: str, inner: str, kinds: Iterable[
 
 
 def files_of(types: "Iterable[PackageType]", enumerations: Mapping[str, Iterable[Enumeration]]) -> dict[str, bytes]:
-    """Give the files of object types by their path in a package.
+    """Return the files of object types by their path in a package.
 
-    `enumerations`: by type, what its actions take. Raises InvalidProject naming the type that cannot be copied.
+    `enumerations`: those of the actions, by type. Raise InvalidProject naming a type that cannot be copied.
     """
     types = list(types)
     files: dict[str, bytes] = {f"{FOLDER}/__init__.py": b""}

@@ -65,7 +65,7 @@ _FREQUENT: Final[dict[type[ast.AST], Callable[[Any], str]]] = {
 
 
 def _unparse(node: ast.AST) -> str:
-    """Write what is one line; a tree as Build makes it, so that nothing needs parentheses."""
+    """Write a one-line statement of a generated tree, which never needs parentheses."""
     write = _FREQUENT.get(type(node))
     # The text is one line and has no comment, so what starts with a quote is a string.
     return write(node) if write is not None else _STRING.sub(_in_quotes, ast.unparse(node))
@@ -100,7 +100,7 @@ def _simple(node: ast.stmt, indent: str) -> list[str]:
 
 
 def _reads(test: ast.expr, before: ast.stmt) -> bool:
-    """Return whether a condition asks for what the statement before it has just found out."""
+    """Return whether a condition checks the result of the statement before it."""
     if not isinstance(before, ast.Assign):
         return False
     given = {name.id for target in before.targets for name in ast.walk(target) if isinstance(name, ast.Name)}
@@ -131,7 +131,7 @@ class Writer:
             before = node
 
     def _distance(self, before: ast.stmt, node: ast.stmt, indent: str, *, commented: bool) -> int:
-        """Return how many blank lines stand between two statements of a block."""
+        """Return the number of blank lines between two statements of a block."""
         if not indent:
             if isinstance(before, ast.FunctionDef) or isinstance(node, ast.FunctionDef):
                 return 2

@@ -84,7 +84,7 @@ class ComputeProcess:
         on_progress: ProgressCallback | None,
         place: str = "",
     ) -> Any:
-        """Return the answer. Raises what the computation raises; ComputeStopped, ComputeTimeout when there is none."""
+        """Return the result of a task. Raise the error of the computation, ComputeStopped or ComputeTimeout."""
         try:
             async with asyncio.timeout(within + START_WITHIN):
                 if world is not None:
@@ -103,7 +103,7 @@ class ComputeProcess:
         return msgspec.msgpack.decode(message.value, type=task.result_type)
 
     async def _send_world(self, world: WorldDescription, place: str) -> None:
-        """Tell the process what changed since it was told last."""
+        """Send the changes of a world since the last task."""
         known = self._sent_worlds.pop(place, {})
         put = [body for key, body in world.items() if (old := known.get(key)) is not body and old != body]
         remove = [key for key in known if key not in world]
@@ -127,7 +127,7 @@ class ComputeProcess:
         return message
 
     async def _why(self, task: Task[Any], within: float, error: Exception) -> Arcor2Error:
-        """Say why there is no answer."""
+        """Return the reason for a missing answer."""
         self._writer.transport.abort()
         code = await self.process.ended(GOES_WITHIN)
         await asyncio.wait({self._output}, timeout=GOES_WITHIN)
@@ -139,14 +139,14 @@ class ComputeProcess:
 
     # -------------------------------------------------------------------------------- ending
     async def close(self) -> None:
-        """End the process, and wait until it is gone. It keeps nothing: it is killed."""
+        """Kill the process, which stores nothing, and wait for its end."""
         self._writer.transport.abort()
         self.process.kill()
         await self.process.wait()
         await asyncio.gather(self._output, return_exceptions=True)
 
     async def _read_output(self) -> None:
-        """Log what libraries print."""
+        """Log the output of libraries."""
         async for line in self.process.output(LONGEST_LINE):
             self._lines.append(line)
             log.info("compute worker", pid=self.process.pid, text=line)

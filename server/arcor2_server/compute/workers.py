@@ -54,7 +54,7 @@ class _Worker:
             self._serving.add_done_callback(self._tasks.discard)
 
     async def close(self) -> None:
-        """Refuse what waits, and end the process."""
+        """Refuse waiting tasks and end the process."""
         if self._serving is not None:
             self._serving.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -139,7 +139,7 @@ class Compute:
         on_progress: ProgressCallback | None = None,
         background: bool = False,
     ) -> R:
-        """Return the answer to a task.
+        """Return the result of a task.
 
         within: seconds, where not as the task has it. world: what stands in the way, by id, where the task asks for
         it. place: the name of that world; what is kept of it is worth keeping while the same things stand in it. told:

@@ -60,7 +60,7 @@ class Archive(Data, frozen=True):
 
     @property
     def name(self) -> str:
-        """How what was exported is called."""
+        """The name of the exported document."""
         document = self.project or self.scene
         return document.name if document is not None else next(iter(self.types), "")
 
@@ -116,7 +116,7 @@ def files_of(archive: Archive) -> dict[str, bytes]:
 
 
 def write(archive: Archive, path: Path) -> None:
-    """Write the file, which appears whole or not at all; the same content gives the same bytes.
+    """Write the file atomically. The same content gives the same bytes.
 
     Raise StorageError if that is impossible.
     """
@@ -205,9 +205,9 @@ def _checked_id(document: Scene | Project, path: str) -> None:
 
 
 def read(path: Path) -> Archive:
-    """Read an export file, or an execution package. Nothing of it is unpacked to disk, and nothing is run.
+    """Read an export file or an execution package, without unpacking it to disk or running any of it.
 
-    Raises NotFound when there is no such file, InvalidPackage naming the entry that is damaged, StorageError.
+    Raise NotFound if the file does not exist, InvalidPackage naming a damaged entry, or StorageError.
     """
     if not path.is_file():
         raise NotFound(f"There is no file {path}.")

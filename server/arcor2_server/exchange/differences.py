@@ -38,12 +38,12 @@ class Difference(Data, frozen=True):
 
 
 def differences(old: Archive, new: Archive) -> list[Difference]:
-    """Return what differs. The order of a document's entries, and when it was saved, are no differences."""
+    """Return the differences, ignoring the order of entries and the times of saving."""
     return list(_compare(_tree(old), _tree(new), [], names_of(old, new)))
 
 
 def names_of(*archives: Archive) -> dict[str, str]:
-    """Return what people call the things that have an id; the last export counts most."""
+    """Return the names of items by id; the last export takes precedence."""
     names = {START: START, END: END}
     for archive in archives:
         names |= _names(archive)
@@ -132,7 +132,7 @@ def _keyed(items: list[Any]) -> dict[str, Any] | None:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON can hold it: an object type's source is not repeated as a whole."""
+    """Return a value for JSON, without the whole source of an object type."""
     if isinstance(value, _Text):
         return f"{len(value.splitlines())} lines"
     if isinstance(value, dict):

@@ -18,7 +18,7 @@ from arcor2_server.exchange.archive import Archive, AssetFile, mesh_of, with_nee
 
 
 def chosen(listed: Iterable[Listed], wanted: str, what: str, url: str) -> str:
-    """Give the id of what is named, by its id or its name. Raises NotFound; Conflict when a name is not unique."""
+    """Return the id of a document by id or name. Raise NotFound, or Conflict if a name is not unique."""
     found = [one.id for one in listed if one.id == wanted] or [one.id for one in listed if one.name == wanted]
     if not found:
         raise NotFound(f"the server at {url} has no {what} {wanted}")

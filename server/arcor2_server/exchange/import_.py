@@ -42,7 +42,7 @@ class Step(Data, frozen=True):
 
 
 def renamed(archive: Archive, name: str) -> Archive:
-    """Return the export as a copy: its document gets another name and an id of its own. The rest stays what it is."""
+    """Return the export as a copy, whose document has another name and a new id."""
     if archive.project is not None:
         return replace(archive, project=replace(archive.project, id=new_id("pro"), name=name))
     if archive.scene is not None:
@@ -67,9 +67,9 @@ class Target:
         self._metas: dict[str, ObjectTypeMeta] = {}
 
     async def plan(self, installed: list[SourceFile]) -> list[Step]:
-        """Return what would be done. Nothing is changed.
+        """Return the steps of the import without changing anything.
 
-        Raises InvalidPackage naming the first entry that is at fault, Conflict naming all that stands in the way.
+        Raise InvalidPackage naming the first invalid entry, or Conflict naming all conflicts.
         """
         archive = self._archive
         await self._check(installed)
@@ -156,7 +156,7 @@ class Target:
         self._note(kind, given.name, same, old is None)
 
     async def _same_beside(self, key: str) -> bool:
-        """Return whether the script and what is kept beside the project are the same, too."""
+        """Return whether the script, parameters and overrides of the project are equal, too."""
         archive, rest = self._archive, self._rest
         if archive.script is not None:
             try:
@@ -169,7 +169,7 @@ class Target:
         return kept == (archive.parameters, archive.overrides)
 
     async def _check_open(self) -> None:
-        """Refuse to change a document that somebody has open: to save it later would undo the import unseen."""
+        """Refuse to change an open document: saving it later would silently undo the import."""
         try:
             greeting = await self._client.next_event(timeout=FIRST_WORD)
         except DeviceTimeout:
@@ -186,9 +186,9 @@ class Target:
 
     # -------------------------------------------------------------------------------- done
     async def carry_out(self) -> None:
-        """Do what was planned, what others refer to first; when something fails, what was done is taken back.
+        """Run the planned steps in the order of references; undo them if one fails.
 
-        The error then names what was, and what could not be.
+        The error names what was undone, and what could not be.
         """
         undoing = Undoing()
         try:
@@ -286,5 +286,5 @@ def _file(one: ObjectTypeSource) -> SourceFile:
 
 
 def _bases_first(types: dict[str, ObjectTypeSource]) -> list[str]:
-    """Return the types each behind those that it imports, as far as they do not import each other."""
+    """Return the types in the order of their imports, as far as they are acyclic."""
     return sorted(types, key=lambda name: len(with_needed([name], types)))

@@ -14,11 +14,11 @@ class Undoing:
         self._done: list[tuple[str, Callable[[], Awaitable[Any]]]] = []
 
     def about_to(self, what: str, undo: Callable[[], Awaitable[Any]]) -> None:
-        """Note what is done next: whether it was, nobody knows when its answer does not come."""
+        """Note the next step, since its outcome is unknown if its answer is lost."""
         self._done.append((what, undo))
 
     async def take_back(self) -> str:
-        """Undo all, what came last first; return a sentence that names what was taken back, and what could not be."""
+        """Undo all steps in reverse order; return a sentence that names what was undone, and what could not be."""
         undone: list[str] = []
         left: list[str] = []
         while self._done:

@@ -75,7 +75,7 @@ class Known:
 
 
 def find(archive: Archive, types: Known, assets: Iterable[str] | None = None) -> Iterator[Finding]:
-    """Return what is wrong with an export. `assets`: ids that the server has already; None where none is asked."""
+    """Return the problems of an export. `assets`: ids that exist on the server; None without a server."""
     there = {*archive.assets, *(assets or ())}
     for name, one in archive.types.items():
         analysis = types.candidates.analysis(name)

@@ -114,7 +114,7 @@ class TypeCatalog:
         return list(self._known.robots.values())
 
     def robot_meta(self, name: str) -> RobotMeta:
-        """Return the features of one robot type; raise NotFound when it is no robot."""
+        """Return the features of a robot type. Raise NotFound if it is not a robot."""
         self.meta(name)
         if (robot := self._known.robots.get(name)) is None:
             raise NotFound(f"The object type {name} is no robot.")
@@ -147,7 +147,7 @@ class TypeCatalog:
         return TypeCode(name, entry_point=f"arcor2_hw.objects:{name}")
 
     def _with_needed(self, names: Iterable[str]) -> list[str]:
-        """Return types and the uploaded modules that they need, each after those that it needs itself."""
+        """Return types and the uploaded modules that they need, in the order of their imports."""
         found: dict[str, None] = {}
         for name in names:
             # A helper or mixin is no type of its own, but its module may be wanted.
@@ -163,7 +163,7 @@ class TypeCatalog:
         return [self._code(name) for name in self._with_needed(names)]
 
     def sources_for(self, names: Iterable[str]) -> list[PackageType]:
-        """Give what a package needs of types, with their uploaded bases and mixins first; nothing for built-in ones."""
+        """Return the code of types for a package, uploaded bases and mixins first, without built-in types."""
         found = []
         for name in self._with_needed(names):
             if (one := self._uploaded.get(name)) is not None:

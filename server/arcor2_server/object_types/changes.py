@@ -27,7 +27,7 @@ class PendingChanges:
         self._sent: Mapping[str, ObjectTypeMeta] = {}
 
     def set_current(self, metas: Mapping[str, ObjectTypeMeta]) -> None:
-        """Set what is known now."""
+        """Set the present object types."""
         self._current = metas
         self._compare()
 
@@ -38,7 +38,7 @@ class PendingChanges:
         return changes
 
     def skip(self, name: str) -> None:
-        """Leave out a type of which the caller notifies the clients."""
+        """Skip a type of which the caller notifies the clients."""
         sent = {key: meta for key, meta in self._sent.items() if key != name}
         if (meta := self._current.get(name)) is not None:
             sent[name] = meta

@@ -13,7 +13,7 @@ QUIET: Final = 0.5
 
 
 def change_events(changes: Changes) -> list[Event]:
-    """Return the events that tell clients what changed among the object types."""
+    """Return the events for changed object types."""
     kinds = (
         (ChangeType.REMOVE, changes.removed),
         (ChangeType.UPDATE, changes.updated),

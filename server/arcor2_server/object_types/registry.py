@@ -99,7 +99,7 @@ class ObjectTypes(TypeCatalog):
         return self._storage.types_revision, self._assets.revision
 
     async def refresh(self) -> Changes:
-        """Take in what was put straight into storage since the last time; return what clients do not know yet."""
+        """Read object types that were written to the storage; return changes of which clients were not notified."""
         if self.up_to_date:
             return self._pending.changes
         async with self._reading:
@@ -108,7 +108,7 @@ class ObjectTypes(TypeCatalog):
             return self._pending.take()
 
     async def take_in(self) -> None:
-        """Take in what was put straight into storage; what clients do not know yet waits for the next refresh."""
+        """Read object types that were written to the storage. The next refresh returns the changes."""
         async with self._reading:
             if self._stored_revision != self._read_at:
                 await self._read_uploaded()
@@ -236,7 +236,7 @@ class ObjectTypes(TypeCatalog):
             log.warning("analysis not stored: the next start takes longer", file=str(file), reason=error.strerror)
 
     def _missing_mesh(self, one: ObjectTypeSource) -> str:
-        """Say which mesh a type needs that is not there; empty when none is missing."""
+        """Return the problem of a missing mesh, empty if none is missing."""
         mesh = UNSET if isinstance(one.model, Unset) else one.model.mesh
         if isinstance(mesh, Unset) or self._assets.exists(mesh.asset_id):
             return ""

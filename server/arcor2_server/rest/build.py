@@ -55,7 +55,7 @@ class BuildOperations:
         limit=MAX_UPLOAD + MIB,
     )
     async def import_project(self, query: ImportOptions, upload: Upload) -> ImportedIds:
-        """Save the scene, the project and the object types that a package holds; what differs must be allowed to go."""
+        """Save the scene, project and object types of a package. Overwriting differing documents must be allowed."""
         with tempfile.TemporaryDirectory(prefix="arcor2-import-") as directory:
             path = Path(directory) / "package.zip"
             await asyncio.to_thread(_copy, upload.file, path)

@@ -43,7 +43,7 @@ async def store_record(
     details: dict[str, Any],
     after: Pose | Unset,
 ) -> None:
-    """Keep a record of what was found, where one is wanted. unit: of the residual. after: the pose, if it is one."""
+    """Store a record of a result if requested. unit: of the residual. after: the pose, if the result is one."""
     if isinstance(under, Unset):
         return
     result: dict[str, Any] = msgspec.to_builtins(found)
@@ -72,7 +72,7 @@ async def store_record(
 async def store_touch_record(
     records: Calibrations, person: str, body: Any, kind: CalibrationKind, found: Any, after: Pose
 ) -> None:
-    """Keep a record of what was found by touch, where one is wanted."""
+    """Store a record of a touched result if requested."""
     unit = "rad" if kind is CalibrationKind.TOOL_ORIENTATION else "m"
     details = {"args": replace(body, record=UNSET)}
     await store_record(records, person, body.record, kind, found, found.residual, unit, [], details, after)
@@ -121,7 +121,7 @@ class CalibrationRecordOperations:
 
     @operation("POST", "/api/calibrations", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def record_by_hand(self, body: ByHandArgs, person: str) -> CalibrationRecord:
-        """Keep a record of a pose that somebody typed in."""
+        """Store a record of a pose entered by hand."""
         record = CalibrationRecord(
             CalibrationKind.BY_HAND,
             person,
@@ -142,6 +142,6 @@ class CalibrationRecordOperations:
 
     @operation("PUT", "/api/calibrations/{calibration_id}/check", CALIBRATION, Role.OPERATOR, plain=True)
     async def check_calibration(self, calibration_id: str, body: CheckArgs) -> CalibrationCheck:
-        """Compare a pose measured now with that of a record."""
+        """Compare a measured pose with the pose of a record."""
         record = await self._calibration_records.get(calibration_id)
         return check_against(record, body.pose, distance_limit=body.distance_limit, angle_limit=body.angle_limit)

@@ -150,12 +150,12 @@ class MeasurementCalibrationOperations:
     # ------------------------------------------------------------------------------------------------ markers
     @operation("GET", "/api/calibration/markers", CALIBRATION, Role.OPERATOR, plain=True)
     async def get_markers(self) -> CalibrationConfiguration:
-        """Return which markers and boards stand where in this workplace."""
+        """Return the poses of markers and boards in this workplace."""
         return self._markers.configuration
 
     @operation("PUT", "/api/calibration/markers", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def put_markers(self, body: CalibrationConfiguration) -> None:
-        """Say which markers and boards stand where, in place of what was said before."""
+        """Replace the poses of markers and boards."""
         await self._markers.set(body)
 
     def _configured(self, given: CalibrationConfiguration | Unset) -> CalibrationConfiguration:
@@ -163,7 +163,7 @@ class MeasurementCalibrationOperations:
 
     @operation("PUT", "/api/calibration/camera", CALIBRATION, Role.TECHNICIAN, **_MANY)
     async def find_camera_pose(self, uploads: Uploads, person: str) -> CameraPose:
-        """Return where a camera stands, from one picture of markers or several of the same view, with all errors."""
+        """Return the pose of a camera from one or several pictures of the same markers, with all errors."""
         args = read_args(uploads.fields["args"], CameraArgs)
         configuration = self._configured(args.markers)
         options = configuration.options if isinstance(args.options, Unset) else args.options
@@ -206,7 +206,7 @@ class MeasurementCalibrationOperations:
 
     @operation("PUT", "/api/calibration/robot", CALIBRATION, Role.TECHNICIAN, **_MANY)
     async def find_robot_pose(self, uploads: Uploads, person: str) -> RobotPose:
-        """Return where a robot stands that a depth camera of known pose sees (16 bit, mm), with all figures."""
+        """Return the pose of a robot seen by a depth camera with a known pose (16 bit, mm), with all metrics."""
         args = read_args(uploads.fields["args"], RobotArgs)
         pictures = await _pictures(uploads)
         model = replace(self._robots.model_of_uri(args.urdf_uri), base=args.robot_pose)
@@ -233,7 +233,7 @@ class MeasurementCalibrationOperations:
 
     @operation("PUT", "/api/calibration/hand-eye", CALIBRATION, Role.TECHNICIAN, **_MANY)
     async def find_hand_eye(self, uploads: Uploads, person: str) -> HandEye:
-        """Return where a camera sits on a robot's flange, or beside the robot."""
+        """Return the pose of a camera on the flange of a robot, or next to the robot."""
         args = read_args(uploads.fields["args"], HandEyeArgs)
         pictures = await _pictures(uploads)
         if len(pictures) != len(args.flanges):

@@ -24,14 +24,14 @@ class DiagnosisOperations:
 
     @operation("GET", "/api/diagnosis", SERVER, Role.TECHNICIAN, media_type=ZIP)
     async def diagnosis(self) -> Binary:
-        """Return a zip for whoever has to find out what is wrong: documents, types, devices, log; without secrets."""
+        """Return the diagnosis bundle: a zip with documents, types, device states and log, without secrets."""
         return Binary(
             await asyncio.to_thread(packed, self._diagnosis.parts(), None, self._secrets.store.values), ZIP, FILE
         )
 
     @operation("POST", "/api/diagnosis", SERVER, Role.TECHNICIAN, media_type=ZIP, plain=True)
     async def diagnosis_with_notes(self, body: ClientNotes) -> Binary:
-        """Return the same with what a client says of itself in it, at most 256 KiB of JSON."""
+        """Return the diagnosis bundle with notes of the client, at most 256 KiB of JSON."""
         if len(msgspec.json.encode(body.client)) > LARGEST_NOTES:
             raise InvalidData(f"A client may add {LARGEST_NOTES} bytes of JSON, not more.")
         return Binary(

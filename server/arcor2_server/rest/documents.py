@@ -181,7 +181,7 @@ _kept = functools.lru_cache(maxsize=16)(document)
 
 
 def service_at(settings: ServerSettings, port: int) -> str:
-    """Give the service that has a classic port of its own, "" for the port of all."""
+    """Return the service of a classic port, "" for the port of all services."""
     services = {one.service for one in OPERATIONS}
     return next((name for name, own in settings.classic_ports.items() if own == port and name in services), "")
 

@@ -59,7 +59,7 @@ class ObjectTypeOperations:
 
     @operation("PUT", "/object-types", STORAGE, Role.PROGRAMMER, limit=2 * MAX_SOURCE)
     async def put_object_type(self, body: ObjectType) -> Timestamp:
-        """Upload an object type, or a module that others need, new or changed; answers the time.
+        """Upload a new or changed object type, or a module that others need; answer the time.
 
         The source is analysed, never imported. It replaces an installed type of the same name until it is deleted.
         Clients are notified of what changed at the latest half a second after the last upload, and before a scene is

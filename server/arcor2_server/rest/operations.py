@@ -189,7 +189,7 @@ def route(declared: Operation, tasks: Tasks) -> HTTPRouteHandler:
 
 
 def _note(outcome: str, declared: Operation, request: Request[Any, Any, Any]) -> None:
-    """Log what changes something."""
+    """Log operations that change something."""
     if declared.method == "GET":
         return
     audit.note(
@@ -221,7 +221,7 @@ async def _arguments(declared: Operation, request: Request[Any, Any, Any], uploa
 
 
 def _query(kind: Any, request: Request[Any, Any, Any]) -> Any:
-    """Read the query; both spellings of a name are taken, and what is not known is nobody's business."""
+    """Decode the query. Both spellings of a name are valid; unknown names are ignored."""
     fields = {field.name: field for field in msgspec.structs.fields(kind)}
     values: dict[str, Any] = {}
     for key, value in request.query_params.multi_items():
@@ -295,7 +295,7 @@ async def _uploads(declared: Operation, request: Request[Any, Any, Any], uploads
 async def _multipart(
     declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]
 ) -> tuple[list[tuple[str, Any]], dict[str, str]]:
-    """Return all parts of a body in their order, and those that are text, or have to be."""
+    """Return all parts of a body in order, and the text parts."""
     if request.content_type[0] != "multipart/form-data":
         raise Unsupported(f"The body has to be multipart/form-data with the file {declared.file}.")
     try:

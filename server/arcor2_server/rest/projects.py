@@ -59,12 +59,12 @@ class ProjectOperations:
 
     @operation("DELETE", "/projects/{project_id}", STORAGE, Role.ADVANCED_USER)
     async def delete_project(self, project_id: str) -> None:
-        """Delete a saved project, with its source and what is kept beside it."""
+        """Delete a saved project with its source, parameters and overrides."""
         await self._storage.delete_project(project_id)
 
     @operation("PUT", "/projects/clone", STORAGE, Role.ADVANCED_USER)
     async def clone_project(self, query: CloneQuery) -> Project:
-        """Copy a project, with its source and what is kept beside it; answers the copy."""
+        """Copy a project with its source, parameters and overrides; answer the copy."""
         storage, beside = self._storage, ProjectTables(self._storage)
         key = new_id("pro") if isinstance(query.new_project_id, Unset) else query.new_project_id
         check_id(key, "project")
@@ -97,21 +97,21 @@ class ProjectOperations:
     # ------------------------------------------------------------------------------------------------ beside
     @operation("GET", "/projects/{project_id}/parameters", STORAGE, Role.OPERATOR)
     async def get_parameters(self, project_id: str) -> list[ProjectParameter]:
-        """Return the parameters that are kept beside a project; those inside of it are in the project."""
+        """Return the parameters stored next to a project, not those inside it."""
         return await ProjectTables(self._storage).parameters(project_id)
 
     @operation("PUT", "/projects/{project_id}/parameters", STORAGE, Role.ADVANCED_USER)
     async def put_parameters(self, project_id: str, body: list[ProjectParameter]) -> Timestamp:
-        """Keep parameters beside a project; answers the time."""
+        """Store parameters next to a project; answer the time."""
         await ProjectTables(self._storage).put_parameters(project_id, body)
         return now()
 
     @operation("GET", "/projects/{project_id}/object-parameters", STORAGE, Role.OPERATOR)
     async def get_object_parameters(self, project_id: str) -> list[SceneObjectOverride]:
-        """Return the overrides of objects' settings that are kept beside a project."""
+        """Return the overrides of settings stored next to a project."""
         return await ProjectTables(self._storage).object_parameters(project_id)
 
     @operation("PUT", "/projects/{project_id}/object-parameters", STORAGE, Role.ADVANCED_USER)
     async def put_object_parameters(self, project_id: str, body: list[SceneObjectOverride]) -> None:
-        """Keep overrides of objects' settings beside a project."""
+        """Store overrides of settings next to a project."""
         await ProjectTables(self._storage).put_object_parameters(project_id, body)

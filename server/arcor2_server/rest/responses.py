@@ -71,7 +71,7 @@ def answer(content: Any, status: int = 200) -> Response[bytes]:
 
 
 def refusal(service: str, error: Arcor2Error) -> Response[bytes]:
-    """Answer an error of ours: 404 for what is not there, 400 for what has a wrong form, 409 for a wrong state."""
+    """Answer an error: 404 for a missing item, 400 for an invalid request, 409 for a wrong state."""
     otherwise = (503, "General") if error.code in _ABSENT else (409, _STATES.get(service, "General"))
     otherwise = _BY_REASON.get(getattr(error, "reason", "")) or _BY_CODE.get(error.code, otherwise)
     status, name = next((found for kind, found in _STATUS.items() if isinstance(error, kind)), otherwise)
@@ -79,7 +79,7 @@ def refusal(service: str, error: Arcor2Error) -> Response[bytes]:
 
 
 def http_refusal(request: Request[Any, Any, Any], error: HTTPException) -> Response[bytes]:
-    """Answer what is refused before a route is reached: no such route, no token, too large."""
+    """Answer a request refused before it reaches a route: no such route, no token, too large."""
     service = "ARCOR2-HW"
     if "route_handler" in request.scope:
         service = request.route_handler.opt.get(SERVICE, service)

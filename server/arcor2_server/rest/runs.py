@@ -16,5 +16,5 @@ class RunOperations:
 
     @operation("GET", "/api/runs", SERVER, Role.OPERATOR, plain=True)
     async def list_runs(self, query: ListRunsArgs) -> list[Run]:
-        """Return the newest runs of packages: who started what when, and how it ended."""
+        """Return the newest runs of packages: user, package, time and outcome."""
         return self._runs.find(query)

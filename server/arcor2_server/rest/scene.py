@@ -108,22 +108,22 @@ class SceneServiceOperations:
 
     @operation("PUT", "/collisions/box", SCENE, Role.TECHNICIAN)
     async def put_box(self, query: BoxQuery, body: Pose) -> str:
-        """Put a box in the way."""
+        """Add a box to the collision models."""
         return self._put(Box, body, query.box_id, query.size_x, query.size_y, query.size_z)
 
     @operation("PUT", "/collisions/sphere", SCENE, Role.TECHNICIAN)
     async def put_sphere(self, query: SphereQuery, body: Pose) -> str:
-        """Put a sphere in the way."""
+        """Add a sphere to the collision models."""
         return self._put(Sphere, body, query.sphere_id, query.radius)
 
     @operation("PUT", "/collisions/cylinder", SCENE, Role.TECHNICIAN)
     async def put_cylinder(self, query: CylinderQuery, body: Pose) -> str:
-        """Put a cylinder in the way."""
+        """Add a cylinder to the collision models."""
         return self._put(Cylinder, body, query.cylinder_id, query.radius, query.height)
 
     @operation("PUT", "/collisions/mesh", SCENE, Role.TECHNICIAN)
     async def put_mesh(self, query: MeshQuery, body: Pose) -> str:
-        """Put a mesh in the way, which is an asset; each axis may be scaled."""
+        """Add a mesh asset to the collision models; each axis may be scaled."""
         check_id(query.mesh_id, "collision model")
         scale = (query.mesh_scale_x, query.mesh_scale_y, query.mesh_scale_z)
         if 0.0 in scale:
@@ -135,12 +135,12 @@ class SceneServiceOperations:
 
     @operation("GET", "/collisions", SCENE, Role.OPERATOR)
     async def list_collisions(self) -> list[str]:
-        """Return the ids of all that is in the way: what was put in, and the objects of the scene that is online."""
+        """Return the ids of all collision models: added ones, and the objects of the online scene."""
         return sorted(self._scene_collisions.in_operation())
 
     @operation("DELETE", "/collisions/{id}", SCENE, Role.TECHNICIAN)
     async def delete_collision(self, id: str) -> None:  # noqa: A002 - the protocol calls it so
-        """Take out of the way what was put in."""
+        """Remove an added collision model."""
         self._collisions.remove(id)
 
     @operation("PUT", "/system/start", SCENE, Role.TECHNICIAN)
@@ -150,7 +150,7 @@ class SceneServiceOperations:
 
     @operation("PUT", "/system/stop", SCENE, Role.TECHNICIAN)
     async def stop_system(self) -> None:
-        """Note that the scene is stopped, and take out of the way all that was put in."""
+        """Mark the scene as stopped, and remove all added collision models."""
         self._collisions.stop()
 
     @operation("GET", "/system/running", SCENE, Role.OPERATOR)
@@ -160,23 +160,23 @@ class SceneServiceOperations:
 
     @operation("PUT", "/utils/focus", SCENE, Role.OPERATOR)
     async def find_by_focus(self, body: MeshFocusAction) -> Pose:
-        """Return where an object stands of which a robot touched at least three points: by least squares."""
+        """Return the pose of an object from at least three touched points, by least squares."""
         return point_registration.fit(body.mesh_focus_points, body.robot_space_points).pose
 
     @operation("PUT", "/utils/line-safe", SCENE, Role.OPERATOR, plain=True)
     async def check_line(self, body: LineCheck) -> LineCheckResult:
-        """Return whether a straight line is free of all that stands in the way, each a little larger than stated."""
+        """Return whether a straight line is free of slightly inflated collision models."""
         found = await self._scene_collisions.hit(body.pt1, body.pt2)
         return LineCheckResult(True) if found is None else LineCheckResult(False, found.id)
 
     @operation("PUT", "/collisions/{id}/attach", SCENE, Role.TECHNICIAN)
     async def attach_collision(self, id: str, query: HolderQuery) -> None:  # noqa: A002 - as above
-        """Let a robot hold what was put in, from where it is now: it moves with a link of the robot's model."""
+        """Attach an added collision model to a link of a robot, at its present pose."""
         self._online.require_online()
         await self._scene_collisions.attach(id, self._online.robot(query.robot_id), query.link)
 
     @operation("PUT", "/collisions/{id}/detach", SCENE, Role.TECHNICIAN)
     async def detach_collision(self, id: str) -> Pose:  # noqa: A002 - as above
-        """Let go of what a robot holds; it stays where it is now, which is the answer."""
+        """Detach a collision model from a robot; answer its pose, which is unchanged."""
         self._online.require_online()
         return await self._scene_collisions.detach(id)

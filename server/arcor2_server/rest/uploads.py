@@ -19,7 +19,7 @@ RECEIVED: Final = 0.9
 
 @contextmanager
 def receiving(request: Request[Any, Any, Any], tasks: Tasks, title: str, shown_from: int) -> Iterator[None]:
-    """Tell of what is received and done inside; not without a title, nor of a body below `told_from` bytes.
+    """Show the enclosed upload as a task, if it has a title and at least `shown_from` bytes.
 
     title: a sentence, in which `{name}` stands for a part of the path.
     """
@@ -48,7 +48,7 @@ def receiving(request: Request[Any, Any, Any], tasks: Tasks, title: str, shown_f
 
 
 def _count(request: Request[Any, Any, Any], task: Task, size: int | None) -> None:
-    """Let the task follow what comes."""
+    """Update the progress of the task from the received data."""
     receive, received = request.receive, 0
 
     async def counted() -> Any:

@@ -67,7 +67,7 @@ class AssetStore:
 
     @classmethod
     async def open(cls, directory: Path, limit: int = MAX_ASSET) -> Self:
-        """Open, or create, the store; what a crash left half written is removed."""
+        """Open or create the store. Files left incomplete by a crash are removed."""
         store = cls(directory, limit)
         with store._storage_errors("use"):
             store._assets = await asyncio.to_thread(store._load)
@@ -94,7 +94,7 @@ class AssetStore:
 
     # ------------------------------------------------------------------------------------------------ look-ups
     def infos(self) -> list[Asset]:
-        """Return all assets that were put in, by id; those that are offered are not listed."""
+        """Return all uploaded assets by id, without those of installed drivers."""
         return [self._assets[key] for key in sorted(self._assets)]
 
     def exists(self, key: str) -> bool:
@@ -102,21 +102,21 @@ class AssetStore:
         return key in self._assets or key in self._offered
 
     def info(self, key: str) -> Asset:
-        """Return what is known of an asset. Raise NotFound if there is none."""
+        """Return the record of an asset. Raise NotFound if there is none."""
         found = self._assets.get(key) or self._offered.get(key)
         if found is None:
             raise NotFound(f"There is no asset {key!r}.")
         return found
 
     def file(self, key: str) -> Path:
-        """Return the file of an asset's present content, which never changes, and goes with it.
+        """Return the file of an asset's present content. It never changes and is deleted with the asset.
 
         Raise NotFound if there is none.
         """
         return self._path(self.info(key).digest).absolute()
 
     async def read(self, asset: Asset) -> AsyncIterator[bytes]:
-        """Return the content of an asset in pieces, of the very version that `info` told of."""
+        """Return the content of an asset in chunks, of the version that `info` returned."""
         with self._storage_errors("read"):
             file = await asyncio.to_thread(self._path(asset.digest).open, "rb")
         with file:
@@ -137,7 +137,7 @@ class AssetStore:
         description: str | Unset = UNSET,
         upsert: bool = False,
     ) -> Asset:
-        """Take in an asset as it arrives; without `key` it is given an id.
+        """Store an asset from a stream; without `key` it gets a new id.
 
         Conflict when there is one of that id, unless `upsert`; raise InvalidData for an impossible id; TooLarge.
         """
@@ -167,7 +167,7 @@ class AssetStore:
     async def offer(self, key: str, content: bytes, description: str | Unset = UNSET) -> None:
         """Offer an asset of an installed distribution until the store is closed.
 
-        One that is put in under its id stands before it; it can be deleted only with its distribution.
+        An uploaded asset with the same id hides it. It can be removed only with its distribution.
         """
         key, digest = _checked(key), hashlib.sha256(content).hexdigest()
         async with self._changing:
@@ -178,9 +178,9 @@ class AssetStore:
             self.revision += 1
 
     async def delete(self, key: str) -> None:
-        """Delete. Raise NotFound if there is none. What is being read at this moment is read to its end.
+        """Delete an asset. Raise NotFound if there is none. Running downloads are completed.
 
-        Conflict for one that is offered by an installed distribution.
+        Raise Conflict if it belongs to an installed distribution.
         """
         async with self._changing:
             asset = self.info(key)

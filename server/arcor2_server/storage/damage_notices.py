@@ -35,7 +35,7 @@ class DataDamage:
         return list(self._notices)
 
     def load(self) -> None:
-        """Read the notices that nobody has received."""
+        """Read the notices that no client has received."""
         try:
             self._notices = msgspec.json.decode(self._path.read_bytes(), type=list[str])
             self._waiting = True
@@ -56,7 +56,7 @@ class DataDamage:
             log.error("notices of damaged files cannot be stored", file=str(self._path), reason=str(error))
 
     def set_aside(self, path: Path, what: str, reason: object) -> Path | None:
-        """Move a damaged file to another name and report it; return that name, None when it cannot be moved.
+        """Rename a damaged file and report it; return the new name, None if it cannot be renamed.
 
         what: sentences about what is lost and what to do.
         """

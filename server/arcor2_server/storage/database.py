@@ -56,7 +56,7 @@ class Database:
         return cls(engine, place)
 
     async def purge(self) -> None:
-        """Overwrite what was replaced or deleted, in the file of SQLite. Raise StorageError if that is impossible."""
+        """Overwrite replaced and deleted data in the file of SQLite. Raise StorageError if that is impossible."""
         try:
             await purge(self._engine)
         except SQLAlchemyError as error:
@@ -69,9 +69,9 @@ class Database:
     # ------------------------------------------------------------------------------------------------ inside
     @asynccontextmanager
     async def together(self) -> AsyncIterator[None]:
-        """Make one transaction of all that is written inside by the present task: all of it is kept, or nothing.
+        """Combine all writes of the present task inside into one transaction.
 
-        StorageError for what the database says of it as a whole.
+        Raise StorageError if the transaction fails.
         """
         before = self.types_revision
         async with self.writing() as session:
@@ -119,7 +119,7 @@ class Database:
 
     @staticmethod
     async def one(session: AsyncSession, table: type[Any], key: str, what: str) -> Any:
-        """Return the row of that key; NotFound says `what` there is not."""
+        """Return the row with a key. Raise NotFound naming `what` if there is none."""
         if (row := await session.get(table, key)) is None:
             raise NotFound(f"There is no {what} {key!r}.")
         return row

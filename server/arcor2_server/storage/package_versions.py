@@ -32,9 +32,9 @@ class Versions(Data, frozen=True):
 
 @cache
 def _distributions() -> dict[str, str]:
-    """Return for every importable name the distribution that it comes from.
+    """Return the distribution of each importable name.
 
-    importlib.metadata.packages_distributions of Python 3.11 does not see compiled modules that stand alone.
+    importlib.metadata.packages_distributions of Python 3.11 does not see top-level compiled modules.
     """
     found: dict[str, str] = {}
     for distribution in importlib.metadata.distributions():
@@ -62,9 +62,9 @@ def present(imported: Iterable[str]) -> Versions:
 
 
 def check_versions(package: Path) -> list[str]:
-    """Return a sentence for each difference between what a package was built with and what is here.
+    """Return a sentence for each difference between the versions of a package and those installed here.
 
-    A package without versions.json (an older one, or one built elsewhere) has none.
+    The list is empty for a package without versions.json (an older one, or one built elsewhere).
     """
     try:
         built = msgspec.json.decode((package / FILE).read_bytes(), type=Versions)

@@ -47,7 +47,7 @@ class Packages:
         """Replaces secrets in the documents of a package by references."""
 
     def checked(self, package_id: str) -> Path:
-        """Return where a package of that id is, or would be; raise InvalidPackage for what is no id."""
+        """Return the path for a package id. Raise InvalidPackage for an invalid id."""
         if not _ID.fullmatch(package_id):
             raise InvalidPackage(f"{package_id[:80]!r} is no id of a package.")
         return self._root / package_id
@@ -80,7 +80,7 @@ class Packages:
         return PackageSummary(package_id, meta, _project_meta(path / "data" / "project.json"))
 
     def rename(self, package_id: str, name: str) -> PackageSummary:
-        """Give a package another name; NotFound, InvalidPackage for an empty name, StorageError."""
+        """Rename a package. Raise NotFound, InvalidPackage for an empty name, or StorageError."""
         if not name:
             raise InvalidPackage("A package needs a name.")
         self._set(package_id, name=name)
@@ -92,7 +92,7 @@ class Packages:
         return self.summary(package_id)
 
     def project_id(self, package_id: str) -> str:
-        """Return the id of the project that a package was built from, empty where it does not say.
+        """Return the id of the project that a package was built from, empty if it is unknown.
 
         Raise NotFound if there is none.
         """
@@ -113,7 +113,7 @@ class Packages:
             raise StorageError(f"The package {package_id} cannot be written: {error.strerror}.") from error
 
     def delete(self, package_id: str) -> PackageSummary:
-        """Delete a package; return what it was. Raise NotFound or StorageError if that is impossible."""
+        """Delete a package; return its summary. Raise NotFound or StorageError if that is impossible."""
         summary = self.summary(package_id)
         try:
             self._discard(self.directory(package_id))
@@ -146,7 +146,7 @@ class Packages:
             raise StorageError(f"The package {package_id} cannot be deleted: {error.strerror}.") from error
 
     def sweep(self) -> list[str]:
-        """Delete what a crash left behind, at the start; return the projects that were being run.
+        """Delete the remains of a crash at the start; return the projects that were running.
 
         Raise StorageError if that is impossible.
         """
@@ -176,7 +176,7 @@ class Packages:
         return self._root / f"{_TEMPORARY}{package_id}"
 
     def zipped(self, package_id: str) -> IO[bytes]:
-        """Return a package as a zip, in a file that is gone when it is closed.
+        """Return a package as a zip, in a file that is deleted when it is closed.
 
         Raise NotFound or StorageError if that is impossible.
         """
@@ -200,7 +200,7 @@ class Packages:
         shutil.rmtree(grave, ignore_errors=True)
 
     def upload(self, package_id: str, data: str) -> PackageSummary:
-        """Put a zip (base64) in the place of a package. InvalidPackage says what is wrong with it.
+        """Replace a package by a zip (base64). Raise InvalidPackage if it is invalid.
 
         Raise StorageError if that is impossible.
         """
@@ -263,7 +263,7 @@ def unpack(content: IO[bytes], directory: Path) -> None:
 
 
 def inside(entry: zipfile.ZipInfo) -> PurePosixPath:
-    """Give the path of a file in a package; InvalidPackage for one that leads outside, or is a link or a device."""
+    """Return the path of a file in a package. Raise InvalidPackage if it leads outside, or is a link or a device."""
     name = entry.filename
     path = PurePosixPath(name)
     kind = stat.S_IFMT(entry.external_attr >> 16)

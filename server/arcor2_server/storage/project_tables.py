@@ -30,19 +30,19 @@ class ProjectTables:
 
     # ------------------------------------------------------------------------------------------------ projects
     async def parameters(self, project_id: str) -> list[ProjectParameter]:
-        """Return the parameters that are kept beside a project."""
+        """Return the parameters stored next to a project."""
         return msgspec.json.decode(await self._read(project_id, "parameters"), type=list[ProjectParameter])
 
     async def put_parameters(self, project_id: str, parameters: list[ProjectParameter]) -> None:
-        """Keep parameters beside a project, in place of those before."""
+        """Replace the parameters stored next to a project."""
         await self._write(project_id, "parameters", parameters)
 
     async def object_parameters(self, project_id: str) -> list[SceneObjectOverride]:
-        """Return the overrides of objects that are kept beside a project."""
+        """Return the overrides of objects stored next to a project."""
         return msgspec.json.decode(await self._read(project_id, "object_parameters"), type=list[SceneObjectOverride])
 
     async def put_object_parameters(self, project_id: str, overrides: list[SceneObjectOverride]) -> None:
-        """Store overrides of objects beside a project, in place of those before."""
+        """Replace the overrides of objects stored next to a project."""
         if (secrets := self._storage.secrets) is not None and overrides:
             scene = await self._storage.scene((await self._storage.project(project_id)).scene_id)
             before = await self.object_parameters(project_id)
@@ -91,7 +91,7 @@ class ProjectTables:
 
     # ------------------------------------------------------------------------------ lists of breakpoints
     async def breakpoints(self, package_id: str) -> list[str]:
-        """Return the breakpoints of a package, none where none were kept."""
+        """Return the breakpoints of a package."""
         async with self._storage.reading() as session:
             row = await session.get(BreakpointsRow, package_id)
             return [] if row is None else msgspec.json.decode(row.ids, type=list[str])
@@ -104,6 +104,6 @@ class ProjectTables:
             )
 
     async def forget_breakpoints(self, package_id: str) -> None:
-        """Drop the breakpoints of a package that is gone."""
+        """Delete the breakpoints of a deleted package."""
         async with self._storage.writing() as session:
             await session.execute(delete(BreakpointsRow).where(BreakpointsRow.package_id == package_id))

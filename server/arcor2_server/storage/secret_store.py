@@ -92,7 +92,7 @@ class SecretStore:
         return reference
 
     def save(self) -> None:
-        """Write what was added. Raise StorageError if that is impossible."""
+        """Write added values. Raise StorageError if that is impossible."""
         with self._lock:
             if not self._changed:
                 return
@@ -103,6 +103,6 @@ class SecretStore:
             self._changed = False
 
     async def flush(self) -> None:
-        """Write what was added, without blocking the event loop. Raise StorageError if that is impossible."""
+        """Write added values without blocking the event loop. Raise StorageError if that is impossible."""
         if self._changed:
             await asyncio.to_thread(self.save)

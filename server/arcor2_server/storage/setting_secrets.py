@@ -36,7 +36,7 @@ class Types(Protocol):
     """The object types, as far as secrets need them."""
 
     def meta(self, name: str) -> ObjectTypeMeta:
-        """Return what is known of a type. Raise NotFound if there is none."""
+        """Return the metadata of a type. Raise NotFound if there is none."""
 
     def names(self) -> Iterable[str]:
         """Return the names of all types."""

@@ -24,7 +24,7 @@ class SharedData:
             return await session.scalar(select(func.max(ViewValueRow.revision))) or 0
 
     async def view(self, user: str, document: str) -> dict[str, bytes]:
-        """Give the values of a view by their keys, as JSON."""
+        """Return the values of a view by key, as JSON."""
         where = (ViewValueRow.user == user, ViewValueRow.document == document)
         async with self._storage.reading() as session:
             rows = await session.execute(select(ViewValueRow.key, ViewValueRow.value).where(*where))
@@ -57,14 +57,14 @@ class SharedData:
             await session.execute(delete(ViewValueRow).where(*where))
 
     async def forget_document(self, document: str) -> None:
-        """Drop everybody's view of a document that is gone, and its breakpoints."""
+        """Delete the views of all users of a deleted document, and its breakpoints."""
         async with self._storage.writing(documents=False) as session:
             await session.execute(delete(ViewValueRow).where(ViewValueRow.document == document))
             await session.execute(delete(SharedBreakpointsRow).where(SharedBreakpointsRow.project_id == document))
 
     # ------------------------------------------------------------------------------------------ shared breakpoints
     async def breakpoints(self, project_id: str) -> tuple[set[str], str]:
-        """Return the breakpoints of a project, and who set them last."""
+        """Return the breakpoints of a project, and the user who set them last."""
         async with self._storage.reading() as session:
             row = await session.get(SharedBreakpointsRow, project_id)
             return (set(), "") if row is None else (msgspec.json.decode(row.ids, type=set[str]), row.user)
@@ -78,7 +78,7 @@ class SharedData:
 
     # ------------------------------------------------------------------------------------------------ runs
     async def runs(self, limit: int) -> list[Run]:
-        """Return the newest runs, oldest first; those that cannot be read are left out."""
+        """Return the newest runs, oldest first, without unreadable ones."""
         async with self._storage.reading() as session:
             rows = await session.scalars(select(RunRow.document).order_by(RunRow.number.desc()).limit(limit))
             found = [_run(document) for document in rows]

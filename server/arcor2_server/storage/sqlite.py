@@ -35,7 +35,7 @@ def prepare(connection: Any, _record: Any) -> None:
 
 
 async def purge(engine: AsyncEngine) -> None:
-    """Overwrite what was replaced or deleted; other databases do that themselves. Raises SQLAlchemyError."""
+    """Overwrite replaced and deleted data; other databases do that themselves. Raise SQLAlchemyError if that fails."""
     if engine.dialect.name != "sqlite":
         return
     async with engine.connect() as plain:

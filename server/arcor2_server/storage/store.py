@@ -59,7 +59,7 @@ class Storage(Database):
         return scene
 
     async def put_scene(self, scene: Scene) -> Scene:
-        """Save; return the scene as saved: `created` kept or set, `modified` set, `int_modified` gone."""
+        """Save a scene; return it as saved: with `created` and `modified`, without `int_modified`."""
         stamp = now()
         async with self.writing() as session:
             row = await session.get(SceneRow, scene.id)
@@ -82,7 +82,7 @@ class Storage(Database):
         return saved
 
     async def delete_scene(self, key: str) -> None:
-        """Delete. Raise NotFound if there is none."""
+        """Delete the document. Raise NotFound if there is none."""
         async with self.writing() as session:
             await session.delete(await self.one(session, SceneRow, key, "scene"))
         for tell in self.on_deleted:
@@ -141,7 +141,7 @@ class Storage(Database):
         return saved
 
     async def delete_project(self, key: str) -> None:
-        """Delete, with its source. Raise NotFound if there is none."""
+        """Delete a project with its source. Raise NotFound if there is none."""
         async with self.writing() as session:
             row = await self.one(session, ProjectRow, key, "project")
             await session.execute(delete(ProjectSourceRow).where(ProjectSourceRow.id == key))
@@ -161,7 +161,7 @@ class Storage(Database):
         return script
 
     async def put_project_source(self, key: str, script: str) -> None:
-        """Save the script of a project; raise NotFound when there is no such project."""
+        """Save the script of a project. Raise NotFound if there is no such project."""
         async with self.writing() as session:
             await self.one(session, ProjectRow, key, "project")
             await session.merge(ProjectSourceRow(id=key, script=script))
@@ -187,7 +187,7 @@ class Storage(Database):
             return self._object_type(row, await session.get(ModelRow, key))
 
     async def types_without_model(self) -> set[str]:
-        """Return the ids of uploaded object types whose collision model is gone."""
+        """Return the ids of uploaded object types whose collision model is missing."""
         wanted = select(ObjectTypeRow.id).where(ObjectTypeRow.model_kind.is_not(None))
         async with self.reading() as session:
             return set(await session.scalars(wanted.where(ObjectTypeRow.id.not_in(select(ModelRow.id)))))
@@ -216,7 +216,7 @@ class Storage(Database):
         return saved
 
     async def delete_object_type(self, key: str) -> None:
-        """Delete, with its model. Raise NotFound if there is none."""
+        """Delete an object type with its model. Raise NotFound if there is none."""
         async with self.writing() as session:
             await session.delete(await self.one(session, ObjectTypeRow, key, "object type"))
             await session.execute(delete(ModelRow).where(ModelRow.id == key))
@@ -243,7 +243,7 @@ class Storage(Database):
         self.types_revision += 1
 
     async def delete_model(self, key: str) -> None:
-        """Delete. Raise NotFound if there is none."""
+        """Delete the document. Raise NotFound if there is none."""
         async with self.writing() as session:
             await session.delete(await self.one(session, ModelRow, key, "model"))
         self.types_revision += 1
@@ -264,7 +264,7 @@ class Storage(Database):
         return await self.scene_named(name) is not None or await self.project_named(name) is not None
 
     async def identify(self, key: str) -> DocumentId | None:
-        """Return what a stored id names, None when nothing."""
+        """Return the kind of a stored id, None if it is unknown."""
         async with self.reading() as session:
             for kind, column in (
                 ("scene", SceneRow.id),

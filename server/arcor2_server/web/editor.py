@@ -90,7 +90,7 @@ def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
 
     @route("/", http_method=[HttpMethod.GET, HttpMethod.HEAD], opt=open_to_all, name="editor page")
     async def editor_page() -> Response[bytes]:
-        """Answer with the page; a nonce of its own makes each answer another one, so it is never kept."""
+        """Answer with the page. Each response has its own nonce, so it is never cached."""
         nonce = secrets.token_urlsafe(16)
         content = NOT_BUILT if page is None else page.content[""].replace(NONCE, nonce.encode())
         headers = _PAGE | {"Content-Security-Policy": page_policy(nonce)}
@@ -98,7 +98,7 @@ def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
 
     @route("/editor/{path:path}", http_method=[HttpMethod.GET, HttpMethod.HEAD], opt=open_to_all, name="editor file")
     async def editor_file(request: Request[Any, Any, Any]) -> Response[bytes]:
-        """Answer with a file, compressed as the browser takes it; 304 when it has it, 404 when there is none."""
+        """Answer with a file in an accepted encoding; 304 if the browser has it, 404 if it does not exist."""
         name = str(request.path_params["path"]).lstrip("/")
         if name not in names or name == "index.html":
             raise NotFoundException("The editor has no such file.")

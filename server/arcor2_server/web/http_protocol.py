@@ -119,12 +119,12 @@ class HttpProtocol(HttpToolsProtocol):
             self._watch_sending()
 
     def pause_writing(self) -> None:
-        """Watch whether the other side takes what is sent."""
+        """Check that the client receives what is sent."""
         super().pause_writing()
         self._watch_sending()
 
     def resume_writing(self) -> None:
-        """Send on: the other side has taken what was sent."""
+        """Continue sending, since the client has received the buffered data."""
         if self._sending_timer is not None:
             self._sending_timer.cancel()
             self._sending_timer = None

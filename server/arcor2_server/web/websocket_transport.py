@@ -36,7 +36,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
             scope["extensions"][EXTENSION] = self
 
     def handle_pong(self, event: Frame) -> None:
-        """Tell the one who waits for this pong."""
+        """Notify the waiter for this pong."""
         waiter = self._pongs.pop(bytes(event.data), None)
         if waiter is None:
             super().handle_pong(event)
@@ -59,7 +59,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         self.loop.call_later(CLOSE_WITHIN, self.abort)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Tell those who wait for a pong that there will be none."""
+        """Notify the waiters that no pong will arrive."""
         super().connection_lost(exc)
         self._connection.close()
         for waiter in self._pongs.values():
@@ -99,6 +99,6 @@ class WireProtocol(WebSocketsSansIOProtocol):
             self._pongs.pop(payload, None)
 
     def abort(self) -> None:
-        """Drop the connection at once, with what waits in its buffers."""
+        """Drop the connection at once, with its buffers."""
         if not self.disconnected:
             self.transport.abort()

@@ -191,7 +191,7 @@ class Ways:
             node = node.orelse[0]
 
     def _split(self, test: ast.expr, going: list[_Going]) -> tuple[list[_Going], list[_Going]]:
-        """Return the ways on which a condition holds, and those on which it does not."""
+        """Return the paths on which a condition holds, and those on which it does not."""
         match test:
             case ast.Compare(ast.Name(name), [ast.Eq()], [ast.Constant(str(note))]) if name == NOTE:
                 if any(way.note is None for way in going):
@@ -221,7 +221,7 @@ class Ways:
         return (others, holds) if negated else (holds, others)
 
     def _condition(self, test: ast.expr) -> tuple[Condition, str, bool]:
-        """Return what a condition asks for, the variable, and whether it is to be otherwise (`!=`)."""
+        """Return the value and the variable of a condition, and whether it is negated (`!=`)."""
         negated = False
         match test:
             case ast.Name(variable):

@@ -141,7 +141,7 @@ class _Reading:
         )
 
     def _place(self, call: Call, before: str | None) -> str:
-        """Give the id of the action point that a new action lies on."""
+        """Return the id of the action point for a new action."""
         used = [key for node in call.arguments.values() for key in self._values.points_in(node)]
         if used:
             return used[-1]
@@ -238,7 +238,7 @@ class _Reading:
 
 
 def _merged(ways: list[Way]) -> list[Way]:
-    """Leave out conditions that make no difference: the last ways that lead to one place."""
+    """Drop conditions without effect: those of the last edges that lead to the same action."""
     *others, last = ways
     while others and others[-1].target == last.target:
         others.pop()
@@ -260,7 +260,7 @@ def _key(item: LogicItem) -> tuple[str, _Asked]:
 
 
 def _variables(frame: Frame, project: Project) -> dict[str, list[str]]:
-    """Give the variables into which the script of a project puts the results of its actions, by action."""
+    """Return the variables for the results of actions in the script of a project, by action."""
     try:
         cycle = Cycle(frame, logic_graph.read(project))
     except InvalidProject:
@@ -269,7 +269,7 @@ def _variables(frame: Frame, project: Project) -> dict[str, list[str]]:
 
 
 def _reached(project: Project) -> set[str]:
-    """Return the actions that START leads to: those that a script of the project has."""
+    """Return the actions reachable from START, which are those in a script of the project."""
     following: dict[str, list[str]] = {}
     for item in project.logic:
         following.setdefault(item.start.partition("/")[0], []).append(item.end.partition("/")[0])

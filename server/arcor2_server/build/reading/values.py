@@ -37,7 +37,7 @@ def plain(node: ast.expr) -> Any:
 
 
 def of_type(value: Any, kind: str) -> Any:
-    """Return a plain value as what `kind` takes: a whole number may stand for a double."""
+    """Convert a plain value for a parameter kind: an integer may be used for a double."""
     if kind == "double" and type(value) is int:
         return float(value)
     return value
@@ -78,7 +78,7 @@ class Values:
 
     # ------------------------------------------------------------------------------------------------ calls
     def arguments(self, call: ast.Call, declared: ObjectAction, type_name: str) -> dict[str, ast.expr]:
-        """Return what is written for each parameter but `an`; NotUnderstood where it does not fit."""
+        """Return the argument of each parameter except `an`. Raise NotUnderstood if it does not fit."""
         given: dict[str, ast.expr] = {}
         names = [meta.name for meta in declared.parameters]
         by_name = self._frame.types[type_name].keyword_only
@@ -116,7 +116,7 @@ class Values:
     def constant(
         self, node: ast.expr, meta: ParameterMeta, object_id: str, type_name: str, method: str, old: Parameter | None
     ) -> ActionParameter:
-        """Read an argument that is no result of an action."""
+        """Read an argument that is not the result of an action."""
         if isinstance(node, ast.Name):
             return self._project_parameter(node, meta)
         path = self._path(node)
