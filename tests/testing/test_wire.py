@@ -249,7 +249,7 @@ def test_modbus_requests_are_told_apart_by_what_they_do(
 def test_what_is_no_frame_is_not_taken_for_harmless() -> None:
     for frames in (ModbusTcp(), ModbusRtu()):
         assert frames.split(b"\xff\xfe\xfd") == [b"\xff\xfe\xfd"]
-        assert "no Modbus" in frames.acting(b"\xff\xfe\xfd")
+        assert "invalid Modbus" in frames.acting(b"\xff\xfe\xfd")
 
 
 def test_lines_act_by_their_beginnings() -> None:
