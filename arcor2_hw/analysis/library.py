@@ -1,9 +1,7 @@
 """The sources of all object types, and their analyses."""
 
 import ast
-import contextlib
-import gc
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +11,7 @@ from arcor2_hw.analysis.actions import ActionReader
 from arcor2_hw.analysis.enumerations import enumerations_of
 from arcor2_hw.analysis.hierarchy import Hierarchy, is_known_library
 from arcor2_hw.analysis.keywords import keyword_only
-from arcor2_hw.analysis.module import ClassInfo, Import, Module, Value
+from arcor2_hw.analysis.module import ClassInfo, Import, Module, Value, garbage_collection_disabled
 from arcor2_hw.analysis.presentation import of_type
 from arcor2_hw.analysis.robots import robot_meta
 from arcor2_hw.analysis.settings import SettingsReader
@@ -224,7 +222,7 @@ class Library:
             NotFound: There is no source of that name.
         """
         if name not in self._analyses:
-            with _all_stays():
+            with garbage_collection_disabled():
                 self._analyses[name] = self._analyse(name)
         return self._analyses[name]
 
@@ -381,18 +379,6 @@ class Library:
             for ancestor in self._hierarchy.ancestors(each):
                 homes.setdefault(ancestor, name)
         return homes
-
-
-@contextlib.contextmanager
-def _all_stays() -> Iterator[None]:
-    """Disable the garbage collector: syntax trees are many objects that all remain, and it would double the time."""
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 def _dotted(file: SourceFile) -> str:
