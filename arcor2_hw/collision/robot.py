@@ -163,7 +163,7 @@ class CollisionRobot:
         return self.tree.frames(q)
 
     # -------------------------------------------------------------------------------- itself
-    def hits_itself(self, q: Array) -> bool:
+    def in_self_collision(self, q: Array) -> bool:
         """Return whether the robot and its attached bodies collide with each other."""
         return bool(
             pin.computeCollisions(

@@ -80,15 +80,15 @@ class Sweep:
             b: Joint values at the end; they are checked too.
             resolution: Travel between two checked configurations, m. A coarse value finds most collisions quickly.
                 None:
-                a coarse check first, then `proves`.
+                a coarse check first, then `is_free_at_full_resolution`.
         """
         if resolution is None:
-            return self.is_free_between(a, b, 8.0 * self.resolution) and self.proves(a, b)
+            return self.is_free_between(a, b, 8.0 * self.resolution) and self.is_free_at_full_resolution(a, b)
         way = b - a
         count = self._count(a, b, resolution)
         return all(self.is_free(a + number / count * way) for number in _far_apart(count))
 
-    def proves(self, a: Array, b: Array) -> bool:
+    def is_free_at_full_resolution(self, a: Array, b: Array) -> bool:
         """Return whether the motion from `a` to `b` is free of collision at the full resolution.
 
         Where the surroundings are farther away than the robot travels, no configuration between is checked. The links
@@ -97,7 +97,7 @@ class Sweep:
         """
         way, count = b - a, self._count(a, b, self.resolution)
         standing = self._standing
-        if any(standing.hits_itself(self._whole(a + number / count * way)) for number in _far_apart(count)):
+        if any(standing.in_self_collision(self._whole(a + number / count * way)) for number in _far_apart(count)):
             return False
         chunks = self._chunks(count)
         return self._first_near(a, way, _far_apart(chunks), chunks) is None

@@ -67,7 +67,7 @@ class CollisionWorld(WorldState):
         Raises:
             NotFound: There is no such robot.
         """
-        return not self.robot(robot).hits_itself(q) and self.is_free_around(robot, q)
+        return not self.robot(robot).in_self_collision(q) and self.is_free_around(robot, q)
 
     def is_free_around(self, robot: str, q: Array, more: float = 0.0) -> bool:
         """Return whether a robot is farther than the margin plus `more` (m) from everything around it."""

@@ -68,7 +68,7 @@ def inverse(task: t.SolveInverse, state: WorkerState) -> list[Joint]:
 
 
 # ------------------------------------------------------------------------------------------------ reachability
-def judged_poses(task: t.JudgePoses, state: WorkerState) -> list[t.Judged]:
+def judge_poses(task: t.JudgePoses, state: WorkerState) -> list[t.Judged]:
     """Judge how an end effector reaches poses."""
     world = state.world()
     model = world.collisions.robot(task.robot).model
@@ -76,14 +76,14 @@ def judged_poses(task: t.JudgePoses, state: WorkerState) -> list[t.Judged]:
     return [t.Judged(Reach(each.reach.value), each.reason) for each in found]
 
 
-def judged_joints(task: t.JudgeJoints, state: WorkerState) -> list[t.Judged]:
+def judge_joints(task: t.JudgeJoints, state: WorkerState) -> list[t.Judged]:
     """Judge joint configurations."""
     collisions = state.world().collisions
     model = collisions.robot(task.robot).model
-    return [_judged(collisions, task.robot, model, joints) for joints in task.joints]
+    return [_judge(collisions, task.robot, model, joints) for joints in task.joints]
 
 
-def _judged(collisions: "CollisionWorld", robot: str, model: "RobotModel", joints: list[Joint]) -> t.Judged:
+def _judge(collisions: "CollisionWorld", robot: str, model: "RobotModel", joints: list[Joint]) -> t.Judged:
     from arcor2_hw.kinematics.errors import ModelError
 
     try:
@@ -107,14 +107,14 @@ def _near(model: "RobotModel", end_effector: str, q: "Array") -> list[str]:
 
 
 # ------------------------------------------------------------------------------------------------ the world
-def checked_lines(task: t.CheckLines, state: WorkerState) -> list[t.LineHit | None]:
+def check_lines(task: t.CheckLines, state: WorkerState) -> list[t.LineHit | None]:
     """Find the first thing that each line meets."""
     collisions = state.world().collisions
     hits = [collisions.ray(line.start, line.end, task.ignore, task.inflation) for line in task.lines]
     return [None if hit is None else t.LineHit(hit.name, hit.share) for hit in hits]
 
 
-def placed_in_link(task: t.PlaceInLink, state: WorkerState) -> Pose:
+def place_in_link(task: t.PlaceInLink, state: WorkerState) -> Pose:
     """Convert a pose in the world to the frame of a link."""
     from arcor2_hw.exceptions import NotFound
 

@@ -98,7 +98,7 @@ class JudgePoses(Task[list[Judged]], frozen=True):
     """Judge how an end effector reaches poses. Results are cached in the world of the task."""
 
     result_type: ClassVar = list[Judged]
-    function: ClassVar = f"{_FUNCTIONS}:judged_poses"
+    function: ClassVar = f"{_FUNCTIONS}:judge_poses"
     worker: ClassVar = WorkerKind.KINEMATICS
     timeout: ClassVar = 20.0
     label: ClassVar = "reachability"
@@ -112,7 +112,7 @@ class JudgeJoints(Task[list[Judged]], frozen=True):
     """Judge whether a robot may be in joint configurations."""
 
     result_type: ClassVar = list[Judged]
-    function: ClassVar = f"{_FUNCTIONS}:judged_joints"
+    function: ClassVar = f"{_FUNCTIONS}:judge_joints"
     worker: ClassVar = WorkerKind.KINEMATICS
     timeout: ClassVar = 20.0
     label: ClassVar = "reachability of joints"
@@ -146,7 +146,7 @@ class CheckLines(Task[list[LineHit | None]], frozen=True):
     """
 
     result_type: ClassVar = list[LineHit | None]
-    function: ClassVar = f"{_FUNCTIONS}:checked_lines"
+    function: ClassVar = f"{_FUNCTIONS}:check_lines"
     worker: ClassVar = WorkerKind.KINEMATICS
     label: ClassVar = "the safety of a line"
 
@@ -159,7 +159,7 @@ class PlaceInLink(Task[Pose], frozen=True):
     """Convert a pose in the world to the frame of a robot's link at joint values."""
 
     result_type: ClassVar = Pose
-    function: ClassVar = f"{_FUNCTIONS}:placed_in_link"
+    function: ClassVar = f"{_FUNCTIONS}:place_in_link"
     worker: ClassVar = WorkerKind.KINEMATICS
     label: ClassVar = "the pose of a gripped part"
 

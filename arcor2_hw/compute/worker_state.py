@@ -64,7 +64,7 @@ class WorkerState:
         Raises:
             ModelError: The model cannot be used, or the calibration belongs to another kind of robot.
         """
-        from arcor2_hw.kinematics.dh import of_very_arm
+        from arcor2_hw.kinematics.dh import calibrated_model
         from arcor2_hw.kinematics.model import RobotModel as Model
 
         key = msgspec.msgpack.encode((wanted.urdf.path, wanted.settings, wanted.calibration))
@@ -73,7 +73,7 @@ class WorkerState:
             settings: dict[str, Any] = wanted.settings
             found = Model.load(Path(wanted.urdf.path), settings, name=wanted.urdf.name)
             if wanted.calibration is not None:
-                found = of_very_arm(found, wanted.calibration)
+                found = calibrated_model(found, wanted.calibration)
         self._models[key] = found
         while len(self._models) > MODELS:
             self._models.popitem(last=False)

@@ -99,7 +99,7 @@ def calibrated(model: RobotModel, end_effector: str, rows: Sequence[DhRow]) -> R
     return model.with_origins(origins)
 
 
-def of_very_arm(nominal: RobotModel, calibration: KinematicCalibration) -> RobotModel:
+def calibrated_model(nominal: RobotModel, calibration: KinematicCalibration) -> RobotModel:
     """Return the model of one robot, calibrated with the parameters from its controller.
 
     Raises:

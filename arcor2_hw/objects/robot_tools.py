@@ -106,7 +106,7 @@ def _load(
     robot: Robot, settings: Mapping[str, object], package: Path, calibration: KinematicCalibration | None
 ) -> "RobotModel":
     try:
-        from arcor2_hw.kinematics.dh import of_very_arm
+        from arcor2_hw.kinematics.dh import calibrated_model
         from arcor2_hw.kinematics.model import RobotModel
     except ImportError as error:
         raise Refused(
@@ -114,7 +114,7 @@ def _load(
         ) from error
     try:
         nominal = RobotModel.load(package, settings)
-        return nominal if calibration is None else of_very_arm(nominal, calibration)
+        return nominal if calibration is None else calibrated_model(nominal, calibration)
     except Arcor2Error as error:
         raise type(error)(f"The model of {robot.name} cannot be used: {error}", error.detail) from error
 

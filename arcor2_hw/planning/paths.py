@@ -31,7 +31,7 @@ _CORNER_POINTS: Final = 8
 _TRIES: Final = 4
 
 
-def between(a: Pose, b: Pose, share: float) -> Pose:
+def interpolate(a: Pose, b: Pose, share: float) -> Pose:
     """Return the pose at a share (0 to 1) of the line from `a` to `b`, with a rotation about one axis."""
     turn = (a.orientation.inverted() * b.orientation).rotation_vector()
     rotated = a.orientation * Orientation.from_rotation_vector(*(share * part for part in turn))
@@ -80,7 +80,7 @@ class _Line:
 
     def _piece(self, q: Array, here: float, there: float, halvings: int) -> list[Array]:
         """Return the waypoints after `q`, which is at the share `here`, up to the share `there`."""
-        pose = between(self._from, self._to, there)
+        pose = interpolate(self._from, self._to, there)
         after = next(self._inverse.candidates(pose.matrix(), q), None)
         if after is not None and self._keeps((q + after) / 2.0, (here + there) / 2.0):
             return [after]
@@ -91,7 +91,7 @@ class _Line:
         return first + self._piece(first[-1], middle, there, halvings - 1)
 
     def _keeps(self, q: Array, share: float) -> bool:
-        at, wanted = self._arm.pose(q), between(self._from, self._to, share)
+        at, wanted = self._arm.pose(q), interpolate(self._from, self._to, share)
         if at.position.distance_to(wanted.position) > OFF_LINE:
             return False
         return not self._turns or at.orientation.angle_to(wanted.orientation) <= OFF_TURN
@@ -138,7 +138,7 @@ def require_free(sweep: Sweep, way: Sequence[Array], name: str) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ corners
-def rounded(
+def round_corners(
     way: Sequence[Array], scale: Array, is_free: Callable[[Array, Array], bool] | None = None
 ) -> list[list[Array]]:
     """Round the corners of a path where that is free of collision.

@@ -181,7 +181,7 @@ class _Tree:
         apart = self.points[: self.size] - point
         return int(np.argmin(np.einsum("ij,ij->i", apart, apart)))
 
-    def way_from_root(self, node: int) -> list[Array]:
+    def path_from_root(self, node: int) -> list[Array]:
         way = []
         while node >= 0:
             way.append(self.points[node].copy())
@@ -233,7 +233,7 @@ class _Search:
                 met = self._connect(other, grown.points[node], resolution)
                 if met is not None:
                     ends = (node, met) if grown is forth else (met, node)
-                    way = forth.way_from_root(ends[0]) + back.way_from_root(ends[1])[::-1][1:]
+                    way = forth.path_from_root(ends[0]) + back.path_from_root(ends[1])[::-1][1:]
                     return [point / self._scale for point in way]
             grown, other = other, grown
         return None
@@ -267,7 +267,7 @@ class _Search:
     def shortened(self, way: list[Array], resolution: float) -> list[Array]:
         """Shorten a path by straight segments between random points, and drop waypoints that are not needed."""
         points = [q * self._scale for q in way]
-        points = self._without_needless(points, resolution)
+        points = self._drop_redundant(points, resolution)
         idle = 0
         for _ in range(SHORTCUTS):
             if len(points) < 3 or idle >= IDLE or self._over():
@@ -287,9 +287,9 @@ class _Search:
                 continue
             points = [*points[: first + 1], a, b, *points[last + 1 :]]
             idle = 0
-        return [point / self._scale for point in self._without_needless(points, resolution)]
+        return [point / self._scale for point in self._drop_redundant(points, resolution)]
 
-    def _without_needless(self, points: list[Array], resolution: float) -> list[Array]:
+    def _drop_redundant(self, points: list[Array], resolution: float) -> list[Array]:
         """Drop waypoints without which the path is still free, as many at once as possible."""
         kept = [points[0]]
         at = 0

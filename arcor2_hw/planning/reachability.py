@@ -15,7 +15,7 @@ from arcor2_hw.kinematics.arm import NEAR_SINGULAR, Arm
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
 
-KEPT: Final = 20_000
+CACHE_SIZE: Final = 20_000
 """Maximum number of cached poses."""
 
 
@@ -80,7 +80,7 @@ class _Candidates:
 
 
 @dataclass(eq=False, slots=True)
-class _Kept:
+class _CacheEntry:
     target: Array
     candidates: _Candidates
     judgement: Judgement | None = None
@@ -105,8 +105,8 @@ class Reachability:
         self._world, self._name, self.arm = world, robot, arm
         self._standing = world.robot(robot)
         self._inverse = InverseKinematics(arm)
-        self._kept: collections.OrderedDict[tuple[float, ...], _Kept] = collections.OrderedDict()
-        self._stand()
+        self._cache: collections.OrderedDict[tuple[float, ...], _CacheEntry] = collections.OrderedDict()
+        self._update_base()
         self._near_what: dict[int, Array | None] = {}
         self.computed = 0
         self.checked = 0
@@ -114,8 +114,8 @@ class Reachability:
     def judge(self, poses: Iterable[Pose]) -> list[Judgement]:
         """Return for each pose in the world how the arm reaches it."""
         if not np.array_equal(self._base, self._standing.base):
-            self._kept.clear()
-            self._stand()
+            self._cache.clear()
+            self._update_base()
         self._near_what = {}
         # The state of the robot, and its other joints, are part of the key of every result.
         others = np.delete(self._standing.q, self.arm.indices)
@@ -124,9 +124,9 @@ class Reachability:
 
     def forget(self) -> None:
         """Clear the cache."""
-        self._kept.clear()
+        self._cache.clear()
 
-    def _stand(self) -> None:
+    def _update_base(self) -> None:
         self._base = self._standing.base
         self._root_from_world = np.linalg.inv(self._base)
 
@@ -134,31 +134,31 @@ class Reachability:
     def _judged(self, pose: Pose, state: _State) -> Judgement:
         at, turn = pose.position, pose.orientation
         key = (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
-        kept = self._kept.get(key)
-        if kept is None:
+        entry = self._cache.get(key)
+        if entry is None:
             self.computed += 1
             target = self._root_from_world @ pose.matrix()
-            kept = self._kept[key] = _Kept(target, _Candidates(self._found(target)))
-            if len(self._kept) > KEPT:
-                self._kept.popitem(last=False)
+            entry = self._cache[key] = _CacheEntry(target, _Candidates(self._found(target)))
+            if len(self._cache) > CACHE_SIZE:
+                self._cache.popitem(last=False)
         else:
-            self._kept.move_to_end(key)
-        if kept.judgement is None or kept.state != state or self._touched(kept):
+            self._cache.move_to_end(key)
+        if entry.judgement is None or entry.state != state or self._touched(entry):
             self.checked += 1
-            kept.judgement, kept.box = self._looked_at(kept, state)
-        kept.state, kept.revision = state, self._world.revision
-        return kept.judgement
+            entry.judgement, entry.box = self._check(entry, state)
+        entry.state, entry.revision = state, self._world.revision
+        return entry.judgement
 
-    def _touched(self, kept: _Kept) -> bool:
+    def _touched(self, entry: _CacheEntry) -> bool:
         """Return whether something changed near the configurations of a result."""
-        if kept.revision == self._world.revision or kept.box is None:
+        if entry.revision == self._world.revision or entry.box is None:
             return False
-        if kept.revision not in self._near_what:
-            self._near_what[kept.revision] = self._changes_since(kept.revision)
-        boxes = self._near_what[kept.revision]
+        if entry.revision not in self._near_what:
+            self._near_what[entry.revision] = self._changes_since(entry.revision)
+        boxes = self._near_what[entry.revision]
         if boxes is None:
             return True
-        return bool(((boxes[:, 0] <= kept.box[1]) & (boxes[:, 1] >= kept.box[0])).all(axis=1).any())
+        return bool(((boxes[:, 0] <= entry.box[1]) & (boxes[:, 1] >= entry.box[0])).all(axis=1).any())
 
     def _changes_since(self, revision: int) -> Array | None:
         """Return the bounding boxes (n, 2, 3) of changes after a revision, None when they are no longer recorded."""
@@ -171,12 +171,12 @@ class Reachability:
         for q in self._inverse.candidates(target):
             yield _Candidate(q, q)
 
-    def _looked_at(self, kept: _Kept, state: _State) -> tuple[Judgement, Array | None]:
+    def _check(self, entry: _CacheEntry, state: _State) -> tuple[Judgement, Array | None]:
         """Judge a pose; also return the bounding box of the configurations checked; None: no collision matters."""
         second: Judgement | None = None
         hit: Judgement | None = None
         boxes: list[Array] = []
-        for one in kept.candidates:
+        for one in entry.candidates:
             if one.box is None or one.state != state:
                 one.whole = self.arm.whole(one.q, self._standing.q)
                 one.box, one.state = self._standing.box(one.whole), state
@@ -192,7 +192,7 @@ class Reachability:
             second = second or Judgement(Reach.NEAR_LIMIT, joints, one.reservation)
         if best := second or hit:
             return best, _around(boxes)
-        return Judgement(Reach.OUT_OF_REACH, reason=self._why_not(kept.target)), None
+        return Judgement(Reach.OUT_OF_REACH, reason=self._reason(entry.target)), None
 
     def _collision(self, whole: Array) -> str:
         found = self._world.contacts(self._name, whole)
@@ -205,7 +205,7 @@ class Reachability:
             return "The arm would be near a singularity."
         return ""
 
-    def _why_not(self, target: Array) -> str:
+    def _reason(self, target: Array) -> str:
         distance = float(np.linalg.norm(target[:3, 3] - self.arm.centre))
         if distance > self.arm.reach:
             return f"The pose is {distance:.2f} m from the robot, which reaches at most {self.arm.reach:.2f} m."

@@ -14,7 +14,7 @@ from ruckig import Trajectory as RuckigTrajectory
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.kinematics.arm import Arm
 from arcor2_hw.kinematics.shapes import Array
-from arcor2_hw.planning.paths import rounded
+from arcor2_hw.planning.paths import round_corners
 
 RAMP: Final = 0.4
 """Time in which a joint reaches its maximum velocity, s. A URDF states no accelerations."""
@@ -140,7 +140,7 @@ def smooth(
     """
     if len(way) < 3:
         return with_stops(way, limits)
-    pieces = rounded(way, 1.0 / limits.velocity, is_free)
+    pieces = round_corners(way, 1.0 / limits.velocity, is_free)
     timed = Trajectory([_along(_with_knots(piece), limits) for piece in pieces])
     if is_free is not None:
         count = max(2, math.ceil(timed.duration / 0.02))

@@ -48,7 +48,7 @@ class Place(Data, frozen=True):
             return False
 
     @property
-    def told_as(self) -> str:
+    def error_text(self) -> str:
         """Return the text that an error has to contain."""
         if self.path:
             return self.path

@@ -68,7 +68,7 @@ class CellBench(Bench):
         if self.place is None:
             return self.entry.name
         if self.wire is None:
-            return self.place.told_as
+            return self.place.error_text
         return str(self._moved[self.place.settings[-1]]) if not self.place.url else self.wire.address
 
     def make(self) -> Generic:
@@ -158,7 +158,7 @@ class CellBench(Bench):
     def _lack(self, hook: str) -> str | None:
         if hook in OF_THE_WIRE and self.wire is None:
             return "no wire is possible: `wire` must name host and port, or the port, or fixed ports"
-        if hook == "absent" and (self.place is None or len(self.place.ports) > 1 or not self.place.told_as):
+        if hook == "absent" and (self.place is None or len(self.place.ports) > 1 or not self.place.error_text):
             return "its settings do not tell where a missing device could be"
         if hook in ("writes", "actuating") and (self.wire is None or self.frames is None):
             return "its frames are unknown: quality.yaml has no `frames` for this wire"

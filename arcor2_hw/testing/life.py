@@ -88,7 +88,7 @@ def named(error: DeviceError, name: str, address: str, what: str) -> None:
     assert address in text, f"the error of {what} does not name the address {address}: {text}"
 
 
-class Beside:
+class BackgroundCall:
     """A call on its own thread."""
 
     def __init__(self, call: Callable[[], Any]) -> None:

@@ -11,7 +11,7 @@ from arcor2_hw.objects import Axis, Generic
 from arcor2_hw.runtime.creation import Recipe
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.testing.bench import Bench
-from arcor2_hw.testing.life import POLL, Beside, wait_until
+from arcor2_hw.testing.life import POLL, BackgroundCall, wait_until
 
 WATCHED: Final = 0.5
 """Time for which nothing may start to move again, s."""
@@ -22,9 +22,9 @@ GONE: Final = (NotConnected, ConnectionLost, DeviceTimeout, Stale)
 UP: Final = (Connection.ONLINE, Connection.BACK)
 
 
-def under_way(bench: Bench, device: Generic) -> Beside:
+def under_way(bench: Bench, device: Generic) -> BackgroundCall:
     """Start the long act and wait until it is running at the device."""
-    act = Beside(lambda: bench.run_long(device))
+    act = BackgroundCall(lambda: bench.run_long(device))
     wait_until(lambda: bench.running() or act.over, STARTS_WITHIN, "the act of run_long")
     assert not act.over, f"the act of run_long ended at once: {act.error!r}"
     return act

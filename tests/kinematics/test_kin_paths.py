@@ -12,7 +12,7 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.kinematics.errors import MotionInCollision, NoStraightLine, OutOfReach
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array, Box
-from arcor2_hw.planning.paths import OFF_LINE, OFF_TURN, between, free_line, rounded, straight_line
+from arcor2_hw.planning.paths import OFF_LINE, OFF_TURN, free_line, interpolate, round_corners, straight_line
 from arcor2_hw.planning.timing import MotionLimits, Trajectory, along_line, point_to_point, smooth, with_stops
 from tests.kinematics import kin_robots
 
@@ -53,7 +53,7 @@ def test_the_tip_keeps_to_the_line_and_turns_evenly(model: RobotModel) -> None:
                 at = arm.pose(a + share * (b - a))
                 assert line_off(here.position, there.position, at.position) < 3.0 * OFF_LINE
                 come = here.position.distance_to(at.position) / whole
-                assert at.orientation.angle_to(between(here, there, come).orientation) < 6.0 * OFF_TURN
+                assert at.orientation.angle_to(interpolate(here, there, come).orientation) < 6.0 * OFF_TURN
     assert done >= 5
 
 
@@ -160,7 +160,7 @@ def test_a_corner_without_room_is_not_rounded_but_stood_at() -> None:
     def free(a: Array, b: Array) -> bool:
         return all(min(abs(q[1]), abs(q[0] - 0.9)) < 0.001 for q in (a, (a + b) / 2.0, b))
 
-    assert [len(piece) for piece in rounded(way, np.ones(2), free)] == [2, 2]
+    assert [len(piece) for piece in round_corners(way, np.ones(2), free)] == [2, 2]
     timed = smooth(way, LIMITS, free)
     q, v, _ = rates(timed)
     assert np.minimum(np.abs(q[:, 1]), np.abs(q[:, 0] - 0.9)).max() < 0.001

@@ -207,5 +207,5 @@ def test_a_thin_wire_between_two_configurations_is_found() -> None:
         assert hit is not None
         assert "wire" in hit.what
         assert abs(hit.share - share) < 0.15
-        assert not sweep.proves(READY, goal)
+        assert not sweep.is_free_at_full_resolution(READY, goal)
         assert not sweep.is_free_between(READY, goal)

@@ -359,7 +359,7 @@ def test_fast_and_thorough_answers_agree_among_a_thousand_bodies() -> None:
         world.delete(f"body {number}")
     for number in range(1, 1000, 2):
         world.move(f"body {number}", at(10.0, number, 0.0))
-    assert all(world.is_free("arm", q) == (not world.robots["arm"].hits_itself(q)) for q in configurations)
+    assert all(world.is_free("arm", q) == (not world.robots["arm"].in_self_collision(q)) for q in configurations)
 
 
 def test_changes_are_told_with_their_place(world: CollisionWorld) -> None:

@@ -129,7 +129,10 @@ def test_without_a_cell_it_says_what_is_missing(tmp_path: Path) -> None:
         ({"settings": {"hots": "127.0.0.1"}}, "far: FunctionalTester has no setting hots"),
         ({"settings": {"host": "127.0.0.1"}, "wire": ["gate"]}, "far: wire names 'gate'"),
         ({"bench": "no_such_module:Bench"}, "far: the bench no_such_module:Bench cannot be imported"),
-        ({"bench": "arcor2_hw.testing.life:Beside"}, "far: arcor2_hw.testing.life:Beside is not a bench"),
+        (
+            {"bench": "arcor2_hw.testing.life:BackgroundCall"},
+            "far: arcor2_hw.testing.life:BackgroundCall is not a bench",
+        ),
     ],
 )
 def test_a_mistake_in_a_cell_names_the_device(changes: dict[str, object], told: str) -> None:

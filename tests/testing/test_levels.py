@@ -152,7 +152,7 @@ def test_a_report_that_is_not_there_or_none_is_told(tmp_path: Path) -> None:
 
 # ------------------------------------------------------------------------------------------------ places
 @pytest.mark.parametrize(
-    ("settings", "here", "told_as"),
+    ("settings", "here", "error_text"),
     [
         ({"host": "127.0.0.1", "port": 5020}, True, "5020"),
         ({"host": "192.0.2.7", "port": 502}, False, "502"),
@@ -167,10 +167,10 @@ def test_a_report_that_is_not_there_or_none_is_told(tmp_path: Path) -> None:
         ({"channel": "can0", "interface": "socketcan"}, False, "channel can0"),
     ],
 )
-def test_where_a_device_is(settings: dict[str, Any], here: bool, told_as: str) -> None:
+def test_where_a_device_is(settings: dict[str, Any], here: bool, error_text: str) -> None:
     found = places(settings)
     assert all(place.here for place in found) is here
-    assert found[0].told_as == told_as
+    assert found[0].error_text == error_text
 
 
 def test_settings_may_be_named_and_ports_given() -> None:

@@ -21,7 +21,7 @@ from arcor2_hw.exceptions import (
     OutOfRange,
     Refused,
 )
-from arcor2_hw.testing.life import Beside
+from arcor2_hw.testing.life import BackgroundCall
 from tests.fakes.conftest import FakeProcess
 
 on_both = pytest.mark.parametrize("fake", ["tcp", "pty"], indirect=True)
@@ -277,7 +277,7 @@ def test_what_the_quality_file_claims_is_there() -> None:
 
 @pytest.mark.parametrize("fake", ["flags"], indirect=True)
 def test_stop_ends_the_wait_and_the_label_comes_out_once(fake: FakeProcess, printer: ZplPrinter) -> None:
-    printing = Beside(lambda: printer.print(LABEL))
+    printing = BackgroundCall(lambda: printer.print(LABEL))
     while "format" not in fake.truth()["received"]:
         assert not printing.over
     printer.stop()

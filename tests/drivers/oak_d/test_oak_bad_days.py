@@ -22,7 +22,7 @@ from arcor2_hw.exceptions import (
     Overexposed,
     Stale,
 )
-from arcor2_hw.testing.life import Beside
+from arcor2_hw.testing.life import BackgroundCall
 from tests.fakes.conftest import FakeProcess
 
 from .conftest import PATIENCE
@@ -230,7 +230,7 @@ def test_several_cameras_have_to_be_told_apart(monkeypatch: pytest.MonkeyPatch) 
 
 def test_stop_ends_the_wait_for_a_picture(fake: FakeProcess, camera: OakD) -> None:
     fake.control.do("frozen")
-    waiting = Beside(camera.color_image)
+    waiting = BackgroundCall(camera.color_image)
     while not waiting.over:
         camera.stop()
         time.sleep(0.01)

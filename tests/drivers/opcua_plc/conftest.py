@@ -22,7 +22,7 @@ POINTS = (
 )
 
 
-class Beside:
+class BackgroundCall:
     """A call on a thread of its own."""
 
     def __init__(self, call: Callable[[], object]) -> None:

@@ -21,7 +21,7 @@ from arcor2_hw.exceptions import (
 )
 from arcor2_hw.objects.edges import Edge
 from tests.drivers.benches.opcua_plc_bench import ORPHAN
-from tests.drivers.opcua_plc.conftest import HANDSHAKE, POINTS, Beside
+from tests.drivers.opcua_plc.conftest import HANDSHAKE, POINTS, BackgroundCall
 from tests.fakes.conftest import FakeProcess
 
 UP = (Connection.ONLINE, Connection.BACK)
@@ -33,7 +33,7 @@ def test_lost_in_a_job_and_back(
 ) -> None:
     edges: list[Edge] = []
     plc.subscribe("part", edges.append)
-    running = Beside(lambda: plc.run_job(3))
+    running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
     fake.control.do(fault)
     assert isinstance(running.outcome(10.0), DeviceError)
@@ -73,7 +73,7 @@ def test_outputs_and_job_when_our_life_sign_ends(fake: FakeProcess) -> None:
 
 
 def test_our_life_sign_outlives_a_long_job(fake: FakeProcess, plc: OpcUaPlc) -> None:
-    running = Beside(lambda: plc.run_job(3))
+    running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
     time.sleep(2.2)  # twice the PLC's patience
     assert fake.truth()["moving"]
@@ -83,7 +83,7 @@ def test_our_life_sign_outlives_a_long_job(fake: FakeProcess, plc: OpcUaPlc) -> 
 
 
 def test_a_program_that_stands_makes_values_old(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
-    running = Beside(lambda: plc.run_job(3))
+    running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
     fake.control.do("live", on=False)
     assert isinstance(running.outcome(5.0), DeviceError)

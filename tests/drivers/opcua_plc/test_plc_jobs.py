@@ -8,7 +8,7 @@ import pytest
 
 from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, NotInControl, OutOfRange, Refused
-from tests.drivers.opcua_plc.conftest import Beside
+from tests.drivers.opcua_plc.conftest import BackgroundCall
 from tests.fakes.conftest import FakeProcess
 
 
@@ -60,7 +60,7 @@ def test_a_request_that_is_not_answered_is_taken_back(fake: FakeProcess, plc: Op
 
 def test_a_job_is_stopped(fake: FakeProcess, plc: OpcUaPlc) -> None:
     plc.write_digital("valve", True)
-    running = Beside(lambda: plc.run_job(3))
+    running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
     with pytest.raises(Refused, match="job 1 is refused: another job runs"):
         plc.run_job(1)
@@ -73,7 +73,7 @@ def test_a_job_is_stopped(fake: FakeProcess, plc: OpcUaPlc) -> None:
 
 def test_a_plc_that_is_not_idle_refuses_a_job(fake: FakeProcess, plc: OpcUaPlc, make: Callable[..., OpcUaPlc]) -> None:
     fake.control.do("stuck")
-    running = Beside(lambda: plc.run_job(1, 30.0))
+    running = BackgroundCall(lambda: plc.run_job(1, 30.0))
     fake.control.wait_until(lambda t: t["moving"])
     other = make(fake.ready["url"], host_number=2)
     other.connect()
@@ -100,7 +100,7 @@ def test_control_is_refused_while_another_host_has_it(fake: FakeProcess, observe
 
 
 def test_control_that_somebody_takes_away_is_noticed(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
-    running = Beside(lambda: plc.run_job(3))
+    running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
     fake.control.do("stranger", number=77)
     assert isinstance(running.outcome(), NotInControl)

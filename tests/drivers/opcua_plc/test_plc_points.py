@@ -13,7 +13,7 @@ from arcor2_drivers.opcua_plc.settings import OpcUaPlcSettings
 from arcor2_hw.data.device import Connection, Health, Quality
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, OutOfRange, Refused
 from arcor2_hw.objects.edges import Edge
-from tests.drivers.opcua_plc.conftest import HANDSHAKE, Beside
+from tests.drivers.opcua_plc.conftest import HANDSHAKE, BackgroundCall
 from tests.fakes.conftest import FakeProcess
 
 URL = "opc.tcp://127.0.0.1:4840"
@@ -107,13 +107,13 @@ def test_wait_for(fake: FakeProcess, observed: OpcUaPlc) -> None:
     observed.wait_for("door", True, 0.0)
     with pytest.raises(DeviceTimeout, match=r"plc at opc.tcp.*part becoming on took longer"):
         observed.wait_for("part", True, 0.1)
-    waiting = Beside(lambda: observed.wait_for("part", True, 10.0))
+    waiting = BackgroundCall(lambda: observed.wait_for("part", True, 10.0))
     time.sleep(0.1)
     began = time.monotonic()
     fake.control.do("set", name="PartPresent", value=True)
     assert waiting.outcome() is None
     assert time.monotonic() - began < 2.0
-    waiting = Beside(lambda: observed.wait_for("part", False, 30.0))
+    waiting = BackgroundCall(lambda: observed.wait_for("part", False, 30.0))
     time.sleep(0.1)
     observed.stop()
     assert isinstance(waiting.outcome(), Cancelled)

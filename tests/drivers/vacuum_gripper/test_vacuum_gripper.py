@@ -33,7 +33,7 @@ from .conftest import Make
 VACUUM, BLOW = 0, 1
 
 
-class Beside:
+class BackgroundCall:
     """A call on a thread of its own."""
 
     def __init__(self, call: Callable[[], Any]) -> None:
@@ -78,7 +78,7 @@ def holding(gripper: SuctionGripper, fake: FakeProcess) -> SuctionGripper:
 
 
 def test_a_part_is_gripped_and_released(gripper: SuctionGripper, fake: FakeProcess) -> None:
-    doing = Beside(gripper.grip)
+    doing = BackgroundCall(gripper.grip)
     wait_for(lambda: output(fake, VACUUM))
     time.sleep(0.1)
     assert not gripper.part_held(), "it waits for the sensor"
@@ -86,7 +86,7 @@ def test_a_part_is_gripped_and_released(gripper: SuctionGripper, fake: FakeProce
     assert doing.end() is None
     assert gripper.is_part_held()
     gripper.check_part()
-    doing = Beside(gripper.release)
+    doing = BackgroundCall(gripper.release)
     wait_for(lambda: output(fake, BLOW))
     assert not output(fake, VACUUM), "no blast against the vacuum"
     part(fake, False)
@@ -178,12 +178,12 @@ def test_a_flicker_of_the_sensor_is_no_loss(make: Make, fake: FakeProcess) -> No
 
 
 def test_a_stop_ends_the_waiting_and_lets_nothing_fall(gripper: SuctionGripper, fake: FakeProcess) -> None:
-    doing = Beside(gripper.grip)
+    doing = BackgroundCall(gripper.grip)
     wait_for(lambda: output(fake, VACUUM))
     gripper.stop()
     assert isinstance(doing.end(1.0), Cancelled)
     assert output(fake, VACUUM)
-    doing = Beside(gripper.blow_off)
+    doing = BackgroundCall(gripper.blow_off)
     wait_for(lambda: output(fake, BLOW))
     gripper.stop()
     assert isinstance(doing.end(1.0), Cancelled)
@@ -191,7 +191,7 @@ def test_a_stop_ends_the_waiting_and_lets_nothing_fall(gripper: SuctionGripper, 
 
 
 def test_one_act_at_a_time(gripper: SuctionGripper, fake: FakeProcess) -> None:
-    doing = Beside(gripper.grip)
+    doing = BackgroundCall(gripper.grip)
     wait_for(lambda: output(fake, VACUUM))
     for second in (gripper.grip, gripper.release, gripper.blow_off):
         with pytest.raises(Refused, match="gripper is gripping or releasing"):
@@ -286,7 +286,7 @@ def test_a_carrier_that_is_not_up_is_waited_for(make: Make, block: RemoteIO) -> 
     with pytest.raises(NotConnected, match="gripper: block is not connected"):
         gripper.connect(0.2)
     assert time.monotonic() - began < 1.0
-    doing = Beside(lambda: gripper.connect(10.0))
+    doing = BackgroundCall(lambda: gripper.connect(10.0))
     time.sleep(0.1)
     block.connect()
     assert doing.end() is None
