@@ -127,8 +127,8 @@ class SettingsReader:
             kind, enumeration = parameter_type_of(hint, info.module, info, self._resolver)
             if kind.name not in _KINDS:
                 raise info.problem(f"a setting cannot be of type {kind.name}", hint)
-            told = "" if isinstance(description, Unset) else description
-            extra = unit_extra(told) if kind.name in NUMBERS else UNSET
+            text = "" if isinstance(description, Unset) else description
+            extra = unit_extra(text) if kind.name in NUMBERS else UNSET
             if enumeration is not None:
                 members = enum_members(enumeration, self._resolver) or {}
                 extra = encode(Extra(allowed_values=list(dict.fromkeys(members.values()))))

@@ -33,7 +33,7 @@ def is_needed(library: Library) -> bool:
     return bool(_huge(library))
 
 
-def give_up(library: Library, reason: str) -> None:
+def disable_huge_types(library: Library, reason: str) -> None:
     """Disable the types of huge sources after their analysis failed."""
     library.put_analyses(
         {

@@ -99,7 +99,7 @@ class DepthView:
         return np.asarray(self.rays[there] * self.depth[there][:, None])
 
 
-def look(pictures: DepthPictures, parameters: CameraParameters) -> DepthView:
+def depth_view(pictures: DepthPictures, parameters: CameraParameters) -> DepthView:
     """Average, filter and unproject depth images.
 
     Raises:

@@ -53,13 +53,13 @@ def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions)
     deviations = intrinsics_deviations(lens, options)
     everything = PoseProblem(lens, seen, hints, deviations)
     while True:
-        kept = [each for each in seen if each.key not in left_out]
-        problem = PoseProblem(lens, kept, hints, deviations) if left_out else everything
+        used = [each for each in seen if each.key not in left_out]
+        problem = PoseProblem(lens, used, hints, deviations) if left_out else everything
         best = solve(problem, options)
         worst, worst_key = worst_of(problem, best)
         if worst <= options.largest_residual:
             break
-        names = {each.key: each.name for each in kept}
+        names = {each.key: each.name for each in used}
         if len(names) < 3:
             raise CalibrationRefused(
                 f"The picture contradicts what is said of {' and '.join(sorted(names.values()))} by {worst:.0f} px: "

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from arcor2_hw.calibration.depth import DepthPictures, look
+from arcor2_hw.calibration.depth import DepthPictures, depth_view
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.registration import Fit
 from arcor2_hw.calibration.results import Grade, RobotPose
@@ -98,7 +98,7 @@ def find_robot_pose(
     limits = options or RobotPoseOptions()
     world_from_camera = camera_pose.matrix()
     start = np.linalg.inv(assumed.matrix()) @ world_from_camera
-    view = look(depth, parameters)
+    view = depth_view(depth, parameters)
     search = Search(surface, view, start, limits.within, limits.angle_within)
     ends = search.ends()
     best = search.last(ends[0].fit)

@@ -166,12 +166,12 @@ class Client(Requests):
             await self._rest.close()
             self._rest = None
 
-    def _finish(self, told: Exception | None, end: Exception) -> None:
-        """End all streams with `told` and refuse requests with `end`."""
+    def _finish(self, reason: Exception | None, end: Exception) -> None:
+        """End all streams with `reason` and refuse requests with `end`."""
         self._end = end
         self._joined.set()  # waiting requests see the end
         for stream in self._streams:
-            stream.end(told)
+            stream.end(reason)
 
     def _deliver(self, item: Event | EventsMissed) -> None:
         for stream in self._streams:
@@ -200,14 +200,14 @@ class Client(Requests):
         not_resumed: list[str] = []
         try:
             if self._user_name is not None:
-                await self._tell(wire, "RegisterUser", RegisterUserArgs(self._user_name))
+                await self._request(wire, "RegisterUser", RegisterUserArgs(self._user_name))
             elif self._token is not None:
-                await self._tell(wire, "SystemInfo", None)  # with an invalid token this request is not answered
+                await self._request(wire, "SystemInfo", None)  # with an invalid token this request is not answered
             if self._subscribed:
-                await self._tell(wire, "SubscribeEvents", SubscribeEventsArgs(set(self._subscribed)))
+                await self._request(wire, "SubscribeEvents", SubscribeEventsArgs(set(self._subscribed)))
             for key, args in list(self._robots.items()):
                 try:
-                    await self._tell(wire, "RegisterForRobotEvent", args)
+                    await self._request(wire, "RegisterForRobotEvent", args)
                 except RequestFailed:
                     del self._robots[key]  # the scene is offline now, or the robot was removed
                     not_resumed.append(f"{args.what} of {args.robot_id}")
@@ -221,7 +221,7 @@ class Client(Requests):
             held = None
         self._wire = wire
 
-    async def _tell(self, wire: Wire, name: str, args: Any) -> None:
+    async def _request(self, wire: Wire, name: str, args: Any) -> None:
         try:
             message = await wire.ask(name, args, False, self._timeout)
         except (Unsent, Unanswered):

@@ -52,11 +52,11 @@ def intrinsics(task: t.FindIntrinsics, state: WorkerState) -> Intrinsics:
 def _counted(state: WorkerState, what: str) -> Callable[[int, int], None]:
     """Return a function that reports progress as "`what` 3 of 20"."""
 
-    def told(done: int, count: int) -> None:
+    def report(done: int, count: int) -> None:
         share = done / count if count else 0.0
         state.progress(min(max(share, 0.0), 1.0), f"{what} {done} of {count}")
 
-    return told
+    return report
 
 
 def robot_pose(task: t.FindRobotPose, state: WorkerState) -> RobotPose:

@@ -23,20 +23,20 @@ _Y_UP: Final = (-0.7071067811865476, 0.0, 0.0, 0.7071067811865476)
 def encode_glb(meshes: Mapping[str, "DisplayMesh"], extras: Mapping[str, Any]) -> bytes:
     """Return a file with one node and mesh per name, and `extras` of the scene. Equal input gives equal bytes."""
     content = _Content()
-    told: dict[str, Any] = {
+    document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "ARCOR2-HW"},
         "scene": 0,
         "scenes": [{"nodes": [0], "extras": dict(extras)}],
         "nodes": [{"rotation": _Y_UP, "children": list(range(1, len(meshes) + 1))}],
     }
     if meshes:
-        told["extensionsUsed"] = told["extensionsRequired"] = ["KHR_mesh_quantization"]
-        told["nodes"] += [{"mesh": number, "name": name} for number, name in enumerate(meshes)]
-        told["meshes"] = [{"name": name, "primitives": [content.primitive(mesh)]} for name, mesh in meshes.items()]
-        told |= content.told()
+        document["extensionsUsed"] = document["extensionsRequired"] = ["KHR_mesh_quantization"]
+        document["nodes"] += [{"mesh": number, "name": name} for number, name in enumerate(meshes)]
+        document["meshes"] = [{"name": name, "primitives": [content.primitive(mesh)]} for name, mesh in meshes.items()]
+        document |= content.document()
     else:
-        del told["nodes"][0]["children"]
-    text = json.dumps(told, separators=(",", ":"), ensure_ascii=False).encode()
+        del document["nodes"][0]["children"]
+    text = json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode()
     chunks = [(b"JSON", text + b" " * (-len(text) % 4))]
     if meshes:
         chunks.append((b"BIN\0", bytes(content.data)))
@@ -52,7 +52,7 @@ class _Content:
         self._views: list[dict[str, Any]] = []
         self._accessors: list[dict[str, Any]] = []
 
-    def told(self) -> dict[str, Any]:
+    def document(self) -> dict[str, Any]:
         return {
             "buffers": [{"byteLength": len(self.data)}],
             "bufferViews": self._views,

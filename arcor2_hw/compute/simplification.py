@@ -62,10 +62,10 @@ def _joined(surface: Surface) -> Surface:
     """Merge vertices at the same place that have the same colour."""
     used, inverse = np.unique(surface.triangles, return_inverse=True)
     triangles = inverse.reshape(-1, 3)
-    told = np.ascontiguousarray(surface.vertices[used], dtype=np.float32) + np.float32(0.0)  # no negative zeros
+    attributes = np.ascontiguousarray(surface.vertices[used], dtype=np.float32) + np.float32(0.0)  # no negative zeros
     if surface.colours is not None:
-        told = np.hstack((told, np.round(surface.colours[used] * 255.0).astype(np.float32)))
-    rows = np.ascontiguousarray(told).view(f"V{told.shape[1] * 4}").ravel()
+        attributes = np.hstack((attributes, np.round(surface.colours[used] * 255.0).astype(np.float32)))
+    rows = np.ascontiguousarray(attributes).view(f"V{attributes.shape[1] * 4}").ravel()
     _, first, joined = np.unique(rows, return_index=True, return_inverse=True)
     triangles = joined[triangles].reshape(-1, 3)
     a, b, c = triangles.T
@@ -93,8 +93,8 @@ def _simplified(surface: Surface, most: int) -> Surface:
         vertices, triangles, became = fast_simplification.replay_simplification(points, faces, collapses)
         triangles = np.asarray(triangles, dtype=np.int64)
         colours = np.full((len(vertices), 3), 0.75, dtype=np.float32)
-        kept = (became >= 0) & (became < len(vertices))
-        colours[became[kept]] = surface.colours[kept]
+        remaining = (became >= 0) & (became < len(vertices))
+        colours[became[remaining]] = surface.colours[remaining]
     return Surface(np.asarray(vertices, dtype=np.float64) * size + middle, triangles, colours)
 
 

@@ -48,10 +48,10 @@ def main(arguments: Sequence[str]) -> int:
 def serve(sock: socket.socket) -> None:
     """Answer messages until the socket is closed."""
 
-    def say(message: m.FromWorker) -> None:
+    def send(message: m.FromWorker) -> None:
         sock.sendall(m.encode(message))
 
-    state = WorkerState(lambda share, text: say(m.Progress(share, text)))
+    state = WorkerState(lambda share, text: send(m.Progress(share, text)))
     with contextlib.suppress(OSError):
         for message in _messages(sock):
             match message:
@@ -61,7 +61,7 @@ def serve(sock: socket.socket) -> None:
                     state.forget(message.place)
                 case m.Work():
                     state.place = message.place
-                    say(_answer(message, state))
+                    send(_answer(message, state))
 
 
 def _answer(work: m.Work, state: WorkerState) -> m.Done | m.Failed:

@@ -80,7 +80,7 @@ def read_mesh(
         BadMesh: The format is unknown, the file is larger than 64 MiB or a million triangles, damaged or empty, or has
             coordinates that are not finite or beyond 10 km. The message names the file.
     """
-    kind = _looked_at(content, name, MAX_MESH)
+    kind = _checked_format(content, name, MAX_MESH)
     vertices, triangles = _parse(content, kind, name)
     vertices = _checked(vertices * _unit(content, kind, name), triangles, name, MAX_TRIANGLES)
     if upright:
@@ -107,7 +107,7 @@ def read_surface(content: bytes, name: str, *, upright: bool, most_bytes: int, m
     Raises:
         BadMesh: As in `read_mesh`.
     """
-    kind = _looked_at(content, name, most_bytes)
+    kind = _checked_format(content, name, most_bytes)
     vertices, triangles, colours = _parse_coloured(content, kind, name)
     vertices = _checked(vertices * _unit(content, kind, name), triangles, name, most_triangles)
     _refuse_far(vertices[np.unique(triangles)], name)
@@ -191,7 +191,7 @@ def linear_of(colours: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 # ------------------------------------------------------------------------------------------------ checks
-def _looked_at(content: bytes, name: str, most_bytes: int) -> str:
+def _checked_format(content: bytes, name: str, most_bytes: int) -> str:
     """Return the format of a mesh that is safe to parse."""
     kind = kind_of(content, name)
     if len(content) > most_bytes:

@@ -52,8 +52,8 @@ class PathMonitor:
     planning counts. On leaving, PathBlocked names the obstacle, and tells whether the robot came to a stop before it.
     """
 
-    def __init__(self, robot: Robot, path: PlannedPath, look: Callable[[Others], ObstacleSnapshot]) -> None:
-        self._robot, self._path, self._look = robot, path, look
+    def __init__(self, robot: Robot, path: PlannedPath, take_snapshot: Callable[[Others], ObstacleSnapshot]) -> None:
+        self._robot, self._path, self._take_snapshot = robot, path, take_snapshot
         self._over = threading.Event()
         self._stopping = threading.Lock()
         self._others: Others | None = None
@@ -106,7 +106,7 @@ class PathMonitor:
                 others = self._others = list(before.robots.values())
         else:
             others = self._others
-        return self._look(others).settled(before)
+        return self._take_snapshot(others).settled(before)
 
     def _first_contact(self, now: ObstacleSnapshot) -> "Contact | None":
         from arcor2_hw.collision.sweep import Sweep

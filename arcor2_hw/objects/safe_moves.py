@@ -255,7 +255,7 @@ class SafeMoves:
             yield
             return
         tools = way._planned.tools
-        with PathMonitor(self._robot, way._planned, lambda others: self._look(tools, others)):
+        with PathMonitor(self._robot, way._planned, lambda others: self._take_snapshot(tools, others)):
             yield
 
     # -------------------------------------------------------------------------------- what is held
@@ -349,9 +349,9 @@ class SafeMoves:
             return ask(build_world(self._robot, tools, now, around, 0.0), around)
 
     def _snapshot(self) -> ObstacleSnapshot:
-        return self._look(self._tools(), other_robots(self._robot))
+        return self._take_snapshot(self._tools(), other_robots(self._robot))
 
-    def _look(self, tools: RobotTools, others: Others) -> ObstacleSnapshot:
+    def _take_snapshot(self, tools: RobotTools, others: Others) -> ObstacleSnapshot:
         with_model = [(other, joints) for other, joints in others if tools.other(other) is not None]
         return ObstacleSnapshot.take(self._robot, with_model, _tool_of)
 

@@ -291,7 +291,7 @@ class _Search:
 
     def _drop_redundant(self, points: list[Array], resolution: float) -> list[Array]:
         """Drop waypoints without which the path is still free, as many at once as possible."""
-        kept = [points[0]]
+        remaining = [points[0]]
         at = 0
         while at < len(points) - 1:
             further = at + 1
@@ -299,6 +299,6 @@ class _Search:
                 if self._free(points[at], points[other], resolution):
                     further = other
                     break
-            kept.append(points[further])
+            remaining.append(points[further])
             at = further
-        return kept
+        return remaining

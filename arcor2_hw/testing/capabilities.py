@@ -90,9 +90,9 @@ def contradictions(device: Generic, said: frozenset[str]) -> list[str]:
         own = here is not None and here is not hook and (name in said or not _is_of_ours(kind, name, here))
         if name in said and not own:
             wrong.append(f"{name} is declared and is not there")
-        elif name not in said and own and not _says_not_implemented(device, name):
+        elif name not in said and own and not _raises_not_implemented(device, name):
             wrong.append(f"{name} is there, and analysis does not see it")
-        elif name not in said and not own and not _says_not_implemented(device, name):
+        elif name not in said and not own and not _raises_not_implemented(device, name):
             wrong.append(f"{name} is not declared, and does not say that it is not implemented")
     return wrong
 
@@ -101,7 +101,7 @@ def _is_of_ours(kind: type, name: str, member: object) -> bool:
     return any(vars(base).get(name) is member for base in kind.__mro__ if base.__module__.startswith(OURS))
 
 
-def _says_not_implemented(device: Generic, name: str) -> bool:
+def _raises_not_implemented(device: Generic, name: str) -> bool:
     """Return whether an optional method raises the not-implemented error on an object that is not connected."""
     method = getattr(device, name)
     try:

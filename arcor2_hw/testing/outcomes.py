@@ -47,23 +47,23 @@ class Outcomes(dict[str, Ran]):
 
     def add(self, properties: Sequence[tuple[str, Any]], passed: bool, failed: bool, when: str, text: str) -> None:
         """Add a report of pytest; reports of other tests are ignored."""
-        told: dict[str, Any] = next((value for key, value in reversed(properties) if key == PROPERTY), {})
-        if not told:
+        values: dict[str, Any] = next((value for key, value in reversed(properties) if key == PROPERTY), {})
+        if not values:
             return
-        ran = self.setdefault(told["bench"], Ran(told["type"], told["real"]))
-        ran.address = told.get("address", ran.address)
-        ran.identity = told.get("identity", ran.identity)
-        case = told["case"]
+        ran = self.setdefault(values["bench"], Ran(values["type"], values["real"]))
+        ran.address = values.get("address", ran.address)
+        ran.identity = values.get("identity", ran.identity)
+        case = values["case"]
         if case == LEVEL_CASE:
-            if "reached" in told:
-                ran.claimed, ran.reached = Level(told["claimed"]), Level(told["reached"])
-                ran.missing = told["missing"]
+            if "reached" in values:
+                ran.claimed, ran.reached = Level(values["claimed"]), Level(values["reached"])
+                ran.missing = values["missing"]
         elif failed:
             ran.outcomes[case] = Kind.FAILED, text
         elif passed and when == "call":
             ran.outcomes[case] = Kind.PASSED, ""
-        elif not passed and "kind" in told:
-            ran.outcomes[case] = Kind(told["kind"]), told["reason"]
+        elif not passed and "kind" in values:
+            ran.outcomes[case] = Kind(values["kind"]), values["reason"]
 
 
 @dataclass(frozen=True)

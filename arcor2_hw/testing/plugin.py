@@ -103,16 +103,16 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     kind = _bench_of(item)
     if kind is not None:
         case = getattr(item, "originalname", item.name).removeprefix("test_")
-        told = {"bench": kind.name(), "type": kind.type_name(), "real": kind.real, "case": case}
-        item.user_properties.append((PROPERTY, told))
+        values = {"bench": kind.name(), "type": kind.type_name(), "real": kind.real, "case": case}
+        item.user_properties.append((PROPERTY, values))
 
 
-def _told(item: pytest.Item) -> dict[str, Any]:
+def _values(item: pytest.Item) -> dict[str, Any]:
     from arcor2_hw.testing.outcomes import PROPERTY
 
-    told = next(value for key, value in item.user_properties if key == PROPERTY)
-    assert isinstance(told, dict)
-    return told
+    values = next(value for key, value in item.user_properties if key == PROPERTY)
+    assert isinstance(values, dict)
+    return values
 
 
 class _Listening:
@@ -126,9 +126,9 @@ class _Listening:
         if any(key == "arcor2_case" for key, _ in report.user_properties):
             from arcor2_hw.testing.outcomes import Outcomes
 
-            kept = self._config.stash.setdefault(OUTCOMES, Outcomes())
+            outcomes = self._config.stash.setdefault(OUTCOMES, Outcomes())
             text = str(report.longrepr).strip().rpartition("\n")[2][:200] if report.failed else ""
-            kept.add(report.user_properties, report.passed, report.failed, report.when, text)
+            outcomes.add(report.user_properties, report.passed, report.failed, report.when, text)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -203,9 +203,9 @@ def arcor2_bench(
 ) -> Iterator[Bench]:
     """Return the bench, reset, for one case for which it has the hooks; otherwise a reason is required."""
     bench = arcor2_running_bench
-    told = _told(request.node)
-    told |= {"address": bench.address, "identity": arcor2_identity}
-    _fit(request, bench, told)
+    values = _values(request.node)
+    values |= {"address": bench.address, "identity": arcor2_identity}
+    _fit(request, bench, values)
     try:
         bench.reset()
         yield bench
@@ -214,12 +214,12 @@ def arcor2_bench(
         bench.reset()
 
 
-def _fit(request: pytest.FixtureRequest, bench: Bench, told: dict[str, Any]) -> None:
+def _fit(request: pytest.FixtureRequest, bench: Bench, values: dict[str, Any]) -> None:
     """Skip or fail a case for which the bench lacks hooks, or that quality.yaml excludes."""
     from arcor2_hw.exceptions import Arcor2Error
     from arcor2_hw.testing.outcomes import Kind
 
-    case = told["case"]
+    case = values["case"]
     lacking = [hook for hook in getattr(request.function, "needs", ()) if not bench.has(hook)]
     try:
         claims = _claims(bench)
@@ -232,7 +232,7 @@ def _fit(request: pytest.FixtureRequest, bench: Bench, told: dict[str, Any]) -> 
         reason = None  # a faulty quality.yaml must not prevent the cases; the case `described` reports it
 
     def skip(kind: Kind, why: str) -> None:
-        told.update(kind=kind.value, reason=why)
+        values.update(kind=kind.value, reason=why)
         pytest.skip(f"{bench.name()}: {why}")
 
     if lacking and reason is not None:
@@ -292,7 +292,7 @@ def arcor2_verdict(request: pytest.FixtureRequest, arcor2_running_bench: Bench) 
     )
     lacks = report.unmatched(folder, claims, bench.type_name(), there)
     reached, missing = outcomes.judge(there, tests, lacks)
-    _told(request.node).update(claimed=int(claims.claimed), reached=int(reached), missing=missing)
+    _values(request.node).update(claimed=int(claims.claimed), reached=int(reached), missing=missing)
     return outcomes.Verdict(claims.claimed, reached, missing)
 
 

@@ -32,8 +32,8 @@ def missing_tests(
             wrong.append(f"rule {rule}: there is no file {file}")
         elif len(found) > 1:
             wrong.append(f"rule {rule}: there are {len(found)} files {file}")
-        elif lack := _lack(found[0], name, collected.get(str(found[0]))):
-            wrong.append(f"rule {rule}: {test} {lack}")
+        elif problem := _problem(found[0], name, collected.get(str(found[0]))):
+            wrong.append(f"rule {rule}: {test} {problem}")
     return wrong
 
 
@@ -45,7 +45,7 @@ def _files(folders: tuple[Path, ...]) -> dict[str, list[Path]]:
     return found
 
 
-def _lack(path: Path, name: str, collected: frozenset[str] | None) -> str:
+def _problem(path: Path, name: str, collected: frozenset[str] | None) -> str:
     if not (path.name.startswith("test_") or path.name.endswith("_test.py")):
         return "is in a file that pytest does not collect"
     test = _tests(path).get(name.rpartition("::")[2])

@@ -124,7 +124,7 @@ class SerialWire(Wire):
                 if self._ends is not None and self._ends is ends and ends[0] in ready:
                     self._from_driver(ends[0])
                 if device < 0 and not self._ending:
-                    self._look_for_device()
+                    self._check_device()
                 elif device in ready:
                     self._from_device(device)
 
@@ -157,7 +157,7 @@ class SerialWire(Wire):
         data, _ = self._torn(data)
         self._write(self._ends[0], data)
 
-    def _look_for_device(self) -> None:
+    def _check_device(self) -> None:
         with contextlib.suppress(OSError):
             self._device = self._open_device()
             self._plug()

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from arcor2_hw.calibration.depth import look, mean_depth, read_depth
+from arcor2_hw.calibration.depth import depth_view, mean_depth, read_depth
 from arcor2_hw.calibration.pictures import InvalidPicture
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.results import Grade
@@ -72,8 +72,8 @@ def test_averaged_pictures_are_better_than_one(plain: View) -> None:
     sensor = Sensor(shapes=[*arm(JOINTS), *tool(JOINTS)], wall=-2.0, pictures=1, noise=0.004, fixed_noise=0.0)
     rng = np.random.default_rng(5)
     stack = np.stack([sensor.take(EYE, rng) for _ in range(5)])
-    single = look(stack[0], plain.parameters)
-    mean = look(stack, plain.parameters)
+    single = depth_view(stack[0], plain.parameters)
+    mean = depth_view(stack, plain.parameters)
     exact = sensor.exact(EYE)
     inner = (single.depth > 0) & (mean.depth > 0) & (exact < 2.0)
     assert np.std((mean.depth - exact)[inner]) < 0.6 * np.std((single.depth - exact)[inner])
@@ -137,7 +137,7 @@ def test_a_covered_camera_is_refused(plain: View) -> None:
 def test_a_picture_of_another_size_than_the_lens_is_named(plain: View) -> None:
     for depth in (plain.depth[::2, ::2], np.zeros((720, 1280), np.uint16)):
         with pytest.raises(InvalidData, match="another size"):
-            look(depth, plain.parameters)
+            depth_view(depth, plain.parameters)
 
 
 @pytest.mark.parametrize(
@@ -153,7 +153,7 @@ def test_what_is_no_depth_picture_is_named(depth: np.ndarray) -> None:
 def test_wrong_lenses_and_options_are_named(plain: View) -> None:
     for fx in (0.0, -456.0, math.nan):
         with pytest.raises(InvalidData, match="positive"):
-            look(plain.depth, CameraParameters(fx, 456.0, 320.0, 180.0, [0.0] * 5))
+            depth_view(plain.depth, CameraParameters(fx, 456.0, 320.0, 180.0, [0.0] * 5))
     with pytest.raises(InvalidData, match="angle_within"):
         RobotPoseOptions(angle_within=0.0)
 

@@ -215,7 +215,7 @@ class ObjectTypes(TypeCatalog):
             encoded = await worker.analyse(self._library)
         except InvalidData as error:
             log.error("huge object types not analysed", reason=str(error), detail=error.detail)
-            worker.give_up(self._library, f"{error} Split the source into modules.")
+            worker.disable_huge_types(self._library, f"{error} Split the source into modules.")
             return False
         await asyncio.to_thread(snapshot.restore, self._library, encoded)
         return True
