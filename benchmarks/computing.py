@@ -3,14 +3,14 @@
 import time
 from typing import Final
 
-from arcor2_hw.collision.description import RobotSource, StoredFile, WorldBody, WorldItem, WorldRobot
+from arcor2_hw.collision.description import Obstacle, RobotSource, StoredFile, WorldBody, WorldItem, WorldRobot
+from arcor2_hw.collision.lines import first_hit
 from arcor2_hw.compute import kinematics_tasks as t
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.kinematics import primitives
 from arcor2_server.compute.workers import Compute
-from arcor2_server.workspace.collisions import Placed, first_hit
 from benchmarks.metrics import Metric, Report, median, percentile
 from benchmarks.models import UR5E
 
@@ -27,7 +27,7 @@ async def run(report: Report) -> None:
 def lines() -> Metric:
     """Time the safety of a line among a thousand boxes, which the server itself tells."""
     placed = {
-        f"b{n}": Placed(Box(f"b{n}", 0.2, 0.2, 0.2), Pose(Position(n % 10, n // 10 % 10, n // 100)))
+        f"b{n}": Obstacle.of(Box(f"b{n}", 0.2, 0.2, 0.2), Pose(Position(n % 10, n // 10 % 10, n // 100)))
         for n in range(BODIES)
     }
     taken = []

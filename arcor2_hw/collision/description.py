@@ -11,7 +11,7 @@ from msgspec import Struct, field
 
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.object_type import Models
+from arcor2_hw.data.object_type import Mesh, Models
 from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.kinematics.primitives import Box, Cylinder, Sphere
 
@@ -70,6 +70,22 @@ class Obstacle(Data, frozen=True):
     attachment: Attachment | None = None
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
     file: Path | None = None
+
+    @classmethod
+    def of(
+        cls,
+        model: Models,
+        pose: Pose,
+        scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
+        attachment: Attachment | None = None,
+    ) -> "Obstacle":
+        """Return an obstacle with the name of its collision model."""
+        return cls(model.id, model, pose, attachment, scale)
+
+    @property
+    def is_fixed_primitive(self) -> bool:
+        """Return whether it is a primitive shape that is not attached to a robot, so that `lines` can check it."""
+        return self.attachment is None and not isinstance(self.model, Mesh)
 
 
 class WorldBody(Struct, frozen=True, tag="body"):

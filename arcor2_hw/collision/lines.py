@@ -1,13 +1,72 @@
-"""Intersections of straight lines with primitive shapes, in the frame of the shape. Imports no numerics."""
+"""Intersections of straight lines with primitive shapes and obstacles. Imports no numerics."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final
 
-from arcor2_hw.kinematics.primitives import Box, Capsule, Cylinder, Sphere
+from arcor2_hw.collision.description import Obstacle
+from arcor2_hw.data import object_type
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.geometry import Position
+from arcor2_hw.kinematics.primitives import Box, Capsule, Cylinder, Sphere, primitive_of
 
 _TINY: Final = 1e-12
 _Span = tuple[float, float]
+
+
+class Hit(Data, frozen=True):
+    """The first obstacle that a line meets, and the position along the line (0 to 1)."""
+
+    id: str
+    share: float
+
+
+def first_hit(
+    start: Position, end: Position, obstacles: Iterable[tuple[str, Obstacle]], inflation: float
+) -> Hit | None:
+    """Return the first obstacle that a straight line meets, None when the line is free.
+
+    Only fixed primitives are checked; other obstacles are skipped.
+
+    Args:
+        start: Start of the line.
+        end: End of the line.
+        obstacles: Obstacles by id.
+        inflation: Length added to edges, lengths and radii, m.
+    """
+    nearest, hit = math.inf, None
+    way = end - start
+    for key, one in obstacles:
+        if not one.is_fixed_primitive or not _near(one, start, way, 2 * inflation):
+            continue
+        frame = one.pose.inverted()
+        a, b = (frame.position + point.rotated(frame.orientation) for point in (start, end))
+        if isinstance(one.model, object_type.Mesh):
+            continue
+        at = entry(primitive_of(one.model), (a.x, a.y, a.z), tuple(b - a), inflation)
+        if at is not None and at < nearest:
+            nearest, hit = at, key
+    return None if hit is None else Hit(hit, nearest)
+
+
+def _near(obstacle: Obstacle, a: Position, d: Position, within: float) -> bool:
+    """Return whether the bounding sphere of an obstacle is within `within` m of a line; few of many are."""
+    model, at = obstacle.model, obstacle.pose.position
+    match model:
+        case object_type.Box():
+            radius = math.hypot(model.size_x, model.size_y, model.size_z) / 2
+        case object_type.Sphere():
+            radius = model.radius
+        case object_type.Cylinder():
+            radius = math.hypot(model.radius, model.height / 2)
+        case _:
+            return False
+    x, y, z, reach = at.x - a.x, at.y - a.y, at.z - a.z, radius + within
+    square = d.x * d.x + d.y * d.y + d.z * d.z
+    if square > 0.0:
+        share = min(max((x * d.x + y * d.y + z * d.z) / square, 0.0), 1.0)
+        x, y, z = x - share * d.x, y - share * d.y, z - share * d.z
+    return x * x + y * y + z * z <= reach * reach
 
 
 def entry(

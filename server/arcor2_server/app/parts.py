@@ -48,12 +48,12 @@ from arcor2_server.storage.setting_secrets import SettingSecrets
 from arcor2_server.storage.shared_data import SharedData
 from arcor2_server.websocket.hub import Hub
 from arcor2_server.workspace.calibration import Calibration, CalibrationService, RunningCalibrations
-from arcor2_server.workspace.collisions import CollisionWorld
 from arcor2_server.workspace.display_models import DisplayModels
 from arcor2_server.workspace.host_world import HostWorld
 from arcor2_server.workspace.kinematics import Kinematics
 from arcor2_server.workspace.markers import Markers
 from arcor2_server.workspace.object_aiming import ObjectAimings
+from arcor2_server.workspace.obstacles import ObstacleRegistry
 from arcor2_server.workspace.reachability import ReachabilityBoard
 from arcor2_server.workspace.robot_calibrations import RobotCalibrations
 from arcor2_server.workspace.robot_models import RobotModels
@@ -95,7 +95,7 @@ class Server:
     robots: SceneRobots
     robot_calibrations: RobotCalibrations
     robot_models: RobotModels
-    collisions: CollisionWorld
+    collisions: ObstacleRegistry
     scene_collisions: SceneCollisions
     kinematics: Kinematics
     reachability: ReachabilityBoard
@@ -181,7 +181,7 @@ async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
         robot_calibrations.load()
         stack.push_async_callback(robot_calibrations.close)
         robot_models = RobotModels(robots, robot_calibrations)
-        collisions = CollisionWorld(settings.scene_inflation)
+        collisions = ObstacleRegistry(settings.scene_inflation)
         scene_collisions = SceneCollisions(
             assets, types, session, compute, collisions, robots, robot_models, scene_host, program_host
         )

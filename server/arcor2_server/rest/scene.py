@@ -1,5 +1,6 @@
 """The Scene service: collision models, line checks, poses from focus points (protocol, section 14)."""
 
+from arcor2_hw.collision.description import Obstacle
 from arcor2_hw.compute.kinematics_tasks import ReadMesh
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.geometry import Pose, Position
@@ -12,7 +13,7 @@ from arcor2_server.rest.operations import operation
 from arcor2_server.rest.scenes import check_id
 from arcor2_server.storage import AssetStore
 from arcor2_server.workspace import point_registration
-from arcor2_server.workspace.collisions import CollisionWorld, Placed
+from arcor2_server.workspace.obstacles import ObstacleRegistry
 from arcor2_server.workspace.scene_collisions import SceneCollisions
 
 SCENE = "Scene"
@@ -88,7 +89,7 @@ class SceneServiceOperations:
         assets: AssetStore,
         online: OnlineScene,
         compute: Compute,
-        collisions: CollisionWorld,
+        collisions: ObstacleRegistry,
         scene_collisions: SceneCollisions,
     ) -> None:
         self._assets = assets
@@ -103,7 +104,7 @@ class SceneServiceOperations:
             model = kind(key, *sizes)  # type: ignore[arg-type]
         except ValueError as error:
             raise InvalidData(f"{error}.") from None
-        self._collisions.put(Placed(model, pose))
+        self._collisions.put(Obstacle.of(model, pose))
         return "ok"
 
     @operation("PUT", "/collisions/box", SCENE, Role.TECHNICIAN)
@@ -130,7 +131,7 @@ class SceneServiceOperations:
             raise InvalidData("A mesh cannot be scaled to nothing.")
         self._assets.info(query.mesh_file_id)
         await self._compute.run(ReadMesh(self._scene_collisions.mesh_file(query.mesh_file_id), scale))
-        self._collisions.put(Placed(Mesh(query.mesh_id, query.mesh_file_id), body, scale))
+        self._collisions.put(Obstacle.of(Mesh(query.mesh_id, query.mesh_file_id), body, scale))
         return "ok"
 
     @operation("GET", "/collisions", SCENE, Role.OPERATOR)

@@ -7,6 +7,7 @@ from typing import Final, TypeVar
 
 import msgspec
 
+from arcor2_hw.collision.description import Obstacle
 from arcor2_hw.data.object_type import Mesh, ObjectModel
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.robot import KinematicCalibration
@@ -16,7 +17,7 @@ from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.documents import read_document
 from arcor2_server.hosts.session import HostSession
 from arcor2_server.storage import AssetStore
-from arcor2_server.workspace.collisions import CollisionWorld, Placed
+from arcor2_server.workspace.obstacles import ObstacleRegistry
 from arcor2_server.workspace.robot_calibrations import RobotCalibrations
 
 Opening = TypeVar("Opening", m.OpenScene, m.RunPackage)
@@ -38,7 +39,7 @@ class HostWorld:
 
     def __init__(
         self,
-        collisions: CollisionWorld,
+        collisions: ObstacleRegistry,
         robot_calibrations: RobotCalibrations,
         assets: AssetStore,
         scene_host: HostSession,
@@ -48,7 +49,7 @@ class HostWorld:
         self._robot_calibrations = robot_calibrations
         self._assets = assets
         self._hosts = (scene_host, program_host)
-        collisions.on_put.append(lambda placed: self._send(m.PutBody(self._body(placed))))
+        collisions.on_put.append(lambda obstacle: self._send(m.PutBody(self._body(obstacle))))
         collisions.on_remove.append(lambda keys: self._send(m.RemoveBodies(keys)))
         robot_calibrations.on_change.append(
             lambda robot: scene_host.send(m.Calibrate(robot.id, robot_calibrations.in_force(robot)))
@@ -65,7 +66,7 @@ class HostWorld:
 
     def with_world(self, message: Opening, calibrations: dict[str, KinematicCalibration]) -> Opening:
         """Return a message that opens a scene or runs a package, with the present collision models. Send it at once."""
-        bodies = [self._body(placed) for placed in self._collisions.put_in.values()]
+        bodies = [self._body(obstacle) for obstacle in self._collisions.obstacles.values()]
         return msgspec.structs.replace(message, bodies=bodies, calibrations=calibrations)
 
     def calibrations(
@@ -91,13 +92,13 @@ class HostWorld:
             return {}
         return self.calibrations(scene.objects, project.object_overrides)
 
-    def _body(self, placed: Placed) -> m.PutIn:
-        model, attachment = placed.model, placed.attachment
+    def _body(self, obstacle: Obstacle) -> m.PutIn:
+        model, attachment = obstacle.model, obstacle.attachment
         file = ""
         if isinstance(model, Mesh) and self._assets.exists(model.asset_id):
             file = str(self._assets.file(model.asset_id))
         held = ("", "", []) if attachment is None else (attachment.robot, attachment.link, list(attachment.touching))
-        return m.PutIn(model.id, ObjectModel.of(model), placed.pose, placed.scale, file, *held)
+        return m.PutIn(model.id, ObjectModel.of(model), obstacle.pose, obstacle.scale, file, *held)
 
 
 def _documents(data: Path) -> tuple[Scene, Project]:

@@ -62,10 +62,10 @@ class Kinematics:
         # Others whose joints are not known are not known to stand anywhere.
         known = [one for one in others if joints[one.id]]
         try:
-            return await self._compute.run(task, world=self._scene_collisions.things([robot, *known], joints))
+            return await self._compute.run(task, world=self._scene_collisions.world([robot, *known], joints))
         except KinematicsError as error:
             Arcor2Error.__init__(
-                error, self._scene_collisions.in_names(str(error)), error.detail
+                error, self._scene_collisions.with_names(str(error)), error.detail
             )  # with its code and reason
             raise
 

@@ -23,7 +23,7 @@ from arcor2_server.documents import Session
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.hosts.session import HostSession
 from arcor2_server.object_types.registry import ObjectTypes
-from arcor2_server.workspace.collisions import CollisionWorld
+from arcor2_server.workspace.obstacles import ObstacleRegistry
 from arcor2_server.workspace.robot_calibrations import RobotCalibrations
 from arcor2_server.workspace.robot_models import RobotModels
 from arcor2_server.workspace.robots import SceneRobots
@@ -72,7 +72,7 @@ class ReachabilityBoard:
         session: Session,
         host: HostSession,
         compute: Compute,
-        collisions: CollisionWorld,
+        collisions: ObstacleRegistry,
         robot_calibrations: RobotCalibrations,
         robots: SceneRobots,
         robot_models: RobotModels,
@@ -291,7 +291,7 @@ class ReachabilityBoard:
         for gone in row.judged.keys() - targets.keys():
             del row.judged[gone]
             row.targets.pop(gone, None)
-        world = self._scene_collisions.things(
+        world = self._scene_collisions.world(
             standing, {key: at for key, at in self._stopped.joints.items() if key != row.robot}
         )
         if world != row.world:
@@ -328,7 +328,7 @@ class ReachabilityBoard:
         """Store the results and publish those that changed."""
         changed = []
         for key, one in judged.items():
-            item = ReachOfItem(key, one.reach, self._scene_collisions.in_names(one.reason) or UNSET)
+            item = ReachOfItem(key, one.reach, self._scene_collisions.with_names(one.reason) or UNSET)
             row.targets[key] = targets[key]
             if row.judged.get(key) != item:
                 row.judged[key] = item

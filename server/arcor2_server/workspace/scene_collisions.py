@@ -5,7 +5,17 @@ from collections.abc import Iterator, Mapping
 
 import msgspec
 
-from arcor2_hw.collision.description import Attachment, MeshShape, Shape, StoredFile, WorldBody, WorldItem, WorldRobot
+from arcor2_hw.collision.description import (
+    Attachment,
+    MeshShape,
+    Obstacle,
+    Shape,
+    StoredFile,
+    WorldBody,
+    WorldItem,
+    WorldRobot,
+)
+from arcor2_hw.collision.lines import Hit, first_hit
 from arcor2_hw.compute.kinematics_tasks import CheckLines, Line, PlaceInLink
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import PackageInfoData
@@ -21,7 +31,7 @@ from arcor2_server.documents import Session
 from arcor2_server.hosts.session import HostSession
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.storage import AssetStore
-from arcor2_server.workspace.collisions import CollisionWorld, Hit, Placed, first_hit
+from arcor2_server.workspace.obstacles import ObstacleRegistry
 from arcor2_server.workspace.robot_models import RobotModels
 from arcor2_server.workspace.robots import SceneRobots
 
@@ -29,20 +39,20 @@ Joints = Mapping[str, list[Joint]]
 """Present joint values by robot."""
 
 
-def _held(placed: Placed, robot: str, part: HeldPart) -> Placed:
-    return Placed(placed.model, part.pose, placed.scale, Attachment(robot, part.link))
+def _held(obstacle: Obstacle, robot: str, part: HeldPart) -> Obstacle:
+    return Obstacle.of(obstacle.model, part.pose, obstacle.scale, Attachment(robot, part.link))
 
 
 @functools.lru_cache(maxsize=1)
-def _of_program(encoded: bytes) -> tuple[tuple[str, str, Placed], ...]:
+def _of_program(encoded: bytes) -> tuple[tuple[str, str, Obstacle], ...]:
     info = msgspec.json.decode(encoded, type=_InfoEvent).data
     kinds = info.collision_models
     every: list[Models] = [*kinds.boxes, *kinds.spheres, *kinds.cylinders, *kinds.meshes]
     models = {one.id: one for one in every}
     return tuple(
-        (placed.id, placed.name, Placed(models[placed.type], placed.pose))
-        for placed in info.scene.objects
-        if placed.type in models and not isinstance(placed.pose, Unset)
+        (obstacle.id, obstacle.name, Obstacle.of(models[obstacle.type], obstacle.pose))
+        for obstacle in info.scene.objects
+        if obstacle.type in models and not isinstance(obstacle.pose, Unset)
     )
 
 
@@ -59,7 +69,7 @@ class SceneCollisions:
         types: ObjectTypes,
         session: Session,
         compute: Compute,
-        collisions: CollisionWorld,
+        collisions: ObstacleRegistry,
         robots: SceneRobots,
         robot_models: RobotModels,
         scene_host: HostSession,
@@ -81,45 +91,47 @@ class SceneCollisions:
         path = str(self._assets.file(asset_id)) if self._assets.exists(asset_id) else "/nonexistent"
         return StoredFile(path, asset_id)
 
-    def body_of(self, key: str, placed: Placed) -> WorldBody:
-        """Return a placed model for the worker."""
-        model = placed.model
+    def body_of(self, key: str, obstacle: Obstacle) -> WorldBody:
+        """Return an obstacle as a body of a world description."""
+        model = obstacle.model
         shape: Shape = (
-            MeshShape(self.mesh_file(model.asset_id), placed.scale) if isinstance(model, Mesh) else primitive_of(model)
+            MeshShape(self.mesh_file(model.asset_id), obstacle.scale)
+            if isinstance(model, Mesh)
+            else primitive_of(model)
         )
-        return WorldBody(key, shape, placed.pose, placed.attachment)
+        return WorldBody(key, shape, obstacle.pose, obstacle.attachment)
 
-    def in_operation(self) -> dict[str, Placed]:
+    def in_operation(self) -> dict[str, Obstacle]:
         """Return all collision models by id: those added over REST, and those of the scene in operation."""
-        return dict(self._of_scene_in_operation()) | self._collisions.put_in
+        return dict(self._of_scene_in_operation()) | self._collisions.obstacles
 
-    def _of_scene_in_operation(self) -> Iterator[tuple[str, Placed]]:
+    def _of_scene_in_operation(self) -> Iterator[tuple[str, Obstacle]]:
         """Return the collision models of the scene that is online, or of the running program, by id.
 
-        A part that a robot holds is in the frame of the link that holds it.
+        A gripped part is in the frame of the link that holds it.
         """
         scene = self._session.scene
         if scene is not None and self._scene_host.online:
             board = self._scene_host.board
-            placed = [
-                (obj.id, obj.name, Placed(model.model(), obj.pose))
+            obstacles = [
+                (obj.id, obj.name, Obstacle.of(model.model(), obj.pose))
                 for obj in scene.objects
                 if not isinstance(model := self._types.meta(obj.type).object_model, Unset)
                 and not isinstance(obj.pose, Unset)
             ]
         elif (encoded := self._program_host.package_info) is not None:
-            board, placed = self._program_host.board, list(_of_program(encoded))
+            board, obstacles = self._program_host.board, list(_of_program(encoded))
         else:
             return
         disabled, held = board.not_in_the_way(), board.held_parts()
-        for key, name, one in placed:
+        for key, name, one in obstacles:
             if key not in disabled:
                 yield key, _held(one, *held[name]) if name in held else one
         for name, (robot, part) in held.items():
             if part.model is not None:
-                yield name, _held(Placed(part.model.model(), part.pose), robot, part)
+                yield name, _held(Obstacle.of(part.model.model(), part.pose), robot, part)
 
-    def standing(self) -> dict[str, Placed]:
+    def obstacles(self) -> dict[str, Obstacle]:
         """Return the collision models of the open scene, online or not, and those added over REST."""
         found = self.in_operation()
         scene = self._session.scene
@@ -127,11 +139,11 @@ class SceneCollisions:
             for obj in scene.objects:
                 model = self._types.meta(obj.type).object_model
                 if not isinstance(model, Unset) and not isinstance(obj.pose, Unset) and obj.id not in found:
-                    found[obj.id] = Placed(model.model(), obj.pose)
+                    found[obj.id] = Obstacle.of(model.model(), obj.pose)
         return found
 
-    def things(self, chosen: list[SceneObject], joints: Joints | None = None) -> dict[str, WorldItem]:
-        """Return the world of the open scene with the chosen robots and the parts that they hold.
+    def world(self, chosen: list[SceneObject], joints: Joints | None = None) -> dict[str, WorldItem]:
+        """Return the world description of the open scene with the chosen robots and the parts that they hold.
 
         joints: of those robots; others are in their middle position. Parts held by other robots are left out.
         """
@@ -141,18 +153,18 @@ class SceneCollisions:
             model = self._robot_models.find(robot)
             if model is not None:
                 found[robot.id] = WorldRobot(robot.id, model, present.get(robot.id, []))
-        for key, placed in self.standing().items():
-            if key not in found and (placed.attachment is None or placed.attachment.robot in found):
-                found[key] = self.body_of(key, placed)
+        for key, obstacle in self.obstacles().items():
+            if key not in found and (obstacle.attachment is None or obstacle.attachment.robot in found):
+                found[key] = self.body_of(key, obstacle)
         return found
 
-    def in_names(self, text: str) -> str:
-        """Return a sentence of the worker, which knows ids, with the names by which people know the objects."""
+    def with_names(self, text: str) -> str:
+        """Replace the ids of objects in a message of the worker by their names."""
         scene = self._session.scene
         if not text or scene is None:
             return text
         met = [obj for obj in scene.objects if obj.id in text]
-        for obj in sorted(met, key=lambda obj: len(obj.id), reverse=True):  # an id may begin as another one does
+        for obj in sorted(met, key=lambda obj: len(obj.id), reverse=True):  # an id may be the beginning of another
             text = text.replace(obj.id, obj.name)
         return text
 
@@ -162,17 +174,17 @@ class SceneCollisions:
 
         As in the protocol, robots are ignored, since the caller is one of them; the parts that they hold are not.
         """
-        placed = self.in_operation()
+        obstacles = self.in_operation()
         inflation = self._collisions.inflation
-        found = first_hit(start, end, placed.items(), inflation)
-        rest = {key: one for key, one in placed.items() if not one.simple}
+        found = first_hit(start, end, obstacles.items(), inflation)
+        rest = {key: one for key, one in obstacles.items() if not one.is_fixed_primitive}
         if not rest:
             return found
         holders = {one.attachment.robot for one in rest.values() if one.attachment is not None}
         chosen = [robot for robot in self._robots.with_models() if robot.id in holders]
         joints = {robot.id: await self._robots.present_joints(robot) for robot in chosen}
         world: dict[str, WorldItem] = {
-            key: thing for key, thing in self.things(chosen, joints).items() if key in rest or key in holders
+            key: thing for key, thing in self.world(chosen, joints).items() if key in rest or key in holders
         }
         task = CheckLines([Line(start, end)], inflation, sorted(holders))
         (further,) = await self._compute.run(task, world=world)
@@ -182,25 +194,32 @@ class SceneCollisions:
 
     # ------------------------------------------------------------------------------------------------ holding
     async def attach(self, key: str, robot: SceneObject, link: str) -> None:
-        """Let a robot hold a model that was put in, from where both are now on; it moves with the link.
+        """Attach an obstacle to a link of a robot at their present poses.
 
-        NotFound; raise Conflict when it is held, when the robot has no model, or its joints are not known.
+        Raises:
+            NotFound: There is no such obstacle or link.
+            Conflict: It is attached already, or the robot has no model or unknown joints.
         """
-        placed = self._collisions.given(key)
-        if placed.attachment is not None:
+        obstacle = self._collisions.get(key)
+        if obstacle.attachment is not None:
             raise Conflict(f"{key} is held already.")
-        in_link = await self._in_link(robot, link, placed.pose)
-        self._collisions.put(Placed(placed.model, in_link, placed.scale, Attachment(robot.id, link)))
+        in_link = await self._in_link(robot, link, obstacle.pose)
+        self._collisions.put(Obstacle.of(obstacle.model, in_link, obstacle.scale, Attachment(robot.id, link)))
 
     async def detach(self, key: str) -> Pose:
-        """Let go of a model, which stays where it is now; return where. NotFound; Conflict as `attach`."""
-        placed = self._collisions.given(key)
-        if placed.attachment is None:
+        """Detach an obstacle and return its pose, which stays as it is.
+
+        Raises:
+            NotFound: There is no such obstacle.
+            Conflict: It is not attached, or the joints of the robot are unknown.
+        """
+        obstacle = self._collisions.get(key)
+        if obstacle.attachment is None:
             raise Conflict(f"{key} is not held.")
-        robot = self._robots.robot(placed.attachment.robot)
-        link_from_world = await self._in_link(robot, placed.attachment.link, Pose())
-        pose = link_from_world.inverted() * placed.pose
-        self._collisions.put(Placed(placed.model, pose, placed.scale))
+        robot = self._robots.robot(obstacle.attachment.robot)
+        link_from_world = await self._in_link(robot, obstacle.attachment.link, Pose())
+        pose = link_from_world.inverted() * obstacle.pose
+        self._collisions.put(Obstacle.of(obstacle.model, pose, obstacle.scale))
         return pose
 
     async def _in_link(self, robot: SceneObject, link: str, pose: Pose) -> Pose:

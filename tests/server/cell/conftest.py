@@ -44,9 +44,9 @@ from arcor2_server.storage.packages import Packages
 from arcor2_server.storage.secret_store import SecretStore
 from arcor2_server.storage.setting_secrets import SettingSecrets
 from arcor2_server.websocket.hub import Hub
-from arcor2_server.workspace.collisions import CollisionWorld
 from arcor2_server.workspace.host_world import HostWorld
 from arcor2_server.workspace.kinematics import Kinematics
+from arcor2_server.workspace.obstacles import ObstacleRegistry
 from arcor2_server.workspace.robot_calibrations import RobotCalibrations
 from arcor2_server.workspace.robot_models import RobotModels
 from arcor2_server.workspace.robots import SceneRobots
@@ -172,7 +172,7 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     scene_host, program_host = HostSession(hub, hosts, "scene"), HostSession(hub, hosts, "program", everybody=True)
     robots = SceneRobots(assets, known, session, scene_host)
     calibrations = RobotCalibrations(settings, hub, known, session, scene_host, compute, damage, robots)
-    models, collisions = RobotModels(robots, calibrations), CollisionWorld(settings.scene_inflation)
+    models, collisions = RobotModels(robots, calibrations), ObstacleRegistry(settings.scene_inflation)
     scene_collisions = SceneCollisions(
         assets, known, session, compute, collisions, robots, models, scene_host, program_host
     )

@@ -8,13 +8,12 @@ import pytest
 import trimesh
 from msgspec.structs import replace
 
-from arcor2_hw.collision.description import Attachment
+from arcor2_hw.collision.description import Attachment, Obstacle
 from arcor2_hw.data import object_type
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
-from arcor2_server.workspace.collisions import Placed
 from tests.runtime.conftest import Package
 from tests.runtime.test_host_safe_moves import (
     ACROSS,
@@ -93,8 +92,8 @@ async def with_arm_alone(server: Server) -> None:
     await server.open(Scene("scene", id="scn_1", objects=[placed("arm", "Arm", Pose())]))
 
 
-def box(key: str, at: Position, x: float, y: float, z: float, attachment: Attachment | None = None) -> Placed:
-    return Placed(object_type.Box(key, x, y, z), Pose(at), attachment=attachment)
+def box(key: str, at: Position, x: float, y: float, z: float, attachment: Attachment | None = None) -> Obstacle:
+    return Obstacle.of(object_type.Box(key, x, y, z), Pose(at), attachment=attachment)
 
 
 async def line(server: Server, to: Position) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 import msgspec
 
+from arcor2_hw.collision.description import Obstacle
 from arcor2_hw.compute.kinematics_tasks import DescribeRobot
 from arcor2_hw.compute.task import WorkerKind
 from arcor2_hw.data.base import UNSET
@@ -16,7 +17,6 @@ from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Joint
 from arcor2_server.documents.changes import Kind
-from arcor2_server.workspace.collisions import Placed
 from tests.server.protocol.devices import PART
 from tests.server.protocol.stage import PATIENCE, Actor, Stage, open_stage, refused, until
 
@@ -102,7 +102,7 @@ async def test_reachability_is_told_and_follows_edits(tmp_path: Path) -> None:
         await until(lambda: told(bob) == {near: "reachable"})
         bob.take()
         # Something is put in the way, and taken out again.
-        stage.services.collisions.put(Placed(Box("box", 0.2, 0.2, 0.2), Pose(Position(0.4, 0.2, 0.3))))
+        stage.services.collisions.put(Obstacle.of(Box("box", 0.2, 0.2, 0.2), Pose(Position(0.4, 0.2, 0.3))))
         await until(lambda: told(bob) == {near: "in_collision"})
         (answer,) = await carol.ask("Reachability", ids=[near])
         assert "box" in answer["items"][0]["reason"]

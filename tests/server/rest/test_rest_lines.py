@@ -5,12 +5,13 @@ import math
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from arcor2_hw.collision.description import Obstacle
+from arcor2_hw.collision.lines import Hit, first_hit
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, Sphere
-from arcor2_server.workspace.collisions import Hit, Placed, first_hit
 
 
-def inside(point: Position, placed: Placed, inflation: float) -> bool:
+def inside(point: Position, placed: Obstacle, inflation: float) -> bool:
     """Tell it the plain way, to compare with."""
     local = (point - placed.pose.position).rotated(placed.pose.orientation.inverted())
     match placed.model:
@@ -43,8 +44,10 @@ SHARES = [n / SAMPLES for n in range(SAMPLES + 1)]
 
 
 @settings(max_examples=200, deadline=None)
-@given(positions, positions, st.builds(Placed, models, poses), st.sampled_from([0.0, 0.01, 0.3]))
-def test_a_line_meets_what_its_points_lie_in(start: Position, end: Position, placed: Placed, inflation: float) -> None:
+@given(positions, positions, st.builds(Obstacle.of, models, poses), st.sampled_from([0.0, 0.01, 0.3]))
+def test_a_line_meets_what_its_points_lie_in(
+    start: Position, end: Position, placed: Obstacle, inflation: float
+) -> None:
     way = end - start
     samples = [start + Position(way.x * share, way.y * share, way.z * share) for share in SHARES]
     hit = first_hit(start, end, [("it", placed)], inflation) is not None
@@ -58,18 +61,18 @@ def test_a_line_meets_what_its_points_lie_in(start: Position, end: Position, pla
 
 def test_the_size_is_increased_by_as_much_as_stated() -> None:
     for model, reach in ((Box("x", 1, 1, 1), 0.505), (Sphere("x", 0.5), 0.51), (Cylinder("x", 0.5, 1), 0.51)):
-        placed = [("x", Placed(model, Pose()))]
+        placed = [("x", Obstacle.of(model, Pose()))]
         for y, free in ((reach - 1e-6, False), (reach + 1e-6, True)):
             assert (first_hit(Position(-2, y), Position(2, y), placed, 0.01) is None) is free, (model, y)
-    top = [("x", Placed(Cylinder("x", 0.5, 1), Pose()))]
+    top = [("x", Obstacle.of(Cylinder("x", 0.5, 1), Pose()))]
     assert first_hit(Position(0, 0, 0.506), Position(0.1, 0, 0.506), top, 0.01) is None
     assert first_hit(Position(0, 0, 0.504), Position(0.1, 0, 0.504), top, 0.01) == Hit("x", 0.0)
 
 
 def test_a_line_of_no_length_and_one_from_within() -> None:
-    ball = [("x", Placed(Sphere("x", 1), Pose()))]
+    ball = [("x", Obstacle.of(Sphere("x", 1), Pose()))]
     assert first_hit(Position(), Position(), ball, 0.0) == Hit("x", 0.0)
     assert first_hit(Position(2), Position(2), ball, 0.0) is None
     assert first_hit(Position(), Position(5), ball, 0.0) == Hit("x", 0.0)
     assert first_hit(Position(5), Position(9), ball, 0.0) is None, "behind the start there is no line"
-    assert first_hit(Position(-2), Position(2), [("x", Placed(Mesh("x", "file"), Pose()))], 0.0) is None
+    assert first_hit(Position(-2), Position(2), [("x", Obstacle.of(Mesh("x", "file"), Pose()))], 0.0) is None
