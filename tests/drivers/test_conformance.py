@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from arcor2_hw.analysis import InstalledType
-from arcor2_hw.testing import declarations, quality
+from arcor2_hw.testing import declarations, quality, rules
 from arcor2_hw.testing.bench import Bench
 from arcor2_hw.testing.conformance import Conformance
 from tests.drivers import benches
@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def found_benches() -> list[type[Bench]]:
-    """Give the benches of all modules of the package benches."""
+    """Return the benches of all modules of the package `benches`."""
     return [
         each
         for module in pkgutil.iter_modules(benches.__path__, f"{benches.__name__}.")
@@ -37,6 +37,8 @@ def test_every_installed_driver_is_covered(driver: InstalledType) -> None:
     assert not wrong, "; ".join(wrong)
     assert quality.is_bench(file), "quality.yaml does not say `conformance: bench`: none of our drivers is exempt"
     claims = quality.read(file)
-    assert (ROOT / claims.page).is_file(), f"quality.yaml names the page {claims.page}, which is not there"
+    assert (ROOT / claims.page).is_file(), f"quality.yaml names the page {claims.page}, which does not exist"
+    wrong = rules.missing_tests(claims.rules, [ROOT / "tests/drivers"], file.parent.name, {})
+    assert not wrong, "; ".join(wrong)
     have = {bench.type_name() for bench in TestConformance.benches}
     assert driver.name in have or driver.name in claims.not_run, f"{driver.name} has neither a bench nor a reason"

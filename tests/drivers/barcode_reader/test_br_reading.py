@@ -8,11 +8,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from arcor2_drivers.barcode_reader.barcode_reader import BarcodeReader
 from arcor2_drivers.barcode_reader.settings import BarcodeReaderSettings
@@ -397,13 +395,3 @@ def test_a_killed_owner_leaves_no_reading(
     reader = make(fake.ready["port"])
     reader.connect()
     assert reader.scan() == "AFTER"
-
-
-def test_what_the_quality_file_claims_is_there() -> None:
-    root = Path(__file__).resolve().parents[3]
-    claims = yaml.safe_load((root / "drivers/arcor2_drivers/barcode_reader/quality.yaml").read_text())
-    named = [test for tests in claims["rules"].values() for test in tests]
-    for test in named:
-        file, _, function = test.partition("::")
-        assert f"def {function}(" in (Path(__file__).parent / file).read_text(), test
-    assert all(hasattr(getattr(BarcodeReader, name), "__action__") for name in claims["actions"])

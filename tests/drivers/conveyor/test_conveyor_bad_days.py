@@ -8,13 +8,10 @@ import threading
 import time
 import tty
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
-import arcor2_drivers.conveyor as package
 from arcor2_drivers.conveyor.conveyor import Conveyor
 from arcor2_drivers.conveyor.settings import ConveyorSettings
 from arcor2_drivers.conveyor.slcan import SlcanBus
@@ -231,13 +228,3 @@ def test_disconnecting_stops_a_belt_that_runs(fake: FakeProcess, belt: Conveyor)
     belt.disconnect()
     assert time.monotonic() - began < 1.0
     fake.control.wait_until(lambda t: t["velocity"] == 0.0 and t["state"] == "switch_on_disabled")
-
-
-def test_every_claim_names_a_test_that_exists() -> None:
-    claims = yaml.safe_load((Path(package.__file__).parent / "quality.yaml").read_text())
-    here = Path(__file__).parent
-    for tests in claims["rules"].values():
-        for test in tests:
-            file, _, function = test.partition("::")
-            assert f"def {function}(" in (here / file).read_text(), test
-    assert all(hasattr(Conveyor, name) for name in claims["actions"])

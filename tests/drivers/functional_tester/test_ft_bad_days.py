@@ -7,11 +7,9 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from pymodbus.client import ModbusTcpClient
 
 from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
@@ -321,13 +319,3 @@ def test_wrong_unit_is_refused_by_name(fake: FakeProcess, make: Callable[..., Fu
 def test_settings_out_of_range_name_the_parameter(name: str, value: Any) -> None:
     with pytest.raises(OutOfRange, match=f"^{name} must be"):
         FunctionalTesterSettings(**{"host": "127.0.0.1", name: value})
-
-
-def test_what_the_quality_file_claims_is_there() -> None:
-    root = Path(__file__).resolve().parents[3]
-    claims = yaml.safe_load((root / "drivers/arcor2_drivers/functional_tester/quality.yaml").read_text())
-    named = [test for tests in claims["rules"].values() for test in tests]
-    for test in named:
-        file, _, function = test.partition("::")
-        assert f"def {function}(" in (Path(__file__).parent / file).read_text(), test
-    assert all(hasattr(getattr(FunctionalTester, name), "__action__") for name in claims["actions"])

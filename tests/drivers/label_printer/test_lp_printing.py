@@ -2,11 +2,9 @@
 
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from arcor2_drivers.label_printer.settings import ZplPrinterSettings
 from arcor2_drivers.label_printer.zpl_printer import ZplPrinter
@@ -264,15 +262,6 @@ def test_no_such_port(make: Callable[..., ZplPrinter], port: str) -> None:
 def test_settings_out_of_range_name_the_parameter(name: str, value: Any) -> None:
     with pytest.raises(OutOfRange, match=f"^{name} must be"):
         ZplPrinterSettings(**{"port": "/dev/ttyUSB0", name: value})
-
-
-def test_what_the_quality_file_claims_is_there() -> None:
-    root = Path(__file__).resolve().parents[3]
-    claims = yaml.safe_load((root / "drivers/arcor2_drivers/label_printer/quality.yaml").read_text())
-    for test in [test for tests in claims["rules"].values() for test in tests]:
-        file, _, function = test.partition("::")
-        assert f"def {function}(" in (Path(__file__).parent / file).read_text(), test
-    assert all(hasattr(getattr(ZplPrinter, name), "__action__") for name in claims["actions"])
 
 
 @pytest.mark.parametrize("fake", ["flags"], indirect=True)

@@ -6,15 +6,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from pymodbus.client import ModbusTcpClient
 
 from arcor2_drivers.remote_io.remote_io import RemoteIO
-from arcor2_drivers.remote_io.tower_light import TowerLight
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import (
     ConnectionLost,
@@ -257,15 +254,3 @@ def test_outputs_go_to_their_safe_state_when_the_drivers_process_is_killed(
     assert truth["outputs"][4:7] == [False, True, True]
     assert truth["analog_outputs"][0] == 0
     assert watcher.connection is Connection.ONLINE
-
-
-def test_what_the_quality_file_claims_is_there() -> None:
-    root = Path(__file__).resolve().parents[3]
-    claims = yaml.safe_load((root / "drivers/arcor2_drivers/remote_io/quality.yaml").read_text())
-    for test in itertools.chain.from_iterable(claims["rules"].values()):
-        file, _, function = test.partition("::")
-        assert f"def {function}(" in (Path(__file__).parent / file).read_text(), test
-    types = {each.__name__: each for each in (RemoteIO, TowerLight)}
-    assert set(claims["types"]) == set(types)
-    for type_name, names in claims["actions"].items():
-        assert all(hasattr(getattr(types[type_name], name), "__action__") for name in names)

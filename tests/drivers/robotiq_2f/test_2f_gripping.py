@@ -2,11 +2,9 @@
 
 import threading
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -328,13 +326,3 @@ def test_settings_name_the_parameter(wrong: dict[str, Any], named: str) -> None:
     with pytest.raises(OutOfRange, match=f"^{named} must be") as caught:
         Robotiq2FSettings(**{"host": "gripper.local", **wrong})
     assert isinstance(caught.value, Arcor2Error)
-
-
-def test_what_the_quality_file_claims_is_there() -> None:
-    root = Path(__file__).resolve().parents[3]
-    claims = yaml.safe_load((root / "drivers/arcor2_drivers/robotiq_2f/quality.yaml").read_text())
-    named = [test for tests in claims["rules"].values() for test in tests]
-    for test in named:
-        file, _, function = test.partition("::")
-        assert f"def {function}(" in (Path(__file__).parent / file).read_text(), test
-    assert all(hasattr(getattr(Robotiq2F, name), "__action__") for name in claims["actions"])

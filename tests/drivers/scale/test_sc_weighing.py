@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from arcor2_drivers.scale.mt_sics_scale import MtSicsScale
 from arcor2_drivers.scale.settings import MtSicsScaleSettings
@@ -251,12 +250,3 @@ def test_a_port_in_use_and_half_a_command_in_the_scale(fake: FakeProcess, make: 
 def test_settings_out_of_range_name_the_parameter(name: str, value: Any) -> None:
     with pytest.raises(OutOfRange, match=f"^{name} must be"):
         MtSicsScaleSettings(**{"port": "/dev/ttyUSB0", name: value})
-
-
-def test_what_the_quality_file_claims_is_there() -> None:
-    root = Path(__file__).resolve().parents[3]
-    claims = yaml.safe_load((root / "drivers/arcor2_drivers/scale/quality.yaml").read_text())
-    for test in [test for tests in claims["rules"].values() for test in tests]:
-        file, _, function = test.partition("::")
-        assert f"def {function}(" in (Path(__file__).parent / file).read_text(), test
-    assert all(hasattr(getattr(MtSicsScale, name), "__action__") for name in claims["actions"])

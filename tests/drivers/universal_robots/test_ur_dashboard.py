@@ -1,20 +1,14 @@
-"""The dashboard connection: deadlines, late answers, idle connections that broke; and what the quality file claims."""
+"""The dashboard connection: deadlines, late answers, idle connections that broke."""
 
-import ast
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
-import yaml
 
-from arcor2_drivers.universal_robots import ur5e
 from arcor2_drivers.universal_robots.dashboard import Dashboard
-from arcor2_hw.actions import metadata_of
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected, Refused
-from arcor2_hw.objects import Robot
 
 GREETING = b"Connected: Universal Robots Dashboard Server\n"
 Answer = Callable[[socket.socket, bytes], None]
@@ -106,24 +100,3 @@ def test_what_goes_wrong_is_typed_and_names_the_address(server: Callable[[Answer
         dashboard.do("play", "Starting program")
     with pytest.raises(NotConnected, match=r"127\.0\.0\.1:1\.$"):
         Dashboard("127.0.0.1", 1).ask("x")
-
-
-def test_what_the_quality_file_claims_is_there() -> None:
-    root = Path(__file__).parents[3]
-    claims = yaml.safe_load((root / "drivers/arcor2_drivers/universal_robots/quality.yaml").read_text())
-    assert len(claims["rules"]) == 8
-    for tests in claims["rules"].values():
-        for test in tests:
-            file, name = test.split("::")
-            tree = ast.parse((Path(__file__).parent / file).read_text())
-            assert name in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}, test
-    assert (root / claims["page"]).is_file()
-    for type_name in claims["types"]:
-        own = {
-            name
-            for base in getattr(ur5e, type_name).__mro__
-            if base not in Robot.__mro__
-            for name, value in vars(base).items()
-            if metadata_of(value)
-        }
-        assert own == set(claims["actions"])
