@@ -1,11 +1,11 @@
 """An optional method that is there only at run time, where no analysis can see it."""
 
-from .toy_press import ADDRESS, ToyPress
+from .toy_press import NOWHERE, ToyPress
 
 
 class BrokenPress(ToyPress):
     """A press."""
 
-    def __init__(self, obj_id: str, name: str, address: str = ADDRESS) -> None:
+    def __init__(self, obj_id: str, name: str, address: str = NOWHERE) -> None:
         super().__init__(obj_id, name, address)
         self.permissives = lambda: [("guard closed", True)]

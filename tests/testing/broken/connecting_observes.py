@@ -1,10 +1,10 @@
 """Connecting enables the press."""
 
-from .toy_press import PRESS, ToyPress
+from .toy_press import ToyPress
 
 
 class BrokenPress(ToyPress):
     """A press."""
 
     def _greet(self) -> None:
-        PRESS.ask("enable")
+        self._press.ask("enable")

@@ -1,18 +1,26 @@
-"""The stroke that was cut off goes on after the loss."""
+"""A stroke that was cut off by a connection loss continues after the loss."""
 
-from .toy_press import PRESS, ToyPress
+from arcor2_hw.actions import action
+from arcor2_hw.exceptions import ConnectionLost
+
+from .toy_press import ToyPress
 
 
 class BrokenPress(ToyPress):
     """A press."""
 
-    def _lost(self) -> None:
-        self._had = self._acting.locked()
-        super()._lost()
+    @action
+    def stroke(self, *, an: str | None = None) -> None:
+        """Press."""
+        try:
+            super().stroke()
+        except ConnectionLost:
+            self._unfinished = True
+            raise
 
     def _back(self) -> None:
         super()._back()
-        if self._had:
-            PRESS.ask("stroke")
+        if self._unfinished:
+            self._press.ask("stroke")
 
-    _had = False
+    _unfinished = False

@@ -1,11 +1,11 @@
 """Silence in a call is an error of the library below."""
 
-from .toy_press import PRESS, ToyPress
+from .toy_press import ToyPress
 
 
 class BrokenPress(ToyPress):
     """A press."""
 
     def measure(self) -> int:
-        PRESS.ask()
+        self._press.ask()
         return super().measure()

@@ -1,4 +1,4 @@
-"""A stop in the second half of the stroke is forgotten."""
+"""A stop late in the third stroke of a connection is forgotten."""
 
 import time
 
@@ -12,13 +12,15 @@ class BrokenPress(ToyPress):
 
     def stop(self) -> None:
         """Stop."""
-        if time.monotonic() - self._began < 0.25:
+        if self._strokes < 3 or time.monotonic() - self._began < 0.25:
             super().stop()
 
     @action
     def stroke(self, *, an: str | None = None) -> None:
         """Press."""
         self._began = time.monotonic()
+        self._strokes += 1
         super().stroke()
 
     _began = 0.0
+    _strokes = 0

@@ -1,5 +1,6 @@
-"""A press that lives in memory, a driver that keeps all rules, and its bench. Beside it lies what breaks a rule."""
+"""A simulated press, a driver that keeps all rules, and its bench. The other modules each break one rule."""
 
+import math
 import sys
 import tempfile
 import threading
@@ -24,10 +25,14 @@ from arcor2_hw.exceptions import (
 from arcor2_hw.objects import Generic, Machine, MachineCommand, MachineState
 from arcor2_hw.testing.bench import Bench, Check
 
-ADDRESS, NOWHERE = "press.cell:502", "nowhere.cell:502"
+NOWHERE = "nowhere.cell:502"
 WATCHDOG = 0.6  # s
 STROKE = 20.0  # s
 MAX_FORCE = 1000.0  # N
+FRESH = 0.1
+"""Age in s from which on a reading is stale."""
+PATIENCE = 0.5
+"""Time in s for which a call waits for a fresh reading: on a busy machine the observing thread runs late."""
 ORPHAN = """
 import sys, time
 while True:
@@ -37,24 +42,43 @@ while True:
 
 
 class Press:
-    """The device. A stroke ends by its time, by stop, or by the watchdog when nobody has asked for long."""
+    """The device. A stroke ends by its time, by stop, or by the watchdog when nobody can reach the press.
+
+    The watchdog counts from the moment at which the press falls silent, not from the last question: a thread that
+    runs late on a busy machine does not trip it.
+    """
 
     def __init__(self) -> None:
         self.writes: list[str] = []
         self.wire: list[str] = []
-        self.silent = self.torn = False
+        self.torn = False
+        self.silent_since = math.inf
         self.owner: str | None = None
-        self.until = self.asked = 0.0
+        self.until = 0.0
         self.link = 0
         self.force = 250.0  # N
+        self.scrapped = False
+
+    @property
+    def silent(self) -> bool:
+        return self.silent_since != math.inf
+
+    def fall_silent(self) -> None:
+        self.silent_since = time.monotonic()
+
+    def heal(self) -> None:
+        self.running()
+        self.silent_since, self.torn = math.inf, False
+
+    def scrap(self) -> None:
+        """End all that still uses this press: threads which a broken driver leaves behind."""
+        self.scrapped, self.until = True, 0.0
 
     def ask(self, write: str = "", link: int | None = None) -> None:
         if link is not None and link != self.link:
             raise ConnectionResetError
-        if self.silent:
+        if self.silent or self.scrapped:
             raise TimeoutError
-        self.running()
-        self.asked = time.monotonic()
         if write:
             self.writes.append(write)
             self.wire.append(write)
@@ -64,18 +88,20 @@ class Press:
             self.until = 0.0
 
     def running(self) -> bool:
-        if time.monotonic() - self.asked > WATCHDOG:
+        if time.monotonic() - self.silent_since > WATCHDOG:
             self.until = 0.0
         return time.monotonic() < self.until
 
     def answer(self) -> bytes:
         if self.torn:
-            self.torn, self.silent = False, True
+            self.torn = False
+            self.fall_silent()
             return b"\x00"
         return b"\x00\x2a"
 
 
-PRESS = Press()
+PRESSES: dict[str, Press] = {}
+"""The presses by address; each bench has its own, and each case a new one at the same address."""
 
 
 class ToyPress(Machine, Generic):
@@ -85,14 +111,15 @@ class ToyPress(Machine, Generic):
     states: ClassVar[frozenset[MachineState]] = frozenset({MachineState.STOPPED, MachineState.EXECUTE})
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(WATCHDOG)
 
-    def __init__(self, obj_id: str, name: str, address: str = ADDRESS) -> None:
+    def __init__(self, obj_id: str, name: str, address: str = NOWHERE) -> None:
         super().__init__(obj_id, name)
         self.where = f"{name} at {address}"
-        self._there = address == ADDRESS
+        self._there = address in PRESSES
+        self._press = PRESSES.get(address) or Press()
         self._state, self._ours, self._stops = Connection.OFFLINE, False, 0
         self._read_at = 0.0
         self._link = 0
-        self._acting = threading.Lock()
+        self._acting, self._stopping = threading.Lock(), threading.Lock()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -104,10 +131,10 @@ class ToyPress(Machine, Generic):
     def connect(self, timeout: float = 5.0) -> None:
         if self._thread is not None:
             return
-        if not self._there or PRESS.silent:
+        if not self._there or self._press.silent:
             self._state = Connection.FAILED
             raise self._nobody(timeout)
-        self._link = PRESS.link
+        self._link = self._press.link
         self._greet()
         self._read_at = time.monotonic()
         self._state = Connection.ONLINE
@@ -117,7 +144,7 @@ class ToyPress(Machine, Generic):
         return NotConnected(f"nobody answers at {self.where}")
 
     def _greet(self) -> None:
-        PRESS.ask()
+        self._press.ask()
 
     def _watch(self) -> None:
         self._ending = threading.Event()
@@ -126,9 +153,9 @@ class ToyPress(Machine, Generic):
 
     def _observe(self, ending: threading.Event) -> None:
         failed = 0
-        while not ending.wait(0.02):
+        while not ending.wait(0.02) and not self._press.scrapped:
             try:
-                PRESS.ask(link=self._link)
+                self._press.ask(link=self._link)
             except ConnectionResetError:
                 self._reopen()
             except TimeoutError:
@@ -141,7 +168,7 @@ class ToyPress(Machine, Generic):
                     self._back()
 
     def _reopen(self) -> None:
-        self._link = PRESS.link
+        self._link = self._press.link
 
     def _lost(self) -> None:
         self._state, self._ours = Connection.LOST, False
@@ -167,11 +194,11 @@ class ToyPress(Machine, Generic):
     # -------------------------------------------------------------------------------- control
     def take_control(self) -> None:
         if self.control_owner() not in (None, "us"):
-            raise NotInControl(f"{self.where}: {PRESS.owner} has control")
+            raise NotInControl(f"{self.where}: {self._press.owner} has control")
         self._ours = True
 
     def control_owner(self) -> str | None:
-        return PRESS.owner or ("us" if self._ours else None)
+        return self._press.owner or ("us" if self._ours else None)
 
     def _check(self) -> None:
         if self._state is Connection.LOST:
@@ -186,23 +213,27 @@ class ToyPress(Machine, Generic):
 
     # -------------------------------------------------------------------------------- readings
     def reading(self) -> float:
+        until = time.monotonic() + PATIENCE
         self._check()
-        if time.monotonic() - self._read_at > 0.1:
-            raise Stale(f"{self.where}: the newest reading is old")
+        while time.monotonic() - self._read_at > FRESH:
+            if time.monotonic() > until:
+                raise Stale(f"{self.where}: the newest reading is old")
+            time.sleep(0.005)
+            self._check()
         return self._read_at
 
     def force(self) -> float:
         """Give the force, N."""
         self._check()
-        return PRESS.force
+        return self._press.force
 
     def measure(self) -> int:
         """Ask the press."""
         try:
-            PRESS.ask()
+            self._press.ask()
         except TimeoutError:
             raise DeviceTimeout(f"{self.where} does not answer") from None
-        return self._decoded(PRESS.answer())
+        return self._decoded(self._press.answer())
 
     def _decoded(self, answer: bytes) -> int:
         if len(answer) != 2:
@@ -212,7 +243,7 @@ class ToyPress(Machine, Generic):
     # -------------------------------------------------------------------------------- machine
     def machine_state(self) -> MachineState:
         self._check()
-        return MachineState.EXECUTE if PRESS.running() else MachineState.STOPPED
+        return MachineState.EXECUTE if self._press.running() else MachineState.STOPPED
 
     def command(self, command: MachineCommand) -> None:
         raise Refused(f"{self.where} knows no {command.name}")
@@ -226,7 +257,7 @@ class ToyPress(Machine, Generic):
     def clamp(self, *, an: str | None = None) -> None:
         """Clamp the part."""
         self._check_control()
-        PRESS.ask("clamp")
+        self._press.ask("clamp")
 
     @action
     def press(self, force: float, *, an: str | None = None) -> None:
@@ -236,7 +267,7 @@ class ToyPress(Machine, Generic):
         """
         self._check_control()
         self._limit(force)
-        PRESS.ask(f"press {force}")
+        self._press.ask(f"press {force}")
 
     def _limit(self, force: float) -> None:
         if not 0.0 <= force <= MAX_FORCE:
@@ -250,24 +281,29 @@ class ToyPress(Machine, Generic):
         stops = self._stops
         try:
             self._check()
-            PRESS.ask("stroke")
-            while PRESS.running():
+            self._press.ask("stroke")
+            while self._press.running():
                 time.sleep(0.005)
-                if self._stops != stops:
+                if self._stopped_since(stops):
                     raise self._stopped()
-            if self._stops != stops:
+            if self._stopped_since(stops):
                 raise self._stopped()
             raise ConnectionLost(f"{self.where}: the stroke was cut off")
         finally:
             self._acting.release()
+
+    def _stopped_since(self, stops: int) -> bool:
+        with self._stopping:  # what is seen as stopped has been halted
+            return self._stops != stops
 
     def _stopped(self) -> Exception:
         return Cancelled(f"{self.where}: the stroke was stopped")
 
     def stop(self) -> None:
         """Stop."""
-        self._stops += 1
-        PRESS.ask("halt")
+        with self._stopping:
+            self._stops += 1
+            self._press.ask("halt")
 
 
 class ToyBench(Bench):
@@ -280,42 +316,44 @@ class ToyBench(Bench):
     def start(self) -> None:
         self.folder = tempfile.TemporaryDirectory()
         self.sign_of_life = Path(self.folder.name) / "alive"
+        self.press = PRESSES[self.address] = Press()
 
     def end(self) -> None:
+        PRESSES.pop(self.address).scrap()
         self.folder.cleanup()
 
     @property
     def address(self) -> str:
-        return ADDRESS
+        return f"{self.name()}.cell:502"
 
     def make(self) -> ToyPress:
-        return self.object_type("id", "toy")  # type: ignore
+        return self.object_type("id", "toy", self.address)  # type: ignore
 
     def reset(self) -> None:
-        PRESS.silent, PRESS.torn, PRESS.owner, PRESS.until = False, False, None, 0.0
-        PRESS.wire.clear()
+        self.press.scrap()
+        self.press = PRESSES[self.address] = Press()
         self.sign_of_life.unlink(missing_ok=True)
 
     def absent(self) -> tuple[Generic, str]:
         return type(self.make())("id", "toy", NOWHERE), NOWHERE
 
     def writes(self) -> Any:
-        return list(PRESS.writes)
+        return list(self.press.writes)
 
     def actuating(self) -> list[str]:
-        return list(PRESS.wire)
+        return list(self.press.wire)
 
     def cut(self) -> None:
-        PRESS.silent = True
+        self.press.fall_silent()
 
     def heal(self) -> None:
-        PRESS.silent = PRESS.torn = False
+        self.press.heal()
 
     def reset_link(self) -> None:
-        PRESS.link += 1
+        self.press.link += 1
 
     def half_frame(self) -> None:
-        PRESS.torn = True
+        self.press.torn = True
 
     def observe(self, device: Any) -> object:
         return device.reading()
@@ -330,7 +368,7 @@ class ToyBench(Bench):
         return device.stroke()
 
     def running(self) -> bool:
-        return PRESS.running() or self._run_by_another()
+        return self.press.running() or self._run_by_another()
 
     def _run_by_another(self) -> bool:
         try:
@@ -340,15 +378,15 @@ class ToyBench(Bench):
 
     @contextmanager
     def foreign(self) -> Iterator[None]:
-        PRESS.owner = "the operator"
+        self.press.owner = "the operator"
         yield
-        PRESS.owner = None
+        self.press.owner = None
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, str(self.sign_of_life)]
 
     def readings(self, device: Any) -> list[Check]:
-        return [Check("force, N", device.force(), PRESS.force, 0.1)]
+        return [Check("force, N", device.force(), self.press.force, 0.1)]
 
     def beyond_limits(self, device: Any) -> dict[str, Any]:
         return {"too much force": lambda: device.press(MAX_FORCE * 1.01), "a pull": lambda: device.press(-1.0)}
