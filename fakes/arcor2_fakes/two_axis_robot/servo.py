@@ -230,9 +230,9 @@ class Servo:
     def _take(self, name: str, value: int) -> None:
         self.writes.append((name, value))
         was, self._values[name] = self._values[name], value
-        if name == "goal":
-            self._target = value - self._values["homing_offset"]
-        elif name == "torque" and value and not was:
-            self._target = self._values["goal"] - self._values["homing_offset"]
+        if name == "goal" or (name == "torque" and value and not was):
+            goal = self._values["goal"]
+            # The encoder resolves whole ticks: a shaft that is at the goal as far as the servo knows does not move.
+            self._target = self._shaft if goal == round(self.position) else goal - self._values["homing_offset"]
         elif name == "torque" and not value:
             self._speed = 0.0

@@ -10,12 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from arcor2_drivers.two_axis_robot import kinematics
+from arcor2_drivers.two_axis_robot.motion import STANDING
 from arcor2_drivers.two_axis_robot.settings import TwoAxisRobotSettings
 from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint, MoveEnd, Power
-from arcor2_hw.exceptions import Cancelled, NotConnected, NotInControl, OutOfRange, Refused
+from arcor2_hw.exceptions import Cancelled, DeviceFault, NotConnected, NotInControl, OutOfRange, Refused
 from tests.fakes.conftest import FakeProcess
 
 from .conftest import Doing, moving, standing
@@ -249,3 +250,44 @@ def test_what_cannot_be_jogged(ready: TwoAxisRobot) -> None:
     ready.release_control()
     with pytest.raises(NotInControl):
         ready.jog(joint_velocities=[0.1, 0.0])
+
+
+def test_the_slowest_move_is_not_taken_for_a_standstill(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+    ready.move_to_joints(joints(0.045, 0.0), 0.01, safe=False)
+    assert fake.truth()["servos"]["1"]["angle"] == pytest.approx(0.045, abs=math.radians(1.2))
+
+
+def test_a_state_that_arrives_late_is_not_taken_for_a_standstill(
+    fake: FakeProcess, ready: TwoAxisRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    observer = ready._observer
+    fresh, calls = observer.fresh, 0
+
+    def late() -> Any:
+        nonlocal calls
+        calls += 1
+        snapshot = fresh()
+        if calls == 3:  # the first state after the servos took their goals
+            time.sleep(1.5 * STANDING)
+        return snapshot
+
+    monkeypatch.setattr(observer, "fresh", late)
+    ready.move_to_joints(joints(0.5, 0.5), 1.0, safe=False)
+    assert calls > 3
+    assert fake.truth()["servos"]["2"]["angle"] == pytest.approx(0.5, abs=math.radians(1.2))
+
+
+def test_a_joint_that_stops_short_of_its_goal_is_named(ready: TwoAxisRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+    observer = ready._observer
+    fresh, position = observer.fresh, observer.fresh().value.servos[1].position
+
+    def blocked() -> Any:
+        snapshot = fresh()
+        first, second = snapshot.value.servos
+        servos = first, second._replace(position=position)
+        return snapshot._replace(value=snapshot.value._replace(servos=servos))
+
+    monkeypatch.setattr(observer, "fresh", blocked)
+    with pytest.raises(DeviceFault, match="joint_2 of arm stopped short") as caught:
+        ready.move_to_joints(joints(0.3, 0.3), 1.0, safe=False)
+    assert caught.value.fault_code == "short_of_goal"

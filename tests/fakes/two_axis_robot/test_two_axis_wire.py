@@ -111,6 +111,16 @@ def test_a_servo_moves_under_its_profile_and_stops_when_the_bus_is_silent(second
     assert servo.position == stood
 
 
+def test_a_shaft_between_two_ticks_does_not_move_to_the_tick_at_which_it_is() -> None:
+    now = [0.0]
+    servo = Servo(1, lambda: now[0], position=2047.6)
+    for write in ((116, (2048).to_bytes(4, "little")), (64, b"\x01"), (116, (2048).to_bytes(4, "little"))):
+        assert servo.write(*write) == 0
+        now[0] += 0.001
+        servo.advance()
+        assert (servo.position, servo.speed) == (2047.6, 0.0)
+
+
 @pytest.fixture
 def fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
     return start_fake("two_axis_robot")
