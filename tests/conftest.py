@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-pytest_plugins = ["pytester", "tests.leaks"]
+# The clock comes before the check for leaks: its thread lives as long as the process.
+pytest_plugins = ["pytester", "tests.own_time", "tests.leaks"]
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

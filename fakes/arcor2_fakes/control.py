@@ -243,7 +243,7 @@ class ControlClient:
         self._task = asyncio.create_task(self._read(), name=f"control {address}")
 
     @classmethod
-    async def connect(cls, address: str, within: float = 2.0) -> Self:
+    async def connect(cls, address: str, within: float = 10.0) -> Self:
         """Raise `ControlError` when nobody listens there, `ValueError` for an address that is none."""
         host, port = parse_address(address)
         try:
@@ -253,7 +253,7 @@ class ControlClient:
             raise ControlError(f"control channel {address}: {str(e) or 'timed out'}") from e
         return cls(address, reader, writer)
 
-    async def do(self, command: str, within: float = 2.0, **arguments: Any) -> Any:
+    async def do(self, command: str, within: float = 10.0, **arguments: Any) -> Any:
         """The command's data. Raises `ControlError` when it is refused, late, or the channel is gone."""
         if self._closed.is_set():
             raise ControlError(f"{command}: the control channel {self.address} is closed")
@@ -317,7 +317,7 @@ class ControlClient:
 class BlockingControlClient:
     """The control channel for a test: one request, one answer, with a time limit. A context manager."""
 
-    def __init__(self, address: str, within: float = 2.0) -> None:
+    def __init__(self, address: str, within: float = 10.0) -> None:
         self.address = address
         self._numbers = itertools.count(1)
         self._buffer = b""
@@ -326,7 +326,7 @@ class BlockingControlClient:
         except OSError as e:
             raise ControlError(f"control channel {address}: {e}") from e
 
-    def do(self, command: str, within: float = 2.0, **arguments: Any) -> Any:
+    def do(self, command: str, within: float = 10.0, **arguments: Any) -> Any:
         """The command's data. Raises `ControlError` when it is refused, late, or the channel is gone."""
         number = next(self._numbers)
         deadline = time.monotonic() + within
@@ -340,7 +340,7 @@ class BlockingControlClient:
         except OSError as e:
             raise ControlError(f"{command}: {self.address}: {e}") from e
 
-    def wait_until(self, holds: Callable[[Any], bool], within: float = 5.0, command: str = "truth") -> Any:
+    def wait_until(self, holds: Callable[[Any], bool], within: float = 20.0, command: str = "truth") -> Any:
         """Ask until the answer satisfies `holds`; returns it. Raises `ControlError`, with the last answer, if late."""
         deadline = time.monotonic() + within
         while not holds(data := self.do(command)):

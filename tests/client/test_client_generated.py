@@ -71,6 +71,7 @@ async def test_every_argument_reaches_the_field_of_its_name() -> None:
         }
         await getattr(client, generating.snake(rpc.name))(**given)
         assert client.sent[-1][1] == rpc.args(**given), rpc.name
+    assert "AddAction" in {name for name, *_ in client.sent}
 
 
 def test_streams_know_their_names() -> None:

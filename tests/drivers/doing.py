@@ -24,7 +24,7 @@ class Doing:
         self._thread = threading.Thread(target=run, daemon=True)
         self._thread.start()
 
-    def result(self, within: float = 10.0) -> Any:
+    def result(self, within: float = 30.0) -> Any:
         self._thread.join(within)
         assert not self._thread.is_alive(), f"still busy after {within} s"
         if self._error is not None:

@@ -26,7 +26,7 @@ from tests.leaks import outliving_the_test
 WORKPLACE = Path(__file__).parent / "workplace" / "three_devices.toml"
 
 
-async def until(ask: Callable[[], Any], what: str, timeout: float = 10.0) -> Any:
+async def until(ask: Callable[[], Any], what: str, timeout: float = 30.0) -> Any:
     """Ask again and again until the answer is true; fails naming what was waited for."""
     end = time.monotonic() + timeout
     while True:
@@ -176,7 +176,7 @@ class Cell:
         return package_id
 
 
-async def scene_state(client: Client, wanted: SceneStateEnum, timeout: float = 15.0) -> Event:
+async def scene_state(client: Client, wanted: SceneStateEnum, timeout: float = 40.0) -> Event:
     """The next SceneState with that state."""
     while True:
         event = await client.next_event("SceneState", timeout=timeout)

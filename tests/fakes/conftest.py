@@ -88,7 +88,7 @@ def start_fake() -> Iterator[Callable[..., FakeProcess]]:
 def wait_for() -> Callable[..., Any]:
     """Gives ``wait_for(read, holds, within=5.0)``: asks until the value satisfies `holds`, and returns it."""
 
-    def wait(read: Callable[[], Any], holds: Callable[[Any], bool] = bool, within: float = 5.0) -> Any:
+    def wait(read: Callable[[], Any], holds: Callable[[Any], bool] = bool, within: float = 20.0) -> Any:
         deadline = time.monotonic() + within
         while not holds(value := read()):
             assert time.monotonic() < deadline, f"not as expected within {within:g} s, last {value!r}"

@@ -12,6 +12,7 @@ from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import SceneObjectOverride
 from arcor2_hw.data.secret import ObjectSecrets, new_reference
 from arcor2_hw.runtime import messages as m
+from tests.own_time import own_time
 
 from .conftest import HostProcess, open_scene, scene_object, type_code
 
@@ -104,11 +105,11 @@ def test_a_hung_device_fails_in_time_and_hinders_no_other(host: HostProcess) -> 
     _open(host, "a", "b")
     hang = host.begin("obj_a", "hang", deadline=0.3, seconds=1.0)
     waiting = host.begin("obj_a", "quick")
-    began = time.monotonic()
+    began = own_time()
     assert host.call("obj_b", "quick") == "quick"
-    assert time.monotonic() - began < 0.25
+    assert own_time() - began < 0.25
     error = host.answer(hang)
-    assert time.monotonic() - began < 0.8
+    assert own_time() - began < 0.8
     assert error.code == "device_timeout"
     assert all(part in error.message for part in ("a", "hang", "0.3 s"))
     assert "hang" in host.answer(waiting).message
@@ -127,12 +128,12 @@ def test_stop_passes_the_busy_device(host: HostProcess, tmp_path: Path) -> None:
     queued = host.begin("obj_a", "quick")
     while "move" not in (tmp_path / "notes").read_text():
         time.sleep(0.01)
-    began = time.monotonic()
+    began = own_time()
     host.send(m.StopMotion(99, "obj_a"))
     assert host.answer(queued).code == "cancelled"
     assert host.answer(move).code == "cancelled"
     assert host.answer(99) is None
-    assert time.monotonic() - began < 0.5
+    assert own_time() - began < 0.5
     assert host.call("obj_a", "quick") == "quick"
 
 
@@ -145,9 +146,9 @@ def test_a_command_that_overtakes_the_stop_is_stopped_too(host: HostProcess, tmp
     while "move" not in (tmp_path / "notes").read_text():
         time.sleep(0.001)
     host.send(m.StopMotion(99, "obj_a"))
-    began = time.monotonic()
+    began = own_time()
     assert host.answer(move).code == "cancelled"
-    assert time.monotonic() - began < 0.5
+    assert own_time() - began < 0.5
     assert (tmp_path / "notes").read_text().count("stop") == 2
 
 
@@ -177,9 +178,11 @@ def test_a_stop_while_control_is_taken_lets_nothing_begin(host: HostProcess, tmp
 
 
 def test_twenty_slow_devices_come_up_at_once(host: HostProcess) -> None:
-    began = time.monotonic()
+    began = own_time()
     _open(host, *(f"d{n}" for n in range(20)), connect_takes=0.5)
-    assert 0.5 < time.monotonic() - began < 1.2  # the figure itself is measured by the benchmark
+    ended = own_time()
+    assert ended.clock - began.clock > 0.5
+    assert ended - began < 1.2  # the figure itself is measured by the benchmark
 
 
 @pytest.mark.parametrize(("fail", "words"), [("refused", "192.0.2.1:30004"), ("odd", "ZeroDivisionError")])
@@ -280,10 +283,10 @@ def test_the_server_gone_means_stop_disconnect_exit_within_two_seconds(host: Hos
     host.begin("obj_b", "hang", seconds=30)
     while "move" not in notes.read_text():
         time.sleep(0.01)
-    began = time.monotonic()
+    began = own_time()
     host.socket.close()
     host.gone(5)
-    assert time.monotonic() - began < 2.0
+    assert own_time() - began < 2.0
     lines = notes.read_text().splitlines()
     assert lines.index("a stop") < lines.index("a disconnected")
     assert "b stop" in lines
@@ -296,10 +299,10 @@ def test_sigterm_means_the_same(host: HostProcess, tmp_path: Path) -> None:
     host.begin("obj_a", "move")
     while "move" not in notes.read_text():
         time.sleep(0.01)
-    began = time.monotonic()
+    began = own_time()
     os.kill(host.process.pid, signal.SIGTERM)
     host.gone(5)
-    assert time.monotonic() - began < 2.0
+    assert own_time() - began < 2.0
     assert notes.read_text().splitlines()[-2:] == ["a stop", "a disconnected"]
 
 

@@ -85,7 +85,7 @@ def under_way(fake: FakeYumi, *arms: str) -> None:
     fake.control.wait_until(lambda t: all(t["arms"][arm]["speed"] > 0.05 for arm in arms))
 
 
-def wait(holds: Callable[[], bool], within: float = 5.0) -> None:
+def wait(holds: Callable[[], bool], within: float = 20.0) -> None:
     until = time.monotonic() + within
     while not holds():
         assert time.monotonic() < until, f"not within {within} s"

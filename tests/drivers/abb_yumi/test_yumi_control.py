@@ -211,6 +211,7 @@ def test_sessions_do_not_pile_up(fake: FakeYumi) -> None:
         robot.disconnect()
     robot = make(fake.host)
     robot.connect(3.0)
+    assert robot.connection is Connection.ONLINE
     robot.disconnect()
 
 

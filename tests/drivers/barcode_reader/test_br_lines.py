@@ -82,8 +82,8 @@ def test_words_of_the_reader_are_no_codes(text: str) -> None:
 @given(st.text(max_size=100))
 def test_answers_are_read_or_none(text: str) -> None:
     for line in (text, f"STAT,{text}", f"VER,{text}"):
-        lines.status(line)
-        lines.identity(line)
+        assert isinstance(lines.status(line), lines.Status | None)
+        assert isinstance(lines.identity(line), Identity | None)
 
 
 def test_answers() -> None:

@@ -10,6 +10,7 @@ from arcor2_hw.data.device import Health
 from arcor2_hw.exceptions import Cancelled, NotFound, Refused
 from tests.drivers.erp.conftest import Waiting, serials
 from tests.fakes.conftest import FakeProcess
+from tests.own_time import own_time
 
 
 @pytest.fixture
@@ -107,9 +108,9 @@ def test_disconnecting_from_a_silent_service_is_quick_and_keeps_all(
     fake.control.do("silence")
     erp.report_result(order, "S-1", True)
     time.sleep(0.2)
-    began = time.monotonic()
+    began = own_time()
     erp.disconnect()
-    assert time.monotonic() - began < 1.5
+    assert own_time() - began < 1.5
     fake.control.do("heal")
     erp.connect(10.0)
     erp.wait_until_sent(5.0)

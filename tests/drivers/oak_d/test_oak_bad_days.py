@@ -24,11 +24,12 @@ from arcor2_hw.exceptions import (
 )
 from arcor2_hw.testing.life import BackgroundCall
 from tests.fakes.conftest import FakeProcess
+from tests.own_time import own_time
 
 from .conftest import PATIENCE
 
 
-def wait(holds: Callable[[], Any], within: float = 8.0) -> None:
+def wait(holds: Callable[[], Any], within: float = 30.0) -> None:
     deadline = time.monotonic() + within
     while not holds():
         assert time.monotonic() < deadline, f"not within {within:g} s"
@@ -178,10 +179,10 @@ def test_no_camera_is_found_at_once(make: Callable[..., OakD], monkeypatch: pyte
     monkeypatch.setattr(dai.Device, "getAllAvailableDevices", staticmethod(lambda: []))
     for address, who in (("", "the only camera"), ("14442C10D13EABCE00", "14442C10D13EABCE00")):
         camera = make(address)
-        began = time.monotonic()
+        began = own_time()
         with pytest.raises(NotConnected, match=f"^camera at {who} is not there") as raised:
             camera.connect(PATIENCE)
-        assert time.monotonic() - began < 3.0  # opening one that is not there takes 11.5 s
+        assert own_time() - began < 3.0  # opening one that is not there takes 11.5 s
         assert raised.value.detail == "found: none"
     with pytest.raises(NotConnected, match=r"^camera at 127\.0\.0\.9 cannot be reached"):
         make("127.0.0.9").connect(2.0)

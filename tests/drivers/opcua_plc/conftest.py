@@ -36,7 +36,7 @@ class BackgroundCall:
         except Arcor2Error as error:
             self.result = error
 
-    def outcome(self, within: float = 5.0) -> object:
+    def outcome(self, within: float = 20.0) -> object:
         self._thread.join(within)
         assert not self._thread.is_alive(), f"it has not ended within {within:g} s"
         return self.result

@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,6 +27,7 @@ from arcor2_hw.exceptions import (
     Stale,
 )
 from tests.fakes.conftest import FakeProcess
+from tests.own_time import own_time
 
 from .conftest import Doing, moving, standing
 
@@ -49,10 +49,10 @@ def test_a_port_that_is_not_there_or_taken_is_named(fake: FakeProcess, make: Mak
 def test_an_absent_servo_is_named(fake: FakeProcess, make: Make) -> None:
     fake.control.do("absent", servo=2)
     robot = make(fake.ready["port"])
-    began = time.monotonic()
+    began = own_time()
     with pytest.raises(DeviceTimeout, match=rf"servo 2 of arm at {fake.ready['port']}"):
         robot.connect(2.0)
-    assert time.monotonic() - began < 1.0
+    assert own_time() - began < 1.0
     fake.control.do("absent", servo=2, on=False)
     robot.connect()
     assert robot.connection is Connection.ONLINE
@@ -61,10 +61,10 @@ def test_an_absent_servo_is_named(fake: FakeProcess, make: Make) -> None:
 def test_garbage_and_noise_do_not_hang(fake: FakeProcess, make: Make) -> None:
     fake.control.do("garbage")
     robot = make(fake.ready["port"])
-    began = time.monotonic()
+    began = own_time()
     with pytest.raises(DeviceTimeout, match="servo 1 of arm at"):
         robot.connect(2.0)
-    assert time.monotonic() - began < 2.0
+    assert own_time() - began < 2.0
 
 
 def test_one_damaged_answer_costs_nothing(fake: FakeProcess, ready: TwoAxisRobot) -> None:
@@ -117,12 +117,12 @@ def test_the_servos_stop_when_the_drivers_process_is_killed(fake: FakeProcess, m
     try:
         fake.control.wait_until(lambda t: t["servos"]["1"]["speed"] > 0.5, within=15.0)
         os.kill(process.pid, signal.SIGKILL)
-        killed = time.monotonic()
+        killed = own_time()
     finally:
         process.kill()
         process.wait()
     servo = fake.control.wait_until(standing)["servos"]["1"]
-    assert time.monotonic() - killed < TwoAxisRobot.loss_reaction.within + 0.3  # what a busy machine adds
+    assert own_time() - killed < TwoAxisRobot.loss_reaction.within + 0.3  # what a busy machine adds
     assert servo["watchdog"] == 0xFF
     assert servo["angle"] < 1.9
     robot = make(fake.ready["port"])
@@ -209,9 +209,9 @@ def test_a_servo_that_is_not_there_takes_no_longer_than_its_deadline(fake: FakeP
     bus.open()
     try:
         assert len(bus.sync_read((1, 2), STATE)) == 2
-        began = time.monotonic()
+        began = own_time()
         with pytest.raises(DeviceTimeout, match="servo 7 of arm"):
             bus.read(7, HOMING_OFFSET)
-        assert time.monotonic() - began < 0.3
+        assert own_time() - began < 0.3
     finally:
         bus.close()

@@ -15,6 +15,7 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Cancelled, NotInControl
 from tests.drivers.busy import BUSY, stall
 from tests.fakes.conftest import FakeProcess
+from tests.own_time import own_time
 
 from .conftest import Doing, moving, standing
 from .test_two_axis_bad_days import FAR, KILLED
@@ -52,20 +53,20 @@ def test_a_stall_of_half_a_second_does_not_stop_a_move(fake: FakeProcess, ready:
 def test_a_frozen_owner_stops_the_servos_within_what_is_declared(
     fake: FakeProcess, owner: "subprocess.Popen[bytes]"
 ) -> None:
-    began = time.monotonic()
+    began = own_time()
     os.kill(owner.pid, signal.SIGSTOP)
     time.sleep(BUSY)
     assert trips(fake) == 0
     fake.control.wait_until(standing, within=2.0)
-    assert time.monotonic() - began < TwoAxisRobot.loss_reaction.within
+    assert own_time() - began < TwoAxisRobot.loss_reaction.within
     assert trips(fake) == 2
 
 
 def test_a_killed_owner_stops_the_servos_at_once(fake: FakeProcess, owner: "subprocess.Popen[bytes]") -> None:
     owner.kill()
-    began = time.monotonic()
+    began = own_time()
     fake.control.wait_until(standing, within=2.0)
-    assert time.monotonic() - began < 0.4 + 0.3  # the watchdog of its settings, and what a busy machine adds
+    assert own_time() - began < 0.4 + 0.3  # the watchdog of its settings, and what a busy machine adds
 
 
 def test_a_watchdog_that_tripped_is_named(fake: FakeProcess, ready: TwoAxisRobot) -> None:

@@ -99,7 +99,7 @@ def moving(fake: FakeUr) -> None:
     wait(lambda: max(map(abs, fake.truth()["qd"])) > 0.05)
 
 
-def wait(holds: Callable[[], bool], within: float = 5.0) -> None:
+def wait(holds: Callable[[], bool], within: float = 20.0) -> None:
     until = time.monotonic() + within
     while not holds():
         assert time.monotonic() < until, f"not within {within} s"

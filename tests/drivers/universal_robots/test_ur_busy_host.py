@@ -13,6 +13,7 @@ from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_hw.data.device import LossKind
 from arcor2_hw.exceptions import Cancelled, ConnectionLost
 from tests.drivers.busy import BUSY, stall
+from tests.own_time import own_time
 
 from .conftest import Doing, FakeUr, moving, wait
 
@@ -35,9 +36,9 @@ def control_process(pid: int | None = None) -> psutil.Process:
 
 
 def stopped_within(fake: FakeUr, limit: float) -> None:
-    began = time.monotonic()
+    began = own_time()
     fake.control.wait_until(lambda t: not t["moving"], limit + 1.0)
-    assert time.monotonic() - began < limit
+    assert own_time() - began < limit
 
 
 def test_a_stall_of_half_a_second_does_not_stop_a_move(ready: UR5e, fake: FakeUr) -> None:

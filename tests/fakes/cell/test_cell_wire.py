@@ -49,7 +49,7 @@ class Cell:
     def __init__(self, robot: StandInRobot, tester: ControlClient, reader: ControlClient, world: ControlClient) -> None:
         self.robot, self.tester, self.reader, self.world = robot, tester, reader, world
 
-    async def until(self, client: ControlClient, holds: Callable[[Any], bool], within: float = 5.0) -> Any:
+    async def until(self, client: ControlClient, holds: Callable[[Any], bool], within: float = 20.0) -> Any:
         async with asyncio.timeout(within):
             while not holds(truth := await client.do("truth")):
                 await asyncio.sleep(0.005)

@@ -143,6 +143,7 @@ async def test_damaged_files_do_not_keep_the_server_from_starting(tmp_path: Path
                     missing = {name: path for name, path in missing.items() if path not in event["data"]["message"]}
                     if not missing:
                         break
+        assert not missing, f"no notification names {', '.join(missing)}"
         printed = (tmp_path / "data.log").read_text()
     for name in damaged:
         assert list(data.glob(name.replace(".", ".damaged-*."))), name

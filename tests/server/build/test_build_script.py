@@ -80,6 +80,7 @@ def test_whatever_points_are_called_each_is_reached(drawn: list[tuple[str, list[
     )
     aps = read_points(project)
     names = points.names_of(project)
+    assert len(names.poses) == sum(len(orientations) for _, orientations in drawn)
     for orientation_id, path in names.poses.items():
         assert eval("aps." + ".".join(path), {"aps": aps}) == orientation_id
 

@@ -54,7 +54,7 @@ from arcor2_server.workspace.scene_collisions import SceneCollisions
 from tests.runtime.conftest import type_code
 from tests.server.parts import Parts
 
-PATIENCE = 15.0
+PATIENCE = 40.0
 
 
 class Recorder:

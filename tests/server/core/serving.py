@@ -14,7 +14,9 @@ from typing import Any
 from websockets.asyncio.client import ClientConnection, connect
 
 COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
-READY_WITHIN = 20.0
+READY_WITHIN = 60.0
+WITHIN = 30.0
+"""Time in s for which a test waits for what must come; long, as it passes only when a test fails."""
 
 
 class ServerProcess:
@@ -87,7 +89,7 @@ class Talker:
         self.events: list[dict[str, Any]] = []
         self._number = 1000
 
-    async def receive(self, within: float = 10.0) -> dict[str, Any]:
+    async def receive(self, within: float = WITHIN) -> dict[str, Any]:
         async with asyncio.timeout(within):
             message: dict[str, Any] = json.loads(await self.socket.recv())
         return message
@@ -118,7 +120,7 @@ class Talker:
         (message,) = answer["messages"]
         return str(message)
 
-    async def event(self, name: str, within: float = 10.0) -> dict[str, Any]:
+    async def event(self, name: str, within: float = WITHIN) -> dict[str, Any]:
         """Give the next event, which must be of that name."""
         message = self.events.pop(0) if self.events else await self.receive(within)
         assert message.get("event") == name, message
@@ -141,7 +143,7 @@ async def talking(url: str, user: str | None = None, **options: Any) -> AsyncIte
         yield talker
 
 
-async def until(condition: Any, within: float = 10.0) -> None:
+async def until(condition: Any, within: float = WITHIN) -> None:
     """Poll with a deadline."""
     deadline = time.monotonic() + within
     while not condition():

@@ -19,7 +19,7 @@ from arcor2_server.settings import ServerSettings
 from tests.server.protocol import devices
 from tests.server.session.desk import Person, Refused
 
-PATIENCE = 20.0
+PATIENCE = 40.0
 """Seconds; the machine may be busy."""
 
 ORIGIN = {"position": {"x": 0, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}

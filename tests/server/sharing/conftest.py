@@ -9,7 +9,7 @@ import pytest
 
 from tests.server.session.desk import Desk, Person, open_desk
 
-PATIENCE = 10.0
+PATIENCE = 40.0
 
 
 async def came(person: Person, name: str, where: Callable[[Any], bool] = lambda _: True) -> Any:
