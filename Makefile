@@ -10,8 +10,15 @@ FAMILIES := --extra ur --extra modbus --extra serial --extra can --extra dynamix
 # Drivers beyond the demo are tested too.
 TESTED := $(FAMILIES) --extra opcua
 
+# Compiled modules are kept, whatever the environment says: a test run starts some hundred Python processes, and each of
+# them would compile all of ours again.
+unexport PYTHONDONTWRITEBYTECODE
+
 run: .make/run .make/editor
 	$(BIN)/arcor2-hw demo $(ARGS)
+
+# The files with tests that need the machine to themselves: to collect all others again would take 10 s.
+ALONE = $(shell grep -rl --include='test_*.py' mark.alone tests)
 
 # Tests wait for devices most of the time, so three at once suit two cores. A module, or one driver's conformance,
 # stays in one process and shares its fake. What fails beside others, where times of a tenth of a second are hard to keep,
@@ -20,8 +27,8 @@ test: .make/dev .make/editor .make/browser
 	$(BIN)/python editor/build.py test
 	$(BIN)/python -m pytest --numprocesses 3 --dist loadgroup --no-loadscope-reorder -m "not alone" $(ARGS) || test $$? = 5 || \
 	$(BIN)/python -m pytest --once-more -m "not alone" $(ARGS)
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m alone $(ARGS) || test $$? = 5 || \
-	$(BIN)/python -m pytest --once-more -m alone $(ARGS)
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m alone $(or $(ARGS),$(ALONE)) || test $$? = 5 || \
+	$(BIN)/python -m pytest --once-more -m alone $(or $(ARGS),$(ALONE))
 
 bench: .make/dev
 	$(BIN)/python -m benchmarks $(ARGS)
