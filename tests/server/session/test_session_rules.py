@@ -286,9 +286,9 @@ def test_problems_cost_in_proportion(types: RecordedTypes) -> None:
         subject = chain(size)
         best = math.inf
         for _ in range(3):
-            began = time.perf_counter()
+            began = time.thread_time()
             assert project_problems(SCENE, subject, types) == []
-            best = min(best, time.perf_counter() - began)
+            best = min(best, time.thread_time() - began)
         return best
 
     assert cost(1000) < 25 * cost(100)  # ten times the size; a square would be a hundred times the time
