@@ -19,7 +19,7 @@ from arcor2_hw.data.object_type import Box, Mesh, Model3dType, ObjectModel, Obje
 from arcor2_hw.data.project import END, START, ActionPoint, Project
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFound, StorageError
-from arcor2_server.build import importing, package
+from arcor2_server.build import imported, package
 from arcor2_server.build.importing import ImportOptions
 from arcor2_server.build.reading import NotUnderstood
 from arcor2_server.object_types.catalog import PackageType
@@ -455,7 +455,7 @@ async def test_one_file_twice_is_refused(here: Any) -> None:
 
 
 async def test_a_damaged_zip_is_refused(here: Any, packed: bytes) -> None:
-    whole, accepted, refused = importing.read(packed), [], 0
+    whole, accepted, refused = imported.read(packed), [], 0
     for cut in range(100, len(packed), len(packed) // 40):
         torn = packed[:cut] + bytes(16) + packed[cut + 16 :]
         try:
@@ -464,7 +464,7 @@ async def test_a_damaged_zip_is_refused(here: Any, packed: bytes) -> None:
             refused += 1
         else:
             accepted.append(cut)
-            assert importing.read(torn) == whole, cut  # the damage is in a file that is not imported
+            assert imported.read(torn) == whole, cut  # the damage is in a file that is not imported
     assert refused >= 10, accepted
 
 
