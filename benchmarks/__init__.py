@@ -1,1 +1,1 @@
-"""Figures of the whole product, measured on the machine at hand: `make bench`."""
+"""Benchmarks of the whole product on this machine: `make bench`."""

@@ -1,6 +1,6 @@
-"""Time to read eleven object types with nothing read before: our five stock types, and six written for ARCOR2.
+"""Analysis time of eleven object types: five stock types, and six written for ARCOR2.
 
-Each sample is a process of its own that has imported the analysis and not yet used it.
+Each sample runs in a new process that has imported the analysis and not used it yet.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ print(f"[{wall * 1000}, {cpu * 1000}]")
 
 
 async def analyse(report: Report) -> None:
-    """Report the median time, with the share in which the process really had a core beside it."""
+    """Report the median wall time; the note shows the processor time."""
     samples: list[tuple[float, float]] = []
     for _ in range(SAMPLES):
         process = await asyncio.create_subprocess_exec(

@@ -1,4 +1,4 @@
-"""Time of a build against the number of actions: a saved project through storage, program, files and the rename."""
+"""Build time as a function of the number of actions: storage, code generation, files and rename."""
 
 import asyncio
 import tempfile
@@ -34,7 +34,7 @@ from benchmarks.metrics import Metric, Report, median
 
 SIZES: Final = (250, 500, 1000, 2000, 10_000)
 ROUNDS: Final = 9
-_SOURCE: Final = '''"""A machine that is only built for, never run."""
+_SOURCE: Final = '''"""A machine for builds; never run."""
 
 from arcor2_hw.actions import action
 from arcor2_hw.data.geometry import Pose
@@ -60,7 +60,7 @@ _SCENE: Final = Scene("bench", objects=[SceneObject("bench", "Bench", id="obj_be
 
 
 def project(size: int) -> Project:
-    """Make a project of `size` actions: in each group of four a test, one way for true, one for false, and the join."""
+    """Return a project of `size` actions in blocks of four: a test, its two branches, and their join."""
     actions, logic = [], [LogicItem(START, "act_0", id="lit_start")]
     for n in range(size):
         group, place = divmod(n, 4)
@@ -75,19 +75,19 @@ def project(size: int) -> Project:
         method = "move" if place else "test"
         actions.append(Action(f"action {n}", f"obj_bench/{method}", f"act_{n}", parameters, [flow]))
         after = {0: (1, 2), 1: (2,), 2: (1,), 3: (1,)}[place]
-        for way, step in enumerate(after):
+        for branch, step in enumerate(after):
             end = f"act_{n + step}" if n + step < size else END
             when: Any = (
-                ProjectLogicIf(f"act_{n}/default/0", "false" if way else "true") if place == 0 else msgspec.UNSET
+                ProjectLogicIf(f"act_{n}/default/0", "false" if branch else "true") if place == 0 else msgspec.UNSET
             )
-            logic.append(LogicItem(f"act_{n}", end, when, f"lit_{n}_{way}"))
+            logic.append(LogicItem(f"act_{n}", end, when, f"lit_{n}_{branch}"))
     orientations = [NamedOrientation("default", Orientation(), "ori_bench")]
     point = ActionPoint("ap", Position(), id="acp_bench", orientations=orientations, actions=actions)
     return Project(f"bench {size}", _SCENE.id, id=f"pro_{size}", action_points=[point], logic=logic)
 
 
 async def build(report: Report) -> None:
-    """Report the times of builds, and of the way back from the script."""
+    """Report the times of builds and of reading the script back."""
     with tempfile.TemporaryDirectory() as directory:
         settings = ServerSettings(data_dir=Path(directory))
         storage = await Storage.open(settings)
@@ -116,15 +116,15 @@ async def build(report: Report) -> None:
     report.add(Metric("read_script_1000_ms", median(reading), ROUNDS))
 
 
-def _read_back(made_of: Ingredients, types: ObjectTypes) -> float:
-    """Give the time, ms, in which a script becomes the project that it was made from."""
-    facts = Candidates(types.files(), {}).facts(made_of.scene)
-    source = from_logic(made_of.scene, made_of.project, facts)
+def _read_back(source_of: Ingredients, types: ObjectTypes) -> float:
+    """Return the time to convert a generated script back to its project, ms."""
+    facts = Candidates(types.files(), {}).facts(source_of.scene)
+    source = from_logic(source_of.scene, source_of.project, facts)
     begin = time.perf_counter()
-    back = from_script(source, made_of.scene, made_of.project, facts)
+    back = from_script(source, source_of.scene, source_of.project, facts)
     elapsed = (time.perf_counter() - begin) * 1e3
-    if back != made_of.project:
-        raise RuntimeError("the script did not become the project again")
+    if back != source_of.project:
+        raise RuntimeError("The script was not converted back to the same project.")
     return elapsed
 
 

@@ -1,4 +1,4 @@
-"""The field buses on their fakes: what a driver costs beside the bare library, and what a bus loses."""
+"""Field buses with simulated devices: read rates of drivers compared with the bare library, and lost frames."""
 
 import asyncio
 import random
@@ -25,7 +25,7 @@ PDO_SECONDS = 20.0
 
 
 def seconds_each(call: Callable[[], object], n: int) -> float:
-    """Give the mean time of a call over `n` of them."""
+    """Return the mean duration of `n` calls, s."""
     began = time.perf_counter()
     for _ in range(n):
         call()
@@ -33,10 +33,10 @@ def seconds_each(call: Callable[[], object], n: int) -> float:
 
 
 def modbus_reads(address: str, rounds: int = 150, n: int = 100) -> Metric:
-    """Read one point by the driver, and what it reads for that by the bare library, in turns on one fake.
+    """Measure reading one point through the driver and the same registers through the bare library.
 
-    Each has its own connection; the driver observes the block meanwhile, as it always does. What a round measures
-    first is left to chance, so that a machine that is getting slower favours neither.
+    Both use one simulated block with separate connections, in alternation; the driver also observes the block, as it
+    always does. The order within a round is random, so that a machine that is getting slower favours neither.
     """
     host, _, port = address.rpartition(":")
     bare = ModbusTcpClient(host, port=int(port))
@@ -61,16 +61,16 @@ def modbus_reads(address: str, rounds: int = 150, n: int = 100) -> Metric:
 
 
 def dynamixel_reads(port: str, n: int = 1000) -> Metric:
-    """Read the positions of six servos at once, through the driver's bus; the pty has no bit rate."""
+    """Measure reading the positions of six servos at once through the driver's bus; a pty has no bit rate."""
     bus = Bus("servos", port, 1_000_000)
     unanswered = 0
 
     def read(register: Register) -> None:
-        """Ask as the driver does: once more when a servo does not answer within the library's few ms."""
+        """Read as the driver does: retry once if a servo does not answer within the library's time limit."""
         nonlocal unanswered
         try:
             bus.again(lambda: bus.sync_read(SERVOS, register))
-        except DeviceTimeout:  # the fake did not get a core twice; that counts with the time it took
+        except DeviceTimeout:  # the fake did not get a core twice; counted with the time it took
             unanswered += 1
 
     bus.open()
@@ -81,31 +81,31 @@ def dynamixel_reads(port: str, n: int = 1000) -> Metric:
         bus.close()
     note = (
         f"worst {max(samples) * 1e3:.2f} ms, {unanswered} unanswered; "
-        f"all that changes ({STATE.size} bytes each) {median(whole) * 1e3:.2f} ms"
+        f"the whole state ({STATE.size} bytes each) {median(whole) * 1e3:.2f} ms"
     )
     return Metric("dynamixel_sync_read_6_ms", median(samples) * 1e3, n, note)
 
 
 def pdos(address: str, control: str) -> Metric:
-    """Let the belt run and the drive tell its state by two PDOs each 10 ms; compare what it sent with what came.
+    """Run the belt with two PDOs every 10 ms; compare the number of sent and received frames.
 
-    Both count from the first one on, which is sent only when control was taken.
+    Both counts start with the first PDO, which the drive sends only after control was taken.
     """
     belt = Conveyor("belt", "belt", ConveyorSettings(f"socket://{address}", pdo_period_ms=10))
-    came = belt._observer.pdos
+    pdos = belt._observer.pdos
     with BlockingControlClient(control) as drive:
         belt.connect()
         try:
             belt.take_control()
             belt.run(0.1)
-            began = came.received, time.monotonic()
+            began = pdos.received, time.monotonic()
             time.sleep(PDO_SECONDS)
-            rate = (came.received - began[0]) / (time.monotonic() - began[1])
+            rate = (pdos.received - began[0]) / (time.monotonic() - began[1])
             sent = sum(drive.do("truth")["pdos_sent"])
             deadline = time.monotonic() + 2.0
-            while came.received < sent and time.monotonic() < deadline:
+            while pdos.received < sent and time.monotonic() < deadline:
                 time.sleep(0.001)
-            lost = max(0, sent - came.received)
+            lost = max(0, sent - pdos.received)
             belt.halt()
         finally:
             belt.disconnect()

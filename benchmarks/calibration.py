@@ -1,7 +1,7 @@
-"""Calibration by pictures: poses of a camera from rendered pictures whose truth is known.
+"""Errors of camera poses computed from rendered pictures with known truth.
 
-The solver is given intrinsics that are off: fx and fy by 0.05 %, cx and cy by 0.5 px, every distortion coefficient by
-2 % of itself (standard deviations), drawn anew for each picture.
+The solver receives inaccurate intrinsics, drawn anew for each picture: fx and fy are off by 0.05 %, cx and cy by
+0.5 px, every distortion coefficient by 2 % of its value (standard deviations).
 """
 
 import math
@@ -31,15 +31,15 @@ LONG: Final = 2000
 LENS: Final = Lens(870.0, 868.0, 645.0, 355.0, (0.08, -0.16, 0.0006, -0.0004, 0.05))
 SIZE: Final = 0.1
 FOCAL, CENTRE, DISTORTION = 0.0005, 0.5, 0.02
-TELLS: Final = 3.0
-"""A result that is off by more than that many of its own standard deviations (of the position) has a wrong verdict."""
+MAX_DEVIATIONS: Final = 3.0
+"""Position error, in standard deviations of the result, above which the verdict is wrong."""
 CALLS: Final = 3
-"""How often each picture is solved; the shortest time counts, so that what else the machine does is left out."""
+"""Number of times each picture is solved; the shortest time counts, to exclude the load of the machine."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What is looked at, from where, and how the picture comes out."""
+    """Scene, camera pose and exposure of a picture."""
 
     world_from_camera: Array
     plates: list[Plate]
@@ -49,7 +49,7 @@ class View:
 
 @dataclass
 class Tally:
-    """Errors in mm and degrees, times in ms, what was refused or wrong."""
+    """Errors in mm and degrees, times in s, reasons of refusals, number of wrong verdicts."""
 
     position: list[float] = field(default_factory=list)
     orientation: list[float] = field(default_factory=list)
@@ -58,7 +58,7 @@ class Tally:
     wrong: int = 0
 
     def note(self) -> str:
-        """Say what else was seen."""
+        """Return the note: seed, refusals and wrong verdicts."""
         reasons = ", ".join(f"{self.refused.count(each)} {each}" for each in sorted(set(self.refused)))
         return (
             f"seed {SEED}; refused {len(self.refused)}{f' ({reasons})' if reasons else ''}, wrong verdicts {self.wrong}"
@@ -67,7 +67,7 @@ class Tally:
 
 # ------------------------------------------------------------------------------------------------ views
 def on_table(x: float, y: float, turn: float) -> Array:
-    """Give world_from_plate of a plate that lies on the table."""
+    """Return world_from_plate of a plate on the table."""
     pose = np.eye(4)
     pose[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
     pose[:2, 3] = x, y
@@ -75,7 +75,7 @@ def on_table(x: float, y: float, turn: float) -> Array:
 
 
 def camera_over(random: np.random.Generator, near: float = 0.5, far: float = 1.6) -> Array:
-    """Give world_from_camera of a camera so far away (m), tilted by 0 to 60°, turned at will."""
+    """Return a random world_from_camera: distance from `near` to `far` (m), tilt 0 to 60°, any roll."""
     distance, tilt, azimuth = (
         random.uniform(near, far),
         math.radians(random.uniform(0, 60)),
@@ -86,8 +86,8 @@ def camera_over(random: np.random.Generator, near: float = 0.5, far: float = 1.6
     return rendering.looking_at(eye, target, random.uniform(0, math.tau))
 
 
-def in_sight(plate: Plate, world_from_camera: Array, lens: Lens) -> bool:
-    """Tell whether all of a plate is in the picture."""
+def is_visible(plate: Plate, world_from_camera: Array, lens: Lens) -> bool:
+    """Return whether the whole plate is in the picture."""
     width, height = plate.size
     corners = np.array([[x * width / 2, y * height / 2, 0.0, 1.0] for x in (-1, 1) for y in (-1, 1)])
     x, y, z, _ = np.linalg.inv(world_from_camera) @ plate.world_from_plate @ corners.T
@@ -97,7 +97,7 @@ def in_sight(plate: Plate, world_from_camera: Array, lens: Lens) -> bool:
 
 
 def markers_view(random: np.random.Generator, count: int, background: Plate) -> View:
-    """Give a view of one marker, or of several around the middle, all of them in the picture."""
+    """Return a view of one marker, or of several around the center, all within the picture."""
     while True:
         camera = camera_over(random)
         numbers = random.choice(50, count, replace=False)
@@ -107,14 +107,14 @@ def markers_view(random: np.random.Generator, count: int, background: Plate) -> 
             angle, radius = start + index * math.tau / count, random.uniform(0.10, 0.14) if count > 1 else 0.03
             places.append(on_table(radius * math.cos(angle), radius * math.sin(angle), random.uniform(0, math.tau)))
         plates = [rendering.marker(int(n), SIZE, place) for n, place in zip(numbers, places, strict=True)]
-        if all(in_sight(plate, camera, LENS) for plate in plates):
+        if all(is_visible(plate, camera, LENS) for plate in plates):
             break
     listed = [Marker(int(n), Pose.from_matrix(place)) for n, place in zip(numbers, places, strict=True)]
     return View(camera, [background, *plates], Layout(listed, size=SIZE), exposure_of(random))
 
 
 def board_view(random: np.random.Generator, background: Plate) -> View:
-    """Give a view of a ChArUco board of 7 × 5 squares of 30 mm, 0.4 to 1 m away."""
+    """Return a view of a ChArUco board of 7 × 5 squares of 30 mm, 0.4 to 1 m away."""
     cell = 0.03 / 8
     while True:
         camera, place = (
@@ -122,21 +122,21 @@ def board_view(random: np.random.Generator, background: Plate) -> View:
             on_table(random.uniform(-0.05, 0.05), random.uniform(-0.05, 0.05), random.uniform(0, math.tau)),
         )
         plate = rendering.charuco(7, 5, cell, place)
-        if in_sight(plate, camera, LENS):
+        if is_visible(plate, camera, LENS):
             break
     board = CharucoBoard(7, 5, cell * 8, cell * 6, pose=Pose.from_matrix(place))
     return View(camera, [background, plate], Layout(boards=[board]), exposure_of(random))
 
 
 def exposure_of(random: np.random.Generator) -> Exposure:
-    """Give blur, noise and light as they vary in a hall."""
+    """Return random blur, noise and light as in a factory hall."""
     return Exposure(
         random.uniform(0.6, 1.2), random.uniform(1.5, 3.0), random.uniform(0.7, 1.05), random.uniform(0, 0.4)
     )
 
 
-def intrinsics_off(random: np.random.Generator, factor: float = 1.0) -> CameraParameters:
-    """Give the camera's intrinsics as somebody measured them."""
+def inaccurate_intrinsics(random: np.random.Generator, factor: float = 1.0) -> CameraParameters:
+    """Return the camera's intrinsics with measurement errors."""
     f = 1 + factor * FOCAL * random.normal(size=2)
     c = factor * CENTRE * random.normal(size=2)
     bent = [k * (1 + factor * DISTORTION * random.normal()) for k in LENS.coefficients]
@@ -144,12 +144,12 @@ def intrinsics_off(random: np.random.Generator, factor: float = 1.0) -> CameraPa
 
 
 def picture_of(view: View, random: np.random.Generator) -> npt.NDArray[np.uint8]:
-    """Take the picture."""
+    """Render the picture."""
     return rendering.render(LENS, view.world_from_camera, view.plates, random, view.exposure)
 
 
 def errors_of(pose: Pose, world_from_camera: Array) -> tuple[float, float]:
-    """Give by how much a pose is off: mm, degrees."""
+    """Return the position error, mm, and the orientation error, degrees."""
     off = pose.inverted() * Pose.from_matrix(world_from_camera)
     return math.hypot(*off.position) * 1e3, math.degrees(off.orientation.angle_to(Pose().orientation))
 
@@ -158,7 +158,7 @@ def errors_of(pose: Pose, world_from_camera: Array) -> tuple[float, float]:
 def measure(
     make: Callable[[np.random.Generator, Plate], View], pictures: int, limit: float, options: PoseOptions, factor: float
 ) -> Tally:
-    """Find the camera on pictures, given as JPEG files; what is off by more than `limit` mm has a wrong verdict."""
+    """Compute camera poses from JPEG files; an error of more than `limit` mm is a wrong verdict."""
     tally = Tally()
     for index in range(pictures):
         random = np.random.default_rng([SEED, index])
@@ -167,7 +167,7 @@ def measure(
         view = make(random, background)
         done, data = cv2.imencode(".jpg", picture_of(view, random), [cv2.IMWRITE_JPEG_QUALITY, 95])
         assert done
-        file, parameters = data.tobytes(), intrinsics_off(random, factor)
+        file, parameters = data.tobytes(), inaccurate_intrinsics(random, factor)
         seconds, result = _timed(file, parameters, view.layout, options)
         tally.seconds.append(seconds)
         if isinstance(result, CalibrationRefused):
@@ -177,14 +177,14 @@ def measure(
         tally.position.append(position)
         tally.orientation.append(orientation)
         known = 1e3 * math.sqrt(sum(result.covariance[axis][axis] for axis in range(3)))
-        tally.wrong += position > limit or position > TELLS * known
+        tally.wrong += position > limit or position > MAX_DEVIATIONS * known
     return tally
 
 
 def _timed(
     file: bytes, parameters: CameraParameters, layout: Layout, options: PoseOptions
 ) -> tuple[float, CameraPose | CalibrationRefused]:
-    """Solve a picture some times; give the shortest time, s, and what came of it."""
+    """Solve a picture `CALLS` times; return the shortest time, s, and the result or refusal."""
     best = math.inf
     result: CameraPose | CalibrationRefused | None = None
     for _ in range(CALLS):
@@ -199,7 +199,7 @@ def _timed(
 
 
 async def run(report: Report, long: bool) -> None:
-    """Measure the poses of a camera, on 200 pictures of each kind, or on 2,000."""
+    """Measure camera poses on 200 pictures of each kind, or on 2,000 if `long`."""
     pictures = LONG if long else PICTURES
     sys.stderr.write(f"calibration: seed {SEED}, {pictures} pictures of each kind\n")
     options = PoseOptions(focal_deviation=FOCAL, centre_deviation=CENTRE, distortion_deviation=DISTORTION)
@@ -217,7 +217,7 @@ async def run(report: Report, long: bool) -> None:
         )
         far = f"99th percentile {percentile(tally.orientation, 99):.3f}"
         report.add(Metric(f"{prefix}_deg", median(tally.orientation), count, far))
-        slow = f"99th percentile {percentile(tally.seconds, 99) * 1e3:.1f}; with the decoding of a JPEG file"
+        slow = f"99th percentile {percentile(tally.seconds, 99) * 1e3:.1f}; including the decoding of the JPEG file"
         report.add(Metric(f"{prefix}_ms", median(tally.seconds) * 1e3, len(tally.seconds), slow))
         report.add(Metric(f"{prefix}_wrong", 100 * tally.wrong / pictures, pictures))
         report.add(Metric(f"{prefix}_refused", 100 * len(tally.refused) / pictures, pictures))

@@ -1,4 +1,4 @@
-"""The camera: what 30 frames a second of colour and depth cost the process that holds it."""
+"""Processor time of a process that receives 30 frames of colour and depth per second."""
 
 import asyncio
 import sys
@@ -13,18 +13,18 @@ SECONDS = 20.0
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Take 1280 x 720 colour and depth from the fake in a process of its own, as the cell host does."""
+    """Measure receiving 1280 x 720 colour and depth from the fake in a separate process, as in the cell host."""
     command = python_module("arcor2_fakes.oak_d", "--listen", "127.0.0.1:0", "--control", "127.0.0.1:0")
     fake = Child("camera", command, directory / "camera.log")
     try:
         addresses = await fake.start_json()
-        command = (sys.executable, "-m", "benchmarks.receive_pictures", addresses["stream"], str(SECONDS))
-        process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE)
+        receiver = (sys.executable, "-m", "benchmarks.receive_pictures", addresses["stream"], str(SECONDS))
+        process = await asyncio.create_subprocess_exec(*receiver, stdout=asyncio.subprocess.PIPE)
         assert process.stdout is not None
         result = msgspec.json.decode(await process.stdout.read())
         await process.wait()
     finally:
         await fake.stop()
     seconds = result["seconds"]
-    note = f"{result['frames'] / seconds:.1f} frames/s, a picture is {result['age'] * 1e3:.1f} ms old when it is here"
+    note = f"{result['frames'] / seconds:.1f} frames/s, age of a picture on arrival {result['age'] * 1e3:.1f} ms"
     report.add(Metric("oak_core_percent", 100.0 * result["cpu"] / seconds, result["frames"], note))

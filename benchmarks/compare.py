@@ -1,7 +1,7 @@
-"""`make bench-compare`: measure this checkout and another revision in turns, and print both side by side.
+"""Measure this checkout and another revision in alternation, and print both results (`make bench-compare`).
 
-`python -m benchmarks.compare REVISION [--rounds N] [GROUP ...]`: each round measures every named group (default: all)
-first in one, then in the other; the order alternates. The table shows medians over the rounds and their ratio.
+`python -m benchmarks.compare REVISION [--rounds N] [GROUP ...]` measures every named group (default: all) in both
+checkouts in each round; the order alternates. The table shows the medians over the rounds and their ratio.
 """
 
 import argparse
@@ -25,7 +25,7 @@ FOLDERS = (".", "drivers", "fakes", "server")
 
 
 def write_metadata(checkout: Path) -> None:
-    """Write what an installation would say of a checkout: its version and entry points, which may have moved."""
+    """Write the package metadata of a checkout: its version and entry points, which may have moved."""
     project = tomllib.loads((checkout / "pyproject.toml").read_text())["project"]
     info = checkout / f"arcor2_hw-{project['version']}.dist-info"
     info.mkdir(exist_ok=True)
@@ -42,19 +42,19 @@ def write_metadata(checkout: Path) -> None:
 def measure(checkout: Path, group: str) -> dict[str, float]:
     """Measure one group with the code of a checkout; return its results by name."""
     path = os.pathsep.join(str(checkout / folder) for folder in FOLDERS)
-    ended = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-m", "benchmarks", group],
         cwd=checkout,
         env=os.environ | {"PYTHONPATH": path},
         stdout=subprocess.PIPE,
         check=False,
     )
-    results = [msgspec.json.decode(line) for line in ended.stdout.splitlines()]
+    results = [msgspec.json.decode(line) for line in process.stdout.splitlines()]
     return {result["name"]: result["value"] for result in results}
 
 
 def compare(other: Path, groups: list[str], rounds: int) -> None:
-    """Measure both checkouts in turns and print the table."""
+    """Measure both checkouts in alternation and print the table."""
     found: dict[str, dict[Path, list[float]]] = {}
     for number in range(rounds):
         for group in groups:
@@ -74,7 +74,7 @@ def main() -> None:
     """Read the command line, check the other revision out, and compare."""
     parser = argparse.ArgumentParser(prog="benchmarks.compare")
     parser.add_argument("revision", help="commit to compare with")
-    parser.add_argument("groups", nargs="*", help="groups to measure; all when none is named")
+    parser.add_argument("groups", nargs="*", help="groups to measure; default: all")
     parser.add_argument("--rounds", type=int, default=3)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="arcor2-hw-compare-") as folder:

@@ -1,4 +1,4 @@
-"""What the compute workers cost the server: their start, a question, and worlds of many bodies."""
+"""Compute workers: start time, round trip of a task, and worlds of many bodies."""
 
 import time
 from typing import Final
@@ -19,13 +19,13 @@ ROUNDS: Final = 100
 
 
 async def run(report: Report) -> None:
-    """Measure all of them."""
-    for metric in (lines(), *await questions(), await reachability()):
+    """Measure everything in this group."""
+    for metric in (lines(), *await tasks(), await reachability()):
         report.add(metric)
 
 
 def lines() -> Metric:
-    """Time the safety of a line among a thousand boxes, which the server itself tells."""
+    """Measure the collision check of a line among 1,000 boxes, which runs in the server."""
     placed = {
         f"b{n}": Obstacle.of(Box(f"b{n}", 0.2, 0.2, 0.2), Pose(Position(n % 10, n // 10 % 10, n // 100)))
         for n in range(BODIES)
@@ -39,8 +39,8 @@ def lines() -> Metric:
     return Metric("computing_line_1000_ms", median(taken), len(taken), f"p99 {percentile(taken, 99):.2f} ms")
 
 
-async def questions() -> list[Metric]:
-    """Time the start of a worker with its first answer, one question, and one after one of many bodies moved."""
+async def tasks() -> list[Metric]:
+    """Measure the start of a worker, the round trip of a task, and of a task after one of many bodies moved."""
     model = RobotSource(StoredFile(str(UR5E), "ur5e"))
     compute = Compute(idle=60.0)
     try:
@@ -48,29 +48,31 @@ async def questions() -> list[Metric]:
         described = await compute.run(t.DescribeRobot(model))
         start = 1e3 * (time.perf_counter() - began)
         joints = [Joint(joint.name, 0.3) for joint in described.joints]
-        question, world = [], []
-        things: dict[str, WorldItem] = {f"b{n}": box(n) for n in range(BODIES)}
+        round_trip, world = [], []
+        items: dict[str, WorldItem] = {f"b{n}": box(n) for n in range(BODIES)}
         check = t.CheckLines([t.Line(Position(-1, 0, 0), Position(11, 9, 9))])
-        await compute.run(check, world=things)
+        await compute.run(check, world=items)
         for number in range(ROUNDS):
             began = time.perf_counter()
             await compute.run(t.SolveForward(model, "tcp", joints))
-            question.append(1e3 * (time.perf_counter() - began))
-            things[f"b{number}"] = box(number, 0.01 * number)
+            round_trip.append(1e3 * (time.perf_counter() - began))
+            items[f"b{number}"] = box(number, 0.01 * number)
             began = time.perf_counter()
-            await compute.run(check, world=things)
+            await compute.run(check, world=items)
             world.append(1e3 * (time.perf_counter() - began))
     finally:
         await compute.close()
     return [
         Metric("computing_start_ms", start, 1),
-        Metric("computing_question_ms", median(question), len(question), f"p99 {percentile(question, 99):.2f} ms"),
+        Metric(
+            "computing_question_ms", median(round_trip), len(round_trip), f"p99 {percentile(round_trip, 99):.2f} ms"
+        ),
         Metric("computing_world_1000_ms", median(world), len(world), f"p99 {percentile(world, 99):.2f} ms"),
     ]
 
 
 async def reachability() -> Metric:
-    """Time 1,000 points in three orientations each, asked in pieces as the server does."""
+    """Measure the reachability of 1,000 points with three orientations each, in batches as in the server."""
     robot = WorldRobot("arm", RobotSource(StoredFile(str(UR5E), "ur5e")))
     turns = [Orientation(1, 0, 0, 0), Orientation(0, 0.5**0.5, 0, 0.5**0.5), Orientation(0.5**0.5, 0, 0, 0.5**0.5)]
     points = [Position(0.12 * (n % 10) - 0.6, 0.12 * (n // 10 % 10) - 0.6, 0.1 * (n // 100)) for n in range(1000)]
@@ -89,6 +91,6 @@ async def reachability() -> Metric:
 
 
 def box(number: int, aside: float = 0.0) -> WorldBody:
-    """Give one of a grid of boxes."""
+    """Return box `number` of a grid."""
     place = Position(number % 10 + 3.0, number // 10 % 10 + aside, number // 100)
     return WorldBody(f"b{number}", primitives.Box(0.2, 0.2, 0.2), Pose(place))

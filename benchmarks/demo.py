@@ -1,4 +1,4 @@
-"""The main job on a busy computer: `arcor2-hw demo --once` next to processes that compute, without privileges."""
+"""The demo on a busy computer: `arcor2-hw demo --once` next to computing processes, without raised priorities."""
 
 import asyncio
 import ctypes
@@ -11,7 +11,7 @@ from typing import Final
 from benchmarks.metrics import Metric, Report
 
 BUSY: Final = 8
-"""Processes that compute without a pause."""
+"""Number of processes that compute continuously."""
 RUNS, LONG_RUNS = 1, 5
 BOARDS: Final = 5
 ENDS_WITHIN: Final = 400.0
@@ -19,13 +19,13 @@ _PR_CAPBSET_DROP, _CAP_SYS_NICE = 24, 23
 
 
 def _without_priority() -> None:
-    """Let the process that is started, and its children, not raise their priority, not even as root."""
+    """Prevent the started process and its children from raising their priority, even as root."""
     ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_SYS_NICE, 0, 0, 0)
     resource.setrlimit(resource.RLIMIT_NICE, (0, 0))
 
 
 async def _demo(folder: Path) -> str:
-    """Run the demo; return what it ended with, empty when it completed."""
+    """Run the demo; return the end of its output if it failed, otherwise an empty string."""
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "arcor2_server.cli.main", "demo", "--once", "--port", "0"),
         *("--boards", str(BOARDS), "--data-dir", str(folder)),
@@ -38,7 +38,7 @@ async def _demo(folder: Path) -> str:
     except TimeoutError:
         process.terminate()
         await process.wait()
-        return f"it did not end within {ENDS_WITHIN:g} s"
+        return f"did not end within {ENDS_WITHIN:g} s"
     return "" if process.returncode == 0 else " ".join(output.decode().split()[-40:])
 
 
@@ -55,5 +55,5 @@ async def run(report: Report, folder: Path, long: bool) -> None:
         for process in busy:
             process.kill()
             await process.wait()
-    ended = [problem for problem in problems if problem]
-    report.add(Metric("busy_demo_completed", 100.0 * (runs - len(ended)) / runs, runs, "; ".join(ended)))
+    failed = [problem for problem in problems if problem]
+    report.add(Metric("busy_demo_completed", 100.0 * (runs - len(failed)) / runs, runs, "; ".join(failed)))

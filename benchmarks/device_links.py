@@ -1,7 +1,7 @@
-"""Links between a driver and its fake, one for each transport: how each is lost, made whole, and seen to be whole.
+"""Links between drivers and fakes, one for each transport: how to interrupt and restore them, and detect recovery.
 
-The drivers have the settings they are delivered with. A reading counts as fresh when it tells what the device was made
-only after the link was whole again, or was taken after that.
+The drivers have their default settings. A reading is fresh if it shows a state that the device took after the link was
+restored, or if it was taken after that.
 """
 
 import contextlib
@@ -52,7 +52,7 @@ from tests.fakes.conftest import FakeProcess
 Kind = Literal["reset", "silence", "half-open"]
 KINDS: Final[tuple[Kind, ...]] = ("reset", "silence", "half-open")
 Fresh = Callable[[Any], bool]
-"""Tells whether what was read is of after the link was made whole."""
+"""Returns whether a reading was taken after the link was restored."""
 
 UR_PORTS: Final = (29999, 30003, 30004)
 YUMI_PORTS: Final = (8080, 6101, 6102, 6111, 6112)
@@ -63,10 +63,13 @@ LEVEL: Final = "level=AI ns=2;s=Cell.Level"
 
 @dataclass
 class Link:
-    """A driver on its fake.
+    """A driver connected to its fake.
 
-    read: takes a reading. mark: makes the device another than before and gives what tells so; `n` is another number
-    each time. serial: the link is a port that can be pulled out. beside: what else has to be connected.
+    Attributes:
+        read: Take a reading.
+        mark: Change the state of the device and return a check for that state; `n` differs at each call.
+        serial: The link is a port that can be unplugged.
+        beside: Other objects that have to be connected.
     """
 
     name: str
@@ -81,19 +84,22 @@ class Link:
     def objects(self) -> tuple[Generic, ...]:
         return (*self.beside, self.device)
 
-    def lose(self, kind: Kind) -> None:
-        """Reset: broken, and what would open it anew is refused. Silence: nothing passes. Half-open: the device's
-        process stands still, its kernel goes on acknowledging and taking connections."""
+    def interrupt(self, kind: Kind) -> None:
+        """Interrupt the link.
+
+        Reset closes it and refuses new connections. Silence passes no data. Half-open suspends the device's process,
+        while its kernel still acknowledges data and accepts connections.
+        """
         if kind == "half-open":
             os.kill(self.fake.process.pid, signal.SIGSTOP)
         elif kind == "silence":
             self.fake.control.do("silence")
         else:
-            self.fake.control.do("refuse")  # a port that is pulled out breaks what is open by that
+            self.fake.control.do("refuse")  # unplugging a port also closes it
             if not self.serial:
                 self.fake.control.do("reset")
 
-    def heal(self, kind: Kind) -> None:
+    def restore(self, kind: Kind) -> None:
         if kind == "half-open":
             os.kill(self.fake.process.pid, signal.SIGCONT)
         else:
@@ -123,7 +129,7 @@ def _since_now() -> Fresh:
 
 
 class Links:
-    """Starts fakes and makes drivers for them; nothing is connected."""
+    """Starts fakes and creates drivers for them, not connected."""
 
     def __init__(self, stack: contextlib.ExitStack, folder: Path) -> None:
         self._stack, self._folder = stack, folder
@@ -151,11 +157,11 @@ class Links:
     def _start(self, module: str, *arguments: str) -> FakeProcess:
         fake = FakeProcess(module, *arguments)
         self._stack.callback(fake.end)
-        fake.truth()  # opens the control channel, so that it is there before anything is counted
+        fake.truth()  # opens the control channel before descriptors are counted
         return fake
 
     def _linked(self, module: str, *arguments: str) -> FakeProcess:
-        """Start a fake on a pty whose path stays when it is plugged anew."""
+        """Start a fake on a pty that keeps its path when it is plugged in again."""
         return self._start(module, "--link", str(self._folder / f"tty_{module}"), *arguments)
 
     def _tester(self) -> Link:
@@ -319,8 +325,8 @@ class Links:
             return _is(f"O-{n}")
 
         def read() -> str:
-            there, order, *_ = erp.next_order(0.0)
-            if there:
+            found, order, *_ = erp.next_order(0.0)
+            if found:
                 erp.close_order(order, "read")
             return order
 
@@ -345,7 +351,7 @@ class Links:
 
 @contextlib.contextmanager
 def started() -> Iterator[list[Link]]:
-    """Start every fake; give the links, not connected. At the end all are disconnected and the fakes ended."""
+    """Start every fake and yield the links, not connected; disconnect and stop all at the end."""
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="arcor2-hw-links-", ignore_cleanup_errors=True))
         yield list(Links(stack, Path(folder)).all())

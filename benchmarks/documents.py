@@ -1,4 +1,4 @@
-"""Large documents: what an edit, opening, saving and listing cost."""
+"""Large projects: duration of an edit, and of opening, saving and listing projects."""
 
 import asyncio
 import itertools
@@ -14,7 +14,7 @@ from benchmarks.metrics import Metric, Report, median
 from benchmarks.requests import fdatasync_time
 
 IN_FLIGHT = 128
-"""Requests sent at once while a document is filled."""
+"""Number of pending requests while a project is filled."""
 _ids = itertools.count(1)
 
 
@@ -23,7 +23,7 @@ def request(request_name: str, /, **args: Any) -> str:
 
 
 class Author:
-    """Makes documents over a bare websocket."""
+    """Creates documents over a plain websocket."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket
@@ -35,7 +35,7 @@ class Author:
         return answer.get("data")
 
     async def timed(self, name: str, /, **args: Any) -> float:
-        """Give how long the answer took, s."""
+        """Return the time until the response, s."""
         text = request(name, **args)
         begin = time.perf_counter()
         answer = await server_process.answer(self.socket, text)
@@ -43,8 +43,8 @@ class Author:
         assert json.loads(answer)["result"], answer
         return spent
 
-    async def told(self, event: str, request_name: str, /, **args: Any) -> Any:
-        """Ask, and give the data of the event that follows."""
+    async def event_after(self, event: str, request_name: str, /, **args: Any) -> Any:
+        """Send a request and return the data of the event that follows."""
         await self.socket.send(request(request_name, **args))
         while True:
             message = json.loads(await self.socket.recv())
@@ -53,7 +53,7 @@ class Author:
                 return message["data"]
 
     async def many(self, requests: list[str], event: str) -> list[Any]:
-        """Send many requests, a few at once; gives the data of the events in their order."""
+        """Send many requests, `IN_FLIGHT` at a time; return the data of the events in order."""
         found: list[Any] = []
         for part in _parts(requests):
             for text in part:
@@ -72,21 +72,21 @@ class Author:
     async def scene(self) -> str:
         await self.ask("RegisterUser", user_name="bench")
         await self.ask("NewScene", name="bench")
-        self.object = (await self.told("SceneObjectChanged", "AddObjectToScene", name="rnd", type="RandomActions"))[
-            "id"
-        ]
+        self.object = (
+            await self.event_after("SceneObjectChanged", "AddObjectToScene", name="rnd", type="RandomActions")
+        )["id"]
         await self.ask("SaveScene")
         return str((await self.ask("ListScenes"))[0]["id"])
 
     async def project(self, scene: str, name: str) -> tuple[str, str]:
-        """Open a new project with one action point; gives the ids of both."""
-        opened = await self.told("OpenProject", "NewProject", scene_id=scene, name=name)
+        """Create and open a project with one action point; return the ids of both."""
+        opened = await self.event_after("OpenProject", "NewProject", scene_id=scene, name=name)
         position = {"x": 0.0, "y": 0.0, "z": 0.0}
-        point = await self.told("ActionPointChanged", "AddActionPoint", name="ap", position=position)
+        point = await self.event_after("ActionPointChanged", "AddActionPoint", name="ap", position=position)
         return str(opened["project"]["id"]), str(point["id"])
 
     def dice(self, point: str, number: int) -> dict[str, Any]:
-        """Arguments of AddAction: one that stores a boolean result."""
+        """Return the arguments of AddAction for an action that stores a boolean result."""
         return {
             "action_point_id": point,
             "name": f"action {number}",
@@ -96,7 +96,7 @@ class Author:
         }
 
     async def actions(self, point: str, numbers: range) -> list[str]:
-        """Add actions; gives their ids."""
+        """Add actions; return their ids."""
         made = await self.many([request("AddAction", **self.dice(point, n)) for n in numbers], "ActionChanged")
         by_name = {action["name"]: action["id"] for action in made}
         return [str(by_name[f"action {number}"]) for number in numbers]
@@ -110,7 +110,7 @@ def _parts(requests: list[str]) -> list[list[str]]:
 
 
 class Floor:
-    """What a round trip and a flush cost at the same moment, taken off what waits for both."""
+    """Duration of an echo and an fdatasync at the same time, subtracted from requests that need both."""
 
     def __init__(self, echo: ClientConnection, directory: Path) -> None:
         self._echo, self._directory = echo, directory
@@ -123,15 +123,15 @@ class Floor:
 
     def metric(self, name: str, samples: list[float]) -> Metric:
         echo, sync = median(self._echoes), median(self._syncs)
-        note = f"answer {median(samples) * 1e3:.3f} ms, echo {echo * 1e3:.3f} ms, fdatasync {sync * 1e3:.3f} ms"
+        note = f"response {median(samples) * 1e3:.3f} ms, echo {echo * 1e3:.3f} ms, fdatasync {sync * 1e3:.3f} ms"
         return Metric(name, (median(samples) - echo - sync) * 1e3, len(samples), note)
 
 
 async def edits(report: Report, author: Author, scene: str, echo: ClientConnection, directory: Path) -> None:
-    """AddAction into a project of 10,000."""
+    """Measure AddAction in a project of 10,000 actions."""
     _, point = await author.project(scene, "many actions")
     await author.actions(point, range(10_000))
-    await asyncio.sleep(3)  # what was written while it was filled is still on its way to the disk
+    await asyncio.sleep(3)  # wait until the disk has written the preceding edits
     floor, samples = Floor(echo, directory), []
     for number in range(10_000, 10_100):
         samples.append(await author.timed("AddAction", **author.dice(point, number)))
@@ -142,7 +142,7 @@ async def edits(report: Report, author: Author, scene: str, echo: ClientConnecti
 
 
 async def logic(report: Report, author: Author, scene: str, echo: ClientConnection, directory: Path) -> None:
-    """AddLogicItem in front of a chain of 1,000 actions, and of 18 if/else blocks: all behind it is looked at."""
+    """Measure AddLogicItem in front of a chain of 1,000 actions and of 18 if/else blocks, including the cycle check."""
     _, point = await author.project(scene, "chain")
     chain = await author.actions(point, range(1_001))
     links = zip(chain[1:], [*chain[2:], "END"], strict=True)
@@ -154,10 +154,10 @@ async def logic(report: Report, author: Author, scene: str, echo: ClientConnecti
     ids = await author.actions(point, range(3 * 18 + 2))
     first, last, blocks = ids[0], ids[1], [ids[at : at + 3] for at in range(2, len(ids), 3)]
     steps = [{"start": last, "end": "END"}]
-    for (dice, *ways), following in zip(blocks, [*(block[0] for block in blocks[1:]), last], strict=True):
-        for way, value in zip(ways, ("true", "false"), strict=True):
+    for (dice, *branches), following in zip(blocks, [*(block[0] for block in blocks[1:]), last], strict=True):
+        for branch, value in zip(branches, ("true", "false"), strict=True):
             condition = {"what": f"{dice}/default/0", "value": value}
-            steps += [{"start": dice, "end": way, "condition": condition}, {"start": way, "end": following}]
+            steps += [{"start": dice, "end": branch, "condition": condition}, {"start": branch, "end": following}]
     await author.steps(steps)
     await _close(report, author, "add_logic_item_branches_ms", first, blocks[0][0], Floor(echo, directory))
     await author.ask("CloseProject", force=True)
@@ -184,7 +184,7 @@ async def _close(report: Report, author: Author, metric: str, start: str, end: s
 
 
 async def opening(report: Report, author: Author, scene: str, directory: Path) -> None:
-    """OpenProject and SaveProject of 1,000 actions that store results."""
+    """Measure OpenProject and SaveProject of 1,000 actions that store results."""
     project, point = await author.project(scene, "large")
     await author.actions(point, range(1_000))
     await author.ask("SaveProject")
@@ -196,14 +196,14 @@ async def opening(report: Report, author: Author, scene: str, directory: Path) -
         syncs.append(fdatasync_time(directory, 5, size))
         await author.ask("CloseProject")
         opened.append(await author.timed("OpenProject", id=project))
-    report.add(Metric("open_project_1000_ms", median(opened) * 1e3, len(opened), "to the answer"))
-    note = f"with its flush; {size} bytes and fdatasync alone take {median(syncs) * 1e3:.1f} ms"
+    report.add(Metric("open_project_1000_ms", median(opened) * 1e3, len(opened), "until the response"))
+    note = f"including fdatasync; writing {size} bytes and fdatasync alone take {median(syncs) * 1e3:.1f} ms"
     report.add(Metric("save_project_1000_ms", median(saved) * 1e3, len(saved), note))
     await author.ask("CloseProject")
 
 
 async def listing(report: Report, author: Author, scene: str) -> None:
-    """ListProjects of 200, again and after one of them was saved."""
+    """Measure ListProjects of 200 projects, repeatedly and after one of them was saved."""
     project, point = await author.project(scene, "small")
     await author.actions(point, range(10))
     await author.ask("SaveProject")

@@ -1,4 +1,4 @@
-"""The measure of a round trip: Litestar and uvicorn as the server has them, answering every message with N bytes."""
+"""Reference for round trips: Litestar and uvicorn as in the server, answering every message with N bytes."""
 
 import asyncio
 import signal
@@ -12,7 +12,7 @@ from litestar import Litestar, WebSocket, websocket
 
 
 def application(size: int) -> Litestar:
-    """Make an application that answers `size` bytes to every message."""
+    """Return an application that answers every message with `size` bytes."""
     answer = "x" * size
 
     @websocket("/")
@@ -25,11 +25,11 @@ def application(size: int) -> Litestar:
     return Litestar([respond], openapi_config=None, logging_config=None)
 
 
-class Announcing(uvicorn.Server):
-    """Says where it listens once it does."""
+class AnnouncingServer(uvicorn.Server):
+    """Server that prints its address when it is ready."""
 
     async def startup(self, sockets: list[Any] | None = None) -> None:
-        """Start, then say where."""
+        """Start, then print the address."""
         await super().startup(sockets=sockets)
         if sockets:
             sys.stdout.write(f"ready ws://127.0.0.1:{sockets[0].getsockname()[1]}\n")
@@ -43,7 +43,7 @@ async def main(size: int) -> None:
     config = uvicorn.Config(
         application(size), ws="websockets-sansio", log_config=None, access_log=False, ws_per_message_deflate=False
     )
-    server = Announcing(config)
+    server = AnnouncingServer(config)
 
     def end() -> None:
         server.should_exit = True

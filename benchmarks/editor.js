@@ -1,11 +1,11 @@
-// Looks on from inside the page: when things are first there, and from a message to the picture that shows it.
+// Probe inside the page: times of the first items, and from a message to the frame that shows it.
 (() => {
   const seen = { items: 0, robot: 0, joints: [], edits: [], previews: [], taps: [], enters: [] };
   window.__bench = seen;
   const epoch = () => performance.timeOrigin + performance.now();
   const waiting = { joints: [] };
-  const Plain = window.WebSocket;
-  window.WebSocket = class extends Plain {
+  const OriginalWebSocket = window.WebSocket;
+  window.WebSocket = class extends OriginalWebSocket {
     constructor(...given) {
       super(...given);
       this.addEventListener("message", ({ data }) => {
@@ -19,7 +19,7 @@
   addEventListener("click", () => seen.taps.push(epoch()), true);
   addEventListener("keydown", ({ key }) => key === "Enter" && seen.enters.push(epoch()), true);
   let hooked = null;
-  const look = () => {
+  const poll = () => {
     const engine = window.__engine;
     if (engine && hooked !== engine) {
       hooked = engine;
@@ -30,7 +30,7 @@
       renderer.render = (...given) => {
         render(...given);
         if (!waiting.joints.length) return;
-        gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits until it is drawn
+        gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits until the frame is drawn
         const now = performance.now();
         for (const at of waiting.joints.splice(0)) seen.joints.push(now - at);
       };
@@ -40,7 +40,7 @@
       const robot = engine.ids().map((id) => engine.item(id)).find((item) => item.kind === "robot");
       if (robot && Object.keys(robot.joints ?? {}).length) seen.robot = performance.now();
     }
-    if (!seen.robot) setTimeout(look, 5);
+    if (!seen.robot) setTimeout(poll, 5);
   };
-  look();
+  poll();
 })();

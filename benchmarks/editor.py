@@ -1,7 +1,7 @@
-"""`make bench-editor`: the editor in headless Chromium with software rendering at `q=low`, real server, fakes.
+"""Measure the editor in headless Chromium with software rendering, the server and fakes (`make bench-editor`).
 
-What is measured is told where it is measured; the goals are those of `benchmarks/metrics.py`. A page that reports an
-error measures nothing.
+The page runs with `q=low`. Each function describes what it measures; the goals are in `benchmarks/metrics.py`. If the
+page reports an error, nothing is measured.
 """
 
 import asyncio
@@ -26,6 +26,7 @@ from arcor2_hw.data.project import Project
 from arcor2_server.web.editor import FILES
 from benchmarks.metrics import Metric, Report, median, percentile
 from tests.e2e.harness import Cell, running_cell, scene_state, until
+from tests.editor import texts
 from tests.editor.screen import Screen, running_browser, screen_of
 from tests.editor.test_editor_size import needed
 
@@ -39,38 +40,38 @@ RESTARTS: Final = 3
 ATTEMPTS: Final = 4
 SLOW: Final = 0.015
 """Fraction of the robot's speed."""
-_INSIDE: Final = Path(__file__).with_suffix(".js").read_text()
+_PROBE: Final = Path(__file__).with_suffix(".js").read_text()
 
 
 def size(report: Report) -> None:
-    """Measure what a tablet loads until it shows the workplace, compressed with gzip."""
+    """Measure the size of the files loaded until the workplace is shown, compressed with gzip."""
     manifest = json.loads((FILES / ".vite" / "manifest.json").read_text())
     files = needed(manifest, "index.html", "src/engine/engine.ts")
     total = sum((FILES / f"{name}.gz").stat().st_size for name in files)
     report.add(Metric("editor_size_kb", total / 1e3, len(files), "files of shell and 3D"))
 
 
-async def _inside(screen: Screen) -> dict[str, Any]:
+async def _observed(screen: Screen) -> dict[str, Any]:
     found: dict[str, Any] = await screen.page.evaluate("() => window.__bench")
     return found
 
 
 async def loading(report: Report, browser: Browser, cell: Cell) -> None:
-    """Load the page anew, without a cache, while the project is open: how soon there is what."""
+    """Measure loading the page without a cache while a project is open: first paint, items, robot model."""
     paints, items, robots = [], [], []
     for number in range(LOADS):
         async with screen_of(browser, cell.url) as screen:
             await screen.page.add_init_script(f"localStorage.setItem('arcor2-hw.name', 'bench {number}')")
-            await screen.page.add_init_script(_INSIDE)
+            await screen.page.add_init_script(_PROBE)
             await screen.page.goto(f"{screen.url}/?q=low")
             await screen.until("() => window.__bench.robot > 0")
             paint = "() => performance.getEntriesByName('first-contentful-paint')[0].startTime"
             paints.append(float(await screen.page.evaluate(paint)))
-            seen = await _inside(screen)
+            seen = await _observed(screen)
             items.append(seen["items"])
             robots.append(seen["robot"])
     for name, samples in (("paint", paints), ("usable", items), ("robot", robots)):
-        note = f"from the address to it; worst {max(samples):.0f} ms"
+        note = f"from opening the address; worst {max(samples):.0f} ms"
         report.add(Metric(f"editor_{name}_s", median(samples) / 1e3, len(samples), note))
 
 
@@ -82,13 +83,13 @@ async def _move(client: Client, robot: str, height: float) -> None:
 
 
 async def _moving(client: Client, cell: Cell, robot: str, height: float) -> None:
-    """Have it move; on a busy machine the robot's watchdog ends a motion at times, and it is asked for again."""
+    """Start a motion; repeat it if the robot's watchdog ended it, as can happen on a busy machine."""
     for _ in range(ATTEMPTS):
         await _move(client, robot, height)
         with contextlib.suppress(AssertionError):
-            await until(lambda: _not(_at_rest(cell)), "it moves", 3)
+            await until(lambda: _not(_at_rest(cell)), "the robot moves", 3)
             return
-    raise AssertionError("it does not move")
+    raise AssertionError("The robot does not move.")
 
 
 async def _at_rest(cell: Cell) -> bool:
@@ -96,7 +97,7 @@ async def _at_rest(cell: Cell) -> bool:
 
 
 async def drawing(report: Report, screen: Screen, client: Client, cell: Cell, robot: str) -> None:
-    """Frames while the robot moves slowly, and from an event of it to pixels."""
+    """Measure the frame rate while the robot moves slowly, and the time from its event to pixels."""
     for attempt in range(ATTEMPTS):
         await _moving(client, cell, robot, 0.2 if attempt % 2 else -0.2)
         await asyncio.sleep(0.5)
@@ -107,17 +108,17 @@ async def drawing(report: Report, screen: Screen, client: Client, cell: Cell, ro
         if not await _at_rest(cell):
             break
     else:
-        raise AssertionError("it did not move all the time: the robot's watchdog ends motions on a busy machine")
-    joints = (await _inside(screen))["joints"]
+        raise AssertionError("The robot did not move continuously; its watchdog ends motions on a busy machine.")
+    joints = (await _observed(screen))["joints"]
     report.add(Metric("editor_frames_per_s", rate, round(rate * MOVING_S), f"one robot moves, {POINTS} points"))
     note = f"p50 {median(joints):.0f} ms, {len(joints) / MOVING_S:.0f} events/s"
     report.add(Metric("editor_event_to_pixels_ms", percentile(joints, 95), len(joints), f"p95; {note}"))
     await client.call("StopRobot", rpc.StopRobotArgs(robot))
-    await until(lambda: _at_rest(cell), "it rests")
+    await until(lambda: _at_rest(cell), "the robot is at standstill")
 
 
 async def _idle(screen: Screen) -> int:
-    """Frames drawn while nothing moves, after what came last was drawn."""
+    """Return the number of frames drawn while nothing moves, after pending changes were drawn."""
     await asyncio.sleep(2)
     frames = await screen.frames()
     await asyncio.sleep(IDLE_S)
@@ -129,41 +130,41 @@ async def _not(answer: Any) -> bool:
 
 
 async def stopping(report: Report, screen: Screen, client: Client, cell: Cell, robot: str) -> None:
-    """From the finger on Stop motion to the stopping command at the robot's controller, which stamps it."""
+    """Measure from touching Stop motion to the stop at the robot's controller, which timestamps it."""
     took = []
-    button = screen.page.get_by_role("button", name="Stop motion")
+    button = screen.page.get_by_role("button", name=texts.STOP_MOTION)
     note_time = "window.__tap = performance.timeOrigin + performance.now();"
     await screen.page.evaluate(f"() => addEventListener('pointerdown', () => {{ {note_time} }}, true)")
     for number in range(STOPS):
         await _moving(client, cell, robot, 0.1 if number % 2 else -0.1)
         offset = time.time() - time.monotonic()
         await button.click()
-        await until(lambda: _at_rest(cell), "it rests")
+        await until(lambda: _at_rest(cell), "the robot is at standstill")
         truth = await cell.tell("robot", "truth")
         tapped = await screen.page.evaluate("() => window.__tap") / 1e3
         took.append((truth["last_stop"]["t"] + offset - tapped) * 1e3)
-    note = f"median {median(took):.0f} ms; at the controller, past server and driver"
+    note = f"median {median(took):.0f} ms; at the controller, through server and driver"
     report.add(Metric("editor_stop_ms", max(took), len(took), f"worst; {note}"))
 
 
 async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, project: Project) -> None:
-    """From a typed number on one screen to the event of it on another; and from a step to where others see it."""
+    """Measure from a typed number to its event on another screen, and from a step to its preview there."""
     point = project.action_points[0]
     async with screen_of(browser, cell.url, "small tablet") as two:
-        await two.page.add_init_script(_INSIDE)
-        await two.join("looks on")
+        await two.page.add_init_script(_PROBE)
+        await two.join("observer")
         await two.item(point.id)
-        await one.press("Objects")
+        await one.press(texts.OBJECTS)
         await one.page.get_by_role("row", name=f"{point.name} Action point").click()
 
-        async def heard(what: str, acts: str, act: Callable[[int], Awaitable[None]]) -> list[float]:
+        async def latencies(what: str, acts: str, act: Callable[[int], Awaitable[None]]) -> list[float]:
             took = []
             for number in range(EDITS):
-                before = len((await _inside(two))[what])
+                before = len((await _observed(two))[what])
                 await act(number)
-                acted = (await _inside(one))[acts][-1]
+                acted = (await _observed(one))[acts][-1]
                 await two.until("([what, before]) => window.__bench[what].length > before", [what, before])
-                took.append((await _inside(two))[what][before] - acted)
+                took.append((await _observed(two))[what][before] - acted)
                 await asyncio.sleep(0.05)
             return took
 
@@ -173,37 +174,37 @@ async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, pro
             await one.page.keyboard.press("Enter")
 
         async def step(number: int) -> None:
-            await one.page.get_by_role("button", name=f"Z 1 cm {'less' if number % 3 else 'more'}").click()
+            await one.page.get_by_role("button", name=f"{'Decrease' if number % 3 else 'Increase'} Z by 1 cm").click()
 
-        took = await heard("edits", "enters", type_it)
-        note = f"p50 {median(took):.0f} ms; with its lock, kept in the journal"
+        took = await latencies("edits", "enters", type_it)
+        note = f"p50 {median(took):.0f} ms; including the lock and the journal"
         report.add(Metric("editor_edit_ms", percentile(took, 95), len(took), f"p95; {note}"))
-        edits = len((await _inside(two))["edits"])
-        took = await heard("previews", "taps", step)
+        edits = len((await _observed(two))["edits"])
+        took = await latencies("previews", "taps", step)
         await two.until("edits => window.__bench.edits.length > edits", edits)
-        note = f"p50 {median(took):.0f} ms; the edit itself follows when no further step does"
+        note = f"p50 {median(took):.0f} ms; the edit itself is sent after the last step"
         report.add(Metric("editor_step_ms", percentile(took, 95), len(took), f"p95; {note}"))
 
 
 async def returning(report: Report, screen: Screen, cell: Cell) -> None:
-    """From `ready` of a server that was killed to the page that can edit again, in place."""
+    """Measure from `ready` of a restarted server until the same page can edit again."""
     took = []
     port = urlsplit(cell.url).port
     assert port is not None
     screen.expected_errors = ("WebSocket connection to", "ERR_CONNECTION_REFUSED")
     for _ in range(RESTARTS):
         await cell.kill("server")
-        await screen.sees("No connection to the server.")
+        await screen.sees(texts.NO_CONNECTION)
         await cell.start_server(port)
         begin = time.perf_counter()
         await screen.until("() => !document.querySelector('.lost')")
         took.append(time.perf_counter() - begin)
-    note = f"worst; median {median(took):.2f} s after it is ready"
+    note = f"worst; median {median(took):.2f} s after the server is ready"
     report.add(Metric("editor_back_s", max(took), len(took), note))
 
 
 async def measure(report: Report, directory: Path) -> None:
-    """Measure everything."""
+    """Measure everything in this group."""
     size(report)
     async with running_cell(directory) as cell, running_browser() as browser:
         client = await cell.client("colleague")
@@ -220,12 +221,12 @@ async def measure(report: Report, directory: Path) -> None:
         await scene_state(client, SceneStateEnum.STARTED, 30)
         await loading(report, browser, cell)
         async with screen_of(browser, cell.url) as screen:
-            await screen.page.add_init_script(_INSIDE)
+            await screen.page.add_init_script(_PROBE)
             await screen.join("Eva")
             await screen.until("id => window.__engine?.item(id)?.endEffectors.length > 0", robot)
             await drawing(report, screen, client, cell, robot)
             online = await _idle(screen)
-            note = f"in {IDLE_S:g} s each: offline {offline}, online with the arm at rest {online}"
+            note = f"in {IDLE_S:g} s each: offline {offline}, online with the arm stopped {online}"
             report.add(Metric("editor_idle_frames", offline + online, 2, note))
             await stopping(report, screen, client, cell, robot)
             await editing(report, browser, screen, cell, project)
@@ -233,7 +234,7 @@ async def measure(report: Report, directory: Path) -> None:
 
 
 async def main() -> int:
-    """Measure and print; tells whether something could not be measured."""
+    """Measure and print; return 1 if something could not be measured."""
     report = Report()
     broken = False
     with tempfile.TemporaryDirectory(prefix="arcor2-hw-bench-", ignore_cleanup_errors=True) as name:
@@ -241,7 +242,7 @@ async def main() -> int:
             await measure(report, Path(name))
         except (AssertionError, RequestFailed) as error:
             broken = True
-            sys.stderr.write(f"not measured to the end: {error}\n")
+            sys.stderr.write(f"The measurement failed: {error}\n")
     report.table()
     return int(broken)
 

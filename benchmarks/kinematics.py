@@ -1,7 +1,7 @@
-"""Kinematics of the UR5e and the collision world: how long one answer takes, and how many poses are answered.
+"""Kinematics and collision checks of the UR5e: durations, and the share of solved poses.
 
-Random numbers are seeded. Times of single calls are medians of rounds, so that what else the machine does takes part as
-little as can be; processor time is in the notes.
+Random numbers are seeded. Times of single calls are medians of rounds, to reduce the influence of other load; the notes
+show processor time.
 """
 
 import os
@@ -32,7 +32,7 @@ ORIENTATIONS: Final = (
 
 
 async def run(report: Report) -> None:
-    """Measure all of them."""
+    """Measure everything in this group."""
     model = RobotModel.load(UR5E)
     chance = np.random.default_rng(SEED)
     report.add(forward(model, chance))
@@ -43,7 +43,7 @@ async def run(report: Report) -> None:
 
 
 def each(call: Callable[[Array], object], values: Array, rounds: int) -> float:
-    """Give the median over rounds of the time that a call takes, s; its share of the loop is taken off."""
+    """Return the median duration of a call over rounds, s, without the time of the loop itself."""
     taken = []
     for _ in range(rounds):
         began = time.perf_counter()
@@ -58,14 +58,14 @@ def each(call: Callable[[Array], object], values: Array, rounds: int) -> float:
 
 
 def forward(model: RobotModel, chance: np.random.Generator) -> Metric:
-    """Time one call that gives the tip's matrix."""
+    """Measure forward kinematics, joints to the matrix of the tip."""
     arm = model.arm("tcp")
     taken = each(arm.forward, chance.uniform(-np.pi, np.pi, (2000, 6)), 51)
     return Metric("kinematics_forward_us", taken * 1e6, 51 * 2000, f"load {os.getloadavg()[0]:.1f}, seed {SEED}")
 
 
 def inverse(model: RobotModel, chance: np.random.Generator) -> list[Metric]:
-    """Ask for joints of poses that random joints lead to, from a random seed within a turn."""
+    """Measure inverse kinematics of poses computed from random joints, from random seeds."""
     arm = model.arm("tcp")
     solver = InverseKinematics(arm)
     times, missed = [], 0
@@ -79,19 +79,19 @@ def inverse(model: RobotModel, chance: np.random.Generator) -> list[Metric]:
             continue
         times.append(time.perf_counter() - began)
         missed += not np.allclose(arm.forward(found), target, atol=1e-5)
-    note = f"p99 {percentile(times, 99) * 1e3:.2f} ms, the longest {max(times) * 1e3:.1f} ms"
+    note = f"p99 {percentile(times, 99) * 1e3:.2f} ms, longest {max(times) * 1e3:.1f} ms"
     return [
-        Metric("kinematics_inverse_reached", 100.0 * (1.0 - missed / POSES), POSES, f"{missed} not reached"),
+        Metric("kinematics_inverse_reached", 100.0 * (1.0 - missed / POSES), POSES, f"{missed} not solved"),
         Metric("kinematics_inverse_ms", median(times) * 1e3, len(times), note),
     ]
 
 
 def checks(model: RobotModel, chance: np.random.Generator) -> list[Metric]:
-    """Look whether configurations are free, among 20 boxes in reach, and among 1,000."""
+    """Measure collision checks of free configurations among 20 boxes in reach, and among 1,000."""
     metrics = []
     for count in (20, 1000):
         world = _cluttered(model, count, chance)
-        # Of configurations that are free: what collides is found sooner.
+        # Only free configurations: checks of colliding ones end earlier.
         tried = chance.uniform(-np.pi, np.pi, (2000, 6))
         free = np.array([q for q in tried if world.is_free("arm", q)])[:500]
         taken = each(lambda q, world=world: world.is_free("arm", q), free, 11)  # type: ignore[misc]
@@ -101,7 +101,7 @@ def checks(model: RobotModel, chance: np.random.Generator) -> list[Metric]:
 
 
 def reachability(model: RobotModel, chance: np.random.Generator) -> list[Metric]:
-    """Judge 1,000 points with 3 orientations each, and again after one of the 20 boxes was moved."""
+    """Measure the reachability of 1,000 points with 3 orientations each, and again after one of 20 boxes was moved."""
     world = _cluttered(model, 20, chance)
     reach = Reachability(world, "arm", model.arm("tcp"))
     points = chance.uniform((-0.85, -0.85, 0.0), (0.85, 0.85, 0.85), (1000, 3))
@@ -128,13 +128,13 @@ def reachability(model: RobotModel, chance: np.random.Generator) -> list[Metric]
 
 
 def _cluttered(model: RobotModel, count: int, chance: np.random.Generator) -> CollisionWorld:
-    """Give a robot among boxes of 50 to 150 mm within its reach, none at its foot."""
+    """Return a robot among boxes of 50 to 150 mm within its reach, none at its base."""
     world = CollisionWorld()
     world.add_robot("arm", model, Pose())
     for number in range(count):
-        way = chance.normal(size=3)
-        way *= chance.uniform(0.45, 0.95) / np.linalg.norm(way)
+        offset = chance.normal(size=3)
+        offset *= chance.uniform(0.45, 0.95) / np.linalg.norm(offset)
         sizes = chance.uniform(0.05, 0.15, 3) * (1.0 if count < 100 else 0.3)
         turn = Orientation.from_rotation_vector(*map(float, chance.uniform(-2.0, 2.0, 3)))
-        world.put(f"box {number}", Box(*map(float, sizes)), Pose(Position(*map(float, way)), turn))
+        world.put(f"box {number}", Box(*map(float, sizes)), Pose(Position(*map(float, offset)), turn))
     return world

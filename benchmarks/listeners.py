@@ -1,4 +1,4 @@
-"""Events to many clients: how soon the last of 50 has one, how many are delivered, what those cost who never read."""
+"""Events to many clients: latency at the last of 50, throughput, and cost of clients that never read."""
 
 import asyncio
 import contextlib
@@ -17,7 +17,7 @@ CLIENTS = 50
 DEAF = 10
 ROUNDS = 300
 BURST = 2_000
-"""Locks that are taken and given back in one go: two events each to everybody, and nothing that waits for a disk."""
+"""Number of locks acquired and released without a pause; each sends two events to every client and no disk write."""
 
 
 def _lock(name: str) -> str:
@@ -28,25 +28,25 @@ LOCK, UNLOCK = _lock("WriteLock"), _lock("WriteUnlock")
 
 
 @contextlib.asynccontextmanager
-async def _crowd(url: str, count: int) -> AsyncIterator[list[ClientConnection]]:
-    """Clients of the websockets library; the first is logged in."""
+async def _connected(url: str, count: int) -> AsyncIterator[list[ClientConnection]]:
+    """Connect clients of the websockets library; the first is logged in."""
     async with contextlib.AsyncExitStack() as stack:
-        crowd = [await stack.enter_async_context(server_process.socket(url)) for _ in range(count)]
-        for each in crowd:
-            await each.recv()  # what it is greeted with
+        clients = [await stack.enter_async_context(server_process.socket(url)) for _ in range(count)]
+        for each in clients:
+            await each.recv()  # the greeting
         login = {"id": 1, "request": "RegisterUser", "args": {"user_name": "bench"}}
-        await server_process.answer(crowd[0], json.dumps(login))
-        yield crowd
+        await server_process.answer(clients[0], json.dumps(login))
+        yield clients
 
 
-async def _to_the_last(crowd: list[ClientConnection]) -> list[float]:
-    """Give the times from a request to its event at the last client, s."""
+async def _last_client_latencies(clients: list[ClientConnection]) -> list[float]:
+    """Return the times from a request to its event at the last client, s."""
     samples = []
     for number in range(ROUNDS):
         begin = time.perf_counter()
-        await crowd[0].send(UNLOCK if number % 2 else LOCK)
-        await crowd[0].recv()  # the answer
-        for each in crowd:
+        await clients[0].send(UNLOCK if number % 2 else LOCK)
+        await clients[0].recv()  # the response
+        for each in clients:
             await each.recv()
         samples.append(time.perf_counter() - begin)
     return samples
@@ -57,20 +57,20 @@ async def _take(client: ClientConnection, messages: int) -> None:
         await client.recv()
 
 
-async def _deliveries(crowd: list[ClientConnection]) -> float:
-    """Give the events that all clients together take in a second."""
-    readers = [asyncio.create_task(_take(each, 2 * BURST)) for each in crowd[1:]]
-    own = asyncio.create_task(_take(crowd[0], 4 * BURST))
+async def _deliveries(clients: list[ClientConnection]) -> float:
+    """Return the number of events per second that all clients receive together."""
+    readers = [asyncio.create_task(_take(each, 2 * BURST)) for each in clients[1:]]
+    own = asyncio.create_task(_take(clients[0], 4 * BURST))
     begin = time.perf_counter()
     for _ in range(BURST):
-        await crowd[0].send(LOCK)
-        await crowd[0].send(UNLOCK)
+        await clients[0].send(LOCK)
+        await clients[0].send(UNLOCK)
     await asyncio.gather(own, *readers)
-    return 2 * BURST * len(crowd) / (time.perf_counter() - begin)
+    return 2 * BURST * len(clients) / (time.perf_counter() - begin)
 
 
 async def _deaf(url: str) -> socket.socket:
-    """A client that connects, and never reads again; its own buffer is small, so that all waits at the server."""
+    """Connect a client that never reads; its buffer is small, so that its events queue at the server."""
     host, _, port = url.removeprefix("ws://").partition(":")
     deaf = socket.socket()
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -87,24 +87,24 @@ async def _deaf(url: str) -> socket.socket:
 async def run(report: Report, directory: Path) -> None:
     """Measure everything in this group."""
     async with server_process.server(directory / "listeners") as (url, process):
-        async with _crowd(url, CLIENTS) as crowd:
-            samples = await _to_the_last(crowd)
-            note = f"with the request; p95 {percentile(samples, 95) * 1e3:.2f} ms"
+        async with _connected(url, CLIENTS) as clients:
+            samples = await _last_client_latencies(clients)
+            note = f"including the request; p95 {percentile(samples, 95) * 1e3:.2f} ms"
             report.add(Metric("event_last_of_50_ms", median(samples) * 1e3, len(samples), note))
-            rates = [await _deliveries(crowd) for _ in range(3)]
+            rates = [await _deliveries(clients) for _ in range(3)]
             report.add(Metric("deliveries_per_s", max(rates), 3 * 2 * BURST * CLIENTS, "best of three"))
-        async with _crowd(url, CLIENTS - DEAF) as crowd:
+        async with _connected(url, CLIENTS - DEAF) as clients:
             before = process.memory_full_info().pss
-            alone = median(await _to_the_last(crowd))
+            alone = median(await _last_client_latencies(clients))
             deaf = [await _deaf(url) for _ in range(DEAF)]
             try:
-                rate = await _deliveries(crowd)
-                beside = median(await _to_the_last(crowd))
+                rate = await _deliveries(clients)
+                with_deaf = median(await _last_client_latencies(clients))
                 cost = (process.memory_full_info().pss - before) / 2**20
             finally:
                 for each in deaf:
                     each.close()
             note = f"after {2 * BURST + ROUNDS} events to each; {rate:.0f} deliveries/s to the others meanwhile"
             report.add(Metric("deaf_clients_mib", cost, DEAF, note))
-            note = f"{beside * 1e3:.2f} ms to the last of {len(crowd)} against {alone * 1e3:.2f} ms without them"
-            report.add(Metric("deaf_clients_delay_ms", (beside - alone) * 1e3, ROUNDS, note))
+            note = f"{with_deaf * 1e3:.2f} ms to the last of {len(clients)} against {alone * 1e3:.2f} ms without them"
+            report.add(Metric("deaf_clients_delay_ms", (with_deaf - alone) * 1e3, ROUNDS, note))

@@ -1,4 +1,4 @@
-"""What meshes made ready to be shown cost and save: a robot of 124,000 triangles, from files to what browsers load."""
+"""Preparation of meshes for the browser: time and size for a robot of 124,000 triangles."""
 
 import io
 import time
@@ -24,7 +24,7 @@ AGAIN: Final = 100
 
 
 async def run(report: Report) -> None:
-    """Measure all of them."""
+    """Measure everything in this group."""
     with TemporaryDirectory() as folder:
         for metric in await preparing(Path(folder)):
             report.add(metric)
@@ -32,7 +32,7 @@ async def run(report: Report) -> None:
 
 
 def link(number: int) -> trimesh.Trimesh:
-    """Give a link as CAD programs write them: a tube with grooves, far finer than anybody sees."""
+    """Return a link as exported by CAD programs: a tube with grooves, much finer than visible."""
     mesh = trimesh.creation.capsule(height=0.3 - 0.03 * number, radius=0.07 - 0.005 * number, count=[92, 96])
     around = np.arctan2(mesh.vertices[:, 1], mesh.vertices[:, 0])
     mesh.vertices *= 1.0 + 0.02 * np.sin(40.0 * mesh.vertices[:, 2:]) * np.cos(3.0 * around)[:, None]
@@ -40,7 +40,7 @@ def link(number: int) -> trimesh.Trimesh:
 
 
 def robot() -> tuple[bytes, int, int]:
-    """Give a package of seven links, half of them COLLADA and half STL; the bytes of its meshes, and triangles."""
+    """Return a package of seven links in COLLADA and STL, the size of its meshes, and the number of triangles."""
     links, size, triangles = "", 0, 0
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -57,7 +57,7 @@ def robot() -> tuple[bytes, int, int]:
 
 
 async def preparing(folder: Path) -> list[Metric]:
-    """Time the making, by a worker that runs."""
+    """Measure the preparation in a running worker."""
     content, size, triangles = robot()
     (folder / "arm.zip").write_bytes(content)
     task = PrepareAsset(StoredFile(str(folder / "arm.zip"), "arm.zip"))
@@ -82,7 +82,7 @@ async def preparing(folder: Path) -> list[Metric]:
 
 
 async def again(folder: Path) -> Metric:
-    """Time what is asked for the second time, from the disk."""
+    """Measure repeated requests, read from the disk."""
     taken = []
     (folder / "data").mkdir()
     async with running_server(ServerSettings(data_dir=folder / "data")) as services:
@@ -97,4 +97,4 @@ async def again(folder: Path) -> Metric:
             shown = await services.display_models.get("arm.zip")
             (shown.packed or shown.plain).read_bytes()
             taken.append(1e3 * (time.perf_counter() - began))
-    return Metric("meshes_again_ms", median(taken), len(taken), "the compressed file, read")
+    return Metric("meshes_again_ms", median(taken), len(taken), "including reading the compressed file")

@@ -1,4 +1,4 @@
-"""A metric, how it is printed, and the goals."""
+"""Metrics: their goals, measured values, and the report."""
 
 import statistics
 import sys
@@ -120,7 +120,7 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
 
 @dataclass(frozen=True)
 class Metric:
-    """One measured value; `n` is the number of samples behind it, `note` what else was seen."""
+    """One measured value; `n` is the number of samples, `note` shows further observations."""
 
     name: str
     value: float
@@ -128,7 +128,7 @@ class Metric:
     note: str = ""
 
     def reached(self) -> bool | None:
-        """Tell whether the goal is reached; None when it is no number."""
+        """Return whether the goal is reached; None if the metric has no goal."""
         goal = GOALS.get(self.name, ("", ""))[1]
         if goal.startswith(">="):
             return self.value >= float(goal[2:])
@@ -136,13 +136,13 @@ class Metric:
 
 
 class Report:
-    """Prints each metric as a JSON line on standard output, and all as a table on standard error at the end."""
+    """Prints each metric as a JSON line on standard output, and at the end all as a table on standard error."""
 
     def __init__(self) -> None:
         self._figures: list[Metric] = []
 
     def add(self, metric: Metric) -> None:
-        """Print a metric."""
+        """Print a metric and store it for the table."""
         unit, goal = GOALS.get(metric.name, ("", ""))
         self._figures.append(metric)
         line = {"name": metric.name, "value": round(metric.value, 4), "unit": unit, "n": metric.n, "goal": goal}
@@ -163,11 +163,11 @@ class Report:
 
 
 def median(samples: Sequence[float]) -> float:
-    """Give the median."""
+    """Return the median."""
     return statistics.median(samples)
 
 
 def percentile(samples: Sequence[float], percent: float) -> float:
-    """Give a percentile by the nearest rank."""
+    """Return a percentile by the nearest-rank method."""
     ordered = sorted(samples)
     return ordered[min(len(ordered) - 1, max(0, round(percent / 100 * len(ordered) + 0.5) - 1))]

@@ -1,4 +1,4 @@
-"""The cell host at work: start of a scene, of a program, overhead of an action; all through the server."""
+"""The cell host through the server: start of a scene, start of a program, overhead of an action."""
 
 import asyncio
 import time
@@ -15,7 +15,7 @@ from arcor2_hw.data.project import Flow
 from benchmarks import server_process
 from benchmarks.metrics import Metric, Report, median
 
-SLOW = '''"""A device that takes its time to connect."""
+SLOW = '''"""A device that connects slowly."""
 
 import time
 
@@ -31,7 +31,7 @@ class Slow(Generic):
         time.sleep(0.5)
 '''
 
-PROBE = '''"""An instrument that does nothing but note when it is called."""
+PROBE = '''"""A device that records the times of its calls."""
 
 import dataclasses
 import pathlib
@@ -50,7 +50,7 @@ class ProbeSettings(Settings):
 
 
 class Probe(Generic):
-    """Notes the time from one call to the next."""
+    """Records the time between calls."""
 
     _ABSTRACT = False
 
@@ -60,7 +60,7 @@ class Probe(Generic):
 
     @action
     def tick(self, *, an: str | None = None) -> None:
-        """Note the time."""
+        """Record the time."""
         self.stamps.append(time.perf_counter())
         if len(self.stamps) > self.settings.calls:
             periods = [b - a for a, b in zip(self.stamps, self.stamps[1:])]
@@ -70,7 +70,7 @@ class Probe(Generic):
 
 
 async def add_type(url: str, name: str, source: str) -> None:
-    """Bring an object type into the server."""
+    """Upload an object type to the server."""
     async with httpx.AsyncClient() as http:
         body = {"id": name, "name": name, "source": source}
         answer = await http.put(f"{url.replace('ws://', 'http://')}/object-types", json=body)
@@ -78,19 +78,23 @@ async def add_type(url: str, name: str, source: str) -> None:
 
 
 async def scene_state(client: Client, wanted: str) -> None:
-    """Wait for a state of the scene."""
+    """Wait until the scene has a state.
+
+    Raises:
+        RuntimeError: The scene stopped instead.
+    """
     while True:
         data = (await client.next_event("SceneState")).data
         if data.state == wanted:
             return
         if data.state == "stopped":
-            raise RuntimeError(f"the scene stopped: {data.message}")
+            raise RuntimeError(f"The scene stopped: {data.message}")
 
 
 async def new_scene(
     client: Client, name: str, objects: list[tuple[str, str, list[Parameter]]]
 ) -> tuple[str, list[str]]:
-    """Make and save a scene; gives its id and those of its objects."""
+    """Create and save a scene; return its id and the ids of its objects."""
     await client.call("NewScene", rpc.NewSceneArgs(name))
     scene_id = (await client.next_event("OpenScene")).data.scene.id
     ids = []
@@ -107,7 +111,7 @@ async def start_of_scene(report: Report, url: str, rounds: int = 5) -> None:
         await new_scene(client, "twenty", [(f"slow_{number}", "Slow", []) for number in range(20)])
         samples = []
         for _ in range(rounds):
-            await asyncio.sleep(2.0)  # the spare cell host gets ready
+            await asyncio.sleep(2.0)  # the spare cell host starts
             begin = time.perf_counter()
             await client.call("StartScene")
             await scene_state(client, "started")
@@ -145,7 +149,7 @@ async def programs(report: Report, url: str, directory: Path, rounds: int = 5, c
             await ended(client)
             periods.append(float(file.read_text()))
     report.add(Metric("run_first_action_ms", median(first) * 1e3, rounds, f"worst {max(first) * 1e3:.0f} ms"))
-    note = "script, device's executor, deadline, both events; a client follows them"
+    note = "including script, device executor, deadline and both events; a client follows them"
     report.add(Metric("action_overhead_ms", median(periods) * 1e3, rounds * calls, note))
 
 

@@ -1,6 +1,7 @@
-"""Ways through a cluttered cell: how many are found, in which time, and whether they are free; beside OMPL's.
+"""Path planning in a cluttered cell: share of solved problems, time, and validity; compared with OMPL.
 
-Run as a program it plans the same with OMPL: in a process of its own, as what its bindings keep is listed at the end.
+Run as a program, this module solves the same problems with OMPL, in a separate process because its bindings print
+leaked objects at exit.
 """
 
 import itertools
@@ -26,13 +27,13 @@ PLANS: Final = 20
 SEED: Final = 20
 WITHIN: Final = 2.0
 FINE: Final = 0.003
-"""rad of the fastest joint between two checks of what was found."""
+"""Step of the fastest joint between two checks of a found path, rad."""
 
 Problem = tuple[Array, Array]
 
 
 def metrics(model: RobotModel) -> list[Metric]:
-    """Plan from joints to joints, straight between which something is in the way."""
+    """Measure plans between joint positions with a blocked direct path."""
     world, problems = cell(model)
     arm = model.arm("tcp")
     times, cpu, ratios, found = [], [], [], 0
@@ -40,28 +41,28 @@ def metrics(model: RobotModel) -> list[Metric]:
         planner = Planner(Sweep(world, "arm", arm))
         began, used = time.perf_counter(), time.process_time()
         try:
-            way = planner.to_joints(start, goal, within=WITHIN, seed=number)
+            path = planner.to_joints(start, goal, within=WITHIN, seed=number)
         except KinematicsError:
-            way = []
+            path = []
         times.append(time.perf_counter() - began)
         cpu.append(time.process_time() - used)
-        if way and is_right(world, way, start, goal):
+        if path and is_valid(world, path, start, goal):
             found += 1
-            ratios.append(length(way, planner.sweep.levers) / length([start, goal], planner.sweep.levers))
+            ratios.append(length(path, planner.sweep.levers) / length([start, goal], planner.sweep.levers))
     load = f"load {os.getloadavg()[0]:.1f}, seed {SEED}"
     other = ompl()
     note = (
         f"{median(cpu) * 1e3:.0f} ms on a core; 95th percentile {percentile(times, 95) * 1e3:.0f} ms; "
-        f"{median(ratios):.2f} times the straight way; {other}; {load}"
+        f"{median(ratios):.2f} times the direct path; {other}; {load}"
     )
     return [
-        Metric("kinematics_plans_found", float(found), len(problems), f"of {len(problems)}; each looked at again"),
+        Metric("kinematics_plans_found", float(found), len(problems), f"of {len(problems)}; each checked again"),
         Metric("kinematics_plan_ms", median(times) * 1e3, len(times), note),
     ]
 
 
 def cell(model: RobotModel, seed: int = SEED) -> tuple[CollisionWorld, list[Problem]]:
-    """Give a robot on a floor before two walls among 20 boxes, and free joints with something straight between them."""
+    """Return a cell with a floor, two walls and 20 boxes, and pairs of free joints with a blocked direct path."""
     chance = np.random.default_rng(seed)
     world = CollisionWorld()
     world.add_robot("arm", model, Pose())
@@ -69,10 +70,10 @@ def cell(model: RobotModel, seed: int = SEED) -> tuple[CollisionWorld, list[Prob
     world.put("wall", Box(0.05, 2.4, 2.4), Pose(Position(-0.7, 0.0, 1.0)))
     world.put("side", Box(2.4, 0.05, 2.4), Pose(Position(0.0, -0.8, 1.0)))
     for number in range(20):
-        way = chance.normal(size=3)
-        way *= chance.uniform(0.4, 0.95) / np.linalg.norm(way)
-        way[2] = abs(way[2])
-        world.put(f"box {number}", Box(*map(float, chance.uniform(0.06, 0.18, 3))), Pose(Position(*map(float, way))))
+        offset = chance.normal(size=3)
+        offset *= chance.uniform(0.4, 0.95) / np.linalg.norm(offset)
+        offset[2] = abs(offset[2])
+        world.put(f"box {number}", Box(*map(float, chance.uniform(0.06, 0.18, 3))), Pose(Position(*map(float, offset))))
     sweep = Sweep(world, "arm", model.arm("tcp"))
     problems: list[Problem] = []
     while len(problems) < PLANS:
@@ -83,44 +84,44 @@ def cell(model: RobotModel, seed: int = SEED) -> tuple[CollisionWorld, list[Prob
 
 
 def free_joints(sweep: Sweep, chance: np.random.Generator) -> Array:
-    """Give random joints as an arm on a table has them, its upper arm above it, that are in collision with nothing."""
+    """Return random collision-free joints of an arm on a table, with its upper arm above the table."""
     while True:
         q = chance.uniform((-np.pi, -np.pi, -2.5, -np.pi, -np.pi, -np.pi), (np.pi, 0.0, 2.5, np.pi, np.pi, np.pi))
         if sweep.is_free(q):
             return q
 
 
-def is_right(world: CollisionWorld, way: list[Array], start: Array, goal: Array) -> bool:
-    """Look at a way again: where it begins and ends, and all along it, finer than it was planned."""
-    if not (np.array_equal(way[0], start) and np.allclose(way[-1], goal)):
+def is_valid(world: CollisionWorld, path: list[Array], start: Array, goal: Array) -> bool:
+    """Check a path: its start, its goal, and collisions in finer steps than during planning."""
+    if not (np.array_equal(path[0], start) and np.allclose(path[-1], goal)):
         return False
     return all(
         world.is_free("arm", a + share * (b - a))
-        for a, b in itertools.pairwise(way)
+        for a, b in itertools.pairwise(path)
         for share in np.linspace(0.0, 1.0, 2 + int(np.abs(b - a).max() / FINE))
     )
 
 
-def length(way: list[Array], levers: Array) -> float:
-    """Give the length of a way in joint values times their levers, m."""
-    return float(sum(np.linalg.norm((b - a) * levers) for a, b in itertools.pairwise(way)))
+def length(path: list[Array], levers: Array) -> float:
+    """Return the length of a path in joint values times their levers, m."""
+    return float(sum(np.linalg.norm((b - a) * levers) for a, b in itertools.pairwise(path)))
 
 
 # ------------------------------------------------------------------------------------------------ OMPL
 def ompl() -> str:
-    """Say what OMPL needs for the same problems; that it is not there, if so."""
+    """Return OMPL's results for the same problems as text, or that OMPL is not installed."""
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.planning"], capture_output=True, text=True, timeout=300, check=False
     )
     try:
-        told = json.loads(done.stdout)
+        result = json.loads(done.stdout)
     except json.JSONDecodeError:
-        return "OMPL is not there"
-    return f"OMPL {told['found']} in {told['median']:.0f} ms ({told['cpu']:.0f} on a core)"
+        return "OMPL is not installed"
+    return f"OMPL {result['found']} in {result['median']:.0f} ms ({result['cpu']:.0f} on a core)"
 
 
 def plan_with_ompl(model: RobotModel) -> dict[str, float]:
-    """Let RRTConnect and the path simplifier of OMPL plan to the joints of each problem, at our resolution."""
+    """Solve each problem with OMPL's RRTConnect and path simplifier, at the same resolution."""
     from ompl import base, geometric, util
 
     util.setLogLevel(util.LogLevel.LOG_NONE)
@@ -137,7 +138,7 @@ def plan_with_ompl(model: RobotModel) -> dict[str, float]:
         space.setBounds(bounds)
         about = base.SpaceInformation(space)
         about.setStateValidityChecker(lambda state: sweep.is_free(np.array([state[n] for n in range(6)])))
-        # No point travels farther than the resolution: of an L2 step, by the root of the levers' squares.
+        # Limit the L2 step so that no point of the robot moves farther than the resolution.
         step = sweep.resolution / float(np.linalg.norm(sweep.levers))
         about.setStateValidityCheckingResolution(step / space.getMaximumExtent())
         about.setup()

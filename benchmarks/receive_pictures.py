@@ -1,4 +1,4 @@
-"""Holds one camera as the cell host does and tells, after a while, what came, how old it was, and what it cost."""
+"""Connect one camera as the cell host does; print frames, their age and processor time after a while."""
 
 import sys
 import time

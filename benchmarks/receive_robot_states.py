@@ -1,4 +1,4 @@
-"""Holds one robot as the cell host does and tells, after a while, what was received, missed and spent."""
+"""Connect one robot as the cell host does; print received and missed samples and processor time after a while."""
 
 import sys
 import time

@@ -1,8 +1,8 @@
-"""Recovery: every transport lost and whole again, all drivers at once in one process.
+"""Recovery: every transport is interrupted and restored, with all drivers in one process.
 
-A thread per link loses it; another goes on asking the driver all the time, as a program would. A link is back when the
-driver says that it is online, or back, and has given a fresh reading; the time counts from just before the link is made
-whole. After each cycle everybody is silent, and what the process holds is counted.
+One thread per link interrupts it; another reads from the driver continuously, as a program does. A link has recovered
+when the driver reports that it is online, or back, and has returned a fresh reading; the time starts just before the
+link is restored. After each cycle the reading pauses, and the resources of the process are counted.
 """
 
 import asyncio
@@ -33,130 +33,132 @@ from benchmarks.metrics import Metric, Report, percentile
 CYCLES: Final = 3
 LONG_CYCLES: Final = 50
 OUTAGES: Final = (0.5, 5.0)
-"""s; the longer is noticed by every driver, the shorter by some."""
+"""Durations of an interruption, s. Every driver notices the longer one, some the shorter one."""
 CASES: Final = tuple((kind, seconds) for kind in KINDS for seconds in OUTAGES)
 CONNECTS_WITHIN: Final = 20.0
-"""s; the camera's first picture needs Open3D loaded."""
-GIVEN_UP: Final = 20.0
-"""s after which a driver counts as not back; the metric then has this time."""
-ASKED_EACH: Final = 0.02
+"""Time limit of connecting, s; the camera's first picture loads Open3D."""
+GIVES_UP_AFTER: Final = 20.0
+"""Time after which a driver counts as not recovered, s; used as its sample."""
+READ_PERIOD: Final = 0.02
 STEADY: Final = 1.0
-"""s, and up to another half by chance, between being back and being lost again."""
+"""Time between recovery and the next interruption, s; a random time of up to 0.5 s is added."""
 QUIET: Final = 3.0
-"""s in which what only ends belatedly ends, and what is held is counted."""
+"""Time in which delayed ends complete and resources are counted, s."""
 QUIET_TRIES: Final = 5
 
 ONLINE: Final = (Connection.ONLINE, Connection.BACK)
 
 
-class Asking:
-    """Asks the driver of a link all the time, except while it is held."""
+class Reader:
+    """Reads from the driver of a link continuously, except while paused."""
 
     def __init__(self, link: Link) -> None:
-        self._line = link
-        self._turn = threading.Lock()
-        self._ending = threading.Event()
+        self._link = link
+        self._reading = threading.Lock()
+        self._stop = threading.Event()
         self._fresh: Fresh | None = None
-        self._told = threading.Event()
+        self._arrived = threading.Event()
         self.failed = 0
-        """Readings refused by a typed error."""
-        self.mistakes: list[str] = []
-        """Errors that are none of a device's."""
-        self._thread = threading.Thread(target=self._run, name=f"asking {link.name}", daemon=True)
+        """Number of readings that raised a device error."""
+        self.other_errors: list[str] = []
+        """Errors other than device errors."""
+        self._thread = threading.Thread(target=self._run, name=f"reading {link.name}", daemon=True)
         self._thread.start()
 
     def expect(self, fresh: Fresh) -> None:
-        self._told.clear()
+        self._arrived.clear()
         self._fresh = fresh
 
-    def back_by(self, deadline: float) -> bool:
-        """Wait until what was expected was told and the driver says that it is online."""
-        if not self._told.wait(max(0.0, deadline - time.monotonic())):
+    def recovered_by(self, deadline: float) -> bool:
+        """Wait until the expected reading arrived and the driver reports that it is online; return False on timeout."""
+        if not self._arrived.wait(max(0.0, deadline - time.monotonic())):
             return False
-        while self._line.device.connection not in ONLINE:
+        while self._link.device.connection not in ONLINE:
             if time.monotonic() > deadline:
                 return False
             time.sleep(0.001)
         return True
 
     @contextlib.contextmanager
-    def held(self) -> Iterator[None]:
-        with self._turn:
+    def paused(self) -> Iterator[None]:
+        with self._reading:
             yield
 
     def end(self) -> None:
-        self._ending.set()
+        self._stop.set()
         self._thread.join()
 
     def _run(self) -> None:
-        while not self._ending.wait(ASKED_EACH):
-            with self._turn:
+        while not self._stop.wait(READ_PERIOD):
+            with self._reading:
                 try:
-                    found = self._line.read()
+                    found = self._link.read()
                 except DeviceError:
                     self.failed += 1
                     continue
                 except Exception as error:  # noqa: BLE001 - reported with the driver's name
                     self.failed += 1
-                    self.mistakes.append(f"{type(error).__name__}: {error}")
+                    self.other_errors.append(f"{type(error).__name__}: {error}")
                     continue
                 if (fresh := self._fresh) is not None and fresh(found):
                     self._fresh = None
-                    self._told.set()
+                    self._arrived.set()
 
 
 class Trial:
-    """One link through all its cases, cycle by cycle."""
+    """Interrupts one link in all its cases, cycle by cycle."""
 
     def __init__(self, link: Link) -> None:
         self.link = link
         self.samples: dict[tuple[Kind, float], list[float]] = {case: [] for case in CASES}
-        self.lost_for_good: list[str] = []
+        self.never_recovered: list[str] = []
         self._marks = 0
         for each in link.objects:
             each.connect(CONNECTS_WITHIN)
-        self.asking = Asking(link)
-        if not self._seen_anew():
-            raise RuntimeError(f"{link.name} gives no fresh reading before anything was lost")
+        self.reader = Reader(link)
+        if not self._recovers():
+            raise RuntimeError(f"{link.name} returned no fresh reading before the first interruption.")
 
-    def _seen_anew(self) -> bool:
-        """Give the device another state; tell whether the driver tells it in time."""
+    def _recovers(self) -> bool:
+        """Change the state of the device; return whether the driver reports it in time."""
         self._marks += 1
-        self.asking.expect(self.link.mark(self._marks))
-        return self.asking.back_by(time.monotonic() + GIVEN_UP)
+        self.reader.expect(self.link.mark(self._marks))
+        return self.reader.recovered_by(time.monotonic() + GIVES_UP_AFTER)
 
     def cycle(self) -> None:
         for kind, seconds in random.sample(CASES, len(CASES)):
             time.sleep(STEADY + 0.5 * random.random())
-            self._lose(kind, seconds)
+            self._interrupt(kind, seconds)
 
-    def _lose(self, kind: Kind, seconds: float) -> None:
+    def _interrupt(self, kind: Kind, seconds: float) -> None:
         link = self.link
-        failed = self.asking.failed
-        link.lose(kind)
+        failed = self.reader.failed
+        link.interrupt(kind)
         time.sleep(seconds)
-        failed = self.asking.failed - failed
+        failed = self.reader.failed - failed
         began = time.monotonic()
-        link.heal(kind)
-        back = self._seen_anew()
-        self.samples[kind, seconds].append(time.monotonic() - began if back else GIVEN_UP)
+        link.restore(kind)
+        back = self._recovers()
+        self.samples[kind, seconds].append(time.monotonic() - began if back else GIVES_UP_AFTER)
         if seconds == max(OUTAGES) and not failed:
-            raise RuntimeError(f"{link.name} gave readings through {seconds:g} s of {kind}: the link was not lost")
+            raise RuntimeError(
+                f"{link.name} returned readings during {seconds:g} s of {kind}: the link was not interrupted."
+            )
         if not back:
-            self.lost_for_good.append(f"{kind} of {seconds:g} s")
-            self._anew()
+            self.never_recovered.append(f"{kind} of {seconds:g} s")
+            self._reconnect()
 
-    def _anew(self) -> None:
-        with self.asking.held():
+    def _reconnect(self) -> None:
+        with self.reader.paused():
             for each in reversed(self.link.objects):
                 each.disconnect()
             for each in self.link.objects:
                 each.connect(CONNECTS_WITHIN)
-        if not self._seen_anew():
-            raise RuntimeError(f"{self.link.name} is not there when it is connected anew either")
+        if not self._recovers():
+            raise RuntimeError(f"{self.link.name} did not recover after reconnecting.")
 
     def end(self) -> None:
-        self.asking.end()
+        self.reader.end()
         for each in reversed(self.link.objects):
             each.disconnect()
 
@@ -164,34 +166,34 @@ class Trial:
         return [sample for samples in self.samples.values() for sample in samples]
 
 
-Held = dict[str, Counter[str]]
+Resources = dict[str, Counter[str]]
 
 
-def held() -> Held:
-    """Count the threads (also those of libraries), descriptors and tasks of this process, each by what it is."""
+def resources() -> Resources:
+    """Count the threads (including those of libraries), descriptors and tasks of this process by name."""
     names = {thread.native_id: thread.name for thread in threading.enumerate()}
     threads = Counter(names.get(int(each.name), "of a library") for each in Path("/proc/self/task").iterdir())
     descriptors: Counter[str] = Counter()
     for each in Path("/proc/self/fd").iterdir():
-        with contextlib.suppress(OSError):  # the one of this very look
+        with contextlib.suppress(OSError):  # the descriptor of this directory listing
             descriptors[str(each.readlink()).partition(":")[0]] += 1
     found = [each for each in gc.get_objects() if issubclass(type(each), asyncio.Task)]
     tasks = Counter(getattr(each.get_coro(), "__qualname__", "") for each in found if not each.done())
     return {"threads": threads, "descriptors": descriptors, "tasks": tasks}
 
 
-def settled(trials: list[Trial]) -> Held:
-    """Give what is held most of the time in a few seconds in which every driver is online.
+def settled(trials: list[Trial]) -> Resources:
+    """Return the most frequent resource counts during a few seconds in which every driver is online.
 
-    Not the least: a link that a busy machine lets be lost and opened anew just then holds less.
+    The minimum would be wrong: a link that reconnects at that moment on a busy machine uses less.
     """
     for _ in range(QUIET_TRIES):
-        found: list[Held] = []
+        found: list[Resources] = []
         online = True
         until = time.monotonic() + QUIET
         while time.monotonic() < until:
             gc.collect()
-            found.append(held())
+            found.append(resources())
             online = online and all(trial.link.device.connection in ONLINE for trial in trials)
             time.sleep(0.1)
         if online:
@@ -200,30 +202,30 @@ def settled(trials: list[Trial]) -> Held:
     return {kind: next(each[kind] for each in found if each[kind].total() == usual[kind]) for kind in found[0]}
 
 
-def through(trials: list[Trial], cycles: int) -> tuple[Held, Held, str]:
-    """Run all cycles; give what was held after the first and after the last, and in words the memory then."""
-    counted: list[Held] = []
+def run_cycles(trials: list[Trial], cycles: int) -> tuple[Resources, Resources, str]:
+    """Run all cycles; return the resources after the first and the last cycle, and the memory as text."""
+    counted: list[Resources] = []
     memory: list[float] = []
-    with ThreadPoolExecutor(len(trials), thread_name_prefix="losing") as pool:
+    with ThreadPoolExecutor(len(trials), thread_name_prefix="interrupting") as pool:
         for _ in range(cycles):
             for done in [pool.submit(trial.cycle) for trial in trials]:
                 done.result()
             with contextlib.ExitStack() as quiet:
                 for trial in trials:
-                    quiet.enter_context(trial.asking.held())
+                    quiet.enter_context(trial.reader.paused())
                 counted.append(settled(trials))
                 memory.append(resident())
     return counted[0], counted[-1], f"{memory[0]:.0f} to {memory[-1]:.0f} MiB resident"
 
 
 def resident() -> float:
-    """Give the memory of this process, MiB."""
+    """Return the resident memory of this process, MiB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * resource.getpagesize() / 2**20
 
 
-def grown(first: Held, last: Held) -> tuple[int, str]:
-    """Give how many more there are, each kind by itself, and which are new."""
+def grown(first: Resources, last: Resources) -> tuple[int, str]:
+    """Return the growth summed over the kinds, and a text that names new resources."""
     more = {kind: max(0, last[kind].total() - first[kind].total()) for kind in first}
     counts = ", ".join(f"{first[kind].total()} to {last[kind].total()} {kind}" for kind in first)
     new = [f"{n} {what}" for kind in first if more[kind] for what, n in (last[kind] - first[kind]).items()]
@@ -231,9 +233,9 @@ def grown(first: Held, last: Held) -> tuple[int, str]:
 
 
 def table(trials: list[Trial]) -> None:
-    """Print on standard error how long each link took, worst first."""
+    """Print the recovery times of each link on standard error, worst first."""
     console = Console(stderr=True, width=None if sys.stderr.isatty() else 180)
-    shown = Table("link", "p95", *(f"{kind} {seconds:g} s" for kind, seconds in CASES), title="back after, s: worst")
+    shown = Table("link", "p95", *(f"{kind} {seconds:g} s" for kind, seconds in CASES), title="worst recovery time, s")
     for trial in sorted(trials, key=lambda each: -percentile(each.all_samples(), 95)):
         worst = (f"{max(trial.samples[case]):.2f}" for case in CASES)
         shown.add_row(trial.link.name, f"{percentile(trial.all_samples(), 95):.2f}", *worst)
@@ -241,20 +243,20 @@ def table(trials: list[Trial]) -> None:
 
 
 def measure(cycles: int) -> list[Metric]:
-    """Measure on this thread."""
+    """Measure in this thread."""
     with device_links.started() as links, contextlib.ExitStack() as stack:
         trials = []
         for link in links:
             trials.append(Trial(link))
             stack.callback(trials[-1].end)
-        first, last, memory = through(trials, cycles)
+        first, last, memory = run_cycles(trials, cycles)
     table(trials)
-    mistakes = [f"{trial.link.name}: {text}" for trial in trials for text in trial.asking.mistakes]
-    if mistakes:
-        raise RuntimeError(f"errors that are none of a device's: {'; '.join(mistakes[:5])}")
+    other_errors = [f"{trial.link.name}: {text}" for trial in trials for text in trial.reader.other_errors]
+    if other_errors:
+        raise RuntimeError(f"Errors other than device errors: {'; '.join(other_errors[:5])}")
     worst = max(trials, key=lambda trial: percentile(trial.all_samples(), 95))
     every = [sample for trial in trials for sample in trial.all_samples()]
-    never = [f"{trial.link.name} never back from {case}" for trial in trials for case in trial.lost_for_good]
+    never = [f"{trial.link.name} never recovered from {case}" for trial in trials for case in trial.never_recovered]
     parts = (f"worst of {len(trials)} links: {worst.link.name}", f"of all {percentile(every, 95):.2f} s", *never)
     growth, what = grown(first, last)
     return [
@@ -265,6 +267,6 @@ def measure(cycles: int) -> list[Metric]:
 
 async def run(report: Report, long: bool = False) -> None:
     """Measure everything in this group."""
-    logging.getLogger("arcor2_hw").setLevel(logging.ERROR)  # each loss is told once, as it should; not here
+    logging.getLogger("arcor2_hw").setLevel(logging.ERROR)  # hide the log line of each connection loss
     for metric in await asyncio.to_thread(measure, LONG_CYCLES if long else CYCLES):
         report.add(metric)

@@ -1,11 +1,11 @@
-"""Pictures of markers and boards as a camera takes them, ray by ray: the truth for calibrations.
+"""Rendered camera pictures of markers and boards, by ray casting: reference data for calibrations.
 
-Every pixel has its ray, which comes from the lens's own formula, inverted by Newton's method. Where it meets a printed
-plate is computed in the plate's frame, and what is printed there is taken at 16 places around it. Nothing is projected,
-and nothing of the solver, or of OpenCV's geometry, is used: the dictionaries' bits are all that is taken from there. A
-picture then gets light that falls off to one side, blur of lens and defocus, the camera's tone curve, noise and 8 bits.
+The ray of every pixel is computed from the lens model, inverted by Newton's method. Its intersection with a printed
+plate is computed in the plate's frame, and the print is sampled at 16 positions around it. Nothing is projected, and
+no code of the solver or of OpenCV's geometry is used, except the bits of the marker dictionaries. The picture then gets
+light that falls off to one side, blur of lens and defocus, the tone curve of a camera, noise, and 8-bit quantization.
 
-Not modelled: depth (plates are painted in the order given), shadows, reflections, rolling shutter, colour filters.
+Not modelled: depth (plates are painted in the given order), shadows, reflections, rolling shutter, colour filters.
 """
 
 import functools
@@ -25,7 +25,7 @@ WHITE, BLACK, TABLE = 0.85, 0.06, 0.32  # reflectance
 
 @dataclass(frozen=True)
 class Lens:
-    """fx, fy, cx, cy in px; coefficients k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, as many as there are."""
+    """Lens: fx, fy, cx, cy in px; the first of the coefficients k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4."""
 
     fx: float
     fy: float
@@ -38,9 +38,12 @@ class Lens:
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """Something flat and printed. cells: reflectance, rows from the top, columns from the left; cell: side of one, m.
+    """A flat printed plate.
 
-    world_from_plate: 4 × 4; the origin is in the plate's middle, x right, y up, z out of it.
+    Attributes:
+        world_from_plate: 4 × 4; the origin is the center of the plate, x right, y up, z out of it.
+        cells: Reflectance, rows from the top, columns from the left.
+        cell: Side of a cell, m.
     """
 
     world_from_plate: Array
@@ -55,9 +58,14 @@ class Plate:
 
 @dataclass(frozen=True)
 class Exposure:
-    """blur: px, standard deviation. noise: grey levels, standard deviation. light: of a white sheet, 1 saturates.
+    """Exposure of a picture.
 
-    falloff: by how much less light there is at one side. srgb: tone curve of pictures, not of bare sensors.
+    Attributes:
+        blur: Standard deviation, px.
+        noise: Standard deviation, grey levels.
+        light: Brightness of a white sheet; 1 saturates.
+        falloff: Share of the light that is missing at one side.
+        srgb: Apply the sRGB tone curve; otherwise linear, as from a bare sensor.
     """
 
     blur: float = 0.8
@@ -67,15 +75,15 @@ class Exposure:
     srgb: bool = True
 
 
-# ------------------------------------------------------------------------------------------------ things
+# ------------------------------------------------------------------------------------------------ plates
 def marker(number: int, size: float, world_from_marker: Array, dictionary: int = cv2.aruco.DICT_4X4_50) -> Plate:
-    """Give one marker with a white margin as wide as a cell. size: side of its black square, m."""
+    """Return a marker with a white margin as wide as a cell; `size` is the side of its black square, m."""
     bits = _bits(number, dictionary)
     return Plate(world_from_marker, np.pad(bits, 1, constant_values=WHITE), size / len(bits))
 
 
 def charuco(columns: int, rows: int, cell: float, world_from_board: Array) -> Plate:
-    """Give a board of squares of 8 cells and markers of 6, of 4x4_50 from number 0, with a margin of 4 cells."""
+    """Return a board with squares of 8 cells, markers of 6 cells (4x4_50 from number 0), and a margin of 4 cells."""
     board = np.full((rows * 8, columns * 8), WHITE)
     number = 0
     for row in range(rows):
@@ -90,14 +98,14 @@ def charuco(columns: int, rows: int, cell: float, world_from_board: Array) -> Pl
 
 
 def table(random: np.random.Generator, side: float = 6.0, grain: float = 0.008) -> Plate:
-    """Give a speckled table at z = 0."""
+    """Return a speckled table at z = 0."""
     count = int(side / grain)
     return Plate(np.eye(4), np.clip(random.normal(TABLE, 0.06, (count, count)), 0.02, 0.9), grain)
 
 
 @functools.cache
 def _bits(number: int, dictionary: int) -> Array:
-    """Give a marker's cells, its black border being one of them."""
+    """Return the cells of a marker, including its black border."""
     known = cv2.aruco.getPredefinedDictionary(dictionary)
     side = known.markerSize + 2
     return np.where(cv2.aruco.generateImageMarker(known, number, side) > 127, WHITE, BLACK).astype(np.float64)
@@ -105,7 +113,7 @@ def _bits(number: int, dictionary: int) -> Array:
 
 # ------------------------------------------------------------------------------------------------ rays
 def bent(x: Array, y: Array, coefficients: tuple[float, ...]) -> tuple[Array, Array]:
-    """Give where the lens sends a ray through (x, y) at distance 1."""
+    """Return the distorted coordinates of a ray through (x, y) at distance 1."""
     k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = (*coefficients, *(0.0,) * (12 - len(coefficients)))
     q = x * x + y * y
     radial = (1.0 + q * (k1 + q * (k2 + q * k3))) / (1.0 + q * (k4 + q * (k5 + q * k6)))
@@ -117,7 +125,7 @@ def bent(x: Array, y: Array, coefficients: tuple[float, ...]) -> tuple[Array, Ar
 
 @functools.lru_cache(maxsize=4)
 def rays(lens: Lens) -> Array:
-    """Give x and y at distance 1 for the middle of every pixel and of a margin of one: rows + 2, columns + 2, 2."""
+    """Return x and y at distance 1 for the center of every pixel, with a margin of one: rows + 2, columns + 2, 2."""
     u, v = np.meshgrid(np.arange(-1.0, lens.width + 1), np.arange(-1.0, lens.height + 1))
     aim_x, aim_y = (u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy
     x, y = aim_x.copy(), aim_y.copy()
@@ -133,11 +141,11 @@ def rays(lens: Lens) -> Array:
         y += (a * miss_y - c * miss_x) / determinant
         if max(np.abs(miss_x).max(), np.abs(miss_y).max()) < 1e-11:
             return np.stack((x, y), axis=-1)
-    raise ValueError("the lens folds its picture: no ray belongs to some of the pixels")
+    raise ValueError("The distortion is not invertible: some pixels have no ray.")
 
 
 def _met(plate: Plate, world_from_camera: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    """Give where rays meet a plate, in its frame, m; NaN for one that looks the other way or at its back."""
+    """Return the intersections of rays with a plate in its frame, m; NaN for rays that miss it or meet its back."""
     plate_from_camera = np.linalg.inv(plate.world_from_plate) @ world_from_camera
     r, eye = plate_from_camera[:3, :3], plate_from_camera[:3, 3]
     if eye[2] <= 0:
@@ -152,7 +160,7 @@ def _met(plate: Plate, world_from_camera: Array, x: Array, y: Array) -> tuple[Ar
 
 
 def _box(plate: Plate, world_from_camera: Array, lens: Lens) -> tuple[slice, slice] | None:
-    """Give the part of the picture (with its margin of one) that may show a plate."""
+    """Return the part of the picture (with its margin of one) that can show a plate."""
     coarse = 8
     grid = rays(lens)[::coarse, ::coarse]
     x, y = _met(plate, world_from_camera, grid[..., 0], grid[..., 1])
@@ -177,11 +185,11 @@ def _paint(picture: Array, plate: Plate, world_from_camera: Array, lens: Lens, s
     grid = rays(lens)[rows.start - 1 : rows.stop + 1, columns.start - 1 : columns.stop + 1]
     margin_x, margin_y = _met(plate, world_from_camera, grid[..., 0], grid[..., 1])
     x, y = margin_x[1:-1, 1:-1], margin_y[1:-1, 1:-1]
-    # Within a pixel the place on the plate moves as it does from one neighbour to the other.
+    # Within a pixel, the position on the plate is interpolated from the neighbouring pixels.
     x_by_u, y_by_u = ((at[1:-1, 2:] - at[1:-1, :-2]) / 2 for at in (margin_x, margin_y))
     x_by_v, y_by_v = ((at[2:, 1:-1] - at[:-2, 1:-1]) / 2 for at in (margin_x, margin_y))
     width, height = plate.size
-    # A cell is divided so finely that its edge, over which values go linearly, is as wide as the gap between samples.
+    # Divide a cell so that its edge, where values change linearly, is as wide as the distance between samples.
     pixel = float(np.nanmedian(np.hypot(x_by_u, y_by_u)))
     fine = int(np.clip(plate.cell / pixel * subpixels, 1, 256)) if subpixels > 1 else 1
     target = picture[rows.start - 1 : rows.stop - 1, columns.start - 1 : columns.stop - 1]
@@ -200,7 +208,7 @@ def _paint(picture: Array, plate: Plate, world_from_camera: Array, lens: Lens, s
 
 
 def _printed(plate: Plate, x: Array, y: Array, fine: int) -> Array:
-    """Give what is printed at points, with edges that are a `fine`th of a cell wide."""
+    """Return the reflectance at points; edges are 1 / `fine` of a cell wide."""
     rows, columns = plate.cells.shape
     right, down = x / plate.cell + columns / 2, rows / 2 - y / plate.cell
     column = np.clip(right.astype(np.int32), 0, columns - 1)
@@ -219,11 +227,11 @@ def _printed(plate: Plate, x: Array, y: Array, fine: int) -> Array:
 
 
 def _between(at: Array, count: int, fine: int) -> tuple[npt.NDArray[np.int32], Array]:
-    """Give the cell before the edge that is nearest, and how far the value has gone over to the next cell's: 0..1."""
+    """Return the cell before the nearest edge, and the weight of the next cell, 0 to 1."""
     edge = np.rint(at)
     part = np.clip((at - edge) * fine + 0.5, 0.0, 1.0)
     before = (edge - 1).astype(np.int32)
-    # At the rim of the plate there is no edge.
+    # The border of the plate is not an edge.
     part = np.where(before < 0, 1.0, part)
     part = np.where(before >= count - 1, 0.0, part)
     return np.clip(before, 0, count - 1), part
@@ -238,9 +246,9 @@ def render(
     exposure: Exposure = Exposure(),
     subpixels: int = SUBPIXELS,
 ) -> npt.NDArray[np.uint8]:
-    """Take a picture: grey values, rows × columns. The first plate is the background, and is sampled once per pixel.
+    """Render a picture: grey values, rows × columns. The first plate is the background, sampled once per pixel.
 
-    subpixels: rows and columns of samples in a pixel of the others.
+    The other plates are sampled `subpixels` × `subpixels` times per pixel.
     """
     reflectance = np.full((lens.height, lens.width), TABLE)
     for index, plate in enumerate(plates):
@@ -257,7 +265,7 @@ def render(
 
 
 def looking_at(eye: Array, target: Array, roll: float) -> Array:
-    """Give world_from_camera of a camera at `eye` whose optical axis goes through `target`, turned by roll about it."""
+    """Return world_from_camera of a camera at `eye` that looks at `target`, turned about its optical axis by `roll`."""
     z = (target - eye) / np.linalg.norm(target - eye)
     x = np.cross(z, (0.0, 0.0, 1.0) if abs(z[2]) < 0.99 else (0.0, 1.0, 0.0))
     x /= np.linalg.norm(x)

@@ -1,4 +1,4 @@
-"""Round trips of requests against an echo of equal size; edits against echo and fdatasync; start and memory."""
+"""Round trips of requests compared with an echo; edits compared with echo and fdatasync; start time and memory."""
 
 import asyncio
 import json
@@ -19,7 +19,7 @@ PER_ROUND = 100
 
 
 async def ratio(report: Report, url: str, directory: Path, name: str, request: str) -> None:
-    """Interleave rounds of the request and of an echo of its answer's size, so that noise meets both."""
+    """Measure a request and an echo of the same size in alternation, so that load affects both."""
     text = json.dumps({"id": 1, "request": request})
     async with server_process.socket(url) as real:
         size = len(await server_process.answer(real, text))
@@ -33,12 +33,12 @@ async def ratio(report: Report, url: str, directory: Path, name: str, request: s
                 ratios.append(ours / theirs)
                 reals.append(ours)
                 echoes.append(theirs)
-    note = f"{median(reals) * 1e6:.0f} us against {median(echoes) * 1e6:.0f} us, answer of {size} bytes"
+    note = f"{median(reals) * 1e6:.0f} us against {median(echoes) * 1e6:.0f} us, response of {size} bytes"
     report.add(Metric(name, median(ratios), ROUNDS * PER_ROUND, note))
 
 
 def fdatasync_time(directory: Path, n: int = 200, size: int = 4096) -> float:
-    """Give the median time of writing `size` bytes and fdatasync, s."""
+    """Return the median time of writing `size` bytes and fdatasync, s."""
     samples = []
     with tempfile.TemporaryFile(dir=directory) as file:
         for _ in range(n):
@@ -109,7 +109,7 @@ async def edits(report: Report, url: str, directory: Path) -> None:
 
 
 async def start(report: Report, directory: Path) -> None:
-    """Measure from exec to the first answer, with the data of an earlier run, and the memory of the idle server."""
+    """Measure the time to the first response with existing data, and the memory of the idle server."""
     samples = []
     memory = 0.0
     hosts = 0.0
@@ -123,18 +123,16 @@ async def start(report: Report, directory: Path) -> None:
                 await _settled(url)
                 memory = process.memory_full_info().pss / 2**20
                 hosts = sum(child.memory_full_info().pss for child in process.children()) / 2**20
-    # The first start makes the database and fills the file cache.
+    # The first start creates the database and fills the file cache.
     report.add(Metric("cold_start_s", median(samples[1:]), 5, f"first on empty data {samples[0]:.2f} s"))
-    report.add(
-        Metric("idle_memory_mib", memory, 1, f"PSS of the server; the spare cell host beside it {hosts:.0f} MiB")
-    )
+    report.add(Metric("idle_memory_mib", memory, 1, f"PSS of the server; the spare cell host uses {hosts:.0f} MiB"))
 
 
 async def _settled(url: str) -> None:
     async with server_process.socket(url) as opened:
         for request in ("ListScenes", "GetObjectTypes", "ListProjects"):
             await server_process.answer(opened, json.dumps({"id": 1, "request": request}))
-    await asyncio.sleep(3)  # the spare cell host does its imports meanwhile
+    await asyncio.sleep(3)  # the spare cell host imports its modules
 
 
 async def run(report: Report, directory: Path) -> None:

@@ -1,4 +1,4 @@
-"""Restarts of the server: killed with a large project open, next to busy processes; the first list after a start."""
+"""Restart of a killed server with a large open project, next to busy processes; first ListProjects after a start."""
 
 import contextlib
 import json
@@ -16,7 +16,7 @@ from benchmarks.metrics import Metric, Report, median, percentile
 ACTIONS: Final = 1000
 """Actions in the project that is open when the server is killed."""
 UNSAVED: Final = 100
-"""Of these, so many are in the journal alone."""
+"""Number of these actions that are only in the journal."""
 PROJECTS: Final = 200
 ROUNDS: Final = 12
 BUSY: Final = (2, 8)
@@ -24,9 +24,9 @@ BUSY: Final = (2, 8)
 
 @contextlib.contextmanager
 def busy(processes: int) -> Iterator[None]:
-    """Run so many processes that compute without pause."""
+    """Run processes that compute continuously."""
     running = [
-        subprocess.Popen([sys.executable, "-c", "while True: pass"], start_new_session=True)  # as a service of its own
+        subprocess.Popen([sys.executable, "-c", "while True: pass"], start_new_session=True)  # as a separate service
         for _ in range(processes)
     ]
     try:
@@ -84,5 +84,5 @@ async def run(report: Report, directory: Path) -> None:
             author = Author(socket)
             first.append(await author.timed("ListProjects"))
             again.append(await author.timed("ListProjects"))
-    note = f"again {median(again) * 1e3:.2f} ms"
+    note = f"second {median(again) * 1e3:.2f} ms"
     report.add(Metric("list_projects_200_first_ms", median(first) * 1e3, len(first), note))

@@ -1,4 +1,4 @@
-"""The robot on its wire: how late a stop arrives, what 500 Hz of state cost and lose, how soon a jog ends."""
+"""The UR5e through the whole product: stop latency, 500 Hz state stream, end of a jog."""
 
 import asyncio
 import random
@@ -22,11 +22,11 @@ from benchmarks.operation import scene_state
 
 STREAM_SECONDS = 60.0
 BEGINS_WITHIN = 3.0
-"""s that a motion may take to begin, control taken anew with it."""
+"""Time limit for the start of a motion, including taking control, s."""
 
 
 async def ask(control: str, do: str, **arguments: Any) -> Any:
-    """Ask the fake over its control channel."""
+    """Send a command to the fake over its control channel; return its data."""
     host, _, port = control.rpartition(":")
     reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 24)
     try:
@@ -40,14 +40,14 @@ async def ask(control: str, do: str, **arguments: Any) -> Any:
 
 
 async def moved(client: Client, robot: str, target: list[Joint]) -> None:
-    """Move to joints, to the end; control is taken by that."""
+    """Move to joints and wait until the motion ends; this also takes control."""
     await client.call("MoveToJoints", rpc.MoveToJointsArgs(robot, 0.5, target))
     while (await client.next_event("RobotMoveToJoints")).data.move_event_type == "start":
         pass
 
 
 async def stop_latency(report: Report, directory: Path, host: str, control: str, n: int = 200) -> None:
-    """Measure from sending StopAll to the stop's frame at the controller and to the answer, at random phases."""
+    """Measure from sending StopAll to the stop at the controller and to the response, at random phases."""
     async with server_process.server(directory / "robot") as (url, _), Client(url, "bench") as client:
         await client.call("NewScene", rpc.NewSceneArgs("robot"))
         settings = [Parameter("host", "string", f'"{host}"'), Parameter("payload_mass", "double", "0.5")]
@@ -56,12 +56,12 @@ async def stop_latency(report: Report, directory: Path, host: str, control: str,
         await client.call("StartScene")
         await scene_state(client, "started")
         home: list[Joint] = await client.call("GetRobotJoints", rpc.GetRobotJointsArgs(robot))
-        # So far apart that no motion is over before it is stopped.
+        # Far enough apart that no motion ends before it is stopped.
         targets = [
             [Joint(joint.name, joint.value + (turn if index == 0 else 0.0)) for index, joint in enumerate(home)]
             for turn in (1.5, -1.5)
         ]
-        # The first motion takes control; what is measured are motions.
+        # The first motion takes control and is not measured.
         await moved(client, robot, targets[1])
         samples: list[float] = []
         answered: list[float] = []
@@ -71,7 +71,7 @@ async def stop_latency(report: Report, directory: Path, host: str, control: str,
             target = targets[0] if present.value < home[0].value else targets[1]
             await client.call("MoveToJoints", rpc.MoveToJointsArgs(robot, 0.5, target))
             await client.next_event("RobotMoveToJoints")
-            # Control may have to be taken again: what is stopped before it moves sends no stop.
+            # Wait for motion, because control may have to be taken again and a stop before motion is not sent.
             until = time.monotonic() + BEGINS_WITHIN
             while not (await ask(control, "truth"))["moving"] and time.monotonic() < until:  # noqa: ASYNC110
                 await asyncio.sleep(0.005)
@@ -84,22 +84,22 @@ async def stop_latency(report: Report, directory: Path, host: str, control: str,
             if arrived:
                 samples.append(arrived[0] - sent)
                 continue
-            # On a machine so busy that the control process got no core in time, the watchdog was there before the stop.
+            # On a busy machine the watchdog can end the motion first, if the control process gets no core in time.
             tripped = (await ask(control, "truth"))["watchdog_trips"]
             if tripped == trips:
-                raise RuntimeError(f"a stop did not arrive at the controller, and the motion ended: {end.message}")
+                raise RuntimeError(f"A stop did not arrive at the controller, and the motion ended: {end.message}")
             trips = tripped
             await moved(client, robot, await client.call("GetRobotJoints", rpc.GetRobotJointsArgs(robot)))
         await client.call("StopScene")
         await scene_state(client, "stopped")
     note = f"median {median(samples) * 1e3:.1f} ms, worst {max(samples) * 1e3:.1f} ms"
-    note += f"; answered when it stood, after {median(answered) * 1e3:.0f} ms (median)"
-    note += f"; {trips - before} motions ended by the watchdog before, not counted" if trips > before else ""
+    note += f"; response at standstill, after {median(answered) * 1e3:.0f} ms (median)"
+    note += f"; {trips - before} motions ended earlier by the watchdog, not counted" if trips > before else ""
     report.add(Metric("stop_latency_p99_ms", percentile(samples, 99) * 1e3, n, note))
 
 
 async def stream(report: Report, host: str) -> None:
-    """Take the state for a minute in a process of its own, as the cell host does."""
+    """Measure receiving the state for a minute in a separate process, as in the cell host."""
     command = (sys.executable, "-m", "benchmarks.receive_robot_states", host, str(STREAM_SECONDS))
     process = await asyncio.create_subprocess_exec(*command, stdout=asyncio.subprocess.PIPE)
     assert process.stdout is not None

@@ -1,10 +1,11 @@
-"""Robot pose from depth: arms before a synthetic sensor, and scenes in which nothing may be found.
+"""Robot pose from depth: arms in front of a synthetic sensor, and scenes in which no pose may be found.
 
-The sensor meets rays with shapes in closed form and shares no code with the solver (tests/calibration/depth_sensor.py):
-1280 × 720, 8 pictures averaged, noise 1.8 mm at 1 m growing with the square of the distance, and 0.8 mm at 1 m of
-smooth noise that stays the same in all pictures; whole millimetres; flying pixels at edges, 0.5 % holes; a table, a
-wall, and on the arm a gripper and a cable that the model lacks. 1.0 to 1.8 m, 15 to 60° above, any joints above the
-table. The assumed pose is 50 mm and 5° off. fx and fy that the solver is told are off by 0.05 %, cx and cy by 0.25 px.
+The sensor intersects rays with shapes in closed form and shares no code with the solver
+(tests/calibration/depth_sensor.py). Picture: 1280 × 720, average of 8, noise 1.8 mm at 1 m growing with the square of
+the distance, smooth noise of 0.8 mm at 1 m that all pictures share, whole millimetres, flying pixels at edges, 0.5 %
+holes. Scene: a table, a wall, and on the arm a gripper and a cable that the model lacks; distance 1.0 to 1.8 m, 15 to
+60° above, any joints above the table. The assumed pose is 50 mm and 5° off. The given fx and fy are off by 0.05 %, cx
+and cy by 0.25 px.
 """
 
 import math
@@ -25,14 +26,14 @@ from tests.calibration.workplace import LARGE, View, drawn, joints_above_the_tab
 SEED: Final = 20261121
 VIEWS: Final = 30
 LONG: Final = 300
-TELLS: Final = 4.0
-"""A result that is off by more than that many of its own standard deviations has a wrong verdict."""
-USELESS: Final = 0.005
-"""m; a result that is off by more is wrong whatever it says."""
+MAX_DEVIATIONS: Final = 4.0
+"""Error, in standard deviations of the result, above which the verdict is wrong."""
+MAX_ERROR: Final = 0.005
+"""Position error above which a verdict is always wrong, m."""
 
 
 def run(report: Report, long: bool) -> None:
-    """Measure."""
+    """Measure everything in this group."""
     count = LONG if long else VIEWS
     sys.stderr.write(f"robot pose: {count} views from seed {SEED}\n")
     distances, angles, seconds, refused, wrong = [], [], [], 0, 0
@@ -49,24 +50,28 @@ def run(report: Report, long: bool) -> None:
         distance, angle = view.error(found.pose)
         distances.append(distance * 1e3)
         angles.append(math.degrees(angle))
-        told_off = distance > TELLS * found.position_deviation or angle > TELLS * found.orientation_deviation
-        wrong += told_off or distance > USELESS
+        beyond_own_deviation = (
+            distance > MAX_DEVIATIONS * found.position_deviation or angle > MAX_DEVIATIONS * found.orientation_deviation
+        )
+        wrong += beyond_own_deviation or distance > MAX_ERROR
     note = f"p99 {percentile(distances, 99):.2f} mm, {percentile(angles, 99):.3f}°, seed {SEED}"
     report.add(Metric("robot_pose_mm", median(distances), len(distances), note))
     report.add(Metric("robot_pose_deg", median(angles), len(angles)))
     report.add(Metric("robot_pose_s", median(seconds), len(seconds), f"longest {max(seconds):.1f} s"))
     report.add(Metric("robot_pose_refused", 100.0 * refused / count, count))
-    report.add(Metric("robot_pose_wrong", 100.0 * wrong / count, count, f"beyond {TELLS:g} own deviations, or 5 mm"))
-    given, asked = 0, 0
+    report.add(
+        Metric("robot_pose_wrong", 100.0 * wrong / count, count, f"beyond {MAX_DEVIATIONS:g} own deviations, or 5 mm")
+    )
+    returned, scenes = 0, 0
     for view in _impostors(max(12, count // 3)):
-        asked += 1
+        scenes += 1
         try:
             found = _solve(view)
         except CalibrationRefused:
             continue
-        given += view.error(found.pose)[0] > USELESS
+        returned += view.error(found.pose)[0] > MAX_ERROR
     note = "no robot, a cupboard in its place, a joint 12° and more off, 0.3 m and more away"
-    report.add(Metric("robot_pose_impostors", 100.0 * given / asked, asked, note))
+    report.add(Metric("robot_pose_impostors", 100.0 * returned / scenes, scenes, note))
 
 
 def _solve(view: View) -> RobotPose:
@@ -74,7 +79,7 @@ def _solve(view: View) -> RobotPose:
 
 
 def _impostors(count: int) -> list[View]:
-    """Scenes in which the robot is not there, is another one, or stands far from where it is assumed."""
+    """Return scenes without the robot, with a cupboard, with a wrong joint, or with a far-off assumed pose."""
     views = []
     for number in range(count):
         rng = np.random.default_rng(SEED + number)

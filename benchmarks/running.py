@@ -1,4 +1,4 @@
-"""A program as people run it: how soon a command is told and obeyed, and a package of 1,000 distinct actions."""
+"""A running program: latency of its commands, and a package of 1,000 distinct actions."""
 
 import asyncio
 import itertools
@@ -14,7 +14,7 @@ from benchmarks import server_process
 from benchmarks.metrics import Metric, Report, median, percentile
 from benchmarks.operation import PROBE, add_type, ended
 
-NAPPER = '''"""A device whose work takes its time."""
+NAPPER = '''"""A device whose action takes 5 ms."""
 
 import time
 
@@ -38,7 +38,7 @@ DISTINCT = 1000
 
 
 def project(name: str, actions: int, does: str) -> dict[str, Any]:
-    """Give a project of so many actions, each another one, that do the same one after the other."""
+    """Return a project of `actions` consecutive actions of the same type."""
     ids = [f"act_{number}" for number in range(actions)]
     ends = ["START", *ids, "END"]
     return {
@@ -62,7 +62,7 @@ def project(name: str, actions: int, does: str) -> dict[str, Any]:
 
 
 async def prepare(url: str, directory: Path) -> None:
-    """Save a scene with two devices, and two projects on it: a short one without end, and a long one."""
+    """Save a scene with three objects, and three projects: an endless one, a long one, and one that sleeps."""
     await add_type(url, "Probe", PROBE)
     await add_type(url, "Napper", NAPPER)
     parameters = [
@@ -92,14 +92,14 @@ async def prepare(url: str, directory: Path) -> None:
 
 
 async def built(client: Client, name: str) -> str:
-    """Build a project; gives the package's id."""
+    """Build a project; return the id of the package."""
     answer = await client.call("BuildProject", rpc.BuildProjectArgs(f"pro_{name}", name))
     package: str = answer.package_id
     return package
 
 
 async def timed(client: Client, request: str, event: str, state: str = "") -> float:
-    """Give the time from sending a request to an event (PackageState: of that state), s."""
+    """Return the time from sending a request to an event, of a state if one is given, s."""
     begin = time.perf_counter()
     asked = asyncio.create_task(client.call(request))
     try:
@@ -112,12 +112,12 @@ async def timed(client: Client, request: str, event: str, state: str = "") -> fl
 
 
 async def commands(report: Report, url: str) -> None:
-    """Measure how soon commands to a running program are told and obeyed."""
+    """Measure the latency of commands to a running program."""
     samples: dict[str, list[float]] = {name: [] for name in ("pausing", "step", "resume", "stopping")}
     async with Client(url, "bench") as client:
         package = await built(client, "few")
         for _ in range(ROUNDS // 10):
-            await asyncio.sleep(1.0)  # the spare cell host gets ready
+            await asyncio.sleep(1.0)  # the spare cell host starts
             await client.call("RunPackage", rpc.RunPackageArgs(package, start_paused=True))
             await until_paused(client)
             for _ in range(10):
@@ -134,12 +134,12 @@ async def commands(report: Report, url: str) -> None:
 
 
 async def stopped(report: Report, url: str) -> None:
-    """Measure how soon a program is over that is stopped in an action in which no device moves."""
+    """Measure the time until a program ends that is stopped during a sleeping action."""
     samples = []
     async with Client(url, "bench") as client:
         package = await built(client, "sleeping")
         for _ in range(STOPS):
-            await asyncio.sleep(1.0)  # the spare cell host gets ready
+            await asyncio.sleep(1.0)  # the spare cell host starts
             await client.call("RunPackage", rpc.RunPackageArgs(package))
             await client.next_event("ActionStateBefore")
             await asyncio.sleep(0.1)
@@ -150,13 +150,13 @@ async def stopped(report: Report, url: str) -> None:
 
 
 async def until_paused(client: Client) -> None:
-    """Wait for the program to be paused."""
+    """Wait until the program is paused."""
     while (await client.next_event("PackageState")).data.state != "paused":
         pass
 
 
 async def distinct(report: Report, url: str, rounds: int = 3) -> None:
-    """Measure a run of 1,000 actions, each another one, from the request to the end."""
+    """Measure a run of 1,000 distinct actions, from the request to the end."""
     samples, first = [], []
     async with Client(url, "bench") as client:
         package = await built(client, "distinct")

@@ -1,4 +1,4 @@
-"""Safe moves among 20 boxes: what planning and monitoring add to a motion, and how soon a new obstacle stops it."""
+"""Safe moves among 20 boxes: overhead of planning and monitoring, and time until a new obstacle stops a motion."""
 
 import threading
 import time
@@ -23,8 +23,8 @@ READY: Final = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 ACROSS: Final = (2.0, *READY[1:])
 
 
-class Around(Nothing):
-    """20 boxes near the arm that are not in its way, and the one that comes into it."""
+class Boxes(Nothing):
+    """Twenty boxes near the arm that do not block it, and one that appears in its path."""
 
     def __init__(self) -> None:
         self.boxes = {
@@ -41,7 +41,7 @@ class Around(Nothing):
 
 
 class InstantArm(UrdfRobot):
-    """A UR5e that is at its goal at once, or waits on its way until it is stopped."""
+    """A UR5e that reaches its goal immediately, or waits on its path until it is stopped."""
 
     _ABSTRACT = False
     urdf_package_name = "ur5e.urdf"
@@ -58,7 +58,7 @@ class InstantArm(UrdfRobot):
         return self.now
 
     def follow(self, way: Way) -> None:
-        """Go to the goal."""
+        """Go to the goal immediately, or wait until stopped."""
         self.moving.set()
         if self.waits:
             self.stopped.wait(5.0)
@@ -73,15 +73,15 @@ class InstantArm(UrdfRobot):
 
 
 def metrics() -> list[Metric]:
-    """Measure moves whose motion takes no time, and stops before a box that appears."""
-    arm, around = InstantArm(), Around()
+    """Measure moves whose motion takes no time, and stops for a box that appears."""
+    arm, around = InstantArm(), Boxes()
     arm.surround(around)
     times = []
     for number in range(MOVES):
         began = time.perf_counter()
         arm.move_to_joints(_joints(READY if number % 2 else ACROSS), 0.5)
         times.append(time.perf_counter() - began)
-    found = [Metric("safe_move_overhead_ms", median(times[2:]) * 1e3, MOVES - 2, "20 boxes, none in the way")]
+    found = [Metric("safe_move_overhead_ms", median(times[2:]) * 1e3, MOVES - 2, "20 boxes, none on the path")]
     arm.waits, late = True, []
     for _ in range(STOPS):
         arm.now = _joints(READY)
@@ -96,7 +96,7 @@ def metrics() -> list[Metric]:
         mover.join()
         late.append(arm.stopped_at - began)
         del around.boxes["crate"]
-    note = f"95th percentile {percentile(late, 95) * 1e3:.0f} ms; from the change to the call of stop"
+    note = f"95th percentile {percentile(late, 95) * 1e3:.0f} ms; from the appearance to the call of stop"
     return [*found, Metric("safe_move_stop_after_change_ms", median(late) * 1e3, STOPS, note)]
 
 
@@ -105,7 +105,7 @@ def _blocked(arm: InstantArm) -> None:
         arm.move_to_joints(_joints(ACROSS), 0.5)
     except PathBlocked:
         return
-    raise AssertionError("the arm was not stopped")
+    raise AssertionError("The arm was not stopped.")
 
 
 def _joints(values: tuple[float, ...]) -> list[Joint]:

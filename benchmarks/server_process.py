@@ -1,4 +1,4 @@
-"""A server process for measurements, and the echo that it is compared with."""
+"""Server process for measurements, and the echo server it is compared with."""
 
 import asyncio
 import contextlib
@@ -15,7 +15,7 @@ from arcor2_server.demo.processes import Child, python_module
 
 @contextlib.asynccontextmanager
 async def server(directory: Path) -> AsyncIterator[tuple[str, psutil.Process]]:
-    """Run `arcor2-hw serve` with this data directory; gives its address and process."""
+    """Run `arcor2-hw serve` with a data directory; yield its address and process."""
     child = Child(
         "server",
         python_module("arcor2_server.cli.main", "serve", "--port", "0", "--data-dir", str(directory)),
@@ -31,7 +31,7 @@ async def server(directory: Path) -> AsyncIterator[tuple[str, psutil.Process]]:
 
 @contextlib.asynccontextmanager
 async def echo(directory: Path, size: int) -> AsyncIterator[str]:
-    """Run an answerer of `size` bytes on the same stack in a process of its own; gives its address."""
+    """Run an echo server that answers `size` bytes with the same libraries; yield its address."""
     child = Child("echo", [sys.executable, "-m", "benchmarks.echo_server", str(size)], directory / f"echo-{size}.log")
     try:
         yield await child.start()
@@ -41,13 +41,13 @@ async def echo(directory: Path, size: int) -> AsyncIterator[str]:
 
 @contextlib.asynccontextmanager
 async def socket(url: str) -> AsyncIterator[ClientConnection]:
-    """A bare websocket: what is measured is the server, not the client's decoding."""
+    """Open a plain websocket, so that the client's decoding is not measured."""
     async with connect(url, compression=None, max_size=None) as opened:
         yield opened
 
 
 async def answer(opened: ClientConnection, request: str) -> str | bytes:
-    """Send a request and give the answer, passing over events."""
+    """Send a request and return the response, ignoring events."""
     await opened.send(request)
     while True:
         text = await opened.recv()
@@ -57,7 +57,7 @@ async def answer(opened: ClientConnection, request: str) -> str | bytes:
 
 
 async def round_trips(opened: ClientConnection, request: str, n: int) -> list[float]:
-    """Give the durations of `n` round trips, s."""
+    """Return the durations of `n` round trips, s."""
     samples = []
     for _ in range(n):
         begin = time.perf_counter()

@@ -1,7 +1,7 @@
-"""Stops: from the call of a driver's stop to its frame at the device, all that move moving at once in one process.
+"""Stop latency: from the call of a driver's stop to its frame at the device, with all drivers moving in one process.
 
-Each fake stamps what comes on the machine's monotonic clock, which is the one that the call is stamped by. Once in a
-process that does nothing else, once next to an action that computes and one that keeps the interpreter for 0.4 s.
+Fakes and calls use the machine's monotonic clock. Measured in an otherwise idle process, and next to an action that
+computes and one that holds the interpreter lock for 0.4 s.
 """
 
 import asyncio
@@ -28,23 +28,23 @@ from tests.drivers.benches.universal_robots_bench import UR5eBench
 from tests.drivers.busy import stall
 
 STOPS: Final = 100
-"""For each driver."""
+"""Number of stops of each driver."""
 LONG_STOPS: Final = 500
-"""For each driver in a busy process, with `--long`."""
-KEEPS: Final = 0.4
-"""Seconds for which an action keeps the interpreter."""
-PAUSES: Final = 0.6
-"""Seconds until it does so again."""
+"""Number of stops of each driver in a busy process, with `--long`."""
+LOCK_TIME: Final = 0.4
+"""Time for which an action holds the interpreter lock, s."""
+LOCK_PAUSE: Final = 0.6
+"""Time until it holds the lock again, s."""
 PHASES: Final = 0.3
-"""s from the begin of a motion to its stop, at most."""
+"""Maximum time from the start of a motion to its stop, s."""
 BEGINS_WITHIN: Final = 10.0
 ENDS_WITHIN: Final = 5.0
 ARRIVES_WITHIN: Final = 2.0
 
 MOVING_ARM: Final = "left"
-"""Of the YuMi, in `run_long`; the other, which stands, hears of a stop sooner."""
+"""Arm of the YuMi that `run_long` moves; the stationary arm reads a stop earlier."""
 CONTROL_WORD: Final = "2b406000"
-"""How the data of an SDO that writes the control word (6040h) begins; the word follows, low byte first."""
+"""First bytes of an SDO that writes the control word (6040h); the word follows, low byte first."""
 HALT: Final = 0x0100
 
 
@@ -58,7 +58,7 @@ def _halts(truth: dict[str, Any]) -> Iterable[float]:
 
 
 def _stamps(bench: Bench) -> Callable[[], Iterable[float]]:
-    """Give what tells when stopping frames came to the fake of a bench."""
+    """Return a function that returns the arrival times of stopping frames at the fake of a bench."""
     if isinstance(bench, UR5eBench):
         ur = bench.fake
         return lambda: [stop["t"] for stop in ur.do("stops")]
@@ -70,7 +70,7 @@ def _stamps(bench: Bench) -> Callable[[], Iterable[float]]:
         return lambda: _halts(belt.truth())
     assert isinstance(bench, DobotMagicianBench | TwoAxisRobotBench | Robotiq2FBench)
     fake = bench.fake
-    # The servos are given goals at which they can stand soonest; nothing else is written while they move.
+    # A stop writes the nearest goals at which the servos can stop; nothing else is written during motion.
     command = "sync_writes" if isinstance(bench, TwoAxisRobotBench) else "stops"
     return lambda: fake.control.do(command)
 
@@ -86,7 +86,7 @@ BENCHES: Final[tuple[type[Bench], ...]] = (
 
 
 class Motion:
-    """A motion on a thread of its own, which is stopped before it ends."""
+    """A motion in a separate thread, stopped before it ends."""
 
     def __init__(self, bench: Bench, device: Generic) -> None:
         self._bench, self._device = bench, device
@@ -97,39 +97,39 @@ class Motion:
     def _run(self) -> None:
         try:
             self._bench.run_long(self._device)
-        except BaseException as error:  # noqa: BLE001 - judged by who waits
+        except BaseException as error:  # noqa: BLE001 - checked by wait_until_stopped
             self._error = error
 
-    def under_way(self) -> None:
+    def wait_until_moving(self) -> None:
         until = time.monotonic() + BEGINS_WITHIN
         while not self._bench.running():
             if not self._thread.is_alive() or time.monotonic() > until:
                 raise RuntimeError(f"{self._bench.name()} does not move: {self._error!r}")
             time.sleep(0.005)
 
-    def stopped(self) -> None:
+    def wait_until_stopped(self) -> None:
         self._thread.join(ENDS_WITHIN)
         if self._thread.is_alive() or not isinstance(self._error, Cancelled):
-            raise RuntimeError(f"a stopped motion of {self._bench.name()} did not end as one: {self._error!r}")
+            raise RuntimeError(f"A stopped motion of {self._bench.name()} did not raise Cancelled: {self._error!r}")
 
 
 def one_stop(bench: Bench, device: Any, stamps: Callable[[], Iterable[float]]) -> float:
-    """Begin a motion, stop it at some moment; give how late the frame was at the device, s."""
+    """Start a motion and stop it at a random moment; return the latency of the frame at the device, s."""
     motion = Motion(bench, device)
-    motion.under_way()
+    motion.wait_until_moving()
     time.sleep(PHASES * random.random())
     called = time.monotonic()
     device.stop()
     until = time.monotonic() + ARRIVES_WITHIN
     while not (arrived := [stamp for stamp in stamps() if stamp >= called]):
         if time.monotonic() > until:
-            raise RuntimeError(f"a stop of {bench.name()} did not arrive")
-    motion.stopped()
+            raise RuntimeError(f"A stop of {bench.name()} did not arrive.")
+    motion.wait_until_stopped()
     return min(arrived) - called
 
 
 def stops_of(kind: type[Bench], count: int) -> tuple[list[float], list[str]]:
-    """Return how late each stop of a driver was, s, and what went wrong with the others."""
+    """Return the latencies of the stops of a driver, s, and the errors of failed stops."""
     bench = kind()
     bench.start()
     late, wrong = [], []
@@ -152,18 +152,18 @@ def stops_of(kind: type[Bench], count: int) -> tuple[list[float], list[str]]:
 
 @contextlib.contextmanager
 def busy() -> Iterator[None]:
-    """Have one action compute in Python and one keep the interpreter in a C call, again and again."""
+    """Run one action that computes in Python, and one that repeatedly holds the interpreter lock in a C call."""
     ending = threading.Event()
 
     def compute() -> None:
         while not ending.is_set():
             sum(i * i for i in range(10_000))
 
-    def keep() -> None:
-        while not ending.wait(PAUSES):
-            stall(KEEPS)
+    def hold_lock() -> None:
+        while not ending.wait(LOCK_PAUSE):
+            stall(LOCK_TIME)
 
-    threads = [threading.Thread(target=each) for each in (compute, keep)]
+    threads = [threading.Thread(target=each) for each in (compute, hold_lock)]
     interval = sys.getswitchinterval()
     sys.setswitchinterval(0.0005)  # as in the cell host
     for thread in threads:
@@ -185,7 +185,7 @@ def _stop_all(count: int) -> tuple[dict[type[Bench], list[float]], list[str]]:
 
 
 def measure_busy(count: int) -> list[Metric]:
-    """Measure in a busy process, on this thread."""
+    """Measure in a busy process, in this thread."""
     with busy():
         found, wrong = _stop_all(count)
     late = [each for samples in found.values() for each in samples]
@@ -198,7 +198,7 @@ def measure_busy(count: int) -> list[Metric]:
 
 
 def measure() -> Metric:
-    """Measure on this thread."""
+    """Measure in this thread."""
     found, wrong = _stop_all(STOPS)
     if wrong:
         raise RuntimeError("; ".join(wrong))

@@ -1,4 +1,4 @@
-"""Eight devices that do not come back, and what that costs everybody else; all through the server."""
+"""Latency of calls on one device while calls on eight others hang, through the server."""
 
 import asyncio
 import time
@@ -11,7 +11,7 @@ from benchmarks import server_process
 from benchmarks.metrics import Metric, Report, percentile
 from benchmarks.operation import add_type, scene_state
 
-HUNG = 8
+UNRESPONSIVE = 8
 CALLS = 1000
 
 ROBOT = '''"""A robot whose vendor library answers after {seconds:g} s."""
@@ -46,8 +46,8 @@ class {name}(Robot):
 '''
 
 
-async def calls_beside(client: Client, robot: str, calls: int) -> list[float]:
-    """Give how long each of some calls on one robot took, s."""
+async def call_durations(client: Client, robot: str, calls: int) -> list[float]:
+    """Return the durations of calls on one robot, s."""
     samples = []
     for _ in range(calls):
         begin = time.perf_counter()
@@ -57,26 +57,26 @@ async def calls_beside(client: Client, robot: str, calls: int) -> list[float]:
 
 
 async def run(report: Report, directory: Path) -> None:
-    """Measure a prompt robot's calls while eight others hang."""
+    """Measure calls on a responsive robot while eight others hang."""
     async with server_process.server(directory / "hung") as (url, _), Client(url, "bench") as client:
         await add_type(url, "HungRobot", ROBOT.format(name="HungRobot", seconds=600.0))
         await add_type(url, "PromptRobot", ROBOT.format(name="PromptRobot", seconds=0.0))
         await client.call("NewScene", rpc.NewSceneArgs("hung"))
         ids = []
-        for number, kind in enumerate(["PromptRobot", *["HungRobot"] * HUNG]):
+        for number, kind in enumerate(["PromptRobot", *["HungRobot"] * UNRESPONSIVE]):
             await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs(f"robot_{number}", kind, Pose()))
             ids.append((await client.next_event("SceneObjectChanged")).data.id)
         await client.call("StartScene")
         await scene_state(client, "started")
-        alone = await calls_beside(client, ids[0], CALLS // 4)
+        alone = await call_durations(client, ids[0], CALLS // 4)
         hung = [asyncio.create_task(client.call("GetGrippers", rpc.GetGrippersArgs(each))) for each in ids[1:]]
         await asyncio.sleep(0.2)
-        samples = await calls_beside(client, ids[0], CALLS)
+        samples = await call_durations(client, ids[0], CALLS)
         under_way = sum(not task.done() for task in hung)
         for task in hung:
             task.cancel()
         await asyncio.gather(*hung, return_exceptions=True)
-    if under_way != HUNG:
-        raise RuntimeError(f"only {under_way} of {HUNG} devices hung to the end")
-    note = f"alone {percentile(alone, 99) * 1e3:.1f} ms; all {HUNG} hung to the end"
+    if under_way != UNRESPONSIVE:
+        raise RuntimeError(f"Only {under_way} of {UNRESPONSIVE} devices hung to the end.")
+    note = f"alone {percentile(alone, 99) * 1e3:.1f} ms; all {UNRESPONSIVE} hung to the end"
     report.add(Metric("hung_beside_p99_ms", percentile(samples, 99) * 1e3, len(samples), note))
