@@ -9,16 +9,10 @@ from typing import Any, Final
 import msgspec
 import structlog
 
+from arcor2_hw.data import events as e
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import RunEnd
-from arcor2_hw.data.events import (
-    Event,
-    MainScreen,
-    PackageInfoData,
-    PackageStateData,
-    ProjectExceptionData,
-    ShowMainScreenData,
-)
+from arcor2_hw.data.events import Event, MainScreen, ProjectExceptionData
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_hw.runtime import messages as m
@@ -153,7 +147,7 @@ class Execution(PackageLibrary):
         return [self._state_event(), *(msgspec.json.decode(encoded, type=Event) for encoded in known)]
 
     def _state_event(self) -> Event:
-        return make_event("PackageState", PackageStateData(self.state, self.package_id or UNSET))
+        return make_event("PackageState", e.PackageStateData(self.state, self.package_id or UNSET))
 
     def _enter(self, state: PackageStateEnum) -> None:
         self.state = state
@@ -371,7 +365,7 @@ class Execution(PackageLibrary):
             self._killing = None
         self._enter(S.STOPPED)
         if self._over is None:
-            screen = ShowMainScreenData(MainScreen.PACKAGES_LIST, self.package_id)
+            screen = e.ShowMainScreenData(MainScreen.PACKAGES_LIST, self.package_id)
             self._hub.broadcast(make_event("ShowMainScreen", screen))
         elif not self._over.done():
             self._over.set_result(None)
@@ -397,7 +391,7 @@ class Execution(PackageLibrary):
 
 
 class _InfoEvent(msgspec.Struct):
-    data: PackageInfoData
+    data: e.PackageInfoData
 
 
 class _ExceptionEvent(msgspec.Struct):

@@ -363,7 +363,7 @@ async def test_records_of_calibrations_are_listed_and_compared(tmp_path: Path) -
         assert (await stranger.ask("CheckCalibration", id=held.id, pose={}))["passed"] is True
         for args, words in (
             ({"id": held.id}, "frame of the flange of arm"),
-            ({"id": lens.id, "pose": {}}, "gave no pose"),
+            ({"id": lens.id, "pose": {}}, "has no pose that could be checked"),
             ({"id": "cal_none"}, "cal_none"),
             ({"id": near.id, "angle_limit": 0}, "angle_limit"),
         ):
