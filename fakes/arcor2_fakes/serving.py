@@ -1,6 +1,7 @@
 """The process of a fake: its wires, its control channel, its ready line and its end."""
 
 import contextlib
+import inspect
 import sys
 from collections.abc import Awaitable, Callable
 from typing import Any
@@ -31,7 +32,7 @@ class Fake:
         self.channel.source("truth", read)
 
     def at_end(self, call: Callable[[], object]) -> None:
-        """Call a function when the fake ends."""
+        """Call a function, which may be a coroutine function, when the fake ends."""
         self._ends.append(call)
 
     def wires(self, checked: tuple[str, ...] = (), **wires: Wire) -> None:
@@ -54,18 +55,24 @@ class Fake:
         register_faults(self.channel, {name: line})
         self.commands(plug=plug, unplug=unplug)
 
-    async def run(self, **addresses: Wire) -> None:
-        """Open the wires, print the ready line with the addresses, and return when the fake is told to end."""
+    async def run(self, **addresses: Wire | Callable[[], object]) -> None:
+        """Open the wires, print the ready line, and return when the fake is told to end.
+
+        Args:
+            addresses: What the ready line says: the address of a wire, or the value of a function.
+        """
         for wire in self._wires.values():
             await (wire.listen() if isinstance(wire, TcpWire) else wire.plug())
-        shown = {name: each.address if isinstance(each, TcpWire) else each.port for name, each in addresses.items()}
+        shown = {name: _address(each) for name, each in addresses.items()}
         announce(name=self.name, **shown, control=await self.channel.start())
         await until_told_to_end()
 
     async def close(self) -> None:
         """Close the wires and the control channel."""
         for call in self._ends:
-            call()
+            result = call()
+            if inspect.isawaitable(result):
+                await result
         for wire in self._wires.values():
             if isinstance(wire, TcpWire):
                 wire.close()
@@ -75,7 +82,15 @@ class Fake:
         await self.channel.close()
 
 
-def serve(name: str, control: str, body: Callable[[Fake], Awaitable[None]], *addresses: str | None) -> int:
+def _address(of: Wire | Callable[[], object]) -> object:
+    if isinstance(of, TcpWire):
+        return of.address
+    return of() if callable(of) else of.port
+
+
+def serve(
+    name: str, control: str, body: Callable[[Fake], Awaitable[None]], *addresses: str | None, ahead: bool = True
+) -> int:
     """Run a fake to its end and return the exit status: 2 for an address that is not HOST:PORT.
 
     Args:
@@ -83,6 +98,7 @@ def serve(name: str, control: str, body: Callable[[Fake], Awaitable[None]], *add
         control: HOST:PORT of the control channel.
         body: Builds the device and awaits `Fake.run`.
         addresses: Further addresses to check before anything starts; None for one that was not given.
+        ahead: Whether it may run before other processes; see `process.run`.
     """
     try:
         host, port = parse_address(control)
@@ -100,4 +116,4 @@ def serve(name: str, control: str, body: Callable[[Fake], Awaitable[None]], *add
         finally:
             await fake.close()
 
-    return run(main, name)
+    return run(main, name, ahead=ahead)

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import sys
 from typing import Annotated
 
 from cyclopts import App, Parameter, validators
 
-from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.control import ControlServer
 from arcor2_fakes.conveyor.hub import Hub
 from arcor2_fakes.conveyor.node import Node
 from arcor2_fakes.conveyor.socketcand import Server
-from arcor2_fakes.process import announce, run, until_told_to_end
-from arcor2_fakes.wire import register_faults
+from arcor2_fakes.serving import Fake, serve
 
 app = App(name="arcor2_fakes.conveyor", help="Fake conveyor: CiA 402 drive on CAN.", version_flags=[])
 
 
 def register_commands(control: ControlServer, node: Node) -> None:
-    """Make what the world and a test can do to the drive known to the control channel."""
+    """Register what tests and the cell can do to the drive."""
 
     def emergency(code: int, stands: bool = False) -> None:
         if not isinstance(code, int) or not 1 <= code <= 0xFFFF:
@@ -71,42 +69,25 @@ def main(
         node: CANopen node id of the drive.
         time_scale: how many times faster than real the belt moves; heartbeats and boot-up stay in real time.
     """
-    try:
-        control_host, control_port = parse_address(control)
-    except ValueError as e:
-        sys.stderr.write(f"conveyor: {e}\n")
-        return 2
 
-    async def body() -> None:
+    async def body(fake: Fake) -> None:
         hub = Hub(host, port)
         daemon = Server(hub, host, socketcand_port)
         drive = Node(hub, node, time_scale)
-        channel = ControlServer(control_host, control_port)
-        register_commands(channel, drive)
-        register_faults(channel, {"can": hub.wire, "socketcand": daemon.wire})
-        channel.source("truth", drive.truth)
-        channel.source("motion", drive.motion)
-        await hub.wire.listen()
-        await daemon.wire.listen()
+        register_commands(fake.channel, drive)
+        fake.wires(can=hub.wire, socketcand=daemon.wire)
+        fake.truth(drive.truth)
+        fake.channel.source("motion", drive.motion)
         life = asyncio.create_task(drive.run())
-        try:
-            announce(
-                name="conveyor",
-                can=hub.wire.address,
-                socketcand=daemon.wire.address,
-                node=node,
-                control=await channel.start(),
-            )
-            await until_told_to_end()
-        finally:
-            life.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await asyncio.gather(life)
-            hub.wire.close()
-            daemon.wire.close()
-            await channel.close()
 
-    return run(body, "conveyor")
+        async def end() -> None:
+            life.cancel()
+            await asyncio.gather(life, return_exceptions=True)
+
+        fake.at_end(end)
+        await fake.run(can=hub.wire, socketcand=daemon.wire, node=lambda: node)
+
+    return serve("conveyor", control, body)
 
 
 if __name__ == "__main__":

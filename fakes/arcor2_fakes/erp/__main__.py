@@ -13,8 +13,7 @@ from cyclopts import App
 from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.erp.planning import Planning
 from arcor2_fakes.erp.port import Port
-from arcor2_fakes.process import announce, run, until_told_to_end
-from arcor2_fakes.wire import register_faults
+from arcor2_fakes.serving import Fake, serve
 
 app = App(name="arcor2_fakes.erp", help="Fake production planning service (ERP) on HTTP.", version_flags=[])
 
@@ -32,7 +31,7 @@ def truth(planning: Planning, port: Port) -> dict[str, Any]:
 
 
 def register_commands(control: ControlServer, planning: Planning, port: Port) -> None:
-    """Make what a planner and a test can do to the service known to the control channel."""
+    """Make what a planner and a test can do to the service."""
 
     def add_order(order: str, product: str, quantity: int = 1) -> None:
         planning.add_order(order, product, quantity)
@@ -78,8 +77,6 @@ def main(
         key: PEM file of the certificate's private key.
     """
     try:
-        address = parse_address(listen)
-        control_address = parse_address(control)
         planning = Planning(store)
         for text in order or ():
             number, _, what = text.partition("=")
@@ -94,24 +91,17 @@ def main(
         sys.stderr.write(f"erp: {e}\n")
         return 2
 
-    async def body() -> None:
-        channel = ControlServer(*control_address)
-        port = Port(planning, *address, token, context)
-        port.changed = lambda: channel.publish("truth")
-        register_commands(channel, planning, port)
-        register_faults(channel, {"http": port.wire})
-        channel.source("truth", lambda: truth(planning, port))
-        where = await port.wire.listen()
-        try:
-            scheme = "http" if context is None else "https"
-            announce(name="erp", url=f"{scheme}://{where}", control=await channel.start())
-            await until_told_to_end()
-        finally:
-            port.wire.close()
-            await channel.close()
-            planning.close()
+    async def body(fake: Fake) -> None:
+        port = Port(planning, *parse_address(listen), token, context)
+        port.changed = lambda: fake.channel.publish("truth")
+        register_commands(fake.channel, planning, port)
+        fake.wires(http=port.wire)
+        fake.truth(lambda: truth(planning, port))
+        fake.at_end(planning.close)
+        scheme = "http" if context is None else "https"
+        await fake.run(url=lambda: f"{scheme}://{port.wire.address}")
 
-    return run(body, "erp")
+    return serve("erp", control, body, listen)
 
 
 if __name__ == "__main__":

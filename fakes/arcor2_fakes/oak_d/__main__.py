@@ -16,8 +16,8 @@ from arcor2_fakes.oak_d.camera import Camera
 from arcor2_fakes.oak_d.optics import Lens
 from arcor2_fakes.oak_d.pictures import Pictures
 from arcor2_fakes.oak_d.scene import Pose, Scene
-from arcor2_fakes.process import announce, run, until_told_to_end
-from arcor2_fakes.wire import TcpWire, register_faults
+from arcor2_fakes.serving import Fake, serve
+from arcor2_fakes.wire import TcpWire
 
 app = App(name="arcor2_fakes.oak_d", help="Fake OAK-D: rendered colour and depth over TCP.", version_flags=[])
 
@@ -54,7 +54,7 @@ def read_scene(path: Path | None) -> Scene:
 
 
 def register_commands(control: ControlServer, camera: Camera, wire: TcpWire, boot_time: float) -> None:
-    """Make what the world and a test can do known to the control channel."""
+    """Make what the world and a test can do."""
     scene = camera.scene
 
     def switch(attribute: str) -> Any:
@@ -90,7 +90,6 @@ def register_commands(control: ControlServer, camera: Camera, wire: TcpWire, boo
     control.command("move", move)
     control.command("overheat", lambda temperature=96.0: camera.heat(temperature))
     control.command("power_cycle", power_cycle)
-    register_faults(control, {"stream": wire})
     control.command("heal", heal)  # the device's own faults too
 
 
@@ -123,7 +122,6 @@ def main(
         seed: of the noise.
     """
     try:
-        stream_address, control_address = parse_address(listen), parse_address(control)
         start_scene = read_scene(scene)
     except ValueError as e:
         sys.stderr.write(f"oak_d: {e}\n")
@@ -133,25 +131,19 @@ def main(
             sys.stderr.write(f"oak_d: {module} is not installed; it comes with the extra `vision`\n")
             return 1
 
-    async def body() -> None:
+    async def body(fake: Fake) -> None:
         lens = Lens(width, height)
         pictures = Pictures(lens, noise, seed)
         camera = Camera(start_scene, lens, fps, pictures.warm, pictures.take)
-        wire = TcpWire("stream", *stream_address, camera.opened)
-        channel = ControlServer(*control_address)
-        register_commands(channel, camera, wire, boot_time / time_scale)
-        channel.source("truth", lambda: {**camera.truth(), "rendered": pictures.rendered})
-        await wire.listen()
+        wire = TcpWire("stream", *parse_address(listen), camera.opened)
+        fake.wires(stream=wire)
+        register_commands(fake.channel, camera, wire, boot_time / time_scale)
+        fake.truth(lambda: {**camera.truth(), "rendered": pictures.rendered})
+        fake.at_end(camera.stop)
         camera.start()
-        try:
-            announce(name="oak_d", stream=wire.address, control=await channel.start())
-            await until_told_to_end()
-        finally:
-            await camera.stop()
-            wire.close()
-            await channel.close()
+        await fake.run(stream=wire)
 
-    return run(body, "oak_d", ahead=False)
+    return serve("oak_d", control, body, listen, ahead=False)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import sys
 from datetime import UTC, datetime
@@ -19,8 +18,7 @@ from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.opcua_plc.program import Host, Program, Step
 from arcor2_fakes.opcua_plc.proxy import Proxy
 from arcor2_fakes.opcua_plc.space import OFF_ON_LOSS, POINTS, Space
-from arcor2_fakes.process import announce, run, until_told_to_end
-from arcor2_fakes.wire import register_faults
+from arcor2_fakes.serving import Fake, serve
 
 app = App(name="arcor2_fakes.opcua_plc", help="Fake PLC with an OPC UA server.", version_flags=[])
 SCAN = 0.01
@@ -106,7 +104,7 @@ class Plc:
 
 
 def register_commands(control: ControlServer, plc: Plc, proxy: Proxy) -> None:
-    """Make what the world and a test can do to the PLC known to the control channel."""
+    """Register what tests and the cell can do to the PLC."""
     program, space = plc.program, plc.space
 
     async def set_point(name: str, value: Any) -> None:
@@ -193,39 +191,31 @@ def main(
         certificate: PEM or DER file; the server signs and encrypts then, and takes nothing else.
         key: PEM file of the certificate's private key.
     """
-    try:
-        address, control_address = parse_address(listen), parse_address(control)
-    except ValueError as e:
-        sys.stderr.write(f"opcua_plc: {e}\n")
-        return 2
 
-    async def body() -> None:
+    async def body(fake: Fake) -> None:
         logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # broken connections are what a fake is for
-        channel = ControlServer(*control_address)
         server = await make_server(user, password, certificate, key)
         jobs = {number: seconds / time_scale for number, seconds in JOBS.items()}
         plc = Plc(server, Program(jobs, 0.1 / time_scale, patience))
         await plc.space.build()
         await server.start()
         inner = cast("Any", server.bserver)._server.sockets[0].getsockname()[1]
-        proxy = Proxy(*address, inner)
-        register_commands(channel, plc, proxy)
-        register_faults(channel, {"opcua": proxy.wire})
-        channel.source("truth", plc.truth)
+        proxy = Proxy(*parse_address(listen), inner)
+        register_commands(fake.channel, plc, proxy)
+        fake.wires(opcua=proxy.wire)
+        fake.truth(plc.truth)
         scanning = asyncio.ensure_future(plc.run())
-        where = await proxy.wire.listen()
-        try:
-            announce(name="opcua_plc", url=f"opc.tcp://{where}", control=await channel.start())
-            await until_told_to_end()
-        finally:
+
+        async def end() -> None:
             scanning.cancel()
             await proxy.close()
-            await channel.close()
-            with contextlib.suppress(asyncio.CancelledError):
-                await scanning
+            await asyncio.gather(scanning, return_exceptions=True)
             await server.stop()
 
-    return run(body, "opcua_plc")
+        fake.at_end(end)
+        await fake.run(url=lambda: f"opc.tcp://{proxy.wire.address}")
+
+    return serve("opcua_plc", control, body, listen)
 
 
 if __name__ == "__main__":
