@@ -254,7 +254,7 @@ class ControlClient:
         return cls(address, reader, writer)
 
     async def do(self, command: str, within: float = 10.0, **arguments: Any) -> Any:
-        """The command's data. Raises `ControlError` when it is refused, late, or the channel is gone."""
+        """Return the data of a command. Raises `ControlError` when it is refused, late, or the channel is gone."""
         if self._closed.is_set():
             raise ControlError(f"{command}: the control channel {self.address} is closed")
         number = next(self._numbers)
@@ -327,7 +327,7 @@ class BlockingControlClient:
             raise ControlError(f"control channel {address}: {e}") from e
 
     def do(self, command: str, within: float = 10.0, **arguments: Any) -> Any:
-        """The command's data. Raises `ControlError` when it is refused, late, or the channel is gone."""
+        """Return the data of a command. Raises `ControlError` when it is refused, late, or the channel is gone."""
         number = next(self._numbers)
         deadline = time.monotonic() + within
         try:

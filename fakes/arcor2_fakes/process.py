@@ -1,4 +1,4 @@
-"""The life of a fake's process: ready line, orderly end on SIGTERM and SIGINT, no survival of the parent."""
+"""The life cycle of a fake's process: ready line, orderly end on SIGTERM and SIGINT, end with its parent."""
 
 import asyncio
 import contextlib
@@ -21,9 +21,9 @@ _told_to_end: ContextVar[asyncio.Event] = ContextVar("told_to_end")
 
 
 class OwnTime:
-    """A clock that stands still while this process was held up: a device has a processor of its own.
+    """A clock that stops while this process is held up: a device has a processor of its own.
 
-    What came in meanwhile, such as a kick of a watchdog, is handled before the watchdog counts the time.
+    What arrived meanwhile, such as a trigger of a watchdog, is handled before the watchdog counts the time.
     """
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class OwnTime:
         self._read, self._elapsed = self._loop.time(), 0.0
 
     def __call__(self) -> float:
-        """The seconds that it has run."""
+        """Return the seconds that it has run."""
         return self._elapsed + min(self._loop.time() - self._read, _HELD_UP)
 
     def run(self) -> None:

@@ -31,7 +31,7 @@ _MAX_UNSENT = (
 
 
 class Faults:
-    """What a wire was told to do wrong, applied to what goes out. For any transport: TCP, pty, CAN hub."""
+    """The injected faults of a wire, applied to what it sends. For any transport: TCP, pty, CAN hub."""
 
     def __init__(self) -> None:
         self.silent = False
@@ -41,7 +41,7 @@ class Faults:
         self.delay = 0.0
 
     def outgoing(self, frame: bytes) -> bytes:
-        """What really leaves instead of `frame`; b"" for nothing. `delay` is for the caller to keep."""
+        """Return what is sent instead of `frame`; b"" for nothing. The caller applies `delay`."""
         if self.silent:
             return b""
         if self.half_next:
