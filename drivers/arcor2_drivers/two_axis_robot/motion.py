@@ -214,8 +214,8 @@ class Motion:
 
     def _record(self, speed: float, started: float, end: MoveEnd) -> MoveResult:
         newest = self._observer.newest()
-        assert newest is not None
-        self.last = MoveResult(self.world(self._angles(newest)), speed, time.monotonic() - started, end)
+        pose = self.world(self._angles(newest)) if newest is not None else self._robot.pose  # None: disconnected
+        self.last = MoveResult(pose, speed, time.monotonic() - started, end)
         return self.last
 
     # -------------------------------------------------------------------------------- jogging
