@@ -150,7 +150,7 @@ def test_a_marker_that_was_moved_is_left_out_and_named() -> None:
     assert [error.name for error in found.markers if not error.used] == ["marker 42"]
     assert found.grade == Grade.USABLE
     assert "Marker 42 was not used" in found.verdict
-    stated = float(found.verdict.split("some ")[1].split(" mm")[0])
+    stated = float(found.verdict.split("about ")[1].split(" mm")[0])
     assert 6 <= stated <= 14
 
 
