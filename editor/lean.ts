@@ -5,8 +5,14 @@
 import type { Plugin } from "vitest/config";
 
 /** Shaders of materials and shadows that the engine does not use. */
-const UNUSED =
-  /\/three\/src\/renderers\/shaders\/Shader(Lib\/(meshphysical|meshnormal|distance|vsm|meshtoon|meshmatcap|meshphong|points|background|backgroundCube|cube|equirect)|Chunk\/(lights_physical_\w+|lights_toon_\w+|lights_phong_\w+|transmission_\w+|iridescence_\w+|clearcoat_\w+|cube_uv_reflection_fragment|envmap_physical_pars_fragment|bsdfs_physical|tonemapping_\w+|gradientmap_\w+|map_particle_\w+|normalmap_pars_fragment))\.glsl\.js$/;
+const LIBRARY =
+  "meshphysical|meshnormal|distance|vsm|meshtoon|meshmatcap|meshphong|points|background|backgroundCube|cube|equirect";
+const CHUNKS = [
+  "lights_physical_\\w+|lights_toon_\\w+|lights_phong_\\w+|transmission_\\w+|iridescence_\\w+|clearcoat_\\w+",
+  "cube_uv_reflection_fragment|envmap_physical_pars_fragment|bsdfs_physical|tonemapping_\\w+|gradientmap_\\w+",
+  "map_particle_\\w+|normalmap_pars_fragment",
+].join("|");
+const UNUSED = new RegExp(`/three/src/renderers/shaders/Shader(Lib/(${LIBRARY})|Chunk/(${CHUNKS}))\\.glsl\\.js$`);
 
 /** Modules of three.js that the engine never calls, with the stubs that the renderer needs. */
 const PARTS: Readonly<Record<string, string>> = {
@@ -15,7 +21,8 @@ const PARTS: Readonly<Record<string, string>> = {
   // Needed again by AR in the browser.
   "renderers/webxr/WebXRManager.js": `export class WebXRManager {
     enabled = false; isPresenting = false;
-    addEventListener() {} removeEventListener() {} setAnimationLoop() {} dispose() {} hasDepthSensing() { return false; }
+    addEventListener() {} removeEventListener() {} setAnimationLoop() {} dispose() {}
+    hasDepthSensing() { return false; }
     getEnvironmentBlendMode() { return "opaque"; }
   }`,
   "renderers/webgl/WebGLUniformsGroups.js": "export class WebGLUniformsGroups { bind() {} update() {} dispose() {} }",
@@ -32,8 +39,10 @@ const PARTS: Readonly<Record<string, string>> = {
 const NEVER = new RegExp(
   `^(USE_(${[
     "TANGENT|SPECULAR\\w*|TRANSMISSION\\w*|ROUGHNESSMAP|METALNESSMAP|IRIDESCENCE\\w*|EMISSIVEMAP|CLEARCOAT\\w*|AOMAP",
-    "SHEEN\\w*|RETROREFLECTION|REVERSED_DEPTH_BUFFER|SKINNING|NORMALMAP\\w*|LIGHTMAP|DISPLACEMENTMAP|BUMPMAP|BATCHING\\w*",
-    "ALPHAHASH|DIFFUSE_ROUGHNESS\\w*|ANISOTROPY\\w*|ENVMAP|LOGARITHMIC_DEPTH_BUFFER|MORPH\\w+|INSTANCING_MORPH|DISPERSION",
+    "SHEEN\\w*|RETROREFLECTION|REVERSED_DEPTH_BUFFER|SKINNING|NORMALMAP\\w*|LIGHTMAP|DISPLACEMENTMAP|BUMPMAP",
+    "BATCHING\\w*",
+    "ALPHAHASH|DIFFUSE_ROUGHNESS\\w*|ANISOTROPY\\w*|ENVMAP|LOGARITHMIC_DEPTH_BUFFER|MORPH\\w+",
+    "INSTANCING_MORPH|DISPERSION",
     "THICKNESSMAP|GRADIENTMAP|MATCAP|POINTS_UV|LIGHT_PROBES",
   ].join("|")})|STANDARD|PHYSICAL|TOON|PHONG|MATCAP|ENV_WORLDPOS|FOG_EXP2|SHADOWMAP_TYPE_VSM|TONE_MAPPING|IOR)$`,
 );

@@ -20,13 +20,19 @@ uniform float fogFar;
 vec3 lit( vec3 color, vec3 normal, float far ) {
   vec3 light = vec3( 0.0 );
   for ( int i = 0; i < NUM_HEMI_LIGHTS; i ++ )
-    light += mix( hemisphereLights[ i ].groundColor, hemisphereLights[ i ].skyColor, 0.5 * dot( normal, hemisphereLights[ i ].direction ) + 0.5 );
+    light += mix(
+      hemisphereLights[ i ].groundColor,
+      hemisphereLights[ i ].skyColor,
+      0.5 * dot( normal, hemisphereLights[ i ].direction ) + 0.5
+    );
   for ( int i = 0; i < NUM_DIR_LIGHTS; i ++ )
     light += directionalLights[ i ].color * clamp( dot( normal, directionalLights[ i ].direction ), 0.0, 1.0 );
   vec3 shade = clamp( light * diffuse * color * 0.3183098861837907, 0.0, 1.0 );
   // sRGB to a thousandth, of roots alone, which cost a tenth of powers.
   vec3 root = sqrt( shade ), second = sqrt( root );
-  shade = clamp( 0.662002687 * root + 0.684122060 * second - 0.323583601 * sqrt( second ) - 0.0225411470 * shade, 0.0, 1.0 );
+  shade = clamp(
+    0.662002687 * root + 0.684122060 * second - 0.323583601 * sqrt( second ) - 0.0225411470 * shade, 0.0, 1.0
+  );
   #ifdef USE_FOG
   shade = mix( shade, fogColor, smoothstep( fogNear, fogFar, far ) );
   #endif

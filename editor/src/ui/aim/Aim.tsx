@@ -31,8 +31,10 @@ export function Aim({ engine }: { engine: Engine }) {
         const place = at ? bearingOf(engine, at) : null;
         if (!mark.current) return;
         mark.current.style.visibility = place?.inView ? "visible" : "hidden";
-        if (place)
-          mark.current.style.transform = `translate(${place.x.toFixed(1)}px, ${place.y.toFixed(1)}px) translate(-50%, -50%)`;
+        if (place) {
+          const [x, y] = [place.x.toFixed(1), place.y.toFixed(1)];
+          mark.current.style.transform = `translate(${x}px, ${y}px) translate(-50%, -50%)`;
+        }
       }),
     [engine],
   );

@@ -13,13 +13,14 @@ const PATHS = {
   tree: "M5 5h6M5 5v14h4M5 12h4M13 12h6M13 19h6",
   plug: "M9 3v5M15 3v5M6 8h12v3a6 6 0 0 1-12 0zM12 17v4",
   robot: "M6 21h8M10 21v-5l-4-5 6-6 6 3M12 5a1 1 0 1 0 0 .01",
-  search: "M10.500 4a6.500 6.500 0 1 0 0 13 6.500 6.500 0 0 0 0-13zM15.500 15.500L21 21",
+  search: "M10.5 4a6.5 6.5 0 1 0 0 13 6.5 6.5 0 0 0 0-13zM15.5 15.500L21 21",
   people:
-    "M9 11a3.500 3.500 0 1 0 0-7 3.500 3.500 0 0 0 0 7zM2.500 20a6.500 6.500 0 0 1 13 0M16 4.500a3.500 3.500 0 0 1 0 6.500M18 14.500a6.500 6.500 0 0 1 3.500 5.500",
+    "M9 11a3.5 3.5 0 1 0 0-7 3.5 3.5 0 0 0 0 7zM2.5 20a6.5 6.5 0 0 1 13 0" +
+    "M16 4.500a3.5 3.5 0 0 1 0 6.500M18 14.500a6.5 6.5 0 0 1 3.5 5.5",
   zoom: "M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5",
   info: "M12 11v6M12 7.500v.01M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18z",
-  warn: "M12 4L2.500 20h19zM12 10v5M12 17.500v.01",
-  check: "M4 12.500l5 5L20 6.500",
+  warn: "M12 4L2.5 20h19zM12 10v5M12 17.500v.01",
+  check: "M4 12.500l5 5L20 6.5",
   pause: "M8 5v14M16 5v14",
   stop: "M6 6h12v12H6z",
   step: "M6 5l9 7-9 7zM18 5v14",
@@ -28,9 +29,9 @@ const PATHS = {
   list: "M4 6h16M4 12h16M4 18h16",
   box: "M4 8l8-4 8 4v8l-8 4-8-4zM4 8l8 4 8-4M12 12v8",
   point: "M12 9a3 3 0 1 0 0 6 3 3 0 0 0 0-6zM12 2v4M12 18v4M2 12h4M18 12h4",
-  action: "M4 14c0-2 3.600-3.500 8-3.500s8 1.500 8 3.500-3.600 3.500-8 3.500S4 16 4 14z",
+  action: "M4 14c0-2 3.6-3.5 8-3.500s8 1.5 8 3.5-3.6 3.5-8 3.500S4 16 4 14z",
   eye: "M2 12s4-7 10-7 10 7 10 7-4 7-10 7-10-7-10-7zM12 9a3 3 0 1 0 0 6 3 3 0 0 0 0-6z",
-  lock: "M6 11h12v9H6zM8.500 11V8a3.500 3.500 0 0 1 7 0v3",
+  lock: "M6 11h12v9H6zM8.5 11V8a3.5 3.5 0 0 1 7 0v3",
 } as const;
 
 export type IconName = keyof typeof PATHS;
@@ -43,7 +44,7 @@ export function Icon({ name, size = 20 }: { name: IconName; size?: number }) {
       viewBox="0 0 24 24"
       fill="none"
       stroke="currentColor"
-      strokeWidth="1.900"
+      strokeWidth="1.9"
       strokeLinecap="round"
       strokeLinejoin="round"
       aria-hidden="true"

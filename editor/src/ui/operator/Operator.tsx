@@ -115,7 +115,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
             )}
             {result?.detail && <p>{withNames(state, result.detail)}</p>}
             {result?.tone === "bad" && (
-              <p className="operator-advice">{t`Fix the cause, then press Start. If it fails again, call a programmer.`}</p>
+              <p className="operator-advice">{t`Fix the cause, then press Start. If it fails again, call for help.`}</p>
             )}
             {idle && !run && <LastRun />}
           </div>
