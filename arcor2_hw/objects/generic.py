@@ -20,13 +20,13 @@ class Generic(abc.ABC):
     """An object in the workplace.
 
     `__init__` stores its arguments, `connect` opens the connection, `disconnect` closes it. A type written for the
-    older
-    convention opens it in `__init__` and closes it in `cleanup`; such a type works unchanged.
+    older convention opens it in `__init__` and closes it in `cleanup`; such a type works unchanged.
 
     Class Attributes:
         _ABSTRACT: Whether the type cannot be added to a scene.
         loss_reaction: What the device does when it loses the connection.
         loss_ends_program: Whether the running program ends when this device is disconnected.
+        own_process: Whether instances run in a process of their own, so that their computing delays no other device.
         DYNAMIC_PARAMS: {parameter: (method that returns its values, names of the parameters it needs)}.
         CANCEL_MAPPING: {action: method that cancels it}.
         category: Category in the editor.
@@ -38,6 +38,7 @@ class Generic(abc.ABC):
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {}
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
     loss_ends_program: ClassVar[bool] = True
+    own_process: ClassVar[bool] = False
     category: ClassVar[str] = ""
     icon: ClassVar[str] = ""
 

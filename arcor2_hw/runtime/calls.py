@@ -1,4 +1,4 @@
-"""Calls of the server on devices, each answered once, and stops, which pass whatever else a device is doing."""
+"""Calls of the server on devices, each answered once, and stops, which run next to any other call."""
 
 import threading
 from collections.abc import Callable
@@ -20,14 +20,14 @@ Post = Callable[[m.ToServer], None]
 
 
 def error_data(error: BaseException, object_id: str = "") -> m.ErrorData:
-    """Give an error in the form in which it leaves the process."""
+    """Return an error in the form in which it is sent to the server."""
     code = error.code if isinstance(error, Arcor2Error) else "error"
     detail = error.detail if isinstance(error, Arcor2Error) else ""
     return m.ErrorData(code, type(error).__name__, str(error) or type(error).__name__, detail, object_id)
 
 
 class Calls:
-    """Makes the calls. `cell` gives the devices that there are; `stopping` is told of each device to be stopped."""
+    """Makes the calls. `cell` returns the devices; `stopping` is called for each device that is stopped."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class Calls:
         self._answering: threading.Thread | None = None
 
     def call(self, message: m.Call) -> None:
-        """Begin a call; CallDone or CallFailed answers it."""
+        """Start a call; CallDone or CallFailed answers it."""
         device: Device | None = None
         try:
             device = self._cell()[message.object_id]
@@ -57,7 +57,7 @@ class Calls:
             job, own = device.prepare(method, message.arguments, message.control, answer)
             lane = device.stop_lane if message.cancel else device.lane_for(method)
             lane.submit(job)
-        except Exception as error:  # noqa: BLE001 - a call that cannot be made is an answer too
+        except Exception as error:  # noqa: BLE001 - a call that cannot be made is answered too
             told = error if device is None else describe(device, error)
             self._post(m.CallFailed(message.id, error_data(told, message.object_id)))
             return
@@ -88,7 +88,7 @@ class Calls:
         return answer
 
     def stop_motion(self, message: m.StopMotion) -> None:
-        """Stop one device; answered when it has obeyed, or with why it has not."""
+        """Stop one device; the answer comes when it has stopped, or says why it has not."""
         try:
             device = self._cell()[message.object_id]
         except Arcor2Error as error:
@@ -129,7 +129,7 @@ class Calls:
             self._answering.join(STOP_DEADLINE)
 
     def stop(self, device: Device, answer: Callable[[Device, BaseException | None], None]) -> None:
-        """Stop a device past everything else; `answer` is called once it has obeyed, or with why it did not."""
+        """Stop a device next to any other call; `answer` is called when it has stopped, or with the error."""
         try:
             begun = device.begin_stop(lambda job: answer(device, job.error))
         except Arcor2Error as error:  # an earlier stop hangs

@@ -1,4 +1,4 @@
-"""All devices of a scene: brought up at once, stopped at once, closed at once."""
+"""All devices of a scene: connected, stopped and closed concurrently."""
 
 import importlib
 import time
@@ -16,21 +16,22 @@ from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.exceptions import Arcor2Error, NotConnected, NotFound, ProgramStopped, Refused
 from arcor2_hw.objects import Camera, Generic, Robot
 from arcor2_hw.runtime.creation import Recipe, load_type, recipe
-from arcor2_hw.runtime.device import CLOSE_DEADLINE, Device, describe, overrides, until
+from arcor2_hw.runtime.device import CLOSE_DEADLINE, Device, describe, until
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import OpenScene
+from arcor2_hw.runtime.methods import overrides
 from arcor2_hw.runtime.stopping import SentStop, send_stop
 from arcor2_hw.runtime.surroundings import SceneSurroundings
-from arcor2_hw.runtime.told import Told
+from arcor2_hw.runtime.world_updates import WorldUpdates
 
 CONTROL_DEADLINE: Final = 10.0
 """Seconds for taking control: a controller may have to load and start its control program."""
 SETTLE: Final = 0.4
-"""Seconds that calls which are under way get to come back before a device is closed past them."""
+"""Seconds that running calls have to return before their device is closed."""
 
 
 class SceneFault(Exception):
-    """A scene could not be brought up: what went wrong, and with which object."""
+    """A scene could not be opened: the error, and the object that it belongs to."""
 
     def __init__(self, object_id: str, error: Arcor2Error) -> None:
         super().__init__(str(error))
@@ -46,9 +47,9 @@ def recipes(
     failed: Callable[[SceneFault], None] | None = None,
     secrets: Mapping[str, ObjectSecrets] = MappingProxyType({}),
 ) -> list[Recipe]:
-    """Work out how every object is made; `secrets` are those of the objects, by id.
+    """Return how every object is made; `secrets` are those of the objects, by id.
 
-    SceneFault names the first that cannot be; with `failed`, that is told of each instead.
+    SceneFault names the first that cannot be made; with `failed`, that is called for each instead.
     """
     overridden = list(overridden)
     _import_numpy(classes.values())
@@ -71,10 +72,10 @@ def recipes(
 def scene_recipes(
     message: OpenScene, failed: Callable[[SceneFault], None] | None = None, only: str = ""
 ) -> list[Recipe]:
-    """Load the types of a scene's objects, or of `only` that one, and work out how each is made.
+    """Load the types of the objects of a scene, or of `only` that one, and return how each is made.
 
-    SceneFault for the first object that cannot be; with `failed`, that is told of each, else NotFound or
-    InvalidData for a type.
+    SceneFault for the first object that cannot be made; with `failed`, that is called for each. Otherwise NotFound
+    or InvalidData for a type.
     """
     objects = [one for one in message.scene.objects if only in ("", one.id)]
     codes = {code.name: code for code in message.types}
@@ -117,10 +118,10 @@ class Cell:
         self._abandoned = False
         self.assets: Mapping[str, str] = {}
         """Files of meshes and of robots' models that were uploaded, by the asset's id."""
-        self.told = Told()
-        """What is known of the world besides."""
+        self.updates = WorldUpdates()
+        """Bodies and calibrations that the server has sent."""
         self.changed: Callable[[Device], None] = lambda _: None
-        """Called when the connection of a device changes, on the thread that keeps it."""
+        """Called when the connection of a device changes, on the thread that observes it."""
 
     def __iter__(self) -> Iterator[Device]:
         return iter(list(self._devices.values()))
@@ -134,7 +135,7 @@ class Cell:
             raise NotFound(f"the scene has no object {object_id}") from None
 
     def find(self, name: str) -> Generic:
-        """Give the instance of an object by its name or id, for another object; NotFound, NotConnected."""
+        """Return the instance of an object by its name or id, for another object; NotFound, NotConnected."""
         for device in self:
             if name in (device.name, device.id):
                 return device.require()
@@ -161,10 +162,10 @@ class Cell:
 
     # -------------------------------------------------------------------------------- up and down
     def open(self, how: Iterable[Recipe], failed: Callable[[SceneFault], None] | None = None) -> None:
-        """Create and connect all objects at once; SceneFault with the first that fails, as soon as it fails.
+        """Create and connect all objects concurrently; SceneFault for the first that fails, as soon as it fails.
 
-        With `failed`, that is called with each that fails, and the others go on.
-        What came up stays up: `close` follows in any case. ProgramStopped when `abandon` is called meanwhile.
+        With `failed`, that is called for each that fails, and the others continue.
+        Connected objects stay connected; `close` follows in any case. ProgramStopped if `abandon` is called meanwhile.
         """
         began = time.monotonic()
         pending: dict[Job, tuple[Device, float]] = {}
@@ -195,13 +196,13 @@ class Cell:
             failed(fault)
 
     def _make(self, how: Recipe) -> Device:
-        surroundings = SceneSurroundings(how.scene_object.id, self, self.assets, self.told)
+        surroundings = SceneSurroundings(how.scene_object.id, self, self.assets, self.updates)
         device = Device(how, lambda device: self.changed(device), self.find, surroundings, self.find_robot)
         self._devices[device.id] = device
         return device
 
-    def lack(self, fault: SceneFault) -> None:
-        """Note an object that could not even be prepared; whoever asks for it is told why."""
+    def mark_absent(self, fault: SceneFault) -> None:
+        """Record an object that could not be prepared, with the error that its callers get."""
         self._absent[fault.object_id] = fault.error
 
     def require_failed(self, object_id: str) -> None:
@@ -214,7 +215,7 @@ class Cell:
             raise Refused(f"{device.name} has not failed")
 
     def retry(self, how: Recipe) -> None:
-        """Create and connect one object in place of the one that failed; SceneFault when it fails again."""
+        """Create and connect an object that has failed once more; SceneFault when it fails again."""
         object_id = how.scene_object.id
         former = self._devices.get(object_id)
         if former is not None and former.failure is None:
@@ -232,12 +233,12 @@ class Cell:
             raise SceneFault(object_id, error) from job.error
 
     def abandon(self) -> None:
-        """Make an `open` that is under way end at once."""
+        """End an `open` that is in progress."""
         self._abandoned = True
         self._ended.put(None)
 
     def close(self) -> Arcor2Error | None:
-        """Disconnect all at once, within about CLOSE_DEADLINE; gives the first thing that went wrong."""
+        """Disconnect all devices concurrently, within about CLOSE_DEADLINE; return the first error."""
         settled = time.monotonic() + SETTLE
         while time.monotonic() < settled and any(d.lane.busy_with or d.stop_lane.busy_with for d in self):
             time.sleep(0.002)
@@ -268,7 +269,7 @@ class Cell:
     def stop_all(self, because: BaseException | None = None) -> list[SentStop]:
         """Send a stop to every device without waiting; return the stops.
 
-        With `because`, calls that run or wait end at once with that error for whoever waits for them.
+        With `because`, running and waiting calls end at once with that error for their callers.
         """
         stops = []
         for device in self:
@@ -278,7 +279,7 @@ class Cell:
         return stops
 
     def wait_still(self, within: float) -> bool:
-        """Wait until no device says that it moves; False when one still does after `within` s."""
+        """Wait until no device reports that it moves; return False when one still does after `within` s."""
         deadline = time.monotonic() + within
         while any(device.moving for device in self):
             if time.monotonic() >= deadline:
@@ -287,7 +288,7 @@ class Cell:
         return True
 
     def take_control(self) -> None:
-        """Take control of every device that knows control, all at once; SceneFault names one that refuses."""
+        """Take control of every device that has the concept, concurrently; SceneFault names one that refuses."""
         jobs = []
         for device in self:
             if overrides(device.recipe.cls, "take_control"):

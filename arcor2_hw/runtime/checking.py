@@ -51,15 +51,15 @@ def check(given: CellDevice) -> Checked:
             device.lane.expire(opening, deadline)
         found = msgspec.structs.replace(found, seconds=time.monotonic() - began)
         if opening.error is not None:
-            return msgspec.structs.replace(found, problem=_told(device, opening.error))
+            return msgspec.structs.replace(found, problem=_with_detail(device, opening.error))
         return _read(device, found)
     except Arcor2Error as error:
-        return msgspec.structs.replace(found, problem=_told(device, error))
+        return msgspec.structs.replace(found, problem=_with_detail(device, error))
     finally:
         _close(device)
 
 
-def _told(device: Device, error: BaseException) -> str:
+def _with_detail(device: Device, error: BaseException) -> str:
     """Give an error with its detail, where that adds something."""
     named = describe(device, error)
     return f"{named} ({named.detail})" if named.detail and named.detail not in str(named) else str(named)
@@ -79,7 +79,7 @@ def _read(device: Device, found: Checked) -> Checked:
             answer: T = job.value
             return answer
         if not isinstance(job.error, Arcor2NotImplemented):
-            problem = problem or _told(device, job.error)
+            problem = problem or _with_detail(device, job.error)
         return otherwise
 
     identity = ask("identify", instance.identify, None)

@@ -1,4 +1,4 @@
-"""The host's clock: one thread for everything that happens at a time, periodic or once."""
+"""Timers of the cell host: one thread for periodic and single calls."""
 
 import heapq
 import itertools
@@ -11,7 +11,7 @@ _log = logging.getLogger(__name__)
 
 
 class Clock:
-    """Calls short functions, which must not block: periods and deadlines."""
+    """Calls functions periodically or once; they must return quickly."""
 
     def __init__(self) -> None:
         self._due: list[tuple[float, int, float, Callable[[], object]]] = []
@@ -19,7 +19,7 @@ class Clock:
         self._changed = threading.Condition()
 
     def start(self) -> None:
-        """Let time pass."""
+        """Start the thread."""
         threading.Thread(target=self._run, name="clock", daemon=True).start()
 
     def after(self, seconds: float, function: Callable[[], object]) -> None:
@@ -49,9 +49,9 @@ class Clock:
                     continue
                 heapq.heappop(self._due)
                 if period:
-                    # After a pause of the whole process the missed beats are not made up for.
+                    # Periods that were missed while the process was stopped are not made up for.
                     heapq.heappush(self._due, (max(moment + period, now), next(self._number), period, function))
             try:
                 function()
-            except Exception:  # noqa: BLE001 - the clock goes on for everybody else
+            except Exception:  # noqa: BLE001 - the other timers continue
                 _log.exception("at its time, %s failed", function)

@@ -34,17 +34,17 @@ ENTRY_POINTS: Final = "arcor2_hw.object_types"
 _NO_SECRETS: Final = ObjectSecrets()
 
 source_hooks: list[Callable[[], None]] = [older.install]
-"""Called before a source that is no installed module is imported: the place of what older sources want to import."""
+"""Called before an uploaded source is imported: they provide what older sources import."""
 
 
 def prepare_for_sources() -> None:
-    """Do what has to be done before sources that are no installed modules are imported."""
+    """Prepare the process for uploaded sources; to be called before one is imported."""
     for hook in source_hooks:
         hook()
 
 
 def module_name(type_name: str) -> str:
-    """Give the name of the module of an object type (protocol, section 9.1)."""
+    """Return the name of the module of an object type (protocol, section 9.1)."""
     return str(humps.depascalize(type_name))
 
 
@@ -73,7 +73,7 @@ def _import(module: str, type_name: str) -> ModuleType:
 def write_sources(types: Iterable[TypeCode]) -> str | None:
     """Write uploaded sources as the package `object_types` into a private directory, and put it on the path.
 
-    Gives the directory, None when there is nothing to write.
+    Return the directory; None when there is nothing to write.
     """
     uploaded = [code for code in types if not code.entry_point and code.source]
     if not uploaded:
@@ -125,7 +125,7 @@ def find_type(name: str) -> type[Generic]:
 
 # ------------------------------------------------------------------------------------------------ settings
 def settings_type(cls: type[Generic]) -> type[Settings] | None:
-    """Give the dataclass of an object type's settings, None when it has none."""
+    """Return the dataclass of an object type's settings; None when it has none."""
     for base in cls.__mro__:
         constructor = base.__dict__.get("__init__")
         if constructor is None:
@@ -202,7 +202,7 @@ def fill_settings(cls: type[Generic], name: str, parameters: Mapping[str, Parame
 
 
 def address_of(settings: Settings | None) -> str:
-    """Give where a device should be, for messages: the settings that say so, empty when none does."""
+    """Return the address of a device for messages, from its settings; empty when there is none."""
     if settings is None:
         return ""
     wanted = (
@@ -245,7 +245,7 @@ def recipe(
     overrides: Iterable[SceneObjectOverride] = (),
     secrets: ObjectSecrets = _NO_SECRETS,
 ) -> Recipe:
-    """Work out the constructor's arguments (protocol, section 9.2); InvalidData names object and parameter.
+    """Return how an object is made (protocol, section 9.2); InvalidData names object and parameter.
 
     secrets: values of the object's secret settings.
     """

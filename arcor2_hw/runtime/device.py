@@ -1,4 +1,4 @@
-"""A device in the host: the instance, its lanes, and what may be asked of it on which."""
+"""A device in the cell host: the instance and its lanes."""
 
 import inspect
 import time
@@ -15,65 +15,31 @@ from arcor2_hw.exceptions import (
     InvalidData,
     NotConnected,
 )
-from arcor2_hw.objects import Axis, CollisionObject, Generic, HoldsParts, MultiArmRobot, Robot
+from arcor2_hw.objects import CollisionObject, Generic, HoldsParts, Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.objects.surroundings import Surroundings
 from arcor2_hw.runtime.creation import Recipe
 from arcor2_hw.runtime.lane import Job, Lane
+from arcor2_hw.runtime.methods import OBSERVING, OVERTAKES_WITHIN, overrides, stop_of
+from arcor2_hw.runtime.own_process.process import STARTS_WITHIN, DeviceProcess
 from arcor2_hw.runtime.values import decode_arguments
 
 CONSTRUCTION_DEADLINE: Final = 10.0
 """Seconds beyond the connect timeout for a constructor that, by the older convention, opens the device itself."""
 STOP_DEADLINE: Final = 2.0
 """Seconds a `stop` may take before it is reported as failed."""
-NO_STOP: Final = (Robot.stop, MultiArmRobot.stop)
-"""The hooks that only raise the not-implemented error."""
-OVERTAKES_WITHIN: Final = 0.1
-"""Seconds from the begin of a call within which its command to the device may still be on its way."""
 STOP_GRACE: Final = 2.0
-"""Seconds a stopped call has to come back before its caller is told that it is cancelled."""
+"""Seconds that a stopped call has to return before it is reported as cancelled."""
 CLOSE_DEADLINE: Final = 1.2
 """Seconds `disconnect` has (objects promise 1 s)."""
 
-OBSERVING: Final = frozenset(
-    {
-        "alarms",
-        "connection",
-        "control_owner",
-        "forward_kinematics",
-        "get_arm_ids",
-        "get_end_effector_pose",
-        "get_end_effectors_ids",
-        "get_hand_teaching_mode",
-        "grippers",
-        "health",
-        "joint_limits",
-        "max_tcp_speed",
-        "move_in_progress",
-        "robot_joints",
-        "state",
-        "suctions",
-    }
-)
-"""What is asked on the watch lane of a robot, so that it is answered while an action runs."""
-
-PLAIN: Final = frozenset(
-    {"id", "name", "settings", "pose", "collision_model", "enabled", "connection", "health", "move_in_progress"}
-)
-"""Properties of the bases that are memory, not I/O: read where one is, without a lane."""
-
 
 def connect_timeout(cls: type[Generic]) -> float:
-    """Give the seconds that an object type allows itself to connect: the default of `timeout`."""
+    """Return the seconds that an object type needs to connect: the default of `timeout`."""
     parameter = inspect.signature(cls.connect).parameters.get("timeout")
     default = None if parameter is None else parameter.default
     return float(default) if isinstance(default, int | float) else DEFAULT_CONNECT_TIMEOUT
-
-
-def overrides(cls: type[Generic], name: str) -> bool:
-    """Tell whether an object type brings its own `name`, instead of the one of Generic."""
-    return getattr(cls, name, None) is not getattr(Generic, name)
 
 
 class Device:
@@ -106,29 +72,31 @@ class Device:
         self.closing = False
         self._opening: Job | None = None
         self.closed_by: Job | None = None
-        """What closes it after it failed."""
+        """The call that closes it after a failure."""
+        self._process: DeviceProcess | None = None
+        """The process of an object type that asks for its own."""
         self.failure: Arcor2Error | None = None
-        """Why it did not come up, in a scene that goes on without it."""
+        """Why it could not be connected, in a scene that continues without it."""
 
     # -------------------------------------------------------------------------------- life
     def open(self, notify: Callable[[Job], None]) -> tuple[Job, float]:
-        """Begin to create and connect the instance; gives the call and its deadline."""
+        """Start to create and connect the instance; return the call and its deadline."""
         cls = self.recipe.cls
         deadline = connect_timeout(cls) + (1.0 if overrides(cls, "connect") else CONSTRUCTION_DEADLINE)
+        deadline += STARTS_WITHIN if cls.own_process else 0.0
         job = self._opening = Job("connect", self._open, notify=notify)
         self.lane.submit(job)
         return job, deadline
 
     @property
     def up(self) -> bool:
-        """Tell whether the device is connected and not being disconnected."""
+        """Return whether the device is connected and not being disconnected."""
         opening = self._opening
         return opening is not None and opening.ended and opening.error is None and not self.closing
 
     def _open(self) -> None:
         with listening(self._life_changed):
-            instance = self.recipe.make()
-            self.instance = instance
+            self.instance = instance = self._make()
             if isinstance(instance, CollisionObject):
                 instance.tell_enabled(lambda: self._changed(self))
             if self._find is not None:
@@ -140,9 +108,22 @@ class Device:
             if isinstance(instance, Robot) and self._surroundings is not None:
                 instance.surround(self._surroundings)
             instance.connect()
-        if self.closing:  # came up too late: nobody waits any more
+        if self.closing:  # connected too late: the caller has given up
             self.instance = None
             instance.cleanup()
+            self._end_process()
+
+    def _make(self) -> Generic:
+        """Make the instance, in a process of its own if its type asks for one."""
+        recipe = self.recipe
+        if not recipe.cls.own_process:
+            return recipe.make()
+        self._process = DeviceProcess(recipe.cls, self.name, lambda: self._changed(self))
+        return self._process.make(recipe.arguments, recipe.keywords)
+
+    def _end_process(self) -> None:
+        if self._process is not None:
+            self._process.end()
 
     def _life_changed(self, life: Observing) -> None:
         if life not in self._lives:
@@ -150,19 +131,19 @@ class Device:
         self._changed(self)
 
     def connection_reason(self) -> str:
-        """Tell why the connection is lost or failed; empty when it is not, or when nobody knows."""
+        """Return why the connection is lost or failed; empty when it is not, or when the reason is unknown."""
         given = "" if self.instance is None else self.instance.connection_reason
         return given or next((life.reason for life in self._lives if life.reason), "")
 
     def require_not_lost(self, method: str) -> None:
-        """ConnectionLost while the connection is lost: an action would be sent into nothing."""
+        """Raise ConnectionLost while the connection is lost."""
         if self.require().connection is Connection.LOST:
             raise ConnectionLost(
                 f"{self.name}: {method} was not done: the connection is lost", self.connection_reason()
             )
 
     def fail(self, error: Arcor2Error) -> None:
-        """Count as failed from now on; what is there of it is closed beside everything else."""
+        """Mark the device as failed and close it, concurrently with everything else."""
         self.failure = error
         try:
             self.closed_by = self.begin_close(lambda _: self.release_lanes())
@@ -173,9 +154,9 @@ class Device:
         self.instance = None
 
     def begin_close(self, notify: Callable[[Job], None] | None = None) -> Job | None:
-        """Begin to disconnect; gives the call, None when there is nothing to close.
+        """Start to disconnect; return the call, or None when there is nothing to close.
 
-        A device whose lane hangs is closed from the stop lane: its socket is still ours to shut.
+        A device whose lane hangs is closed on the stop lane, which can still close its socket.
         """
         self.closing = True
         instance = self.instance
@@ -186,7 +167,8 @@ class Device:
         return job
 
     def release_lanes(self) -> None:
-        """End the threads."""
+        """End the threads, and the process of the device if it has one."""
+        self._end_process()
         for lane in (self.lane, self.stop_lane, self._watch_lane):
             if lane is not None:
                 lane.close()
@@ -194,19 +176,19 @@ class Device:
     # -------------------------------------------------------------------------------- calls
     @property
     def watch_lane(self) -> Lane:
-        """Give the lane for observing, made on first use."""
+        """Return the lane for observing, which is created on first use."""
         if self._watch_lane is None:
             self._watch_lane = Lane(self.name, "watch")
         return self._watch_lane
 
     def lane_for(self, method: str) -> Lane:
-        """Give the lane on which a method is called."""
+        """Return the lane on which a method is called."""
         if method in OBSERVING and isinstance(self.instance, Robot):
             return self.watch_lane
         return self.lane
 
     def require(self) -> Generic:
-        """Give the instance; NotConnected when there is none, or it has failed."""
+        """Return the instance; NotConnected when there is none, or it has failed."""
         if self.failure is not None:
             raise NotConnected(f"{self.name} is not there: {self.failure}", self.failure.detail)
         if self.instance is None:
@@ -214,7 +196,7 @@ class Device:
         return self.instance
 
     def take_control(self) -> None:
-        """Take control unless it is ours. To be called on the lane."""
+        """Take control unless the cell host has it. To be called on the lane."""
         instance = self.require()
         if instance.control_owner() != "us":
             instance.take_control()
@@ -222,7 +204,7 @@ class Device:
     def prepare(
         self, method: str, arguments: Mapping[str, bytes], control: bool, notify: Callable[[Job], None]
     ) -> tuple[Job, float | None]:
-        """Make the call of a method with arguments in JSON; gives it with the method's own deadline.
+        """Prepare a call of a method with arguments in JSON; return it with the deadline of the method.
 
         Raises NotFound, InvalidData.
         """
@@ -239,7 +221,7 @@ class Device:
             if control:
                 self.require_not_lost(method)
                 self.take_control()
-                self.lane_for(method).check_wanted()  # taking control may last, and a stop come meanwhile
+                self.lane_for(method).check_wanted()  # a stop may have come while control was taken
             return bound(**keywords)
 
         return Job(method, run, notify=notify), deadline_of(bound)
@@ -247,15 +229,11 @@ class Device:
     # -------------------------------------------------------------------------------- stop
     @property
     def stop_method(self) -> Callable[[], Any] | None:
-        """Give what stops this device, None when nothing does."""
-        instance = self.instance
-        if isinstance(instance, Axis):
-            return instance.halt
-        found = getattr(instance, "stop", None)
-        return found if callable(found) and getattr(found, "__func__", None) not in NO_STOP else None
+        """Return the method that stops this device; None when there is none."""
+        return stop_of(self.instance)
 
     def cancelled_by(self, action: str) -> str:
-        """Name the method that cancels an action; InvalidData when nothing does."""
+        """Return the name of the method that cancels an action; InvalidData when there is none."""
         method = type(self.require()).CANCEL_MAPPING.get(action)
         if method is None:
             raise InvalidData(f"{self.name}.{action} cannot be cancelled")
@@ -306,12 +284,12 @@ class Device:
 
     @property
     def moving(self) -> bool:
-        """Tell whether the instance says that it moves."""
+        """Return whether the device reports that it moves."""
         return isinstance(self.instance, Robot) and self.instance.move_in_progress
 
 
 def describe(device: Device, error: BaseException) -> Arcor2Error:
-    """Give an error that names the device, its type and its address; one that is typed keeps its type."""
+    """Return an error that names the device, its type and its address; a typed error keeps its type."""
     where = f"{device.name} ({device.recipe.cls.__name__})"
     address = device.recipe.address
     text = str(error) or type(error).__name__
@@ -324,7 +302,9 @@ def describe(device: Device, error: BaseException) -> Arcor2Error:
     if isinstance(error, Arcor2Error):
         if not prefix and not suffix:
             return error
-        named = type(error)(f"{prefix}{text}{suffix}", error.detail)
+        named = type(error).__new__(type(error))  # its constructor may want other arguments
+        named.args = (f"{prefix}{text}{suffix}",)
+        vars(named).update(vars(error))
         named.__cause__ = error
         return named
     kind = "" if text == type(error).__name__ else f"{type(error).__name__}: "
@@ -334,5 +314,5 @@ def describe(device: Device, error: BaseException) -> Arcor2Error:
 
 
 def until(deadline: float) -> float:
-    """Give the seconds left until a moment of the monotonic clock, never negative."""
+    """Return the seconds left until a time of the monotonic clock, never negative."""
     return max(0.0, deadline - time.monotonic())

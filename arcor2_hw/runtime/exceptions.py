@@ -10,7 +10,7 @@ from arcor2_hw.runtime.program import current
 
 
 def print_exception(error: BaseException) -> None:
-    """Tell the server, or whoever reads the standard output, of the exception that ended the script."""
+    """Report the exception that ended the script to the server, or on standard output."""
     program = current()
     if program is not None:
         program.exception(error)

@@ -27,7 +27,7 @@ RENEWED_WITHIN: Final = 2.0
 
 
 JUST_AFTER: Final = 0.001
-"""Seconds from the end of a lease to the look whether it was renewed."""
+"""Seconds from the end of a lease to the check whether it was renewed."""
 
 
 class _Hold:
@@ -61,16 +61,16 @@ class Holds:
         self._lock = threading.Lock()
         self._held: dict[str, _Hold] = {}
         self._ended: dict[str, int] = {}
-        """By device, the number of the last hold that has ended: it and those before never begin again."""
+        """Number of the last hold that has ended, by device: it and earlier ones never start again."""
 
     @property
     def any(self) -> bool:
-        """Tell whether anything is held."""
+        """Return whether any device is held."""
         return bool(self._held)
 
     # -------------------------------------------------------------------------------- leases
     def lease(self, message: m.Lease) -> None:
-        """Begin, renew or end a hold; CallDone (with the scale of a jog) or CallFailed answers it."""
+        """Start, renew or end a hold; CallDone (with the scale of a jog) or CallFailed answers it."""
         try:
             hold = self._taken(message)
         except Arcor2Error as error:
@@ -81,7 +81,7 @@ class Holds:
         elif message.until == 0.0:
             self.end(hold, None)
         else:
-            self._clock.after(message.until - time.monotonic() + JUST_AFTER, lambda: self._look(hold))
+            self._clock.after(message.until - time.monotonic() + JUST_AFTER, lambda: self._check_expired(hold))
             self._act(hold)
 
     def _taken(self, message: m.Lease) -> _Hold | None:
@@ -109,7 +109,7 @@ class Holds:
             hold.unanswered.append(message.id)
             return hold
 
-    def _look(self, hold: _Hold) -> None:
+    def _check_expired(self, hold: _Hold) -> None:
         """End a hold that has run out. On the clock's thread, when a lease ends."""
         if hold.newest.until <= time.monotonic():
             what = "jog" if hold.kind is HoldKind.JOG else "hold"
@@ -117,15 +117,15 @@ class Holds:
 
     # -------------------------------------------------------------------------------- acting
     def _act(self, hold: _Hold) -> None:
-        """Have the driver told of the newest lease, unless it is being told; then it is told again at the end."""
+        """Pass the newest lease to the driver; if it is busy with one, after that."""
         with self._lock:
             if hold.ending or hold.job is not None or not hold.unanswered:
                 return
             numbers, hold.unanswered = hold.unanswered, []
             job = hold.job = Job(
                 "jog" if hold.kind is HoldKind.JOG else SET_MODE,
-                lambda: self._tell_driver(hold),
-                notify=lambda done: self._told(hold, done, numbers),
+                lambda: self._pass_to_driver(hold),
+                notify=lambda done: self._answer_leases(hold, done, numbers),
             )
             within = RENEWED_WITHIN + (0.0 if hold.begun else CONTROL_DEADLINE)
         lane = hold.device.lane
@@ -136,7 +136,7 @@ class Holds:
             return
         self._clock.after(within, lambda: lane.expire(job, within))
 
-    def _tell_driver(self, hold: _Hold) -> float:
+    def _pass_to_driver(self, hold: _Hold) -> float:
         """Call the driver, on the device's lane; gives the scale of the velocity."""
         device, robot = hold.device, hold.device.require()
         assert isinstance(robot, Robot)
@@ -155,8 +155,8 @@ class Holds:
             robot.set_hand_teaching_mode(True, **hold.arm)
         return 1.0
 
-    def _told(self, hold: _Hold, job: Job, numbers: list[int]) -> None:
-        """Answer the leases that the driver was told of."""
+    def _answer_leases(self, hold: _Hold, job: Job, numbers: list[int]) -> None:
+        """Answer the leases that were passed to the driver."""
         device = hold.device
         if job.error is not None:
             error = (hold.error if hold.ending else None) or describe(device, job.error)
@@ -196,7 +196,7 @@ class Holds:
         self._post(m.HandTeachingEnded(device.id, error_data(error, device.id), arm.get("arm_id")))
 
     def end(self, hold: _Hold, error: Arcor2Error | None) -> None:
-        """Bring the robot to rest, then tell; `error` says why, None when it was let go."""
+        """Stop the robot, then report it; `error` is the reason, None when the button was released."""
         with self._lock:
             if hold.ending:
                 return

@@ -40,15 +40,15 @@ from arcor2_hw.runtime.teaching import TEACHING_PERIOD, Teaching
 from arcor2_hw.runtime.watch import OBSERVE_PERIOD, Watch
 
 GONE_WITHIN: Final = 1.8
-"""Seconds from the loss of the server to the end of this process, whatever hangs."""
+"""Seconds from the loss of the server to the end of this process, even if a call hangs."""
 NUDGE_PERIOD: Final = 0.1
 """Seconds between two interruptions of a script that does not end although it is stopped."""
 LOST_WITHIN: Final = 5.0
-"""Seconds that a script gets to end when it is stopped because a device is lost, as when somebody stops it."""
+"""Seconds that a script has to end when it is stopped because a device is lost."""
 ROOM_WITHIN: Final = 1.0
-"""Seconds that an event of the program waits for a server that does not keep up."""
+"""Seconds that an event of the program waits for a slow server."""
 AHEAD: Final = -5
-"""Niceness that is asked for: who keeps devices alive goes before who shows them."""
+"""Requested niceness: processes that own devices run before those of user interfaces."""
 FLUSH: Final = 0.3
 """Seconds for the last messages."""
 
@@ -72,7 +72,7 @@ class Host:
         self.clock = Clock()
         self.program: Program | None = None
         self._cell = Cell()
-        self._told = self._cell.told
+        self._updates = self._cell.updates
         self._work: SimpleQueue[m.HostBound] = SimpleQueue()
         self._subscribed: dict[str, m.Subscribe] = {}
         self._teaching = Teaching(lambda *ended: self._holds.teaching_ended(*ended))
@@ -89,18 +89,18 @@ class Host:
         self._wake, wake_up = socket.socketpair()
         wake_up.setblocking(False)
         signal.set_wakeup_fd(wake_up.detach(), warn_on_full_buffer=False)
-        signal.signal(signal.SIGTERM, lambda *_: None)  # told through the wake-up socket: the reader acts
+        signal.signal(signal.SIGTERM, lambda *_: None)  # arrives on the wake-up socket: the reader acts
         signal.signal(signal.SIGUSR1, self._interrupted)
 
     # -------------------------------------------------------------------------------- main thread
     def run(self) -> int:
-        """Serve until the scene or the program is over; gives the exit status."""
+        """Serve until the scene is closed or the program has ended; return the exit status."""
         logging.basicConfig(level=logging.INFO, format="%(name)s: %(message)s", handlers=[_LogHandler(self.link)])
         logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs every request, and drivers poll
         self.clock.every(m.HEARTBEAT_PERIOD, lambda: self.link.post(m.Heartbeat()))
-        self.clock.every(OBSERVE_PERIOD, lambda: self._watch.look())
+        self.clock.every(OBSERVE_PERIOD, lambda: self._watch.check_all())
         self.clock.every(NUDGE_PERIOD, self._nudge)
-        self.clock.every(TEACHING_PERIOD, self._teaching.look)
+        self.clock.every(TEACHING_PERIOD, self._teaching.check_all)
         self.clock.start()
         self.link.post(m.Ready(os.getpid()))
         threading.Thread(target=self._read, name="from server", daemon=True).start()
@@ -125,7 +125,7 @@ class Host:
         return status
 
     def _open_scene(self, message: m.OpenScene) -> bool:
-        """Bring the scene up; False when the host has to go."""
+        """Open the scene; return False when the host has to exit."""
         fault: SceneFault | None = None
         self._scene = message
         self._cell.assets = message.assets
@@ -146,18 +146,18 @@ class Host:
             self.link.post(m.SceneFailed(error_data(fault.error, fault.object_id)))
             return False
         for device in self._cell:  # clients know how each device is when they learn that the scene is online
-            self._watch.glance(device)
+            self._watch.check_connection(device)
         self.link.post(m.SceneOpened())
         self.clock.every(message.streaming_period if message.streaming_period > 0 else 0.1, self._stream_subscribed)
         return True
 
     def _missing(self, fault: SceneFault) -> None:
-        """Go on without an object."""
-        self._cell.lack(fault)
-        self._watch.tell(fault.object_id, Connection.FAILED, str(fault.error))
+        """Continue without an object."""
+        self._cell.mark_absent(fault)
+        self._watch.report(fault.object_id, Connection.FAILED, str(fault.error))
 
     def _retry(self, message: m.RetryObject) -> None:
-        """Make and connect an object anew. On a thread of its own: loading its type may last."""
+        """Create and connect an object again. On its own thread, because loading its type may take long."""
         object_id = message.object_id
         try:
             assert self._scene is not None
@@ -165,7 +165,7 @@ class Host:
             if not self._retrying.acquire(blocking=False):
                 raise Refused("another object is being retried: wait for that")
             try:
-                self._watch.tell(object_id, Connection.CONNECTING)
+                self._watch.report(object_id, Connection.CONNECTING)
                 (recipe,) = scene_recipes(self._scene, only=object_id)
                 self._cell.retry(recipe)
             except SceneFault as fault:
@@ -176,7 +176,7 @@ class Host:
         except Exception as error:  # noqa: BLE001 - whatever a type does when it is loaded
             self.link.post(m.CallFailed(message.id, error_data(error, object_id)))
             return
-        self._watch.glance(self._cell[object_id])
+        self._watch.check_connection(self._cell[object_id])
         self.link.post(m.CallDone(message.id))
 
     def _close_scene(self) -> None:
@@ -200,7 +200,7 @@ class Host:
             secrets=message.secrets,
         )
         self._cell = program.cell
-        self._cell.assets, self._cell.told = message.assets, self._told
+        self._cell.assets, self._cell.updates = message.assets, self._updates
         self._watch = Watch(program.cell, self.link.post, self._lost)
         program.inside = True
         self.program = program
@@ -240,11 +240,11 @@ class Host:
         self.link.post(m.ProgramEvent(name, encoded, number, action, time))
 
     def changed(self, state: str) -> None:
-        """Tell that the program is running or paused now."""
+        """Report that the program is running or paused."""
         self.link.post(m.ProgramChanged(state))
 
     def action_over(self, number: int, duration: float, error: str) -> None:
-        """Tell that an action has ended where no event says so."""
+        """Report the end of an action that has no event."""
         self.link.post(m.ActionFailed(number, duration, error))
 
     # -------------------------------------------------------------------------------- reader thread
@@ -260,16 +260,16 @@ class Host:
         match message:
             case m.OpenScene() | m.RunPackage():
                 for body in message.bodies:  # at once: what follows may change them
-                    self._told.put(body)
+                    self._updates.put(body)
                 for object_id, calibration in message.calibrations.items():
-                    self._told.calibrate(object_id, calibration)
+                    self._updates.calibrate(object_id, calibration)
                 self._work.put(message)
             case m.PutBody():
-                self._told.put(message.body)
+                self._updates.put(message.body)
             case m.RemoveBodies():
-                self._told.remove(message.ids)
+                self._updates.remove(message.ids)
             case m.Calibrate():
-                self._told.calibrate(message.object_id, message.calibration)
+                self._updates.calibrate(message.object_id, message.calibration)
             case m.CloseScene():
                 self._cell.abandon()
                 self._work.put(message)
@@ -300,7 +300,7 @@ class Host:
         self._holds.stopping(device)
 
     def _leave(self) -> None:
-        """The server is gone, or wants us gone: stop motion, disconnect, exit, in bounded time."""
+        """Stop motion, disconnect and exit in bounded time, because the server has ended or requested it."""
         watchdog = threading.Timer(GONE_WITHIN, os._exit, (3,))
         watchdog.daemon = True
         watchdog.start()
@@ -343,7 +343,7 @@ class Host:
 
     # -------------------------------------------------------------------------------- signal handler
     def _interrupted(self, number: int, frame: types.FrameType | None) -> None:  # noqa: ARG002
-        """Raise ProgramStopped in the script; never inside our own code, which looks by itself."""
+        """Raise ProgramStopped in the script; never inside our own code, which checks by itself."""
         program = self.program
         if program is not None and program.stop_requested and not program.inside and not program.ended:
             raise ProgramStopped

@@ -1,4 +1,4 @@
-"""A jog as the driver is told of it: never faster than a person may be near, nor into the limit of a joint."""
+"""Jogging: limits the velocity that the driver gets to the speed allowed near people and to the joint limits."""
 
 import contextlib
 import math
@@ -19,7 +19,7 @@ COMES_TO_REST: Final = 0.15
 AT_LIMIT: Final = 0.01
 """rad (m where prismatic) from its limit at which a joint counts as being there."""
 NEAR_LIMIT: Final = 0.2
-"""rad (m) from a limit within which a motion of unknown direction begins slowly."""
+"""Distance from a limit, rad (m), within which a motion of unknown direction starts slowly."""
 LEVERS_CHANGE: Final = 0.95
 """Fraction of the most speed that is given by joints: the levers are those at the begin of a lease."""
 SAME_WAY: Final = 0.95
@@ -27,11 +27,11 @@ SAME_WAY: Final = 0.95
 SLOWEST_BEGIN: Final = 0.05
 """Of the velocity, at a limit."""
 SOONEST_LOOK: Final = 0.02
-"""Seconds between two looks at where joints are: less says nothing of how fast they are."""
+"""Shortest time between two readings of joints from which their velocity is computed, s."""
 STANDS: Final = 1e-3
 """rad/s (m/s)."""
 LEAST_VALID: Final = 0.02
-"""Seconds: what remains of a lease below that is not worth a motion."""
+"""Shortest remaining time of a lease that is used for a motion, s."""
 
 Twist = tuple[float, float, float, float, float, float]
 NO_TWIST: Final[Twist] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -63,7 +63,7 @@ class Jog:
             return {}
 
     def drive(self, lease: Lease) -> float:
-        """Tell the driver of a lease; gives the fraction of the velocity that it was told.
+        """Pass a lease to the driver; return the fraction of the velocity that was used.
 
         Raises OutOfRange at a joint's limit, InvalidData for names that the robot has not, what the driver raises.
         """
@@ -74,7 +74,7 @@ class Jog:
         return self._drive_twist(lease, lease.twist or NO_TWIST, joints)
 
     def _left(self, lease: Lease) -> float:
-        """Give the seconds left of a lease at this moment; Refused when there are too few."""
+        """Return the remaining seconds of a lease; Refused when there are too few."""
         left = lease.until - time.monotonic()
         if left < LEAST_VALID:
             raise Refused(f"{self._robot.name}: the lease had run out when the robot was ready for it")
@@ -123,7 +123,7 @@ class Jog:
 
     # -------------------------------------------------------------------------------- limits of joints
     def _room(self, joint: Joint, rate: float, valid_for: float) -> float:
-        """Give how much of a joint's rate leaves it within its limits; OutOfRange when it is at one already."""
+        """Return the fraction of a joint's velocity that keeps it within its limits; OutOfRange when it is at one."""
         limits = self._limits.get(joint.name)
         if limits is None or rate == 0.0:
             return 1.0
@@ -134,7 +134,7 @@ class Jog:
         return min(1.0, left / (abs(rate) * (valid_for + COMES_TO_REST)))
 
     def _room_of_twist(self, twist: Twist, joints: list[Joint], valid_for: float, scale: float) -> float:
-        """Give the scale at which joints stay within their limits, by how they moved since the last lease."""
+        """Return the scale that keeps joints within their limits, from their motion since the last lease."""
         now, before = time.monotonic(), self._before
         if before is None or _cosine(before.twist, twist) < SAME_WAY or before.scale <= 0.0:
             gaps = [self._gap(joint) for joint in joints]
@@ -152,7 +152,7 @@ class Jog:
         return math.inf if limits is None else min(limits[1] - joint.value, joint.value - limits[0])
 
     def _most(self, joint: Joint, rate: float, valid_for: float) -> float:
-        """Give by how much a rate may grow, or has to shrink; as `_room`, but not bounded by one."""
+        """Return the factor by which a velocity may grow or has to shrink; as `_room`, but may exceed 1."""
         limits = self._limits.get(joint.name)
         if limits is None:
             return math.inf
@@ -162,7 +162,7 @@ class Jog:
 
     # -------------------------------------------------------------------------------- speed of the end effector
     def _tcp_speed(self, lease: Lease, joints: list[Joint], velocities: list[float]) -> float:
-        """Give the speed, m/s, that joint rates give the end effector; 0 for a type that keeps the bound itself."""
+        """Return the end effector speed, m/s, for joint velocities; 0 for a type that limits it itself."""
         if not any(velocities):
             return 0.0
         end_effector = lease.end_effector_id or min(self._end_effectors, default="")

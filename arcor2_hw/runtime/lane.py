@@ -14,12 +14,12 @@ _on_lane = threading.local()
 
 
 def on_any_lane() -> bool:
-    """Tell whether the present thread is a lane's: whatever it calls is part of another call."""
+    """Return whether the current thread is a lane's: what it calls is part of another call."""
     return getattr(_on_lane, "here", False)
 
 
 class Job:
-    """One call. It ends once: by the lane, by its deadline, or by somebody who gives it up; the first one counts."""
+    """One call. It ends once: when the lane has run it, at its deadline, or when its caller gives it up."""
 
     __slots__ = (
         "_claim",
@@ -60,11 +60,11 @@ class Job:
 
     @property
     def ended(self) -> bool:
-        """Tell whether the call has ended, one way or the other."""
+        """Return whether the call has ended."""
         return self._claim.locked()
 
     def finish(self, value: Any = None, error: BaseException | None = None) -> bool:
-        """End the call; False when it had ended already and this answer is dropped."""
+        """End the call; return False if it had ended already, so that this answer is dropped."""
         if not self._claim.acquire(blocking=False):
             return False
         self.value = value
@@ -76,21 +76,21 @@ class Job:
 
     def give_up(self, error: BaseException) -> bool:
         """End the call without waiting for its answer."""
-        self.given_up = True  # before `finish`: whoever learns of the end finds the lane refusing
+        self.given_up = True  # before `finish`: at the end of the call the lane already refuses further ones
         if self.finish(None, error):
             return True
         self.given_up = False
         return False
 
     def wait(self, timeout: float | None) -> bool:
-        """Wait for the end, at most `timeout` s; False when it did not come."""
+        """Wait for the end, at most `timeout` s; return False on timeout."""
         if self._gate.acquire(timeout=-1 if timeout is None else max(timeout, 0.0)):
             self._gate.release()
             return True
         return False
 
     def outcome(self) -> Any:
-        """Give the result of a call that has ended, or raise its error."""
+        """Return the result of a call that has ended, or raise its error."""
         if self.error is not None:
             raise self.error
         return self.value
@@ -120,7 +120,7 @@ class Lane:
         keywords: Mapping[str, Any] = _NO_ARGUMENTS,
         deadline: float | None = None,
     ) -> Any:
-        """Run a call and give its result; DeviceTimeout after `deadline` s. On the lane itself it simply runs."""
+        """Run a call and return its result; DeviceTimeout after `deadline` s. On the lane itself, call it directly."""
         if threading.current_thread() is self._thread:
             return function(*arguments, **keywords)
         job = Job(method, function, arguments, keywords)
@@ -162,9 +162,9 @@ class Lane:
             waiting.finish(None, Cancelled(f"{self.device}: {waiting.method} was stopped before it began"))
 
     def check_wanted(self) -> None:
-        """Raise Cancelled when the call that runs was stopped or given up. On the lane, before it begins to act.
+        """Raise Cancelled if the running call was stopped or given up. To be called on the lane, before it acts.
 
-        What overtakes a stop from now on counts from now on.
+        The time from which a command may overtake a stop starts anew.
         """
         job = self._current
         if job is None:
@@ -176,28 +176,28 @@ class Lane:
     # -------------------------------------------------------------------------------- state
     @property
     def current(self) -> Job | None:
-        """Give the call that runs, None when none does."""
+        """Return the running call; None when there is none."""
         return self._current
 
     @property
     def busy_with(self) -> str:
-        """Name the method that runs, empty when none does."""
+        """Return the name of the running method; empty when there is none."""
         current = self._current
         return "" if current is None else current.method
 
     @property
     def hung(self) -> bool:
-        """Tell whether a call that was given up still runs."""
+        """Return whether a call that was given up is still running."""
         current = self._current
         return current is not None and current.given_up
 
     def close(self) -> None:
-        """End the thread once it is free; what waits is cancelled."""
+        """End the thread after the running call, and cancel the waiting calls."""
         self.interrupt()
         self._queue.put(None)
 
     def join(self, timeout: float) -> bool:
-        """Wait for the end of the thread after `close`; False when it did not come."""
+        """Wait until the thread has ended after `close`; return False on timeout."""
         self._thread.join(timeout)
         return not self._thread.is_alive()
 
@@ -228,7 +228,7 @@ class Lane:
         _on_lane.here = True
         while (job := self._queue.get()) is not None:
             job.since = time.monotonic()
-            self._current = job  # before looking whether it has ended, so that its deadline finds it here
+            self._current = job  # before the check whether it has ended, so that its deadline finds it here
             if job.ended or job.epoch != self._epoch:
                 self._current = None
                 job.finish(None, Cancelled(f"{self.device}: {job.method} was stopped before it began"))

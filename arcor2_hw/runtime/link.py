@@ -1,4 +1,4 @@
-"""The host's end of the socket to the server: a thread that writes, and a reader that signals can wake."""
+"""The host's end of the socket to the server: a writing thread, and a reader that signals can wake."""
 
 import select
 import signal
@@ -20,12 +20,12 @@ from arcor2_hw.runtime.messages import (
 )
 
 STREAM_BACKLOG: Final = 1000
-"""Messages waiting for a server that does not read, beyond which streamed values are left out."""
+"""Number of messages waiting for a slow server above which streamed values are dropped."""
 BACKLOG: Final = 4096
-"""Messages waiting for a server that does not keep up, beyond which a program waits before its next event."""
+"""Number of messages waiting for a slow server above which a program waits before its next event."""
 _CHUNK: Final = 1 << 18
 _LOOK: Final = 0.002
-"""Seconds between two looks at how many messages still wait."""
+"""Seconds between two checks of the number of waiting messages."""
 
 
 class Link:
@@ -45,12 +45,12 @@ class Link:
         self._outbox.put(message)
 
     def post_stream(self, message: StreamEvent) -> None:
-        """Send a value that a newer one replaces anyway: dropped when the server does not read."""
+        """Send a value that a newer one replaces; drop it when the server does not read."""
         if self._outbox.qsize() < STREAM_BACKLOG:
             self._outbox.put(message)
 
     def wait_for_room(self, timeout: float) -> None:
-        """Wait while too much waits to be sent, but no longer than `timeout` s: a server that hangs stops nobody."""
+        """Wait while too many messages are waiting, at most `timeout` s: a hanging server does not stop a program."""
         if self._outbox.qsize() < BACKLOG:
             return
         deadline = time.monotonic() + timeout
@@ -58,7 +58,7 @@ class Link:
             time.sleep(_LOOK)
 
     def close(self, timeout: float) -> None:
-        """Send what waits; given up when the server takes nothing for `timeout` s."""
+        """Send the waiting messages; give up when the server reads nothing for `timeout` s."""
         self._outbox.put(None)
         sent = -1
         while self._writer.is_alive() and sent != self._sent:
@@ -84,13 +84,13 @@ class Link:
                     self._socket.sendall(b"".join(batch))
                     self._sent += len(batch)
                 except OSError:
-                    alive = False  # the reader learns of it too; what follows has no address
+                    alive = False  # the reader notices it too; further messages are dropped
             if last:
                 return
 
     # -------------------------------------------------------------------------------- in
     def messages(self, wake: socket.socket) -> Iterator[HostBound]:
-        """Give what the server says, until it is gone or SIGTERM is told on `wake`."""
+        """Yield the messages of the server, until it closes the connection or SIGTERM arrives on `wake`."""
         buffer = bytearray()
         poll = select.poll()
         poll.register(self._socket, select.POLLIN)
@@ -112,7 +112,7 @@ class Link:
 
 
 def _take(buffer: bytearray) -> Iterator[Any]:
-    """Take all whole messages from the front of a buffer."""
+    """Remove all complete messages from the start of a buffer and yield them."""
     while len(buffer) >= PREFIX_SIZE:
         end = PREFIX_SIZE + body_length(bytes(buffer[:PREFIX_SIZE]))
         if len(buffer) < end:

@@ -14,7 +14,7 @@ class _Mode(enum.Enum):
 
 
 class Gate:
-    """Every outermost action passes it before it begins and after it has ended.
+    """Every outermost action passes it before it starts and after it has ended.
 
     `tell` is called with "paused" once nothing runs any more, and with "running" when it goes on.
     `settle` waits until nothing moves; it is called without any lock.
@@ -35,14 +35,14 @@ class Gate:
         self._steps = 0
         if start_paused:  # as if a step had just been used up: pause before the next action
             self._mode = _Mode.STEP
-        self._told = False
+        self._reported = False
         self._under_way = 0
         self._stopped = False
         self._changed = threading.Condition()
 
     # -------------------------------------------------------------------------------- commands
     def pause(self) -> None:
-        """Let no further action begin. "paused" is told at once when none is under way."""
+        """Let no further action start. "paused" is reported at once when none is running."""
         with self._changed:
             self._mode = _Mode.PAUSE
             self._tell_paused()
@@ -56,7 +56,7 @@ class Gate:
         self._go(_Mode.STEP)
 
     def stop(self) -> None:
-        """Let nobody pass any more: whoever waits here, or comes, gets ProgramStopped."""
+        """Let no action pass any more: present and later callers get ProgramStopped."""
         with self._changed:
             self._stopped = True
             self._changed.notify_all()
@@ -65,7 +65,7 @@ class Gate:
         with self._changed:
             self._mode = mode
             self._steps = 1
-            self._told = False
+            self._reported = False
             self._tell("running")
             self._changed.notify_all()
 
@@ -76,7 +76,7 @@ class Gate:
             self._breakpoints = breakpoints
 
     def before(self, ids: Set[str] = frozenset()) -> None:
-        """Wait for leave to begin an action; `ids`: its own, and of its action points. Raises ProgramStopped."""
+        """Wait until an action may start; `ids`: its own, and of its action points. Raises ProgramStopped."""
         with self._changed:
             if (self._mode is _Mode.STEP and not self._steps) or not self._breakpoints.isdisjoint(ids):
                 self._mode = _Mode.PAUSE
@@ -101,6 +101,6 @@ class Gate:
             raise ProgramStopped
 
     def _tell_paused(self) -> None:
-        if not self._under_way and not self._told:
-            self._told = True
+        if not self._under_way and not self._reported:
+            self._reported = True
             self._tell("paused")

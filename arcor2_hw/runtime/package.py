@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 def package_name(directory: Path, default: str) -> str:
-    """Give the package's name from package.json, `default` when it has none."""
+    """Return the package's name from package.json; `default` when it has none."""
     try:
         return str(msgspec.json.decode((directory / "package.json").read_bytes())["name"])
     except (OSError, msgspec.MsgspecError, KeyError, TypeError):
@@ -43,7 +43,7 @@ class PackageData:
                 self.models[model.model().id] = model
 
     def collision_models(self) -> CollisionModels:
-        """Give the models by kind."""
+        """Return the models by kind."""
         found: list[Models] = [model.model() for model in self.models.values()]
         return CollisionModels(
             [m for m in found if isinstance(m, Box)],
@@ -81,7 +81,7 @@ class Places:
         return found
 
     def bare_action_point(self, action_point_id: str) -> ActionPoint:
-        """Give an action point as the project has it, with its position in the world."""
+        """Return an action point as the project has it, with its position in the world."""
         try:
             point = self._points[action_point_id]
         except KeyError:
@@ -89,28 +89,28 @@ class Places:
         return msgspec.structs.replace(point, position=self.position(action_point_id), parent=msgspec.UNSET)
 
     def position(self, action_point_id: str) -> Position:
-        """Give where an action point is, in the world."""
+        """Return the position of an action point in the world."""
         try:
             return copy.deepcopy(self._positions[action_point_id])
         except KeyError:
             raise NotFound(f"the project has no action point {action_point_id}") from None
 
     def pose(self, orientation_id: str) -> Pose:
-        """Give the pose in the world of an action point with this orientation."""
+        """Return the pose in the world of an action point with this orientation."""
         try:
             return self._marked(self._poses[orientation_id], orientation_id)
         except KeyError:
             raise NotFound(f"the project has no orientation {orientation_id}") from None
 
     def joints(self, joints_id: str) -> ProjectRobotJoints:
-        """Give joints of an action point."""
+        """Return joints of an action point."""
         try:
             return self._marked(self._joints[joints_id], joints_id)
         except KeyError:
             raise NotFound(f"the project has no joints {joints_id}") from None
 
     def parameter(self, parameter_id: str) -> Any:
-        """Give the value of a project parameter."""
+        """Return the value of a project parameter."""
         try:
             return self._parameters[parameter_id]
         except KeyError:

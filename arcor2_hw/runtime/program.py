@@ -1,4 +1,4 @@
-"""A program while it runs: what is told of its actions, how it is paced, how it is stopped."""
+"""A running program: how its actions are reported, how it is paused, how it is stopped."""
 
 import itertools
 import threading
@@ -31,22 +31,22 @@ from arcor2_hw.runtime.values import encode_shown, results
 POINT: Final = "action_point_id"
 """The attribute by which a pose knows its action point."""
 STILL_WITHIN: Final = 2.0
-"""Seconds that a device gets to stand still after the action before a pause."""
+"""Seconds that a device has to come to standstill after the action before a pause."""
 
 _encode = msgspec.json.Encoder().encode
 
 
 class Channel(Protocol):
-    """Where a program tells of itself."""
+    """Destination of the events of a program."""
 
     def event(self, name: str, encoded: bytes, number: int = 0, action: str = "", time: float = 0.0) -> None:
         """Pass on an encoded event; of an action with the number of its call, its name, and a time (ProgramEvent)."""
 
     def changed(self, state: str) -> None:
-        """Tell that the program is running or paused now."""
+        """Report that the program is running or paused."""
 
     def action_over(self, number: int, duration: float, error: str) -> None:
-        """Tell that an action has ended where no event says so: by an error, or in a project without actions."""
+        """Report the end of an action that has no event: by an error, or in a project without actions."""
 
 
 class Action:
@@ -90,9 +90,9 @@ class Program:
         )
         self.stop_requested = False
         self.ended = False
-        """The script is over; what follows is closing, which no stop may interrupt."""
+        """The script has ended; the devices are being closed, which no stop may interrupt."""
         self.inside = False
-        """The script's main thread is in our code, where an exception out of nowhere would do harm."""
+        """The main thread of the script is in our code, where an asynchronous exception would do harm."""
         self.error: BaseException | None = None
         self._blamed: tuple[BaseException, Device] | None = None
         self._failed: tuple[BaseException, Action] | None = None
@@ -107,30 +107,30 @@ class Program:
 
     # -------------------------------------------------------------------------------- the project
     def load(self, project: Project) -> None:
-        """Take the names of actions and points from the project; NotFound for a breakpoint that it does not have."""
+        """Read the names of actions and points from the project; NotFound for an unknown breakpoint."""
         self._action_ids = {a.name: a.id for point in project.action_points for a in point.actions}
         self._joints_points = {j.id: point.id for point in project.action_points for j in point.robot_joints}
         if unknown := self.breakpoints.difference((p.id for p in project.action_points), self._action_ids.values()):
             raise NotFound(f"a breakpoint is set on {', '.join(sorted(unknown))}, which is no action point or action")
 
     def started(self, info: PackageInfoData) -> None:
-        """Tell that everything is up and the first action follows."""
+        """Report that all devices are connected and the first action follows."""
         self.channel.changed("running")
         self.channel.event("PackageInfo", _encode(Event("PackageInfo", data=info)))
 
     # -------------------------------------------------------------------------------- actions
     @property
     def in_main_thread(self) -> bool:
-        """Tell whether the present thread is the script's first."""
+        """Return whether the current thread is the main thread of the script."""
         return threading.current_thread() is self._main
 
     def check(self) -> None:
-        """Raise ProgramStopped once somebody has stopped the program."""
+        """Raise ProgramStopped if the program was stopped."""
         if self.stop_requested:
             raise ProgramStopped
 
     def points_of(self, arguments: Sequence[Any]) -> set[str]:
-        """Give the action points whose poses and joints are among the arguments."""
+        """Return the action points whose poses and joints are among the arguments."""
         points: set[str] = set()
         for argument in arguments:
             if isinstance(argument, Pose):
@@ -141,11 +141,11 @@ class Program:
         return points
 
     def set_shared_breakpoints(self, ids: Set[str]) -> None:
-        """Pause from now on at these, beside those that were asked for at the start."""
+        """Set breakpoints in addition to those that were given at the start."""
         self.gate.set_breakpoints(self.breakpoints | ids)
 
     def action_begins(self, what: str, name: str | None, arguments: Sequence[Any]) -> Action:
-        """Tell that action `name` begins, and wait for leave.
+        """Report that action `name` starts, and wait while the program is paused.
 
         Raises InvalidData when the project knows no such action, ProgramStopped.
         """
@@ -173,7 +173,7 @@ class Program:
         return action
 
     def action_ended(self, action: Action, value: Any) -> None:
-        """Tell that an action has ended with a result, and wait for leave to go on. Raises ProgramStopped."""
+        """Report the result of an action that has ended; wait while the program is paused. Raises ProgramStopped."""
         duration = time.monotonic() - action.began
         if action.id is None:
             self.channel.action_over(action.number, duration, "")
@@ -184,19 +184,19 @@ class Program:
         self.gate.after()
 
     def action_failed(self, action: Action, error: BaseException) -> None:
-        """Say that an action is over without a result. Raises ProgramStopped."""
+        """Report that an action has ended without a result. Raises ProgramStopped."""
         self._failed = error, action
         duration = time.monotonic() - action.began
         self.channel.action_over(action.number, duration, str(error) or type(error).__name__)
         self.gate.after()
 
     def blame(self, device: Device, error: BaseException) -> None:
-        """Note from which device an error came, so that whoever reads it learns which one."""
+        """Record which device an error came from, so that its report names the device."""
         self._blamed = error, device
 
     # -------------------------------------------------------------------------------- ends
     def stop(self) -> None:
-        """Stop all devices past whatever they do, then let nothing of the script go on."""
+        """Stop all devices next to any running call, then end the script."""
         self.stop_requested = True
         self._stops = self.cell.stop_all(ProgramStopped("the program was stopped"))
         self._stop_sent.set()
@@ -204,7 +204,7 @@ class Program:
         self.gate.stop()
 
     def device_lost(self, device: Device, reason: str) -> bool:
-        """Stop because a device is lost; tells whether that was necessary."""
+        """Stop because a device is lost; return whether that was necessary."""
         error = ConnectionLost(f"{device.name}: the connection is lost, so the program was stopped", reason)
         with self._telling:
             if self.ended or self.stop_requested or self.error is not None:
@@ -215,12 +215,12 @@ class Program:
         return True
 
     def settle(self, failed: bool) -> Arcor2Error | None:
-        """Wait for the stop that was sent; after a failure send it, so that nothing goes on moving.
+        """Wait for the stop that was sent; after a failure send it first, so that no device keeps moving.
 
-        Gives the first device that did not obey.
+        Return the error of the first device that did not stop.
         """
         if self.stop_requested:
-            self._stop_sent.wait(STOP_DEADLINE)  # the script may be out before the last device was told
+            self._stop_sent.wait(STOP_DEADLINE)  # the script may end before the stop is sent to the last device
         elif failed:
             self._stops = self.cell.stop_all()
         return wait_stopped(self._stops)
@@ -231,7 +231,7 @@ class Program:
         return self._stops
 
     def exception(self, error: BaseException) -> None:
-        """Tell of an exception that ended the script; one that was told already is not told again."""
+        """Report an exception that ended the script, once."""
         with self._telling:
             if self.error is not error and not self._device_lost:
                 self._tell_exception(error)
@@ -249,7 +249,7 @@ class Program:
 
 
 def traceback_text(error: BaseException) -> str:
-    """Give the traceback of an exception as text."""
+    """Return the traceback of an exception as text."""
     return "".join(traceback.format_exception(error))
 
 
@@ -257,7 +257,7 @@ _current: Program | None = None
 
 
 def current() -> Program | None:
-    """Give the program that this process runs for the server, None in a script started by hand."""
+    """Return the program that this process runs for the server; None in a script started by hand."""
     return _current
 
 

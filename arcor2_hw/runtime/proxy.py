@@ -1,4 +1,4 @@
-"""What a script has in its hands instead of a device: every call goes through the device's lane, actions are told."""
+"""Objects that a script calls as devices: every call runs on the lane of the device, and actions are reported."""
 
 import inspect
 import types
@@ -9,8 +9,9 @@ from arcor2_hw.actions import deadline_of, metadata_of
 from arcor2_hw.actions.decorator import with_present_names
 from arcor2_hw.exceptions import InvalidData, ProgramFinished, ProgramStopped
 from arcor2_hw.objects import Generic
-from arcor2_hw.runtime.device import PLAIN, STOP_DEADLINE, Device
+from arcor2_hw.runtime.device import STOP_DEADLINE, Device
 from arcor2_hw.runtime.lane import on_any_lane
+from arcor2_hw.runtime.methods import PLAIN
 from arcor2_hw.runtime.program import Program
 
 _DEVICE = "_arcor2_device"
@@ -18,10 +19,10 @@ _PROGRAM = "_arcor2_program"
 
 
 def _bind(bound: Any, arguments: tuple[Any, ...], keywords: Mapping[str, Any]) -> list[Any]:
-    """Give all arguments in the order of the signature, as if they were positional."""
+    """Return all arguments in the order of the signature, as if they were positional."""
     try:
         return list(inspect.signature(bound).bind(*arguments, **keywords).arguments.values())
-    except TypeError:  # the call itself will say so better
+    except TypeError:  # the call itself raises the better error
         return list(arguments)
 
 
@@ -52,7 +53,7 @@ def _plain_call(device: Device, program: Program, name: str, bound: Callable[...
 
 
 def _action_call(device: Device, program: Program, name: str, bound: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap an action: the outermost call is told before and after, and paced."""
+    """Wrap an action: the outermost call is reported before and after, and may be paused."""
     lane, deadline = device.lane, deadline_of(bound)
     what = f"{device.name}.{name}"
 
@@ -93,7 +94,7 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
 
 
 class Proxy:
-    """Stands for a device; `isinstance` sees the device's own class."""
+    """Represents a device; `isinstance` sees the class of the device."""
 
     def __init__(self, device: Device, program: Program) -> None:
         self.__dict__[_DEVICE] = device
@@ -131,5 +132,5 @@ class Proxy:
 
 
 def proxy(device: Device, program: Program) -> Generic:
-    """Give what a script calls as if it were the device."""
+    """Return the object that a script calls as the device."""
     return cast("Generic", Proxy(device, program))

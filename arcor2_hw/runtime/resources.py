@@ -1,4 +1,4 @@
-"""Resources: what a package's script works with. In the cell host it uses the host's program, else one of its own."""
+"""Resources: objects and points for a package's script, of the host's program or, outside a cell host, of its own."""
 
 import types
 from pathlib import Path
@@ -47,32 +47,32 @@ class Resources:
     # -------------------------------------------------------------------------------- data
     @property
     def scene(self) -> Scene:
-        """Give the scene of the package."""
+        """Return the scene of the package."""
         return self._data.scene
 
     @property
     def project(self) -> Project:
-        """Give the project of the package; its action points are relative to their parents."""
+        """Return the project of the package; its action points are relative to their parents."""
         return self._data.project
 
     def action_point(self, action_point_id: str) -> ActionPoint:
-        """Give an action point with its position in the world; NotFound."""
+        """Return an action point with its position in the world; NotFound."""
         return self._places.bare_action_point(action_point_id)
 
     def position(self, action_point_id: str) -> Position:
-        """Give where an action point is in the world, as a copy; NotFound."""
+        """Return the position of an action point in the world, as a copy; NotFound."""
         return self._places.position(action_point_id)
 
     def pose(self, orientation_id: str) -> Pose:
-        """Give the pose in the world of an orientation at its action point, as a copy; NotFound."""
+        """Return the pose in the world of an orientation at its action point, as a copy; NotFound."""
         return self._places.pose(orientation_id)
 
     def joints(self, joints_id: str) -> ProjectRobotJoints:
-        """Give joints of an action point, as a copy; NotFound."""
+        """Return joints of an action point, as a copy; NotFound."""
         return self._places.joints(joints_id)
 
     def parameter(self, parameter_id: str) -> Any:
-        """Give the value of a project parameter; NotFound."""
+        """Return the value of a project parameter; NotFound."""
         return self._places.parameter(parameter_id)
 
     # -------------------------------------------------------------------------------- life
@@ -119,7 +119,7 @@ class Resources:
         return isinstance(error, ProgramFinished | ProgramStopped)
 
     def _close(self, failed: bool) -> Arcor2Error | None:
-        """Close what is ours to close; after a failure everything is stopped first: nothing may go on moving."""
+        """Close the devices of a standalone script; after a failure stop all devices first."""
         self._program.ended = True
         problem = self._program.settle(failed)
         if self._standalone is not None:

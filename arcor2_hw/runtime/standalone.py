@@ -32,7 +32,7 @@ class _Lines:
             sys.stdout.flush()
 
     def action_over(self, number: int, duration: float, error: str) -> None:
-        pass  # the protocol's lines do not tell it
+        pass  # the protocol has no line for it
 
     def changed(self, state: str) -> None:
         self.event("PackageState", _encode(Event("PackageState", data=PackageStateData(PackageStateEnum(state)))))
@@ -48,7 +48,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 class Standalone:
-    """The program of a script that nobody hosts."""
+    """The program of a script that runs outside a cell host."""
 
     def __init__(self) -> None:
         options = _parse(sys.argv[1:])

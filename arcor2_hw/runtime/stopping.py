@@ -1,4 +1,4 @@
-"""Stops that were sent to devices, and what became of them."""
+"""Stops that were sent to devices, and their outcomes."""
 
 import time
 from typing import Final, NamedTuple

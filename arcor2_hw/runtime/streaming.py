@@ -1,4 +1,4 @@
-"""Joints and end effectors of robots, sent without being asked: at the streaming period, and at rates of their own."""
+"""Subscribed joints and end effector poses of robots, at the streaming period and at other rates."""
 
 import contextlib
 import threading
@@ -43,16 +43,16 @@ def _eef(robot: Robot, time_ms: float | Unset) -> bytes:
 
 
 class Streams:
-    """Sends the state of robots. A robot that has not answered the last time is not asked again: nothing piles up."""
+    """Sends the state of robots. A robot that has not answered yet is not queried again, so nothing piles up."""
 
     def __init__(self, send: Send) -> None:
         self._send = send
         self._pending: dict[tuple[str, bool, bool, float], Job] = {}
 
     def send(self, device: Device, *, joints: bool, eef: bool, rate: float = 0.0) -> None:
-        """Begin to send joints or end effector poses of a device that is a robot; what fails is left out.
+        """Start to send joints or end effector poses of a device that is a robot; errors are left out.
 
-        rate: that of the stream it is for, whose events carry their time; 0 for the ordinary events.
+        rate: of the stream, Hz, whose events contain their time; 0 for the ordinary events.
         """
         robot = device.instance
         if not isinstance(robot, Robot) or device.closing:
@@ -65,11 +65,11 @@ class Streams:
         self._pending[key] = job
         try:
             device.watch_lane.submit(job)
-        except DeviceTimeout as error:  # a question of somebody else hangs there
+        except DeviceTimeout as error:  # another query hangs on the lane
             job.finish(None, error)
 
     def _look(self, robot: Robot, joints: bool, eef: bool, rate: float) -> None:
-        # A value that is stale, or a robot that is away, is no event: clients see the age of the last one.
+        # A stale value or a disconnected robot causes no event: clients see the age of the last one.
         time_ms: float | Unset = round(time.monotonic() * 1e3, 3) if rate else UNSET
         if joints:
             self._send(StreamEvent("RobotJoints", robot.id, _joints(robot, time_ms), rate))
@@ -78,7 +78,7 @@ class Streams:
 
 
 class RatedStreams:
-    """Keeps time for streams at rates of their own: each robot, event and rate is read and encoded once a beat."""
+    """Schedules streams at other rates: each robot, event and rate is read and encoded once per period."""
 
     def __init__(self, cell: Callable[[], Cell], clock: Clock, streams: Streams) -> None:
         self._cell = cell
@@ -89,7 +89,7 @@ class RatedStreams:
         self._beating: set[tuple[str, bool, float]] = set()
 
     def want(self, message: Stream) -> None:
-        """Take the rates of a robot, in place of those before. On the reader's thread."""
+        """Set the rates of a robot, replacing the previous ones. On the reader's thread."""
         for joints, rates in ((True, message.joints), (False, message.eef)):
             with self._lock:
                 self._wanted[message.object_id, joints] = frozenset(rates)
@@ -103,8 +103,8 @@ class RatedStreams:
             if rate not in self._wanted[object_id, joints]:
                 self._beating.discard((object_id, joints, rate))
                 return
-        with contextlib.suppress(Arcor2Error):  # it has failed; it may be retried
+        with contextlib.suppress(Arcor2Error):  # the device has failed; it may be retried
             self._streams.send(self._cell()[object_id], joints=joints, eef=not joints, rate=rate)
         now = time.monotonic()
-        following = max(due + 1.0 / rate, now)  # missed beats are not made up for
+        following = max(due + 1.0 / rate, now)  # missed periods are not made up for
         self._clock.after(following - now, lambda: self._beat(object_id, joints, rate, following))

@@ -1,4 +1,4 @@
-"""What a robot is told of the things around it: the scene's collision objects and other robots, as they are now."""
+"""Obstacles around a robot: the current collision objects of the scene and the other robots."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -10,13 +10,14 @@ from arcor2_hw.objects import CollisionObject, Robot
 from arcor2_hw.objects.surroundings import Attachment, Obstacle
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.messages import PutIn
-from arcor2_hw.runtime.told import Told
+from arcor2_hw.runtime.own_process.pickling import ByReference
+from arcor2_hw.runtime.world_updates import WorldUpdates
 
 JOINTS_WITHIN: Final = 0.5
-"""Seconds in which another robot has to tell its joints: what moves does not stay there longer anyway."""
+"""Seconds in which another robot has to return its joints; older values would be of no use while it moves."""
 
 
-class SceneSurroundings:
+class SceneSurroundings(ByReference):
     """The things around one robot of a scene.
 
     Collision objects that count now, each with the model of its type, where it stands now; what was put in besides, in
@@ -24,12 +25,12 @@ class SceneSurroundings:
     never came up, and what is held by a robot that is not in the scene.
     """
 
-    def __init__(self, robot: str, devices: Iterable[Device], assets: Mapping[str, str], told: Told) -> None:
-        self._robot, self._devices, self._assets, self._told = robot, devices, assets, told
+    def __init__(self, robot: str, devices: Iterable[Device], assets: Mapping[str, str], updates: WorldUpdates) -> None:
+        self._robot, self._devices, self._assets, self._updates = robot, devices, assets, updates
 
     def obstacles(self) -> list[Obstacle]:
-        """Give what robots must not run into."""
-        found, bodies, names = [], self._told.bodies(), {}
+        """Return the obstacles for robots."""
+        found, bodies, names = [], self._updates.bodies(), {}
         for device in self._devices:
             names[device.id] = device.name
             instance = device.instance
@@ -49,7 +50,7 @@ class SceneSurroundings:
         return found
 
     def robots(self) -> list[tuple[Robot, list[Joint]]]:
-        """Give the other robots with their joints. Raises Refused naming one whose joints nobody knows."""
+        """Return the other robots with their joints. Raises Refused naming one whose joints are unknown."""
         found: list[tuple[Robot, list[Joint]]] = []
         for device in self._devices:
             if device.id == self._robot or not issubclass(device.recipe.cls, Robot):
@@ -66,13 +67,13 @@ class SceneSurroundings:
         return found
 
     def asset(self, asset_id: str) -> Path | None:
-        """Give the file of an uploaded asset, None when it is not known here."""
+        """Return the file of an uploaded asset; None when it is unknown."""
         path = self._assets.get(asset_id)
         return None if path is None else Path(path)
 
     def calibration(self, robot_id: str) -> KinematicCalibration | None:
-        """Give what the controller of a robot told of its very arm; None: its kinematics are nominal."""
-        return self._told.calibration(robot_id)
+        """Return the kinematic calibration of a robot; None when its kinematics are nominal."""
+        return self._updates.calibration(robot_id)
 
 
 def _put_in(body: PutIn, name: str, robot: str | None) -> Obstacle:

@@ -1,4 +1,4 @@
-"""Arms in hand teaching mode: watched, so that an end that nobody asked for is reported."""
+"""Robots in hand teaching mode: checked, so that an end without a request is reported."""
 
 import threading
 from collections.abc import Callable, Mapping
@@ -15,7 +15,7 @@ TEACHING_PERIOD: Final = 0.1
 ENDED_BY: Final = frozenset(
     {Safety.PROTECTIVE_STOP, Safety.SAFEGUARD_STOP, Safety.EMERGENCY_STOP, Safety.VIOLATION, Safety.FAULT}
 )
-"""Safety states in which an arm is not in hand teaching mode, whatever the driver says."""
+"""Safety states in which an arm is not in hand teaching mode, whatever the driver reports."""
 SET_MODE: Final = "set_hand_teaching_mode"
 
 
@@ -36,7 +36,7 @@ class Teaching:
             else:
                 self._arms.pop(_key(device, arm), None)
 
-    def look(self) -> None:
+    def check_all(self) -> None:
         """Start to check every arm. On the clock's thread."""
         with self._lock:
             arms = dict(self._arms)
@@ -73,7 +73,7 @@ def _key(device: Device, arm: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _safety(robot: Robot) -> Safety:
-    """Return the safety state, normal for a robot that does not tell it now."""
+    """Return the safety state; normal for a robot that cannot report it."""
     try:
         return robot.state().safety
     except Exception:  # noqa: BLE001 - whatever a driver raises; the mode alone decides then

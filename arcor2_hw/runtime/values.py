@@ -19,7 +19,7 @@ OBJECTS: Final = "arcor2_hw.objects"
 
 
 def encode_shown(value: Any) -> str:
-    """Give a value as JSON text for people to look at; what has no form in JSON is described."""
+    """Return a value as JSON text for display; a value that JSON cannot represent is described."""
     try:
         return encode(value)
     except InvalidData:
@@ -27,7 +27,7 @@ def encode_shown(value: Any) -> str:
 
 
 def results(value: Any) -> list[str]:
-    """Give the results of an action as the protocol lists them: none, one, or the members of a tuple."""
+    """Return the results of an action as the protocol lists them: none, one, or the members of a tuple."""
     if value is None:
         return []
     if isinstance(value, tuple):
@@ -57,7 +57,7 @@ def _signature(function: Callable[..., Any]) -> tuple[inspect.Signature, Mapping
 
 @functools.cache
 def _inherited(cls: type, name: str) -> Mapping[str, Any]:
-    """Give the hints of a method; what it leaves out is taken from the method that it overrides."""
+    """Return the hints of a method; missing ones are taken from the method that it overrides."""
     hints: dict[str, Any] = {}
     for base in reversed(cls.__mro__):
         function = base.__dict__.get(name)

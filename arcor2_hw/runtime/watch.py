@@ -1,4 +1,4 @@
-"""What is told of devices without being asked: connection, health, alarms, control."""
+"""Changes of devices that are reported without a request: connection, health, alarms, control."""
 
 import threading
 import time
@@ -10,41 +10,42 @@ from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_hw.objects import CollisionObject, Generic, Robot
 from arcor2_hw.runtime.cell import Cell
-from arcor2_hw.runtime.device import Device, overrides
+from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
+from arcor2_hw.runtime.methods import overrides
 
 OBSERVE_PERIOD: Final = 0.25
-"""Seconds between two looks at a device's connection and health (memory, by contract)."""
+"""Seconds between two checks of a device's connection and health (memory, by contract)."""
 INQUIRY_PERIOD: Final = 1.0
-"""Seconds between two looks at alarms and control, for which a driver may have to ask."""
+"""Seconds between two checks of alarms and control, for which a driver may query the device."""
 
 _WITH_REASON: Final = (Connection.LOST, Connection.FAILED)
 
 
 class Watch:
-    """Compares what devices say of their condition with what they said last, and tells changes.
+    """Compares the condition of devices with that at the last check, and reports changes.
 
-    A connection that changes is told at once, each loss and each return once. `lost` is called after a loss was told.
+    A change of a connection is reported at once, each loss and each return once. `lost` is called after that.
     """
 
     def __init__(
         self,
         cell: Cell,
-        tell: Callable[[DeviceChanged], None],
+        post: Callable[[DeviceChanged], None],
         lost: Callable[[Device, str], None] = lambda *_: None,
     ) -> None:
         self._cell = cell
-        self._tell = tell
+        self._post = post
         self._lost = lost
         self._turn = threading.Lock()
-        cell.changed = self.glance
+        cell.changed = self.check_connection
         self._pending: dict[str, Job] = {}
         self._known: dict[str, DeviceChanged] = {}
         self._inquired: dict[str, float] = {}
 
-    def look(self) -> None:
-        """Begin to look at every device that has something to say."""
+    def check_all(self) -> None:
+        """Start to check every device whose condition can change."""
         for device in self._cell:
             cls = device.recipe.cls
             if device.instance is None or device.closing:
@@ -62,20 +63,20 @@ class Watch:
             except DeviceTimeout as error:
                 job.finish(None, error)
 
-    def glance(self, device: Device) -> None:
-        """Look at the connection alone, which is memory. On the thread that keeps it."""
+    def check_connection(self, device: Device) -> None:
+        """Check the connection only, which is memory. On the thread that observes it."""
         instance = device.instance
         if instance is not None and not device.closing:
             self._compare(device, instance, None)
 
-    def tell(self, object_id: str, connection: Connection, reason: str = "") -> None:
-        """Tell of an object of which there is no instance that could be looked at."""
+    def report(self, object_id: str, connection: Connection, reason: str = "") -> None:
+        """Report the connection of an object that has no instance."""
         health = Health.FAILURE if connection is Connection.FAILED else Health.NORMAL
         with self._turn:
             found = DeviceChanged(object_id, connection, health, [], None, reason)
             if found != self._known.get(object_id):
                 self._known[object_id] = found
-                self._tell(found)
+                self._post(found)
 
     def _observe(self, device: Device, instance: Generic) -> None:
         before = self._known.get(device.id)
@@ -84,31 +85,33 @@ class Watch:
         moment = time.monotonic()
         if moment - self._inquired.get(device.id, -INQUIRY_PERIOD) >= INQUIRY_PERIOD:
             self._inquired[device.id] = moment
-            alarms = _told(instance.alarms, alarms)
-            owner = _told(instance.control_owner, owner)
-        health = _told(lambda: instance.health, Health.FAILURE)
+            alarms = _value_or(instance.alarms, alarms)
+            owner = _value_or(instance.control_owner, owner)
+        health = _value_or(lambda: instance.health, Health.FAILURE)
         self._compare(device, instance, (health, alarms, owner))
 
-    def _compare(self, device: Device, instance: Generic, asked: tuple[Health, list[Alarm], str | None] | None) -> None:
-        with self._turn:  # the connection is read in here, so that what is told last is what was so last
+    def _compare(
+        self, device: Device, instance: Generic, queried: tuple[Health, list[Alarm], str | None] | None
+    ) -> None:
+        with self._turn:  # the connection is read in here, so that the last report is the last state
             before = self._known.get(device.id)
-            if asked is None:
-                asked = (Health.NORMAL, [], None)
+            if queried is None:
+                queried = (Health.NORMAL, [], None)
                 if before is not None:
-                    asked = (before.health, before.alarms, before.control_owner)
-            connection = _told(lambda: instance.connection, Connection.FAILED)
-            reason = _told(device.connection_reason, "") if connection in _WITH_REASON else ""
+                    queried = (before.health, before.alarms, before.control_owner)
+            connection = _value_or(lambda: instance.connection, Connection.FAILED)
+            reason = _value_or(device.connection_reason, "") if connection in _WITH_REASON else ""
             was = Connection.OFFLINE if before is None else before.connection
             if before is not None and connection is was:
-                reason = before.reason  # that of the loss: what further attempts meet is no news
-            in_the_way = _told(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
-            held = _told(lambda: _held_parts(instance), [])
-            found = DeviceChanged(device.id, connection, *asked, reason, in_the_way, held)
+                reason = before.reason  # that of the loss, not those of further attempts
+            in_the_way = _value_or(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
+            held = _value_or(lambda: _held_parts(instance), [])
+            found = DeviceChanged(device.id, connection, *queried, reason, in_the_way, held)
             if found == before:
                 return
             self._known[device.id] = found
-            self._tell(found)
-        if connection is Connection.LOST and was is not Connection.LOST:
+            self._post(found)
+        if connection is not was and (connection is Connection.LOST or (connection is Connection.FAILED and device.up)):
             self._lost(device, reason)
 
 
@@ -121,9 +124,9 @@ def _held_parts(instance: Generic) -> list[HeldPart]:
     ]
 
 
-def _told(ask: Callable[[], Any], otherwise: Any) -> Any:
-    """Ask; a device that cannot say keeps what was known."""
+def _value_or(query: Callable[[], Any], otherwise: Any) -> Any:
+    """Return the result of a query, or the value known before if the device cannot answer."""
     try:
-        return ask()
-    except Exception:  # noqa: BLE001 - a driver may raise anything; the next look asks again
+        return query()
+    except Exception:  # noqa: BLE001 - a driver may raise anything; the next check queries it again
         return otherwise

@@ -6,8 +6,8 @@ import time
 from typing import Final
 
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, NotInControl, Refused
-from arcor2_hw.runtime.device import OVERTAKES_WITHIN
 from arcor2_hw.runtime.lane import Job
+from arcor2_hw.runtime.methods import OVERTAKES_WITHIN
 from arcor2_hw.testing.bench import Bench, needs
 from arcor2_hw.testing.connecting_cases import DISCONNECTS_WITHIN
 from arcor2_hw.testing.life import SLACK, raised, stays, timed, wait_until

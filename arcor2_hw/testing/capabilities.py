@@ -9,7 +9,7 @@ from arcor2_hw.actions.decorator import is_quick
 from arcor2_hw.analysis import Library
 from arcor2_hw.exceptions import Arcor2NotImplemented
 from arcor2_hw.objects import Axis, Generic
-from arcor2_hw.runtime.device import NO_STOP
+from arcor2_hw.runtime.methods import NO_STOP
 from arcor2_hw.testing import declarations
 
 OURS: Final = "arcor2_hw.objects"

@@ -103,10 +103,11 @@ class Holder:
         return [one for one in self.host.call(OBJ, "report") if not what or one[0] in what]
 
 
-@pytest.fixture(scope="module")
-def hosted() -> Iterator[Holder]:
+@pytest.fixture(scope="module", params=[False, True], ids=["in the cell host", "in its own process"])
+def hosted(request: pytest.FixtureRequest) -> Iterator[Holder]:
     host = HostProcess()
-    host.send(open_scene([type_code("Arm", ARM)], scene_object("arm", "Arm", pose=True)))
+    source = ARM.replace("_ABSTRACT = False", f"_ABSTRACT = False; own_process = {request.param}")
+    host.send(open_scene([type_code("Arm", source)], scene_object("arm", "Arm", pose=True)))
     host.expect(m.SceneOpened)
     yield Holder(host)
     host.end()

@@ -1,8 +1,10 @@
 """One cell host process: its socket, calls, heartbeat and end."""
 
 import asyncio
+import contextlib
 import itertools
 import os
+import signal
 import socket
 from collections.abc import Mapping
 from typing import Any, Final, Protocol, TypeVar, cast
@@ -22,6 +24,8 @@ T = TypeVar("T", bound=m.ToServer)
 COMMAND: Final = ("-P", "-m", "arcor2_hw.runtime.host")
 GOES_WITHIN: Final = 3.0
 """Time limit for a host to end by itself before it is killed, s."""
+DEVICES_END_WITHIN: Final = 2.0
+"""Time limit for the processes of devices to end after their host, before they are killed, s."""
 LAST_WORDS: Final = 0.2
 """Time between the two signs of the end, closed socket and ended process, s."""
 HELD_WITHIN: Final = 15.0
@@ -277,6 +281,12 @@ class CellHost:
             if self._connection.transport is not None:
                 self._connection.transport.abort()
             self.ended.set_result(None)
+            asyncio.get_running_loop().call_later(DEVICES_END_WITHIN, self._kill_rest)
+
+    def _kill_rest(self) -> None:
+        """Kill processes of devices that a C call keeps from ending, which hold the output of the host open."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.pid, signal.SIGKILL)  # the host was the leader of its process group
 
     def _report_end(self, reason: str) -> None:
         if self.reason:

@@ -1,4 +1,4 @@
-"""What the server tells of the world beside the scene's objects: bodies that were put in, calibrations of arms."""
+"""What the server sends about the world next to the scene's objects: added bodies, and calibrations of robots."""
 
 import threading
 from collections.abc import Iterable
@@ -7,8 +7,8 @@ from arcor2_hw.data.robot import KinematicCalibration
 from arcor2_hw.runtime.messages import PutIn
 
 
-class Told:
-    """Told on the reader's thread, looked at on those of robots."""
+class WorldUpdates:
+    """Written on the reader's thread, read on the threads of robots."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -16,18 +16,18 @@ class Told:
         self._calibrations: dict[str, KinematicCalibration] = {}
 
     def put(self, body: PutIn) -> None:
-        """Take in a body, in place of one of its id."""
+        """Add a body, replacing one of the same id."""
         with self._lock:
             self._bodies[body.id] = body
 
     def remove(self, ids: Iterable[str]) -> None:
-        """Forget bodies."""
+        """Remove bodies."""
         with self._lock:
             for key in ids:
                 self._bodies.pop(key, None)
 
     def calibrate(self, object_id: str, calibration: KinematicCalibration | None) -> None:
-        """Take the calibration of a robot, None when it is nominal."""
+        """Set the calibration of a robot; None when its kinematics are nominal."""
         with self._lock:
             if calibration is None:
                 self._calibrations.pop(object_id, None)
@@ -35,11 +35,11 @@ class Told:
                 self._calibrations[object_id] = calibration
 
     def bodies(self) -> dict[str, PutIn]:
-        """Give the bodies as they are now, by id."""
+        """Return the current bodies, by id."""
         with self._lock:
             return dict(self._bodies)
 
     def calibration(self, object_id: str) -> KinematicCalibration | None:
-        """Give what the controller of a robot told of its arm, None when that is not known."""
+        """Return the kinematic calibration that the controller of a robot reported; None when it is unknown."""
         with self._lock:
             return self._calibrations.get(object_id)

@@ -1,0 +1,52 @@
+"""How methods of object types are treated: which only observe, which read memory, which one stops the device."""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from arcor2_hw.objects import Axis, Generic, MultiArmRobot, Robot
+
+OVERTAKES_WITHIN: Final = 0.1
+"""Seconds after the start of a call in which its command may not have reached the device yet."""
+
+NO_STOP: Final = (Robot.stop, MultiArmRobot.stop)
+"""Hooks that only raise the not-implemented error."""
+
+OBSERVING: Final = frozenset(
+    {
+        "alarms",
+        "connection",
+        "control_owner",
+        "forward_kinematics",
+        "get_arm_ids",
+        "get_end_effector_pose",
+        "get_end_effectors_ids",
+        "get_hand_teaching_mode",
+        "grippers",
+        "health",
+        "joint_limits",
+        "max_tcp_speed",
+        "move_in_progress",
+        "robot_joints",
+        "state",
+        "suctions",
+    }
+)
+"""Methods of a robot that are called on its watch lane, so that they are answered while an action runs."""
+
+PLAIN: Final = frozenset(
+    {"id", "name", "settings", "pose", "collision_model", "enabled", "connection", "health", "move_in_progress"}
+)
+"""Properties of the base classes that read memory and do no I/O: they are read on any thread."""
+
+
+def overrides(cls: type[Generic], name: str) -> bool:
+    """Return whether an object type has its own `name`, instead of the one of Generic."""
+    return getattr(cls, name, None) is not getattr(Generic, name)
+
+
+def stop_of(instance: Generic | None) -> Callable[[], Any] | None:
+    """Return the method that stops a device; None when there is none."""
+    if isinstance(instance, Axis):
+        return instance.halt
+    found = getattr(instance, "stop", None)
+    return found if callable(found) and getattr(found, "__func__", None) not in NO_STOP else None
