@@ -1,4 +1,4 @@
-"""Meshes and robots made ready to be shown: fewer triangles, the same looks, read back from the file that is made."""
+"""Tests of prepared meshes and robots: fewer triangles, same appearance, read back from the generated file."""
 
 import io
 import json

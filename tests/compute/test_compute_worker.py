@@ -1,4 +1,4 @@
-"""The workers as the server uses them: started on first use, ended when idle, killed without harm to others."""
+"""Tests of the compute workers: started on first use, stopped when idle, independent of each other."""
 
 import asyncio
 import os

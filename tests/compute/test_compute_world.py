@@ -1,4 +1,4 @@
-"""Kinematics in the worker: the world that it is told of, again after it was killed, and what is asked of it."""
+"""Tests of the kinematics worker: sending the world, also after a restart, and its tasks."""
 
 import asyncio
 import math

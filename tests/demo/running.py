@@ -1,4 +1,4 @@
-"""`arcor2-hw demo` as a process, and the command line beside it, as people use them."""
+"""Tests of `arcor2-hw demo` as a process, and of the command line next to it."""
 
 import asyncio
 import signal

@@ -1,4 +1,4 @@
-"""The demo's markers lie where its world says."""
+"""Tests that the demo's markers are at the positions of its world."""
 
 import msgspec
 

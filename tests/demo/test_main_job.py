@@ -1,4 +1,4 @@
-"""The main job as a newcomer runs it: four readings must agree, each sabotage must tell, and the cell starts again."""
+"""Tests of the demo's main program: four readings agree, each fault is reported, and the cell restarts."""
 
 import asyncio
 import io

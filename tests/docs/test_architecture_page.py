@@ -1,4 +1,4 @@
-"""The files and folders that the page about the architecture names exist, and it names every package."""
+"""Tests that the files and folders on the architecture page exist, and that it names every package."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Runs the tutorials as they stand: writes their files, types their commands, compares what they say is printed."""
+"""Run the tutorials: write their files, run their commands, and compare the output."""
 
 import os
 import re
