@@ -89,7 +89,7 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
             raise ValueError("types names no object type")
         for what, reason in self.not_run.items():
             if len(reason.split()) < 3:
-                raise ValueError(f"not_run: {what} needs an understandable reason, not {reason!r}")
+                raise ValueError(f"not_run: {what} needs a reason in words, not {reason!r}")
         if unknown := set(self.frames) - set(KINDS):
             raise ValueError(f"frames: unknown kind {', '.join(sorted(unknown))}. Available: {', '.join(KINDS)}")
 

@@ -154,7 +154,7 @@ async def test_a_robot_is_found_by_what_the_camera_sees_of_it(world: World) -> N
         millimetres, degrees = off(await world.placed("arm"), ROBOT)
         assert millimetres < 2.5
         assert degrees < 0.2
-        assert message.startswith("arm stands")
+        assert message.startswith("arm is ")
         (record, *_) = (await world.http.get("/api/calibrations", params={"object_id": world.ids["arm"]})).json()
         assert record["kind"] == "robot_pose"
         assert record["parameters"]["camera_name"] == "cam"

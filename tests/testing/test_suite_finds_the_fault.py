@@ -116,7 +116,7 @@ def test_a_reason_for_what_can_be_run_is_refused(tmp_path: Path) -> None:
     [
         ("outputs_on_loss: off", "outputs_on_loss: maybe", "outputs_on_loss"),
         ("limits: []", "limit: []", "unknown field `limit`"),
-        ("level: silver", "not_run: {loss_reaction: because}", "not_run: loss_reaction needs a reason"),
+        ("level: silver", "not_run: {loss_reaction: because}", "not_run: loss_reaction needs a reason in words"),
         ("level: silver", "level: best", "level"),
         ("level: silver", "frames: {morse: []}", "unknown kind morse"),
         ("types: [ToyPress, BrokenPress]", "types: [Other]", "types does not name ToyPress"),

@@ -208,7 +208,7 @@ def test_a_running_server_is_told_and_asked(files: Path, tmp_path: Path, calibra
             assert (ran.status, "cam is still as calibrated" in ran.out, "1.5 mm" in ran.out) == (0, True, True)
             ran = calibrate("online", "check", "cam", "--pose", far, "--record", kept["id"], *url)
             assert (ran.status, ran.out) == (ExitStatus.DIFFERENT, "")
-            assert "cam is 10.0 mm" in ran.err
+            assert "cam differs by 10.0 mm" in ran.err
             ran = calibrate("online", "check", "cam", "--pose", far, "--distance", "0.011", *url)
             assert ran.status == 0
             for words, status in (
