@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser, expect
+from playwright.async_api import Browser, Route, expect
 
 from arcor2_hw.data.role import Role
 from arcor2_server.access.tokens import TokenFile
@@ -81,6 +81,13 @@ async def test_name_in_use_is_refused_and_returning_users_join_by_one_tap(
             if screen is one:
                 await home(one)
         await two.sees("The user name 'Adam' is already in use.")
+        loading = asyncio.Event()
+
+        async def load(route: Route) -> None:
+            await loading.wait()
+            await route.continue_()
+
+        await two.page.route("**/assets/menu-*.js", load)
         await two.page.get_by_label(texts.YOUR_NAME).fill("Berta")
         await two.press(texts.JOIN)
         await home(two)
@@ -88,6 +95,7 @@ async def test_name_in_use_is_refused_and_returning_users_join_by_one_tap(
         assert await one.page.get_by_role("img", name="Adam (you)").is_visible()
         # On a shared tablet, returning users join with one tap.
         await two.press(texts.SETTINGS)
+        loading.set()  # a menu that was asked for before it is loaded opens, too
         await two.page.get_by_role("menuitem", name="Leave (you are Berta)").click()
         people = two.page.get_by_role("group", name="Recent users")
         assert await people.get_by_role("button").all_inner_texts() == ["Berta"]  # not the refused name

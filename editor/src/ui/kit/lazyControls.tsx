@@ -1,6 +1,6 @@
 /** Dialogs and menus whose code is loaded when it is needed. */
 
-import { Suspense } from "react";
+import { Suspense, useState } from "react";
 import { Button } from "./kit";
 import { lazyComponent } from "./lazy";
 import type { AskNameProps, ConfirmProps, MoreProps } from "./props";
@@ -27,18 +27,19 @@ export function AskName(props: AskNameProps) {
   );
 }
 
-/** A button that opens a menu. */
+/** A button that opens a menu; if it is pressed before the menu is loaded, the menu opens as soon as it is. */
 export function More(props: MoreProps) {
   const { label, icon = "more", children, look = "plain" } = props;
+  const [pressed, setPressed] = useState(false);
   return (
     <Suspense
       fallback={
-        <Button look={look} icon={icon} aria-label={label}>
+        <Button look={look} icon={icon} aria-label={label} onPressStart={() => setPressed(true)}>
           {children}
         </Button>
       }
     >
-      <MoreMenu {...props} />
+      <MoreMenu {...props} defaultOpen={pressed} />
     </Suspense>
   );
 }

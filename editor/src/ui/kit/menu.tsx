@@ -5,10 +5,21 @@ import { Icon } from "./icons";
 import { Button } from "./kit";
 import type { MoreProps } from "./props";
 
-export default function MoreMenu({ label, choices, icon = "more", children, look = "plain" }: MoreProps) {
+interface MoreMenuProps extends MoreProps {
+  defaultOpen: boolean;
+}
+
+export default function MoreMenu({
+  label,
+  choices,
+  icon = "more",
+  children,
+  look = "plain",
+  defaultOpen,
+}: MoreMenuProps) {
   const whyUnavailable = choices.filter((each) => each.not).map((each) => each.id);
   return (
-    <MenuTrigger>
+    <MenuTrigger defaultOpen={defaultOpen}>
       <Button look={look} icon={icon} aria-label={label}>
         {children}
       </Button>
