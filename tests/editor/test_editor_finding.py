@@ -224,10 +224,10 @@ async def test_selection_out_of_view_is_found_and_objects_are_faded(place: Place
 
         # Other kinds fade and objects become transparent, in the drawn picture, too.
         await _tool(screen, texts.OBJECTS)
-        assert await page.evaluate("__engine.ties.count") == 0
+        assert await page.evaluate("__engine.parentLines.count") == 0
         await page.get_by_text("Lines from points to their parents").click()
         hanging = sum(1 for each in place.project.action_points if each.parent)
-        await screen.until("count => __engine.ties.count === count", hanging)
+        await screen.until("count => __engine.parentLines.count === count", hanging)
         await page.evaluate("__engine.view.look('top')")
         opaque = await _colour_of(screen, table)
         await page.get_by_role("slider", name="Transparency of objects").press("End")

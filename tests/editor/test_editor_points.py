@@ -179,7 +179,7 @@ async def test_point_by_numbers_gets_a_parent_without_moving(place: Place) -> No
     point = await place.new_point(before)
     assert tuple(point.position) == pytest.approx((0.4, -0.1, 0.25))
     tester = next(each for each in place.scene.objects if each.name == "tester")
-    await page.get_by_label("Parent").select_option("tester")
+    await page.get_by_role("combobox", name="Parent").select_option("tester")
     hung = await place.point(point.name, lambda each: each.parent == tester.id)
     assert tuple(hung.position) == pytest.approx((-0.1, -0.25, 0.2))  # relative to its parent now
     drawn = (await place.screen.item(point.id))["pose"]["position"]
