@@ -34,16 +34,16 @@ async def shared_cell(tmp_path_factory: pytest.TempPathFactory, built_editor: Pa
 
 
 @pytest_asyncio.fixture(loop_scope="session")
-async def cell(shared_cell: Cell) -> AsyncIterator[Cell]:
+async def cell(shared_cell: Cell, browser: Browser) -> AsyncIterator[Cell]:
     """The shared workplace, reset for this test. Its clients are closed afterwards."""
-    await reset(shared_cell)
+    await reset(shared_cell, browser)
     yield shared_cell
     await shared_cell.close_clients()
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
-async def module_cell(shared_cell: Cell) -> AsyncIterator[Cell]:
+async def module_cell(shared_cell: Cell, browser: Browser) -> AsyncIterator[Cell]:
     """The shared workplace, reset once for a module whose tests share an open document."""
-    await reset(shared_cell)
+    await reset(shared_cell, browser)
     yield shared_cell
     await shared_cell.close_clients()

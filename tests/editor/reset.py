@@ -5,6 +5,7 @@ from functools import partial
 from typing import Final
 
 import httpx
+from playwright.async_api import Browser
 
 from arcor2_hw.client import Client, RequestFailed
 from arcor2_hw.data import rpc
@@ -16,12 +17,14 @@ START: Final = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 """Joints of the robot at the start of a test, rad."""
 
 
-async def reset(cell: Cell) -> None:
+async def reset(cell: Cell, browser: Browser) -> None:
     """Close and delete all documents and packages, clear the users' settings, and clear all faults.
 
     The record of runs cannot be deleted: after a run, and after a test that stopped the server, the server is started
-    again on an empty data directory.
+    again on an empty data directory. The screens of a test that its time limit cut off are still open: they are closed.
     """
+    for context in browser.contexts:
+        await context.close()
     await cell.close_clients()
     if cell.children["server"].ended or await _has_runs(cell):
         await cell.renew_server()
@@ -52,28 +55,27 @@ async def _has_runs(cell: Cell) -> bool:
 
 async def _empty(cell: Cell) -> None:
     async with Client(cell.url, "reset", reconnect=False) as client:
-        await until(partial(_is_empty, client), "all documents and packages are deleted", 30)
+        await until(partial(_is_empty, client), "all documents are closed, and deleted with all packages", 30)
         uploaded = {each.type for each in await client.get_object_types() if not each.built_in}
         if uploaded:
             await client.delete_object_types(uploaded)
         await _clear_views(client, ViewScope.SHARED)
     for user in sorted(USERS):
-        async with Client(cell.url, user, reconnect=False) as client:
-            await _clear_views(client, ViewScope.USER)
+        await until(partial(_is_forgotten, cell, user), f"{user} has left, and the user's settings are cleared", 30)
     async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as rest:
         (await rest.put("/api/calibration/markers", json={})).raise_for_status()
 
 
 async def _is_empty(client: Client) -> bool:
     """Stop, close and delete everything that can be now, and return whether nothing is left."""
-    for end in (
-        client.stop_package,
-        client.stop_scene,
-        partial(client.close_project, force=True),
-        partial(client.close_scene, force=True),
-    ):
+    for end in (client.stop_package, client.stop_scene, partial(client.close_project, force=True)):
         with contextlib.suppress(RequestFailed):
             await end()
+    closed = False  # a new scene that was never saved is open, but not listed
+    try:
+        await client.close_scene(force=True)
+    except RequestFailed as refusal:
+        closed = str(refusal).startswith("No scene is open")
     for holder in await client.list_locks():
         if holder.left:
             with contextlib.suppress(RequestFailed):
@@ -86,7 +88,19 @@ async def _is_empty(client: Client) -> bool:
             await client.delete_project(project.id)
         for scene in scenes:
             await client.delete_scene(scene.id)
-    return not (packages or projects or scenes)
+    return closed and not (packages or projects or scenes)
+
+
+async def _is_forgotten(cell: Cell, user: str) -> bool:
+    """Clear the settings of a user and return True; False while the user is connected."""
+    try:
+        async with Client(cell.url, user, reconnect=False) as client:
+            await _clear_views(client, ViewScope.USER)
+    except RequestFailed as refusal:
+        if "is already in use" not in str(refusal):
+            raise
+        return False
+    return True
 
 
 async def _clear_views(client: Client, scope: ViewScope) -> None:

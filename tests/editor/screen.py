@@ -4,7 +4,7 @@ import contextlib
 import os
 import shutil
 from base64 import b64encode
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -150,11 +150,11 @@ class Screen:
         """Return which controls are too small, off the screen, covered or overlapping."""
         return list(await self.page.evaluate(_LAYOUT, SMALLEST))
 
-    async def faults_with_any_font(self) -> list[str]:
-        """Return the faults with a narrow and with a wide font, so that they do not depend on the machine's fonts."""
+    async def faults_with(self, fonts: Iterable[str]) -> list[str]:
+        """Return the faults with each of these fonts, so that they do not depend on the machine's fonts."""
         found = []
-        for name, stretch in FONTS.items():
-            await self._use_font(name, stretch)
+        for name in fonts:
+            await self._use_font(name, FONTS[name])
             found += [f"{fault} ({name} font)" for fault in await self.faults()]
         await self._use_font("", "")
         return found

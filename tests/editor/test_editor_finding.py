@@ -17,7 +17,7 @@ from arcor2_hw.data.project import ActionPoint, Project
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, until
 from tests.editor import texts
-from tests.editor.screen import VIEWPORTS, Screen, screen_of
+from tests.editor.screen import FONTS, VIEWPORTS, Screen, screen_of
 
 pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(120)]
 
@@ -263,7 +263,7 @@ async def test_selection_out_of_view_is_found_and_objects_are_faded(place: Place
                 await page.evaluate("([from, to]) => __engine.view.set(from, to)", away)
                 await arrow.wait_for()
                 await screen.settle()
-                assert not await screen.faults_with_any_font(), (size, away)
+                assert not await screen.faults_with(FONTS), (size, away)
         await arrow.click()
         await arrow.wait_for(state="detached")
         assert (await screen.item(point.id))["visible"]

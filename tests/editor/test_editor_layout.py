@@ -1,10 +1,11 @@
-"""Layout of every screen in all sizes, light and dark, with large text, a narrow and a wide font.
+"""Layout of every screen in all sizes, light and dark, with large text, a wide font, and in two sizes a narrow one.
 
 Controls that are too small, covered, off the screen or overlapping are searched for in all sizes, accessibility
 violations (axe) once in light and once in dark.
 """
 
 from collections.abc import AsyncIterator, Iterable
+from contextlib import asynccontextmanager
 
 import pytest
 import pytest_asyncio
@@ -13,9 +14,9 @@ from playwright.async_api import Browser
 from arcor2_hw.data.project import Project
 from tests.e2e.harness import Cell
 from tests.editor import texts
-from tests.editor.screen import VIEWPORTS, Screen, screen_of
+from tests.editor.screen import FONTS, VIEWPORTS, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(240)]
 
 
 @pytest_asyncio.fixture(loop_scope="session")
@@ -32,12 +33,12 @@ FEW = ("phone", "tablet")
 
 
 class Looks:
-    """Collects the faults of each screen."""
+    """Collects the faults of each screen, of one in dark colours and of the next in light ones."""
 
-    def __init__(self, screen: Screen) -> None:
+    def __init__(self, screen: Screen, *, dark: bool = True) -> None:
         self.screen = screen
         self.found: dict[str, list[str]] = {}
-        self._dark = False
+        self._dark = not dark
 
     async def at(self, what: str, sizes: Iterable[str] = VIEWPORTS) -> None:
         """Check the screen in every size, or in these."""
@@ -47,7 +48,8 @@ class Looks:
         for name in sizes:
             await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
             await self.screen.settle()
-            await self._note(f"{what}, {name}", await self.screen.faults_with_any_font())
+            fonts = FONTS if name in FEW else ("wide",)
+            await self._note(f"{what}, {name}", await self.screen.faults_with(fonts))
             await self.screen.picture(f"{what} {name}{' dark' if self._dark else ''}")
         await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
         await self.screen.settle()
@@ -58,7 +60,7 @@ class Looks:
         page = self.screen.page
         await page.evaluate("() => { document.documentElement.style.fontSize = '200%'; }")
         await self.screen.settle()
-        await self._note(f"{what}, large text", await self.screen.faults_with_any_font())
+        await self._note(f"{what}, large text", await self.screen.faults_with(FONTS))
         await self.screen.picture(f"{what} large text")
         await page.evaluate("() => { document.documentElement.style.fontSize = ''; }")
 
@@ -76,6 +78,11 @@ async def at_the_project(screen: Screen, name: str, project: Project) -> None:
     if await screen.until("() => document.querySelector('.home, .workplace')?.className") == "home":
         await screen.press(texts.open_document(project.name))
     await screen.item(project.action_points[0].id)
+
+
+async def open_tool(screen: Screen, name: str) -> None:
+    await screen.page.get_by_role("navigation").get_by_role("button").filter(has_text=name).click()
+    await screen.page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
 
 
 async def test_join_and_home(cell: Cell, project: Project, browser: Browser) -> None:
@@ -104,31 +111,47 @@ async def test_join_and_home(cell: Cell, project: Project, browser: Browser) -> 
         assert not looks.found, looks.told()
 
 
-async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> None:
+@asynccontextmanager
+async def at_work(cell: Cell, project: Project, browser: Browser, *, dark: bool) -> AsyncIterator[tuple[Screen, Looks]]:
+    """Open the project on a tablet. `dark`: colours of the first screen. Fails at the end if the layout had faults."""
     async with screen_of(browser, cell.url, touch=True) as screen:
-        looks = Looks(screen)
-        page = screen.page
-        await screen.join("Adam")
-        await screen.press(texts.open_document(project.name))
-        await screen.item(project.action_points[0].id)
+        await at_the_project(screen, "Adam", project)
+        looks = Looks(screen, dark=dark)
+        yield screen, looks
+        assert not looks.found, looks.told()
+
+
+async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> None:
+    async with at_work(cell, project, browser, dark=True) as (_, looks):
         await looks.at("workplace")
         await looks.with_large_text("workplace")
-        tools = page.get_by_role("navigation").get_by_role("button")
+
+
+async def test_the_tools(cell: Cell, project: Project, browser: Browser) -> None:
+    async with at_work(cell, project, browser, dark=False) as (screen, looks):
         for name in texts.TOOLS:
-            await tools.filter(has_text=name).click()
-            await page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
+            await open_tool(screen, name)
             await looks.at(name.lower(), FEW)
-        await tools.filter(has_text=texts.OBJECTS).click()
+
+
+async def test_the_selection(cell: Cell, project: Project, browser: Browser) -> None:
+    async with at_work(cell, project, browser, dark=False) as (screen, looks):
+        page = screen.page
         action = project.action_points[0].actions[0].name
         point = project.action_points[0].name
         for name, kind, what in ((point, "Action point", "point"), (action, "Action", "action")):
+            await open_tool(screen, texts.OBJECTS)
             await page.get_by_role("row", name=f"{name} {kind}", exact=True).click()
             await page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
             await page.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
             await looks.at(f"{what} selected", FEW)
             await screen.press(texts.CLOSE_PANEL)
-            await tools.filter(has_text=texts.OBJECTS).click()
-        await screen.press(texts.CLOSE_PANEL)
+
+
+async def test_search_and_views(cell: Cell, project: Project, browser: Browser) -> None:
+    async with at_work(cell, project, browser, dark=False) as (screen, looks):
+        page = screen.page
+        action = project.action_points[0].actions[0].name
         # Search by name.
         await page.keyboard.press("/")
         search = page.get_by_role("dialog", name="Find a command or an object")
@@ -144,10 +167,23 @@ async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> 
             await page.get_by_role("radio", name=name, exact=True).click()
             await screen.settle()
             await looks.at(f"shown as {name}", FEW)
+
+
+async def test_online(cell: Cell, project: Project, browser: Browser) -> None:
+    async with at_work(cell, project, browser, dark=False) as (screen, looks):
+        page = screen.page
         await screen.press(texts.GO_ONLINE)
         await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=60_000)
-        await tools.filter(has_text=texts.ROBOT).click()
+        await open_tool(screen, texts.ROBOT)
         await looks.at("online")
+
+
+async def test_left_handed_controls(cell: Cell, project: Project, browser: Browser) -> None:
+    async with at_work(cell, project, browser, dark=True) as (screen, looks):
+        page = screen.page
+        await screen.press(texts.GO_ONLINE)
+        await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=60_000)
+        await open_tool(screen, texts.ROBOT)
         await screen.press(texts.SETTINGS)
         await page.get_by_role("menuitem", name="Left-handed controls").click()
         await looks.at("left hand")
@@ -158,7 +194,6 @@ async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> 
         await page.get_by_role("button", name=texts.SMALLER_PANEL).click(trial=True)
         await page.get_by_role("button", name=texts.STOP_MOTION).click(trial=True)
         await page.get_by_role("button", name="Views", exact=True).click(trial=True)
-        assert not looks.found, looks.told()
 
 
 async def test_reduced_motion_stops_animations(cell: Cell, project: Project, browser: Browser) -> None:
