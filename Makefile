@@ -17,18 +17,15 @@ unexport PYTHONDONTWRITEBYTECODE
 run: .make/run .make/editor
 	$(BIN)/arcor2-hw demo $(ARGS)
 
-# The files with tests that need the machine to themselves: to collect all others again would take 10 s.
+# Only these files are collected for the second run: collecting all of them takes 10 s.
 ALONE = $(shell grep -rl --include='test_*.py' mark.alone tests)
 
-# Tests wait for devices most of the time, so three at once suit two cores. A module, or one driver's conformance,
-# stays in one process and shares its fake. What fails beside others, where times of a tenth of a second are hard to keep,
-# is tried once more with the machine to itself, as the whole cell is, a dozen processes; both outcomes are shown.
+# Tests mostly wait for simulated devices, so three workers suit two cores. Tests marked `alone` start a dozen processes
+# each and run afterwards, in two workers. Exit code 5 means that no test was selected, as ARGS may select only one kind.
 test: .make/dev .make/editor .make/browser
 	$(BIN)/python editor/build.py test
-	$(BIN)/python -m pytest --numprocesses 3 --dist loadgroup --no-loadscope-reorder -m "not alone" $(ARGS) || test $$? = 5 || \
-	$(BIN)/python -m pytest --once-more -m "not alone" $(ARGS)
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m alone $(or $(ARGS),$(ALONE)) || test $$? = 5 || \
-	$(BIN)/python -m pytest --once-more -m alone $(or $(ARGS),$(ALONE))
+	$(BIN)/python -m pytest --numprocesses 3 --dist loadgroup --no-loadscope-reorder -m "not alone" $(ARGS) || test $$? = 5
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m alone $(or $(ARGS),$(ALONE)) || test $$? = 5
 
 bench: .make/dev
 	$(BIN)/python -m benchmarks $(ARGS)
