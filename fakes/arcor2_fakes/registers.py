@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-from arcor2_fakes.control import ControlServer, parse_address
-from arcor2_fakes.process import announce, run, until_told_to_end
 from arcor2_fakes.serial_line import Line, PtyLine, TcpLine
-from arcor2_fakes.wire import Connection, TcpWire, register_faults
+from arcor2_fakes.serving import Fake, Wire, address_of
+from arcor2_fakes.serving import serve as run_fake
+from arcor2_fakes.wire import Connection, TcpWire
 
 READ_INPUT, WRITE_ONE, WRITE_SEVERAL = 4, 6, 16
 MAX_LINE = 4096
@@ -277,49 +276,25 @@ def serve(
     parser.add_argument("--port", type=int, default=0, help="0 takes a free one")
     parser.add_argument("--control", default="127.0.0.1:0", help="HOST:PORT of the control channel")
     options = parser.parse_args()
-    try:
-        control_host, control_port = parse_address(options.control)
-    except ValueError as e:
-        sys.stderr.write(f"{name}: {e}\n")
-        return 2
 
-    async def body() -> None:
+    async def body(fake: Fake) -> None:
         device = make()
-        channel = ControlServer(control_host, control_port)
-        folder = tempfile.TemporaryDirectory(prefix="arcor2-fake-")
-        line: Line | None = None
-        wire: TcpWire | None = None
-        if bus in ("serial", "tcp"):
-            link = Path(folder.name) / f"tty-{name}" if bus == "serial" else None
-            line = text_line(device, answer or answer_line, options.host, options.port, link)
-            await line.plug()
-            register_faults(channel, {"wire": line})
+        wire: Wire
+        if bus == "modbus":
+            wire = modbus_wire(device, options.host, options.port)
+        elif bus == "http":
+            wire = http_wire(device, answer or answer_http, options.host, options.port)
         else:
-            wire = (
-                modbus_wire(device, options.host, options.port)
-                if bus == "modbus"
-                else http_wire(device, answer or answer_http, options.host, options.port)
-            )
-            await wire.listen()
-            register_faults(channel, {"wire": wire})
-        channel.source("truth", lambda: truth(device) | {"written": device.written})
-        for command, act in commands(device).items():
-            channel.command(command, act)
-        try:
-            address = (
-                line.port.removeprefix("socket://") if line is not None else wire.address if wire is not None else ""
-            )
-            announce(name=name, address=address, control=await channel.start())
-            await until_told_to_end()
-        finally:
-            if line is not None:
-                await line.unplug()
-            if wire is not None:
-                wire.close()
-            await channel.close()
-            folder.cleanup()
+            folder = tempfile.TemporaryDirectory(prefix="arcor2-fake-")
+            fake.at_end(folder.cleanup)
+            link = Path(folder.name) / f"tty-{name}" if bus == "serial" else None
+            wire = text_line(device, answer or answer_line, options.host, options.port, link)
+        fake.wires(wire=wire)
+        fake.truth(lambda: truth(device) | {"written": device.written})
+        fake.commands(**commands(device))
+        await fake.run(address=lambda: address_of(wire).removeprefix("socket://"))
 
-    return run(body, name)
+    return run_fake(name, options.control, body)
 
 
 def serve_device(name: str, make: Callable[[], Device], bus: str, *commands: str) -> int:

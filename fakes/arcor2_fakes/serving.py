@@ -1,9 +1,10 @@
 """The process of a fake: its wires, its control channel, its ready line and its end."""
 
+import asyncio
 import contextlib
 import inspect
 import sys
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from arcor2_fakes.control import ControlServer, Handler, parse_address
@@ -35,13 +36,46 @@ class Fake:
         """Call a function, which may be a coroutine function, when the fake ends."""
         self._ends.append(call)
 
-    def wires(self, checked: tuple[str, ...] = (), **wires: Wire) -> None:
+    def simulate(self, advance: Callable[[float], object], period: float) -> None:
+        """Call `advance` every `period` s with the time since its last call, s, until the fake ends."""
+
+        async def repeat() -> None:
+            loop = asyncio.get_running_loop()
+            last = loop.time()
+            while True:
+                await asyncio.sleep(period)
+                now = loop.time()
+                advance(now - last)
+                last = now
+
+        self.background(repeat())
+
+    def background(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run a coroutine until the fake ends."""
+        task = asyncio.create_task(work)
+
+        async def end() -> None:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+        self.at_end(end)
+
+    def wires(self, checked: tuple[str, ...] = (), /, **wires: Wire) -> None:
         """Serve on wires, and register their faults; `checked` names those whose frames end in a checksum."""
         self._wires |= wires
         register_faults(self.channel, dict(wires), checked)
 
-    def line(self, line: Line, unplugged: Callable[[], object] = lambda: None, name: str = "serial") -> None:
-        """Serve on a serial line that the control channel can plug and unplug."""
+    def line(
+        self, line: Line, unplugged: Callable[[], object] = lambda: None, name: str = "serial", checked: bool = False
+    ) -> None:
+        """Serve on a serial line that the control channel can plug and unplug.
+
+        Args:
+            line: The line.
+            unplugged: Called when the line was unplugged.
+            name: Name of the line in the commands for faults.
+            checked: Whether its frames end in a checksum.
+        """
 
         async def plug() -> str:
             await line.plug()
@@ -51,19 +85,24 @@ class Fake:
             await line.unplug()
             unplugged()
 
-        self._wires[name] = line
-        register_faults(self.channel, {name: line})
+        self.wires((name,) if checked else (), **{name: line})
         self.commands(plug=plug, unplug=unplug)
+
+    def reset_wires(self) -> None:
+        """Break every TCP connection."""
+        for wire in self._wires.values():
+            if isinstance(wire, TcpWire):
+                wire.reset()
 
     async def run(self, **addresses: Wire | Callable[[], object]) -> None:
         """Open the wires, print the ready line, and return when the fake is told to end.
 
         Args:
-            addresses: What the ready line says: the address of a wire, or the value of a function.
+            addresses: Contents of the ready line: the address of a wire, or the value of a function.
         """
         for wire in self._wires.values():
             await (wire.listen() if isinstance(wire, TcpWire) else wire.plug())
-        shown = {name: _address(each) for name, each in addresses.items()}
+        shown = {name: each() if callable(each) else address_of(each) for name, each in addresses.items()}
         announce(name=self.name, **shown, control=await self.channel.start())
         await until_told_to_end()
 
@@ -82,10 +121,9 @@ class Fake:
         await self.channel.close()
 
 
-def _address(of: Wire | Callable[[], object]) -> object:
-    if isinstance(of, TcpWire):
-        return of.address
-    return of() if callable(of) else of.port
+def address_of(wire: Wire) -> str:
+    """Return HOST:PORT of a TCP port; the path or URL of a serial line."""
+    return wire.address if isinstance(wire, TcpWire) else wire.port
 
 
 def serve(

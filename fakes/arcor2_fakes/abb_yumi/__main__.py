@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import sys
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from cyclopts import App, Parameter, validators
@@ -14,16 +13,15 @@ from arcor2_fakes.abb_yumi.controller import TASKS, Controller
 from arcor2_fakes.abb_yumi.http_port import HttpPort
 from arcor2_fakes.abb_yumi.motion_server import MotionServer
 from arcor2_fakes.abb_yumi.services import Services
-from arcor2_fakes.control import ControlServer, parse_address
-from arcor2_fakes.process import announce, run, until_told_to_end
-from arcor2_fakes.wire import TcpWire, register_faults
+from arcor2_fakes.serving import Fake, serve
+from arcor2_fakes.wire import TcpWire
 
 _TICK = 0.004  # s
 
 app = App(name="arcor2_fakes.abb_yumi", help="Fake ABB YuMi: RWS 1.0 and a motion server per arm.", version_flags=[])
 
 
-def register_commands(control: ControlServer, controller: Controller, http: HttpPort) -> None:
+def register_commands(fake: Fake, controller: Controller, http: HttpPort) -> None:
     """Register the commands of the control channel."""
 
     def arm_of(arm: str) -> str:
@@ -60,30 +58,27 @@ def register_commands(control: ControlServer, controller: Controller, http: Http
             body.hand = Hand()
             body.place(body.kinematics.home)
 
-    control.command("renew", renew)
-    control.command("place", place)
-    control.command("part", part)
-    control.command("speed_ratio", speed_ratio)
-    control.command("control_state", lambda state: controller.set_control_state(state))
-    control.command("operation_mode", lambda mode: controller.set_operation_mode(mode))
-    control.command("mastership_held", controller.hold_mastership)
-    control.command("foreign_program", controller.foreign_program)
-    control.command("rapid_error", controller.rapid_error)
-    control.command("collide", lambda arm: controller.collide(arm_of(arm)))
+    def power_cycle() -> None:
+        """Switch the controller off and on: sessions and connections end, the motors are off."""
+        http.end_all()
+        controller.stop()
+        controller.hold_mastership(False)
+        controller.set_control_state("motoroff")
+        fake.reset_wires()
 
-
-async def live(controller: Controller, servers: list[MotionServer], http: HttpPort) -> None:
-    """Advance the simulation."""
-    loop = asyncio.get_running_loop()
-    last = loop.time()
-    while True:
-        await asyncio.sleep(_TICK)
-        now = loop.time()
-        controller.advance(now - last)
-        last = now
-        for server in servers:
-            server.tick()
-        http.expire()
+    fake.commands(
+        renew=renew,
+        power_cycle=power_cycle,
+        place=place,
+        part=part,
+        speed_ratio=speed_ratio,
+        control_state=lambda state: controller.set_control_state(state),
+        operation_mode=lambda mode: controller.set_operation_mode(mode),
+        mastership_held=controller.hold_mastership,
+        foreign_program=controller.foreign_program,
+        rapid_error=controller.rapid_error,
+        collide=lambda arm: controller.collide(arm_of(arm)),
+    )
 
 
 @app.default
@@ -110,13 +105,8 @@ def main(
         control: HOST:PORT of the control channel; port 0 takes a free one.
         time_scale: Speed of the simulation; 1 is real time.
     """
-    try:
-        control_address = parse_address(control)
-    except ValueError as e:
-        sys.stderr.write(f"abb_yumi: {e}\n")
-        return 2
 
-    async def body() -> None:
+    async def body(fake: Fake) -> None:
         controller = Controller(time_scale)
         http = HttpPort(user, password, Services(controller).handle, controller.session_ended)
         servers = {name: MotionServer(controller, name) for name in TASKS}
@@ -129,39 +119,21 @@ def main(
                 f"{name}_watch": TcpWire(f"{name}_watch", host, port + 1, server.opened_watch),
             }
             wires |= server.wires
-        channel = ControlServer(*control_address)
-        register_faults(channel, dict(wires))
-        register_commands(channel, controller, http)
 
-        def power_cycle() -> None:
-            """Switch the controller off and on: sessions and connections end, the motors are off."""
-            http.end_all()
-            controller.stop()
-            controller.hold_mastership(False)
-            controller.set_control_state("motoroff")
-            for wire in wires.values():
-                wire.reset()
+        def advance(seconds: float) -> None:
+            controller.advance(seconds)
+            for server in servers.values():
+                server.tick()
+            http.expire()
 
-        channel.command("power_cycle", power_cycle)
+        register_commands(fake, controller, http)
+        fake.commands(stops=lambda: {name: list(server.stops_taken) for name, server in servers.items()})
+        fake.wires(**wires)
+        fake.truth(lambda: controller.truth() | {"requests": http.requests})
+        fake.simulate(advance, _TICK)
+        await fake.run(**wires, host=lambda: host)
 
-        def truth() -> dict[str, Any]:
-            return controller.truth() | {"requests": http.requests}
-
-        channel.source("truth", truth)
-        channel.command("stops", lambda: {name: list(server.stops_taken) for name, server in servers.items()})
-        addresses = {name: await wire.listen() for name, wire in wires.items()}
-        life = asyncio.create_task(live(controller, list(servers.values()), http))
-        try:
-            announce(name="abb_yumi", host=host, control=await channel.start(), **addresses)
-            await until_told_to_end()
-        finally:
-            life.cancel()
-            await asyncio.gather(life, return_exceptions=True)
-            for wire in wires.values():
-                wire.close()
-            await channel.close()
-
-    return run(body, "abb_yumi")
+    return serve("abb_yumi", control, body)
 
 
 if __name__ == "__main__":

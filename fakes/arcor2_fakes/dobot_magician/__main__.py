@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import asyncio
 import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import App, Parameter, validators
 
-from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.dobot_magician.arm import Arm
 from arcor2_fakes.dobot_magician.commands import Commands
-from arcor2_fakes.process import announce, run, until_told_to_end
 from arcor2_fakes.serial_line import PtyLine
-from arcor2_fakes.wire import register_faults
+from arcor2_fakes.serving import Fake, serve
 
 _TICK = 0.005  # s
 JOINT_TO_ANGLES = 4
@@ -23,7 +20,7 @@ JOINT_TO_ANGLES = 4
 app = App(name="arcor2_fakes.dobot_magician", help="Fake Dobot Magician on a pty.", version_flags=[])
 
 
-def register_commands(control: ControlServer, arm: Arm, commands: Commands) -> None:
+def register_commands(fake: Fake, arm: Arm, commands: Commands) -> None:
     """Register the commands of the control channel."""
 
     def alarm(code: int) -> None:
@@ -51,31 +48,21 @@ def register_commands(control: ControlServer, arm: Arm, commands: Commands) -> N
         arm.enqueue(lambda: arm.point_to_point(JOINT_TO_ANGLES, target))
         arm.running = True
 
-    control.command("renew", renew)
-
     def pace(factor: float) -> None:
         if not 0.0 < factor <= 100.0:
             raise ValueError("factor is above 0, to 100")
         arm.pace = float(factor)
 
-    control.command("drive", drive)
-    control.command("pace", pace)
-    control.command("alarm", alarm)
-    control.command("wrong_checksum", wrong_checksum)
-    control.command("mute", mute)
-    control.command("stops", lambda: list(commands.stops))
-    control.command("power_cycle", arm.power_cycle)
-
-
-async def live(arm: Arm) -> None:
-    """Advance the simulation."""
-    loop = asyncio.get_running_loop()
-    last = loop.time()
-    while True:
-        await asyncio.sleep(_TICK)
-        now = loop.time()
-        arm.advance(now - last)
-        last = now
+    fake.commands(
+        renew=renew,
+        drive=drive,
+        pace=pace,
+        alarm=alarm,
+        wrong_checksum=wrong_checksum,
+        mute=mute,
+        stops=lambda: list(commands.stops),
+        power_cycle=arm.power_cycle,
+    )
 
 
 @app.default
@@ -94,46 +81,22 @@ def main(
         control: HOST:PORT of the control channel; port 0 takes a free one.
         pace: Speed of the simulation; 1 is real time.
     """
-    try:
-        control_address = parse_address(control)
-    except ValueError as e:
-        sys.stderr.write(f"dobot_magician: {e}\n")
-        return 2
 
-    async def body() -> None:
+    async def body(fake: Fake) -> None:
         arm = Arm(pace)
         commands = Commands(arm, lambda frame: line.send(frame))
         line = PtyLine(commands.feed, link)
 
-        async def plug() -> str:
-            await line.plug()
-            return line.port
-
-        async def unplug() -> None:
-            await line.unplug()
-            commands.drop_input()
-
         def truth() -> dict[str, Any]:
             return arm.truth() | {"plugged": line.plugged, "port": line.port, "received": list(commands.received)}
 
-        channel = ControlServer(*control_address)
-        register_commands(channel, arm, commands)
-        register_faults(channel, {"serial": line})
-        channel.command("plug", plug)
-        channel.command("unplug", unplug)
-        channel.source("truth", truth)
-        await line.plug()
-        life = asyncio.create_task(live(arm))
-        try:
-            announce(name="dobot_magician", port=line.port, control=await channel.start())
-            await until_told_to_end()
-        finally:
-            life.cancel()
-            await asyncio.gather(life, return_exceptions=True)
-            await line.unplug()
-            await channel.close()
+        register_commands(fake, arm, commands)
+        fake.line(line, commands.drop_input)
+        fake.truth(truth)
+        fake.simulate(arm.advance, _TICK)
+        await fake.run(port=line)
 
-    return run(body, "dobot_magician")
+    return serve("dobot_magician", control, body)
 
 
 if __name__ == "__main__":

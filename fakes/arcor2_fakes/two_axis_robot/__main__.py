@@ -9,12 +9,11 @@ from typing import Annotated, Any
 
 from cyclopts import App, Parameter, validators
 
-from arcor2_fakes.control import ControlServer, parse_address
-from arcor2_fakes.process import OwnTime, announce, run, until_told_to_end
+from arcor2_fakes.process import OwnTime
 from arcor2_fakes.serial_line import PtyLine
+from arcor2_fakes.serving import Fake, serve
 from arcor2_fakes.two_axis_robot.bus import Bus
 from arcor2_fakes.two_axis_robot.servo import TICKS, VELOCITY_UNIT, Servo
-from arcor2_fakes.wire import register_faults
 
 app = App(name="arcor2_fakes.two_axis_robot", help="Fake servos on a pty, Dynamixel protocol 2.0.", version_flags=[])
 
@@ -44,7 +43,7 @@ def motion(bus: Bus) -> dict[str, Any]:
     return {"angles": {str(n): (s.position - TICKS / 2) * math.tau / TICKS for n, s in bus.servos.items()}}
 
 
-def register_commands(control: ControlServer, bus: Bus) -> None:
+def register_commands(fake: Fake, bus: Bus) -> None:
     """Register the commands of the control channel."""
 
     def at(number: int) -> Servo:
@@ -67,14 +66,16 @@ def register_commands(control: ControlServer, bus: Bus) -> None:
         for one in bus.servos.values():
             one.reboot()
 
-    control.command("hardware_error", lambda servo, bits=0x20: at(servo).fail(byte("bits", bits)))
-    control.command("temperature", lambda servo, celsius: at(servo).warm(byte("celsius", celsius)))
-    control.command("place", lambda servo, ticks: at(servo).place(ticks))
-    control.command("status_error", lambda servo, error=1: bus.refuse_next(at(servo).number, byte("error", error)))
-    control.command("wrong_crc", wrong_crc)
-    control.command("sync_writes", lambda: list(bus.sync_writes))
-    control.command("absent", absent)
-    control.command("power_cycle", power_cycle)
+    fake.commands(
+        hardware_error=lambda servo, bits=0x20: at(servo).fail(byte("bits", bits)),
+        temperature=lambda servo, celsius: at(servo).warm(byte("celsius", celsius)),
+        place=lambda servo, ticks: at(servo).place(ticks),
+        status_error=lambda servo, error=1: bus.refuse_next(at(servo).number, byte("error", error)),
+        wrong_crc=wrong_crc,
+        sync_writes=lambda: list(bus.sync_writes),
+        absent=absent,
+        power_cycle=power_cycle,
+    )
 
 
 @app.default
@@ -93,15 +94,11 @@ def main(
         ids: Ids of the servos on the bus.
         time_scale: Speed of the servos; 1 is real time. Their watchdogs always run in real time.
     """
-    try:
-        control_address = parse_address(control)
-        if len(set(ids)) != len(ids) or not all(0 <= number <= 252 for number in ids):
-            raise ValueError("ids are 0 to 252, each once")
-    except ValueError as e:
-        sys.stderr.write(f"two_axis_robot: {e}\n")
+    if len(set(ids)) != len(ids) or not all(0 <= number <= 252 for number in ids):
+        sys.stderr.write("two_axis_robot: ids are 0 to 252, each once\n")
         return 2
 
-    async def body() -> None:
+    async def body(fake: Fake) -> None:
         own = OwnTime()
 
         def clock() -> float:
@@ -109,32 +106,14 @@ def main(
 
         bus = Bus([Servo(number, clock, time_scale=time_scale) for number in ids], lambda frame: line.send(frame))
         line = PtyLine(bus.feed, link)
-
-        async def plug() -> str:
-            await line.plug()
-            return line.port
-
-        async def unplug() -> None:
-            await line.unplug()
-            bus.clear()
-
-        channel = ControlServer(*control_address)
-        register_commands(channel, bus)
-        register_faults(channel, {"serial": line}, checked=("serial",))
-        channel.command("plug", plug)
-        channel.command("unplug", unplug)
-        channel.source("truth", lambda: truth(bus, line))
-        channel.source("motion", lambda: motion(bus))
+        register_commands(fake, bus)
+        fake.line(line, bus.clear, checked=True)
+        fake.truth(lambda: truth(bus, line))
+        fake.channel.source("motion", lambda: motion(bus))
         own.run()
-        await line.plug()
-        try:
-            announce(name="two_axis_robot", port=line.port, control=await channel.start())
-            await until_told_to_end()
-        finally:
-            await line.unplug()
-            await channel.close()
+        await fake.run(port=line)
 
-    return run(body, "two_axis_robot")
+    return serve("two_axis_robot", control, body)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ def _framed(kind: int, content: bytes) -> bytes:
 
 
 class PrimaryPort:
-    """All clients of the primary port. `deltas` are added to theta, a, d and alpha, as by a calibration."""
+    """All clients of the primary port."""
 
     def __init__(self, geometry: Geometry, version: tuple[int, ...]) -> None:
         self._version = version
@@ -34,8 +34,14 @@ class PrimaryPort:
             (g.d1, 0.0, 0.0, g.d4, g.d5, g.d6),
             (quarter, 0.0, 0.0, quarter, -quarter, 0.0),
         )
-        self.deltas = [[0.0] * 6 for _ in range(4)]
-        self.told = True
+        self._deltas = [[0.0] * 6 for _ in range(4)]
+        self._reported = True
+
+    def calibrate(self, deltas: list[list[float]], reported: bool = True) -> None:
+        """Set what a calibration adds to theta, a, d and alpha; `reported`: whether the primary port reports it."""
+        if [len(row) for row in deltas] != [6] * 4:
+            raise ValueError("four rows of six numbers")
+        self._deltas, self._reported = deltas, reported
 
     def opened(self, connection: Connection) -> None:
         """Serve a client; its data is ignored."""
@@ -45,14 +51,14 @@ class PrimaryPort:
         version += struct.pack(">BBii", self._version[0], self._version[1], self._version[2], self._version[3])
         connection.send(_framed(_ROBOT_MESSAGE, version + b"\0"))
         state = _framed(_ROBOT_MODE, bytes(37))
-        if self.told:
+        if self._reported:
             state += _framed(_KINEMATICS, self._kinematics())
         connection.send(_framed(_ROBOT_STATE, state))
 
     def _kinematics(self) -> bytes:
         rows = [
             n + d
-            for row, delta in zip(self._nominal, self.deltas, strict=True)
+            for row, delta in zip(self._nominal, self._deltas, strict=True)
             for n, d in zip(row, delta, strict=True)
         ]
         return struct.pack(">6I24dI", *_CHECKSUMS, *rows, 0)

@@ -54,7 +54,7 @@ def test_the_calibration_is_read_while_observing_and_goes_into_the_model(arm: UR
 
 
 def test_a_controller_that_tells_none_or_is_not_there_is_named(arm: UR5e, fake: FakeUr) -> None:
-    fake.do("calibration", deltas=NONE, told=False)
+    fake.do("calibration", deltas=NONE, reported=False)
     with pytest.raises(DeviceTimeout, match=f"{fake.host}:30001"):
         read_calibration(fake.host, timeout=0.3)
     with pytest.raises(NotConnected, match=r"127\.99\.0\.2:30001"):
