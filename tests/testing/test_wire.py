@@ -164,7 +164,7 @@ def test_a_connection_that_is_being_made_is_reset_too(
         return made
 
     monkeypatch.setattr(socket, "create_connection", connect_and_reset)
-    with connect((wire.host, wire.ports[0]), 5.0) as driver, pytest.raises(ConnectionResetError):
+    with pytest.raises(ConnectionResetError), connect((wire.host, wire.ports[0]), 5.0) as driver:
         driver.recv(9)
 
 

@@ -106,7 +106,7 @@ def test_a_stop_ends_it_and_nothing_follows(arm: DobotMagician, around: Around, 
 
 def test_it_stops_before_what_comes_into_its_path(arm: DobotMagician, around: Around) -> None:
     box = around.boxes.pop("box")
-    doing = Doing(arm.move_to_joints, joints(RIGHT), 0.2)
+    doing = Doing(arm.move_to_joints, joints(RIGHT), 0.05)  # slow: it must not reach the box before it appears
     start = values(arm)
     while values(arm) == pytest.approx(start, abs=0.01):
         assert not doing.ended_at

@@ -121,14 +121,15 @@ def test_a_stop_between_waypoints_ends_it(ready: UR5e, around: Around, fake: Fak
 @pytest.mark.parametrize("line", [False, True])
 def test_it_stops_before_what_comes_into_its_path(ready: UR5e, around: Around, fake: FakeUr, line: bool) -> None:
     here = ready.get_end_effector_pose("tcp")
+    # Slow, so that the arm does not reach the post before it appears.
     if line:
         there = Pose(here.position + Position(0.0, 0.3, 0.0), here.orientation)
-        doing = Doing(ready.move_to_pose, "tcp", there, 0.2)
+        doing = Doing(ready.move_to_pose, "tcp", there, 0.1)
         post = here.position + Position(0.0, 0.24, 0.05)
     else:
         at = between(ready)
         post = Position(at.x, at.y, at.z - 0.05)
-        doing = Doing(ready.move_to_joints, joints(ready, BESIDE), 0.3)
+        doing = Doing(ready.move_to_joints, joints(ready, BESIDE), 0.1)
     moving(fake)
     around.boxes["post"] = post, (0.03, 0.03, 0.4)
     with pytest.raises(PathBlocked, match=r"ur stopped: post came into its path"):
