@@ -2,19 +2,30 @@
 
 from typing import ClassVar
 
+from arcor2_hw.messages import Message
+
 
 class Arcor2Error(Exception):
     """Base of all errors. `str(error)` is the message for the operator.
 
+    Args:
+        message: The message; with values its template, such as "{robot} did not answer within {limit:g} s.". The
+            default is the first line of the docstring of the class.
+        detail: Detail for the technician, such as address, register or received answer.
+        values: Values of the fields of the template, by name.
+
     Attributes:
         code: Stable text for programs.
-        detail: Detail for the technician, such as address, register or received answer.
+        message: The message with the key and values for its translation.
     """
 
     code: ClassVar[str] = "error"
 
-    def __init__(self, message: str = "", detail: str = "") -> None:
-        super().__init__(message or (type(self).__doc__ or "").strip().splitlines()[0])
+    def __init__(self, message: str | Message = "", detail: str = "", **values: object) -> None:
+        if not isinstance(message, Message):
+            message = Message.of(message or (type(self).__doc__ or "").strip().splitlines()[0], **values)
+        super().__init__(message.text)
+        self.message = message
         self.detail = detail
 
 
@@ -84,8 +95,10 @@ class DeviceFault(DeviceError):
 
     code = "device_fault"
 
-    def __init__(self, message: str = "", detail: str = "", fault_code: int | str = "") -> None:
-        super().__init__(message, detail)
+    def __init__(
+        self, message: str | Message = "", detail: str = "", fault_code: int | str = "", **values: object
+    ) -> None:
+        super().__init__(message, detail, **values)
         self.fault_code = fault_code
 
 
@@ -94,8 +107,8 @@ class SafetyStop(DeviceError):
 
     code = "safety_stop"
 
-    def __init__(self, message: str = "", detail: str = "", kind: str = "") -> None:
-        super().__init__(message, detail)
+    def __init__(self, message: str | Message = "", detail: str = "", kind: str = "", **values: object) -> None:
+        super().__init__(message, detail, **values)
         self.kind = kind
 
 

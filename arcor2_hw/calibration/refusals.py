@@ -3,6 +3,7 @@
 import enum
 
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 
 
 class Reason(enum.StrEnum):
@@ -37,6 +38,12 @@ class CalibrationRefused(Arcor2Error):
 
     code = "calibration_refused"
 
-    def __init__(self, message: str = "", detail: str = "", reason: Reason = Reason.NOT_CONVERGED) -> None:
-        super().__init__(message, detail)
+    def __init__(
+        self,
+        message: str | Message = "",
+        detail: str = "",
+        reason: Reason = Reason.NOT_CONVERGED,
+        **values: object,
+    ) -> None:
+        super().__init__(message, detail, **values)
         self.reason = reason

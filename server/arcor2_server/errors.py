@@ -4,20 +4,21 @@ from typing import Any
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 
 
 class RequestRefused(Arcor2Error):
     """The server cannot grant a request; the text becomes the message of the answer.
 
     Args:
-        message: what is wrong and what to do about it.
+        message: what is wrong and what to do about it; a template when there are values.
         data: the data of the answer. Only DeleteScene and DeleteObjectTypes return data with result=false.
     """
 
     code = "request_refused"
 
-    def __init__(self, message: str, data: Any = UNSET) -> None:
-        super().__init__(message)
+    def __init__(self, message: str | Message, data: Any = UNSET, **values: object) -> None:
+        super().__init__(message, "", **values)
         self.data = data
 
 

@@ -49,8 +49,8 @@ class RestHttpException(RestException):
 
     code = "rest_refused"
 
-    def __init__(self, message: str = "", detail: str = "", error_code: int = 500) -> None:
-        super().__init__(message, detail)
+    def __init__(self, message: str = "", detail: str = "", error_code: int = 500, **values: object) -> None:
+        super().__init__(message, detail, **values)
         self.error_code = error_code
 
 
@@ -130,7 +130,9 @@ def call(
             return _read(value, return_type)
         return [_read(each, list_return_type) for each in msgspec.convert(value, list)]
     except (msgspec.MsgspecError, ValueError, TypeError, KeyError) as error:
-        raise RestException(f"{where}: the answer does not fit: {error}", answer.text[:200]) from error
+        raise RestException(
+            "{place}: the answer does not fit: {reason}", answer.text[:200], place=where, reason=error
+        ) from error
 
 
 def get_image(url: str, timeout: Timeout | None = None) -> "Image.Image":
@@ -142,7 +144,7 @@ def get_image(url: str, timeout: Timeout | None = None) -> "Image.Image":
         picture = Image.open(io.BytesIO(answer.content))
         picture.load()
     except (UnidentifiedImageError, OSError) as error:
-        raise RestException(f"GET {url}: this is no picture: {error}") from error
+        raise RestException("GET {url}: this is no picture: {reason}", url=url, reason=error) from error
     return picture
 
 
@@ -162,11 +164,15 @@ def _ask(
             timeout=httpx.Timeout(within.read, connect=within.connect),
         )
     except httpx.TimeoutException as error:
-        raise RestException(f"{where}: no answer in time", repr(error)) from error
+        raise RestException("{place}: no answer in time", repr(error), place=where) from error
     except (httpx.HTTPError, httpx.InvalidURL) as error:
-        raise RestException(f"{where}: {error or type(error).__name__}", repr(error)) from error
+        raise RestException(
+            "{place}: {reason}", repr(error), place=where, reason=error or type(error).__name__
+        ) from error
     if answer.is_error:
-        raise RestHttpException(f"{where}: {_reason(answer)}", answer.text[:2000], answer.status_code)
+        raise RestHttpException(
+            "{place}: {answer}", answer.text[:2000], answer.status_code, place=where, answer=_reason(answer)
+        )
     return answer
 
 

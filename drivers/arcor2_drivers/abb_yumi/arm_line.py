@@ -105,21 +105,34 @@ class ArmLine:
         except OSError as e:
             for each in opened:
                 each.close()
-            self.ended = NotConnected(f"{self.who} refuses the connection. Is its RAPID program running?", str(e))
+            self.ended = NotConnected(
+                "{device} refuses the connection. Is its RAPID program running?", str(e), device=self.who
+            )
             raise self.ended from e
         self.attach(opened[0], opened[1], watchdog)
         try:
             version, number = self.ask(Code.HELLO, within=max(until - time.monotonic(), 0.1))[:2]
             if version != VERSION:
-                raise Refused(f"{self.who} runs RAPID modules of version {version:g}. Load version {VERSION}.")
+                raise Refused(
+                    "{device} runs RAPID modules of version {version:g}. Load version {other_version}.",
+                    device=self.who,
+                    version=version,
+                    other_version=VERSION,
+                )
             if number != NUMBERS[self.arm]:
-                raise Refused(f"{self.who} is the server of the other arm. Check the ports.")
+                raise Refused("{device} is the server of the other arm. Check the ports.", device=self.who)
             self.ask(Code.BEGIN, watchdog)
         except DeviceTimeout as e:
             self.end(e)
-            raise DeviceTimeout(f"{self.who} does not answer. Its program is stopped, or serves another client.") from e
+            raise DeviceTimeout(
+                "{device} does not answer. Its program is stopped, or serves another client.", device=self.who
+            ) from e
         except (DeviceError, ValueError) as e:
-            self.end(e if isinstance(e, DeviceError) else DeviceFault(f"{self.who} sent an invalid answer to hello."))
+            self.end(
+                e
+                if isinstance(e, DeviceError)
+                else DeviceFault("{device} sent an invalid answer to hello.", device=self.who)
+            )
             raise
 
     def end(self, why: DeviceError, wait: bool = True) -> None:
@@ -175,7 +188,7 @@ class ArmLine:
         """Return the values of the server's answer. Raise DeviceTimeout, CommandRefused or why it ended."""
         with self._asking:
             if self._motion is not None:
-                raise Refused(f"{self.who} is moving. Its server answers at standstill.")
+                raise Refused("{device} is moving. Its server answers at standstill.", device=self.who)
             command = self._send(code, values)
         until = time.monotonic() + within
         try:
@@ -185,7 +198,9 @@ class ArmLine:
                     return self.checked(found, command).values
         finally:
             self.forget(command)
-        raise DeviceTimeout(f"{self.who} did not answer {command.what} within {within:g} s.")
+        raise DeviceTimeout(
+            "{device} did not answer {what} within {within:g} s.", device=self.who, what=command.what, within=within
+        )
 
     def start(self, code: Code, *values: float, stopped: Callable[[], bool]) -> Command | None:
         """Start a motion, unless `stopped` returns True; then return None. Poll it to its end, then `forget` it."""
@@ -258,7 +273,7 @@ class ArmLine:
             self._commands.send(data)
         except OSError as e:
             self._waiting.pop(command.sequence, None)
-            raise ConnectionLost(f"{self.who}: the connection broke.", str(e)) from e
+            raise ConnectionLost("{device}: the connection broke.", str(e), device=self.who) from e
         return command
 
     # -------------------------------------------------------------------------------- on the connection's thread
@@ -266,11 +281,11 @@ class ArmLine:
         try:
             self._serve()
         except (OSError, ValueError) as e:
-            why: DeviceError = ConnectionLost(f"{self.who}: the connection broke.", str(e))
+            why: DeviceError = ConnectionLost("{device}: the connection broke.", str(e), device=self.who)
         except DeviceError as e:
             why = e
         else:
-            why = NotInControl(f"{self.who}: the connection was closed.")
+            why = NotInControl("{device}: the connection was closed.", device=self.who)
         first = self.ended is None
         if first:
             self.ended = why
@@ -291,7 +306,7 @@ class ArmLine:
                     for raw in each.lines():
                         self._take(answer(raw), each is watch)
             if time.monotonic() - self._answered_at > SILENT:
-                raise ConnectionLost(f"{self.who} has not answered for {SILENT:g} s.")
+                raise ConnectionLost("{device} has not answered for {silent:g} s.", device=self.who, silent=SILENT)
 
     def _take(self, found: Answer, from_watch: bool) -> None:
         if not from_watch:
@@ -309,6 +324,6 @@ class ArmLine:
 class CommandRefused(Refused):
     """The motion server refused a command, or ended it early; `status` is the reason."""
 
-    def __init__(self, message: str, status: Status) -> None:
-        super().__init__(message, f"status {int(status)}")
+    def __init__(self, message: str, status: Status, **values: object) -> None:
+        super().__init__(message, f"status {int(status)}", **values)
         self.status = status

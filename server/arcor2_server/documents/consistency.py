@@ -6,6 +6,7 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import END, START, Action, LogicItem
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
+from arcor2_hw.messages import Message
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks import Types, action_meta, check_action, object_problems
 from arcor2_server.documents.document import OWNED, Document, action_of, reference
@@ -21,8 +22,8 @@ class Unsound(InvalidData):
 
     code = "unsound"
 
-    def __init__(self, message: str, ids: Iterable[str]) -> None:
-        super().__init__(message)
+    def __init__(self, message: str | Message, ids: Iterable[str], **values: object) -> None:
+        super().__init__(message, "", **values)
         self.ids = set(ids)
 
 
@@ -59,7 +60,7 @@ def _check_unneeded(document: Document, change: Change) -> None:
     if change.kind is Kind.ACTION:
         needing += [item.id for item in (*document.outgoing(key), *document.incoming(key))]
     if needing:
-        raise Unsound(f"{title(change)} is needed by what was made since.", needing)
+        raise Unsound("{change} is needed by what was made since.", needing, change=title(change))
 
 
 # ---------------------------------------------------------------------------------------------- what comes or changes
@@ -73,7 +74,7 @@ def _check_name(document: Document, change: Change) -> None:
     for kind, name in names:
         other = document.named(kind, name, parent)
         if other is not None and other != change.id:
-            raise Unsound(f"The name {name} is taken.", [other])
+            raise Unsound("The name {name} is taken.", [other], name=name)
 
 
 def _nothing(document: Document, change: Change, types: Types) -> None:
@@ -94,12 +95,12 @@ def _point(document: Document, change: Change, types: Types) -> None:  # noqa: A
         check_no_loop(document, point, point.parent)
     except Arcor2Error as error:
         above = {point.parent, *(each.id for each in document.descendants(point.id))}
-        raise Unsound(str(error), above) from None
+        raise Unsound(error.message, above) from None
 
 
 def _owned(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
     if document.find(Kind.POINT, change.parent) is None:
-        raise Unsound(f"The action point of {title(change)} is gone.", [change.parent])
+        raise Unsound("The action point of {change} is gone.", [change.parent], change=title(change))
 
 
 def _action(document: Document, change: Change, types: Types) -> None:
@@ -117,13 +118,13 @@ def _check_action(document: Document, action: Action, types: Types, blamed: str 
         check_action(action, document, types)
     except Arcor2Error as error:
         targets = {reference(parameter.type, parameter.value) for parameter in action.parameters}
-        raise Unsound(str(error), [blamed] if blamed else [target for target in targets if target]) from None
+        raise Unsound(error.message, [blamed] if blamed else [target for target in targets if target]) from None
 
 
 def _logic(document: Document, change: Change, types: Types) -> None:
     project = next((item for item in document.of_kind(Kind.PROJECT)), None)
     if project is not None and not project.value.has_logic:
-        raise Unsound(f"The project {project.value.name} has no logic any more.", [project.id])
+        raise Unsound("The project {name} has no logic any more.", [project.id], name=project.value.name)
     _check_step(document, change.after, types)
 
 
@@ -136,7 +137,7 @@ def _check_step(document: Document, item: LogicItem, types: Types) -> None:
         siblings = {other.id for other in document.outgoing(action_of(item.start))} - {item.id}
         if not isinstance(item.condition, Unset):
             places.add(action_of(item.condition.what))
-        raise Unsound(str(error), places | siblings) from None
+        raise Unsound(error.message, places | siblings) from None
 
 
 def _check_loops(document: Document, steps: list[LogicItem]) -> None:
@@ -145,13 +146,13 @@ def _check_loops(document: Document, steps: list[LogicItem]) -> None:
     except InvalidData as error:
         # Which of the other steps closes it: whichever was made last.
         own = {step.id for step in steps}
-        raise Unsound(str(error), {item.id for item in document.of_kind(Kind.LOGIC)} - own) from None
+        raise Unsound(error.message, {item.id for item in document.of_kind(Kind.LOGIC)} - own) from None
 
 
 def _project(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
     if not change.after.has_logic and document.count(Kind.LOGIC):
         raise Unsound(
-            f"{change.after.name} has steps of its logic.", [item.id for item in document.of_kind(Kind.LOGIC)]
+            "{name} has steps of its logic.", [item.id for item in document.of_kind(Kind.LOGIC)], name=change.after.name
         )
 
 

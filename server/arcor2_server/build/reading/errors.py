@@ -10,8 +10,9 @@ class NotUnderstood(InvalidProject):
 
     code = "script_not_understood"
 
-    def __init__(self, line: int, message: str, detail: str = "") -> None:
-        super().__init__(f"script.py, line {line}: {message}", detail)
+    def __init__(self, line: int, message: str, detail: str = "", **values: object) -> None:
+        template = message if values else message.replace("{", "{{").replace("}", "}}")
+        super().__init__("script.py, line {line}: " + template, detail, line=line, **values)
         self.line = line
 
 
