@@ -65,7 +65,10 @@ class KeepAlive:
         with self._process.stderr as ready:
             if not (select.select([ready], [], [], STARTS_WITHIN)[0] and ready.read(1)):
                 self.close()
-                raise DeviceTimeout(f"The process that feeds watchdogs did not start within {STARTS_WITHIN:g} s.")
+                raise DeviceTimeout(
+                    "The process that feeds watchdogs did not start within {starts_within:g} s.",
+                    starts_within=STARTS_WITHIN,
+                )
         self.pulse()
 
     @property

@@ -53,7 +53,7 @@ def encode(value: Any) -> str:
     try:
         return _encoder.encode(value).decode()
     except (TypeError, ValueError, NotImplementedError, OverflowError, RecursionError, OSError) as error:
-        raise InvalidData(f"the value cannot be converted to JSON: {error}") from error
+        raise InvalidData("the value cannot be converted to JSON: {reason}", reason=error) from error
 
 
 def decode_json(text: str, annotation: Any) -> Any:
@@ -65,7 +65,7 @@ def decode_json(text: str, annotation: Any) -> Any:
     try:
         return msgspec.json.decode(text, type=annotation)
     except (msgspec.MsgspecError, TypeError, ValueError, RecursionError) as error:
-        raise InvalidData(f"{text[:80]} has the wrong type: {error}") from error
+        raise InvalidData("{text} has the wrong type: {reason}", text=text[:80], reason=error) from error
 
 
 def decode_picture(text: str) -> Any:
@@ -80,5 +80,5 @@ def decode_picture(text: str) -> Any:
         picture = Image.open(io.BytesIO(msgspec.json.decode(text, type=str).encode("latin-1")))
         picture.load()
     except (msgspec.MsgspecError, UnicodeEncodeError, UnidentifiedImageError, OSError) as error:
-        raise InvalidData(f"the value is not an image: {error}") from error
+        raise InvalidData("the value is not an image: {reason}", reason=error) from error
     return picture

@@ -39,7 +39,9 @@ def read_json(parameter: Parameter) -> Any:
     try:
         return msgspec.json.decode(parameter.value)
     except (msgspec.MsgspecError, RecursionError) as error:
-        raise InvalidData(f"parameter {parameter.name}: the value is not JSON: {error}") from error
+        raise InvalidData(
+            "parameter {name}: the value is not JSON: {reason}", name=parameter.name, reason=error
+        ) from error
 
 
 def read_reference(parameter: Parameter) -> str:
@@ -50,7 +52,7 @@ def read_reference(parameter: Parameter) -> str:
     """
     found = read_json(parameter)
     if not isinstance(found, str) or not found:
-        raise InvalidData(f"parameter {parameter.name}: {parameter.value[:80]} is not an id")
+        raise InvalidData("parameter {name}: {value} is not an id", name=parameter.name, value=parameter.value[:80])
     return found
 
 
@@ -120,7 +122,12 @@ class ParameterType(abc.ABC):
     def _check_type(self, parameter: Parameter, meta: ParameterMeta | None) -> None:
         if parameter.type != self.name or (meta is not None and meta.type != self.name):
             wanted = self.name if meta is None else meta.type
-            raise InvalidData(f"parameter {parameter.name} must be of type {wanted}, not {parameter.type}")
+            raise InvalidData(
+                "parameter {name} must be of type {wanted}, not {type}",
+                name=parameter.name,
+                wanted=wanted,
+                type=parameter.type,
+            )
 
 
 class Extra(Data, frozen=True):
@@ -143,4 +150,6 @@ def extra_of(meta: ParameterMeta | None) -> Extra:
     try:
         return msgspec.json.decode(meta.extra, type=Extra)
     except msgspec.MsgspecError as error:
-        raise InvalidData(f"parameter {meta.name}: its declaration is invalid: {error}") from error
+        raise InvalidData(
+            "parameter {name}: its declaration is invalid: {reason}", name=meta.name, reason=error
+        ) from error

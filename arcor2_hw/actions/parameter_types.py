@@ -63,4 +63,4 @@ def parameter_type(name: str) -> ParameterType:
     try:
         return PARAMETER_TYPES[name]
     except KeyError:
-        raise InvalidData(f"there is no parameter type {name!r:.80}") from None
+        raise InvalidData("there is no parameter type {name!r:.80}", name=name) from None

@@ -32,11 +32,13 @@ class _Reference(ParameterType):
     def _resolve(self, parameter: Parameter, lookup: ProjectLookup | None) -> Any:
         reference = read_reference(parameter)
         if lookup is None:
-            raise InvalidData(f"parameter {parameter.name}: {self.what} is available in a project only")
+            raise InvalidData(
+                "parameter {name}: {what} is available in a project only", name=parameter.name, what=self.what
+            )
         try:
             return self._find(reference, lookup)
         except Arcor2Error as error:
-            raise InvalidData(f"parameter {parameter.name}: {error}") from error
+            raise InvalidData("parameter {name}: {reason}", name=parameter.name, reason=error) from error
 
     def check(
         self,
@@ -60,7 +62,9 @@ class _Reference(ParameterType):
             InvalidData: It is of another kind.
         """
         if not isinstance(result, self.result_type):
-            raise InvalidData(f"{result!r:.80} is not a {self.result_type.__name__}")
+            raise InvalidData(
+                "{result!r:.80} is not a {result_type}", result=result, result_type=self.result_type.__name__
+            )
         return encode(result)
 
 
@@ -119,7 +123,11 @@ class JointsType(_Reference):
         self._check_type(parameter, meta)
         joints = self._resolve(parameter, lookup)
         if robot_id is not None and joints.robot_id != robot_id:
-            raise InvalidData(f"parameter {parameter.name}: joints {joints.name} belong to another robot")
+            raise InvalidData(
+                "parameter {name}: joints {joints_name} belong to another robot",
+                name=parameter.name,
+                joints_name=joints.name,
+            )
 
     def expression(self, parameter: Parameter, names: ScriptNames) -> ast.expr:
         """Return the joints by the names of action point and joints."""
@@ -133,7 +141,7 @@ class ImageType(ParameterType):
     annotations = frozenset({"Image", "Image.Image"})
 
     def _refuse(self, parameter: Parameter) -> InvalidData:
-        return InvalidData(f"parameter {parameter.name}: an image can only be linked to a result")
+        return InvalidData("parameter {name}: an image can only be linked to a result", name=parameter.name)
 
     def check(
         self,
@@ -156,7 +164,7 @@ class ImageType(ParameterType):
     def encode(self, result: Any) -> str:
         """Convert the image to JSON."""
         if not is_picture(result):
-            raise InvalidData(f"{result!r:.80} is not an image")
+            raise InvalidData("{result!r:.80} is not an image", result=result)
         return encode(result)
 
     def decode_json(self, text: str, annotation: Any) -> Any:

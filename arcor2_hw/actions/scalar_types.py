@@ -23,7 +23,12 @@ class _Scalar(ParameterType):
         found = read_json(parameter)
         # type() instead of isinstance(), because true is not an integer, and 1 is not a double.
         if type(found) is not self.python_type:
-            raise InvalidData(f"parameter {parameter.name}: {parameter.value[:80]} is not {self.kind}")
+            raise InvalidData(
+                "parameter {name}: {value} is not {type}",
+                name=parameter.name,
+                value=parameter.value[:80],
+                type=self.kind,
+            )
         return found
 
     def check(
@@ -60,7 +65,7 @@ class _Scalar(ParameterType):
         """
         # In Python, bool is a subclass of int.
         if not isinstance(result, self.python_type) or (isinstance(result, bool) and self.python_type is not bool):
-            raise InvalidData(f"{result!r:.80} is not {self.kind}")
+            raise InvalidData("{result!r:.80} is not {type}", result=result, type=self.kind)
         return encode(self.python_type(result))
 
 
@@ -69,7 +74,13 @@ class _Number(_Scalar):
         low = -math.inf if isinstance(extra.minimum, Unset) else extra.minimum
         high = math.inf if isinstance(extra.maximum, Unset) else extra.maximum
         if not low <= found <= high:
-            raise InvalidData(f"parameter {parameter.name}: {found} is not within {low} and {high}")
+            raise InvalidData(
+                "parameter {name}: {found} is not within {low} and {high}",
+                name=parameter.name,
+                found=found,
+                low=low,
+                high=high,
+            )
 
 
 class BooleanType(_Scalar):
@@ -111,7 +122,7 @@ class DoubleType(_Number):
             except OverflowError as error:
                 raise InvalidData("an integer is too large for a double") from error
         if isinstance(result, float) and not math.isfinite(result):
-            raise InvalidData(f"{result} cannot be converted to JSON")
+            raise InvalidData("{result} cannot be converted to JSON", result=result)
         return super().encode(result)
 
 
@@ -130,7 +141,12 @@ class _Enumeration(_Scalar):
     def _check_extra(self, parameter: Parameter, found: Any, extra: Extra) -> None:
         allowed = extra.allowed_values
         if not isinstance(allowed, Unset) and found not in allowed:
-            raise InvalidData(f"parameter {parameter.name}: {found!r} is not one of {', '.join(map(repr, allowed))}")
+            raise InvalidData(
+                "parameter {name}: {found!r} is not one of {allowed}",
+                name=parameter.name,
+                found=found,
+                allowed=", ".join(map(repr, allowed)),
+            )
 
     def expression(self, parameter: Parameter, names: ScriptNames) -> ast.expr:
         """Return the member by its name."""

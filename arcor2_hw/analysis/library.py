@@ -67,7 +67,7 @@ class Library:
             InvalidData: The name is that of a built-in type, or empty.
         """
         if file.name in BUILT_IN:
-            raise InvalidData(f"{file.name} is built in and cannot be replaced")
+            raise InvalidData("{name} is built in and cannot be replaced", name=file.name)
         if not file.name:
             raise InvalidData("a source needs the name of its object type")
         if file.name in self._files:
@@ -124,7 +124,7 @@ class Library:
         try:
             return self._files[name]
         except KeyError:
-            raise NotFound(f"there is no source of an object type {name}") from None
+            raise NotFound("there is no source of an object type {name}", name=name) from None
 
     def _forget(self) -> None:
         self._analyses.clear()
@@ -231,7 +231,7 @@ class Library:
             module = self._load("arcor2_hw.objects")
             found = self._hierarchy.resolver.name(name, module) if module is not None else None
             if not isinstance(found, ClassInfo):
-                raise NotFound(f"the installation lacks the base class {name}")
+                raise NotFound("the installation lacks the base class {name}", name=name)
             return self._of_class(name, found, ())
         file = self._file(name)
         base = ""

@@ -63,7 +63,7 @@ async def analyse(library: Library) -> bytes:
         async with asyncio.timeout(WITHIN):
             encoded, errors = await process.communicate(_encode(sources))
     except TimeoutError:
-        raise InvalidData(f"The sources were not analysed within {WITHIN:g} s.") from None
+        raise InvalidData("The sources were not analysed within {within:g} s.", within=WITHIN) from None
     finally:
         if process.returncode is None:
             process.kill()

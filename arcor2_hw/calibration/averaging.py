@@ -72,8 +72,9 @@ def averaged(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOption
         residual = float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
         if residual > 10 * options.largest_residual and each.key not in left_out:
             raise CalibrationRefused(
-                f"{each.name.capitalize()} contradicts the others. Check its configured pose.",
+                "{name} contradicts the others. Check its configured pose.",
                 f"residual {residual:.0f} px",
                 Reason.IMPLAUSIBLE,
+                name=each.name.capitalize(),
             )
     return Found(inverted(pose), covariance, list(seen), errors, lens.parameters, left_out)

@@ -35,19 +35,30 @@ def board_of(board: CharucoBoard) -> cv2.aruco.CharucoBoard:
     """
     if not (2 <= board.columns <= LARGEST_BOARD and 2 <= board.rows <= LARGEST_BOARD):
         raise InvalidData(
-            f"a board of {board.columns} × {board.rows} squares: columns and rows must be 2 to {LARGEST_BOARD}"
+            "a board of {columns} × {rows} squares: columns and rows must be 2 to {largest_board}",
+            columns=board.columns,
+            rows=board.rows,
+            largest_board=LARGEST_BOARD,
         )
     if board.columns * board.rows < 6:
-        raise InvalidData(f"a board of {board.columns} × {board.rows} squares has too few corners")
+        raise InvalidData(
+            "a board of {columns} × {rows} squares has too few corners", columns=board.columns, rows=board.rows
+        )
     if not (math.isfinite(board.square) and 0 < board.marker < board.square):
         raise InvalidData(
-            f"the marker of a board ({board.marker} m) must be smaller than its square ({board.square} m)"
+            "the marker of a board ({marker} m) must be smaller than its square ({square} m)",
+            marker=board.marker,
+            square=board.square,
         )
     last = board.first_id + board.columns * board.rows // 2 - 1
     size = dictionary_size(board.dictionary)
     if board.first_id < 0 or last >= size:
         raise InvalidData(
-            f"the markers {board.first_id} to {last} of the board are not all in {board.dictionary} (0 to {size - 1})"
+            "the markers {first_id} to {last} of the board are not all in {dictionary} (0 to {size})",
+            first_id=board.first_id,
+            last=last,
+            dictionary=board.dictionary,
+            size=size - 1,
         )
     check_pose(board.pose, "the board's pose")
     numbers = np.arange(board.first_id, last + 1)
@@ -176,19 +187,26 @@ def check_layout(layout: Layout) -> None:
     for marker in layout.markers:
         number = marker.marker_id
         if not 0 <= number < size:
-            raise InvalidData(f"marker {number} is not in the dictionary {layout.dictionary} (0 to {size - 1})")
+            raise InvalidData(
+                "marker {number} is not in the dictionary {dictionary} (0 to {size})",
+                number=number,
+                dictionary=layout.dictionary,
+                size=size - 1,
+            )
         if (layout.dictionary, number) in listed:
-            raise Conflict(f"marker {number} is listed twice")
+            raise Conflict("marker {number} is listed twice", number=number)
         listed.add((layout.dictionary, number))
         side = layout.size if not isinstance(marker.size, float | int) else marker.size
         if not (math.isfinite(side) and 0 < side < 10):
-            raise InvalidData(f"the size of marker {number} must be positive, in m, not {side}")
+            raise InvalidData(
+                "the size of marker {number} must be positive, in m, not {side}", number=number, side=side
+            )
         check_pose(marker.pose, f"the pose of marker {number}")
     for index, board in enumerate(layout.boards):
         board_of(board)
         for number in range(board.first_id, board.first_id + board.columns * board.rows // 2):
             if (board.dictionary, number) in listed:
-                raise Conflict(f"marker {number} of board {index} is listed twice")
+                raise Conflict("marker {number} of board {index} is listed twice", number=number, index=index)
             listed.add((board.dictionary, number))
 
 
@@ -200,4 +218,4 @@ def check_pose(pose: Pose, name: str) -> None:
     """
     numbers = (*pose.position, *pose.orientation)
     if not all(map(math.isfinite, numbers)) or max(map(abs, pose.position)) > 1000:
-        raise InvalidData(f"{name} must be finite, in m", str(numbers))
+        raise InvalidData("{name} must be finite, in m", str(numbers), name=name)

@@ -53,7 +53,9 @@ def find_camera_pose(
     options = options or PoseOptions()
     hints = _hints(options)
     if not 1 <= len(pictures) <= MOST_PICTURES:
-        raise InvalidData(f"1 to {MOST_PICTURES} images are needed, not {len(pictures)}")
+        raise InvalidData(
+            "1 to {most_pictures} images are needed, not {count}", most_pictures=MOST_PICTURES, count=len(pictures)
+        )
     greys = list(one_by_one(pictures)) if len(pictures) > 1 else [grey_of(pictures[0])]
     lens = Lens(parameters, greys[0].shape[1], greys[0].shape[0])
     detection = detect_layout(greys, lens, layout, options.blur_threshold, options.largest_blur)
@@ -83,7 +85,7 @@ def _hints(options: PoseOptions) -> Hints:
         gravity = gravity / length
     for name in ("expected_position", "expected_orientation", "gravity_deviation", "largest_deviation"):
         if not (math.isfinite(getattr(options, name)) and getattr(options, name) > 0):
-            raise InvalidData(f"{name} must be a positive number, not {getattr(options, name)}")
+            raise InvalidData("{name} must be a positive number, not {value}", name=name, value=getattr(options, name))
     if not options.min_distance < options.max_distance:
         raise InvalidData("min_distance must be less than max_distance")
     return Hints(expected, options.expected_position, options.expected_orientation, gravity, options.gravity_deviation)
@@ -102,10 +104,13 @@ def _check_still(seen: list[Seen]) -> None:
             moved = float(np.linalg.norm(each.pixels.mean(axis=0) - before.pixels.mean(axis=0)))
             if moved > _STOOD_STILL:
                 raise CalibrationRefused(
-                    f"The camera or {each.name} moved between picture {before.picture} and picture {each.picture}. "
+                    "The camera or {name} moved between picture {picture} and picture {other_picture}. "
                     "Fix both, then try again.",
                     f"by {moved:.1f} px",
                     Reason.IMPLAUSIBLE,
+                    name=each.name,
+                    picture=before.picture,
+                    other_picture=each.picture,
                 )
 
 
@@ -172,10 +177,12 @@ def _check_known(found: Found, position: float, options: PoseOptions) -> None:
         f"Only {first.name} is visible, from nearly straight ahead or far away" if only else "The markers are far away"
     )
     raise CalibrationRefused(
-        f"{what}: the camera's position would be known to {position * 1000:.0f} mm only. What helps: a second marker, "
+        "{what}: the camera's position would be known to {position:.0f} mm only. What helps: a second marker, "
         "a larger one, a view from the side or from nearer, the direction of gravity, or where the camera roughly is.",
         f"standard deviation {position * 1000:.1f} mm, at most {options.largest_deviation * 1000:.1f} mm",
         Reason.UNOBSERVABLE,
+        what=what,
+        position=position * 1000,
     )
 
 

@@ -86,23 +86,23 @@ def configuration_of(content: Any, where: str) -> CalibrationConfiguration:
         InvalidData: The data is invalid; the message names `where` and the marker.
     """
     if not isinstance(content, dict):
-        raise InvalidData(f"{where}: expected a mapping with marker_size and markers.")
+        raise InvalidData("{place}: expected a mapping with marker_size and markers.", place=where)
     content = {_OLDER.get(key, key): value for key, value in content.items()}
     if isinstance(markers := content.get("markers"), dict):
         content["markers"] = [_listed(key, value, where) for key, value in markers.items()]
     try:
         return msgspec.convert(content, CalibrationConfiguration)
     except msgspec.ValidationError as error:
-        raise InvalidData(f"{where}: {error}.") from None
+        raise InvalidData("{place}: {reason}.", place=where, reason=error) from None
 
 
 def _listed(key: Any, value: Any, where: str) -> dict[str, Any]:
     try:
         number = int(key)
     except (TypeError, ValueError):
-        raise InvalidData(f"{where}: {key!r} is not the id of a marker.") from None
+        raise InvalidData("{place}: {key!r} is not the id of a marker.", place=where, key=key) from None
     if not isinstance(value, dict):
-        raise InvalidData(f"{where}: marker {number} needs a pose.")
+        raise InvalidData("{place}: marker {number} needs a pose.", place=where, number=number)
     return {"marker_id": number} | (value if "pose" in value else {"pose": value})
 
 
@@ -115,12 +115,16 @@ def read_configuration(path: Path) -> CalibrationConfiguration:
     """
     try:
         if path.stat().st_size > MAX_SIZE:
-            raise InvalidData(f"{path} is larger than {MAX_SIZE} bytes, so it is not a configuration of markers.")
+            raise InvalidData(
+                "{path} is larger than {max_size} bytes, so it is not a configuration of markers.",
+                path=path,
+                max_size=MAX_SIZE,
+            )
         text = path.read_bytes()
     except FileNotFoundError:
-        raise NotFound(f"There is no file {path}.") from None
+        raise NotFound("There is no file {path}.", path=path) from None
     except OSError as error:
-        raise InvalidData(f"{path} cannot be read: {error.strerror}.") from None
+        raise InvalidData("{path} cannot be read: {reason}.", path=path, reason=error.strerror) from None
     return configuration_of(yaml_of(text, str(path)), str(path))
 
 
@@ -137,7 +141,7 @@ def yaml_of(text: bytes, where: str) -> Any:
         _refuse_twice(root, where)
         return yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InvalidData(f"{where}: {' '.join(str(error).split())}.") from None
+        raise InvalidData("{place}: {reason}.", place=where, reason=" ".join(str(error).split())) from None
 
 
 def _refuse_twice(node: Any, where: str) -> None:
@@ -153,7 +157,10 @@ def _refuse_twice(node: Any, where: str) -> None:
             if name in seen:
                 what = f"marker {name}" if name.isdecimal() else name
                 raise InvalidData(
-                    f"{where}: {what} is listed twice, the second time in line {key.start_mark.line + 1}."
+                    "{place}: {what} is listed twice, the second time in line {line}.",
+                    place=where,
+                    what=what,
+                    line=key.start_mark.line + 1,
                 )
             seen.add(name)
             _refuse_twice(value, where)

@@ -35,16 +35,27 @@ def read_depth(picture: bytes) -> DepthPictures:
         InvalidPicture: It is not a PNG file, damaged, in colour, 8 bit, or larger than LARGEST_PIXELS or LARGEST_BYTES.
     """
     if len(picture) > LARGEST_BYTES:
-        raise InvalidPicture(f"The depth image has {len(picture)} bytes; the maximum is {LARGEST_BYTES}.")
+        raise InvalidPicture(
+            "The depth image has {count} bytes; the maximum is {largest_bytes}.",
+            count=len(picture),
+            largest_bytes=LARGEST_BYTES,
+        )
     if picture[:8] != _PNG or len(picture) < _IHDR + 17:
         raise InvalidPicture("The depth image is not a PNG file.")
     width, height = (int.from_bytes(picture[_IHDR + 4 * i : _IHDR + 4 * i + 4], "big") for i in range(2))
     if not 0 < width * height <= LARGEST_PIXELS:
-        raise InvalidPicture(f"The depth image has {width} × {height} pixels; the maximum is {LARGEST_PIXELS}.")
+        raise InvalidPicture(
+            "The depth image has {width} × {height} pixels; the maximum is {largest_pixels}.",
+            width=width,
+            height=height,
+            largest_pixels=LARGEST_PIXELS,
+        )
     bits, kind = picture[_IHDR + 8], picture[_IHDR + 9]
     if (bits, kind) != (16, 0):
         raise InvalidPicture(
-            f"A depth image needs one channel of 16 bit in mm; this one has {bits} bit, PNG type {kind}."
+            "A depth image needs one channel of 16 bit in mm; this one has {bits} bit, PNG type {type}.",
+            bits=bits,
+            type=kind,
         )
     try:
         found = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -63,7 +74,9 @@ def mean_depth(pictures: DepthPictures) -> Floats:
     """
     if pictures.dtype != np.uint16 or pictures.ndim not in (2, 3) or not pictures.size:
         raise InvalidData(
-            f"A depth image needs rows and columns of 16 bit in mm, not shape {pictures.shape} of {pictures.dtype}."
+            "A depth image needs rows and columns of 16 bit in mm, not shape {shape} of {dtype}.",
+            shape=pictures.shape,
+            dtype=pictures.dtype,
         )
     if pictures.ndim == 2 or len(pictures) == 1:
         return np.asarray(pictures.reshape(pictures.shape[-2:]), dtype=np.float64) * 1e-3
@@ -112,10 +125,12 @@ def depth_view(pictures: DepthPictures, parameters: CameraParameters) -> DepthVi
     depth = _without_edges(seen)
     if (count := int(np.count_nonzero(depth))) < LEAST_POINTS:
         raise CalibrationRefused(
-            f"The depth image has {count} usable points, but at least {LEAST_POINTS} are needed. Check that "
+            "The depth image has {count} usable points, but at least {least_points} are needed. Check that "
             "the camera is not covered or too near, and that the scene has texture and light.",
             f"{int(np.count_nonzero(seen))} of {seen.size} pixels have a depth",
             Reason.TOO_FEW_POINTS,
+            count=count,
+            least_points=LEAST_POINTS,
         )
     return DepthView(depth, seen, rays)
 
@@ -128,13 +143,24 @@ def pixel_rays(width: int, height: int, parameters: CameraParameters) -> Floats:
     """
     values = (parameters.fx, parameters.fy, parameters.cx, parameters.cy, *parameters.dist_coefs)
     if not np.isfinite(values).all() or parameters.fx <= 0 or parameters.fy <= 0:
-        raise InvalidData(f"fx and fy of a camera must be positive and all parameters finite, not {values}.")
+        raise InvalidData(
+            "fx and fy of a camera must be positive and all parameters finite, not {values}.", values=values
+        )
     if width * height > LARGEST_PIXELS:
-        raise InvalidData(f"The depth image has {width} × {height} pixels; the maximum is {LARGEST_PIXELS}.")
+        raise InvalidData(
+            "The depth image has {width} × {height} pixels; the maximum is {largest_pixels}.",
+            width=width,
+            height=height,
+            largest_pixels=LARGEST_PIXELS,
+        )
     if not (0.25 * width < parameters.cx < 0.75 * width and 0.25 * height < parameters.cy < 0.75 * height):
         raise InvalidData(
-            f"The depth image has {width} × {height} pixels, but the camera's parameters are for another "
-            f"size: their centre is at {parameters.cx:.0f}, {parameters.cy:.0f}."
+            "The depth image has {width} × {height} pixels, but the camera's parameters are for another "
+            "size: their centre is at {cx:.0f}, {cy:.0f}.",
+            width=width,
+            height=height,
+            cx=parameters.cx,
+            cy=parameters.cy,
         )
     u, v = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
     matrix = np.array([[parameters.fx, 0.0, parameters.cx], [0.0, parameters.fy, parameters.cy], [0.0, 0.0, 1.0]])

@@ -87,19 +87,22 @@ def _check_sharp(grey: Grey, content: _ImageContent, name: str, blur_threshold: 
     relative = [blur / min(largest_blur, max(_RESOLVED * cell, _SHARP)) for blur, cell in content.widths]
     if relative and np.median(relative) > 1.0:
         raise CalibrationRefused(
-            f"{name} is blurred: the markers' edges are {np.median([blur for blur, _ in content.widths]):.1f} px wide."
+            "{name} is blurred: the markers' edges are {widths:.1f} px wide."
             " Check the focus, and hold the camera still.",
             f"at most {largest_blur:.1f} px, and a quarter of a cell",
             Reason.BLURRED,
+            name=name,
+            widths=np.median([blur for blur, _ in content.widths]),
         )
     # Sharp edges were measured, or something was at least recognized: sharpness is not what is missing.
     if content.blurs or ((content.strangers or content.pieces) and not content.unclear):
         return
     if (sharpness := sharpness_of(grey)) < blur_threshold:
         raise CalibrationRefused(
-            f"{name} is blurred, or shows nothing. Check the focus, the lens and the light.",
+            "{name} is blurred, or shows nothing. Check the focus, the lens and the light.",
             f"variance of the Laplacian {sharpness:.0f}, at least {blur_threshold:.0f}",
             Reason.BLURRED,
+            name=name,
         )
 
 
@@ -125,8 +128,11 @@ def _in_picture(grey: Grey, picture: int, lens: Lens, layout: Layout, name: str)
     for number in set(numbers):
         if numbers.count(number) > 1:
             raise CalibrationRefused(
-                f"{name} shows marker {number} {numbers.count(number)} times: remove or cover the others.",
+                "{name} shows marker {number} {count} times: remove or cover the others.",
                 reason=Reason.IMPLAUSIBLE,
+                name=name,
+                number=number,
+                count=numbers.count(number),
             )
     content.blurs = [blur for blur, _ in content.widths]
     known = {(layout.dictionary, number) for number, _ in own}

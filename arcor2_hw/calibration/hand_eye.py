@@ -70,7 +70,12 @@ def find_hand_eye(
     """
     options = options or HandEyeOptions()
     if not FEWEST <= len(samples) <= MOST_SAMPLES:
-        raise InvalidData(f"{FEWEST} to {MOST_SAMPLES} samples are needed, not {len(samples)}")
+        raise InvalidData(
+            "{fewest} to {most_samples} samples are needed, not {count}",
+            fewest=FEWEST,
+            most_samples=MOST_SAMPLES,
+            count=len(samples),
+        )
     for index, each in enumerate(samples):
         check_pose(each.flange, f"the flange's pose of sample {index}")
     if not (0 < options.robot_position < 1 and 0 < options.robot_orientation < 1):
@@ -120,10 +125,11 @@ def _check_enough(stations: list[Station], problems: dict[int, str]) -> None:
     if len(stations) < FEWEST:
         first = next((f"sample {index}: {problem}" for index, problem in problems.items()), "")
         raise CalibrationRefused(
-            f"The target is well visible in {len(stations)} pictures only; at least {FEWEST} are needed, ten "
-            "are recommended.",
+            "The target is well visible in {count} pictures only; at least {fewest} are needed, ten are recommended.",
             first,
             Reason.TOO_FEW_POINTS if stations else Reason.NO_MARKER,
+            count=len(stations),
+            fewest=FEWEST,
         )
 
 
@@ -217,10 +223,11 @@ def _result(
     residual = _root_mean_square(np.concatenate(best.errors))
     if residual > options.largest_residual:
         raise CalibrationRefused(
-            f"The flange's poses do not belong to the pictures: the corners are off by {residual:.1f} px. Are they "
+            "The flange's poses do not belong to the pictures: the corners are off by {residual:.1f} px. Are they "
             "in the same order, of the flange, in the base frame, and is the mounting the right one?",
             f"at most {options.largest_residual} px",
             Reason.IMPLAUSIBLE,
+            residual=residual,
         )
     # Outside of the solvers, position comes before rotation, and the displacement is that of the camera itself.
     turn = np.zeros((6, 6))
@@ -231,10 +238,11 @@ def _result(
     orientation = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
     if not position <= options.largest_deviation:
         raise CalibrationRefused(
-            f"The camera's place would be known to {position * 1000:.0f} mm only: more pictures are needed, with the "
+            "The camera's place would be known to {position:.0f} mm only: more pictures are needed, with the "
             "flange turned more, to all sides.",
             f"standard deviation {position * 1000:.1f} mm, at most {options.largest_deviation * 1000:.1f} mm",
             Reason.UNOBSERVABLE,
+            position=position * 1000,
         )
     errors = [
         HandEyeError(s.index, len(e), _root_mean_square(e), float(np.linalg.norm(e, axis=1).max()))

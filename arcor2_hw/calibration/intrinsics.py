@@ -76,7 +76,9 @@ def find_intrinsics(
     """
     options = options or IntrinsicsOptions()
     if not 1 <= len(pictures) <= MOST_PICTURES:
-        raise InvalidData(f"1 to {MOST_PICTURES} images are needed, not {len(pictures)}")
+        raise InvalidData(
+            "1 to {most_pictures} images are needed, not {count}", most_pictures=MOST_PICTURES, count=len(pictures)
+        )
     made = board_of(board)
     size = (0, 0)
     views: list[_View] = []
@@ -128,9 +130,11 @@ def _check_enough(
     covered = coverage_of([view.pixels for view in views], size)
     if covered < options.smallest_coverage:
         raise CalibrationRefused(
-            f"The board was in {covered:.0%} of the picture only; {options.smallest_coverage:.0%} are the least. "
+            "The board was in {covered:.0%} of the picture only; {smallest_coverage:.0%} are the least. "
             "Hold it into the corners, too.",
             reason=Reason.TOO_FEW_POINTS,
+            covered=covered,
+            smallest_coverage=options.smallest_coverage,
         )
 
 
@@ -202,18 +206,20 @@ def _result(
     tilt = _tilt_between(solved.normals)
     if tilt < options.smallest_tilt:
         raise CalibrationRefused(
-            f"The board is seen from one direction only, within {math.degrees(tilt):.0f}°: the focal length and the "
+            "The board is seen from one direction only, within {tilt:.0f}°: the focal length and the "
             "distance cannot be told apart. Tilt it, by 30° and more, to all sides.",
             f"at least {math.degrees(options.smallest_tilt):.0f}°",
             Reason.DEGENERATE,
+            tilt=math.degrees(tilt),
         )
     residual = _root_mean_square(np.concatenate(solved.errors))
     if residual > options.largest_residual:
         raise CalibrationRefused(
-            f"The corners are off by {residual:.1f} px: is it another board, is it bent, or does the lens need a model "
+            "The corners are off by {residual:.1f} px: is it another board, is it bent, or does the lens need a model "
             "with more coefficients?",
             f"residual {residual:.2f} px, at most {options.largest_residual}",
             Reason.IMPLAUSIBLE,
+            residual=residual,
         )
     fx, fy, cx, cy = (float(solved.matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
     width, height = size

@@ -31,13 +31,19 @@ class Lens:
         p = parameters
         for name, value in (("fx", p.fx), ("fy", p.fy)):
             if not (math.isfinite(value) and value > 0):
-                raise InvalidData(f"{name} of the camera must be a positive number of pixels, not {value}")
+                raise InvalidData(
+                    "{name} of the camera must be a positive number of pixels, not {value}", name=name, value=value
+                )
         if not all(map(math.isfinite, (p.cx, p.cy, *p.dist_coefs))):
             raise InvalidData("the camera's parameters must be finite numbers")
         if not (0.25 < p.cx / width < 0.75 and 0.25 < p.cy / height < 0.75):
             raise InvalidData(
-                f"the camera's parameters do not match images of {width} × {height}: the principal point is at "
-                f"{p.cx:.0f}, {p.cy:.0f}"
+                "the camera's parameters do not match images of {width} × {height}: the principal point is at "
+                "{cx:.0f}, {cy:.0f}",
+                width=width,
+                height=height,
+                cx=p.cx,
+                cy=p.cy,
             )
         self.parameters = parameters
         self.width, self.height = width, height

@@ -42,35 +42,45 @@ def grey_of(picture: Picture, name: str = "the picture") -> Grey:
     """
     if isinstance(picture, np.ndarray):
         if picture.ndim != 2 or picture.dtype != np.uint8:
-            raise InvalidPicture(f"{name} must have grey values of 8 bit, not {picture.dtype} of shape {picture.shape}")
+            raise InvalidPicture(
+                "{name} must have grey values of 8 bit, not {dtype} of shape {shape}",
+                name=name,
+                dtype=picture.dtype,
+                shape=picture.shape,
+            )
         _check_size(picture.shape[1], picture.shape[0], name)
         return np.ascontiguousarray(picture)
     if not picture:
-        raise InvalidPicture(f"{name} is empty")
+        raise InvalidPicture("{name} is empty", name=name)
     if len(picture) > LARGEST_BYTES:
-        raise InvalidPicture(f"{name} is too large: {len(picture) / 2**20:.0f} MiB, maximum {LARGEST_BYTES >> 20} MiB")
+        raise InvalidPicture(
+            "{name} is too large: {count:.0f} MiB, maximum {largest_bytes} MiB",
+            name=name,
+            count=len(picture) / 2**20,
+            largest_bytes=LARGEST_BYTES >> 20,
+        )
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(picture), formats=_FORMATS) as header:
                 (width, height), kind = header.size, header.format or ""
     except Image.DecompressionBombError as error:
-        raise InvalidPicture(f"{name} has too many pixels", str(error)) from error
+        raise InvalidPicture("{name} has too many pixels", str(error), name=name) from error
     except (OSError, ValueError, SyntaxError) as error:
         raise InvalidPicture(
-            f"{name} is not an image in a supported format (PNG, JPEG, BMP, TIFF, WebP)", str(error)
+            "{name} is not an image in a supported format (PNG, JPEG, BMP, TIFF, WebP)", str(error), name=name
         ) from error
     _check_size(width, height, name)
     end = _ENDS.get(kind)
     if end is not None and end not in picture[-4096:]:
-        raise InvalidPicture(f"{name} is damaged: its end is missing", f"{kind}, {len(picture)} bytes")
+        raise InvalidPicture("{name} is damaged: its end is missing", f"{kind}, {len(picture)} bytes", name=name)
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
     try:
         grey = cv2.imdecode(np.frombuffer(picture, np.uint8), flags)
     except cv2.error as error:
-        raise InvalidPicture(f"{name} is damaged", str(error)) from error
+        raise InvalidPicture("{name} is damaged", str(error), name=name) from error
     if grey is None or grey.shape != (height, width) or grey.dtype != np.uint8:
-        raise InvalidPicture(f"{name} is damaged, or of an unsupported kind", kind)
+        raise InvalidPicture("{name} is damaged, or of an unsupported kind", kind, name=name)
     return np.asarray(grey, dtype=np.uint8)
 
 
@@ -86,8 +96,13 @@ def one_by_one(pictures: Iterable[Picture]) -> Iterator[Grey]:
         first = first or grey.shape
         if grey.shape != first:
             raise InvalidPicture(
-                f"picture {index} is {grey.shape[1]} × {grey.shape[0]}, the first one {first[1]} × {first[0]}: "
-                "take all of them with one camera in one mode"
+                "picture {index} is {width} × {height}, the first one {first_width} × {first_height}: "
+                "take all of them with one camera in one mode",
+                index=index,
+                width=grey.shape[1],
+                height=grey.shape[0],
+                first_width=first[1],
+                first_height=first[0],
             )
         yield grey
 
@@ -106,7 +121,17 @@ def _check_size(width: int, height: int, name: str) -> None:
     """
     if width * height > LARGEST_PIXELS:
         raise InvalidPicture(
-            f"{name} is too large: {width} × {height}, maximum {LARGEST_PIXELS // 10**6} million pixels"
+            "{name} is too large: {width} × {height}, maximum {largest_pixels} million pixels",
+            name=name,
+            width=width,
+            height=height,
+            largest_pixels=LARGEST_PIXELS // 10**6,
         )
     if min(width, height) < SMALLEST:
-        raise InvalidPicture(f"{name} is too small: {width} × {height}, minimum {SMALLEST} × {SMALLEST}")
+        raise InvalidPicture(
+            "{name} is too small: {width} × {height}, minimum {smallest} × {smallest}",
+            name=name,
+            width=width,
+            height=height,
+            smallest=SMALLEST,
+        )

@@ -62,10 +62,12 @@ def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions)
         names = {each.key: each.name for each in used}
         if len(names) < 3:
             raise CalibrationRefused(
-                f"The picture contradicts what is said of {' and '.join(sorted(names.values()))} by {worst:.0f} px: "
+                "The picture contradicts what is said of {names} by {worst:.0f} px: "
                 "it stands elsewhere, or has another size.",
                 f"residual {worst:.1f} px, at most {options.largest_residual:.1f}",
                 Reason.IMPLAUSIBLE,
+                names=" and ".join(sorted(names.values())),
+                worst=worst,
             )
         left_out.add(worst_key)
         if 2 * (len(names) - 1) <= len({each.key for each in seen}):
@@ -104,9 +106,10 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
     if not allowed:
         what = "is below its minimum height" if found else "could not be found"
         raise CalibrationRefused(
-            f"The position of the camera according to the picture is impossible: it {what}.",
+            "The position of the camera according to the picture is impossible: it {what}.",
             "" if not found else f"z = {inverted(found[0].pose)[2, 3]:.3f} m, at least {options.lowest} m",
             Reason.IMPLAUSIBLE if found else Reason.NOT_CONVERGED,
+            what=what,
         )
     best = allowed[0]
     if worst_of(problem, best)[0] > options.largest_residual:
@@ -115,11 +118,14 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
         distance, angle = apart(inverted(best.pose), inverted(other.pose))
         if other.cost - best.cost < _TELL_APART and distance > 2 * options.largest_deviation:
             raise CalibrationRefused(
-                f"The picture fits two places of the camera, {distance * 1000:.0f} mm and {np.degrees(angle):.0f}° "
-                f"apart: {_who(problem)} seen from nearly straight ahead. What helps: a second marker, a view from the "
+                "The picture fits two places of the camera, {distance:.0f} mm and {angle:.0f}° "
+                "apart: {problem} seen from nearly straight ahead. What helps: a second marker, a view from the "
                 "side or from nearer, the direction of gravity, or where the camera roughly is.",
                 f"costs {best.cost:.1f} and {other.cost:.1f}",
                 Reason.AMBIGUOUS,
+                distance=distance * 1000,
+                angle=np.degrees(angle),
+                problem=_who(problem),
             )
     return best
 

@@ -29,10 +29,12 @@ def check_against(
         InvalidData: The result has no pose, or a limit is not positive.
     """
     if isinstance(record.after, Unset):
-        raise InvalidData(f"The calibration {record.id} ({record.kind.value}) has no pose that could be checked.")
+        raise InvalidData(
+            "The calibration {id} ({value}) has no pose that could be checked.", id=record.id, value=record.kind.value
+        )
     for name, limit in (("distance_limit", distance_limit), ("angle_limit", angle_limit)):
         if not 0.0 < limit < math.inf:
-            raise InvalidData(f"{name} must be positive, not {limit}.")
+            raise InvalidData("{name} must be positive, not {limit}.", name=name, limit=limit)
     distance = record.after.position.distance_to(measured.position)
     angle = record.after.orientation.angle_to(measured.orientation)
     if not (math.isfinite(distance) and math.isfinite(angle)):

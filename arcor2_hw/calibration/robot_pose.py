@@ -69,7 +69,11 @@ class RobotPoseOptions:
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
             if not 0.0 < getattr(self, name) <= 1.0:
-                raise InvalidData(f"{name} of a robot's pose must be above 0 and at most 1, not {getattr(self, name)}.")
+                raise InvalidData(
+                    "{name} of a robot's pose must be above 0 and at most 1, not {value}.",
+                    name=name,
+                    value=getattr(self, name),
+                )
 
 
 def find_robot_pose(
@@ -111,10 +115,11 @@ def find_robot_pose(
     known = best.least_known()
     if known < LEAST_KNOWN or deviations[0] > limits.most_deviation or deviations[1] > limits.most_angle_deviation:
         raise CalibrationRefused(
-            f"The view of the camera leaves a motion of {surface.name} undetermined. Move the robot or the "
+            "The view of the camera leaves a motion of {name} undetermined. Move the robot or the "
             "camera so that more of it is visible.",
             f"standard deviation {deviations[0] * 1e3:.1f} mm, {math.degrees(deviations[1]):.2f}°; known {known:.3f}",
             Reason.UNOBSERVABLE,
+            name=surface.name,
         )
     _refuse_unsettled(surface, best, start, limits)
     pose = Pose.from_matrix(world_from_camera @ np.linalg.inv(best.base_from_camera))
@@ -154,35 +159,39 @@ def _refuse_disagreement(surface: RobotSurface, found: Compared, fit: Fit, limit
     )
     if found.contradicted > limits.most_contradicted or found.uneven > UNEVEN[1]:
         raise CalibrationRefused(
-            f"The camera sees through the expected place of {surface.name}: check its pose, its joint values "
-            "and its model.",
+            "The camera sees through the expected place of {name}: check its pose, its joint values and its model.",
             figures,
             Reason.NOT_CONVERGED,
+            name=surface.name,
         )
     if found.confirmed < limits.least_fitness:
         raise CalibrationRefused(
-            f"Too little of {surface.name} was recognized. Check whether it is covered, and check its pose "
-            "and its model.",
+            "Too little of {name} was recognized. Check whether it is covered, and check its pose and its model.",
             figures,
             Reason.NOT_CONVERGED,
+            name=surface.name,
         )
 
 
 def _refuse_unsettled(surface: RobotSurface, best: Fit, start: Floats, limits: RobotPoseOptions) -> None:
     if best.moved > SETTLED:
         raise CalibrationRefused(
-            f"The search for {surface.name} did not converge.",
+            "The search for {name} did not converge.",
             f"the last step was {best.moved * 1e3:.2f} mm",
             Reason.NOT_CONVERGED,
+            name=surface.name,
         )
     off = best.base_from_camera @ np.linalg.inv(start)
     moved, turned = float(np.linalg.norm(off[:3, 3])), angle_of(off[:3, :3])
     if moved > 1.5 * limits.within or turned > 1.5 * limits.angle_within:
         raise CalibrationRefused(
-            f"{surface.name} was found {moved * 1e3:.0f} mm and {math.degrees(turned):.1f}° from where it was taken to"
+            "{name} was found {moved:.0f} mm and {turned:.1f}° from where it was taken to"
             " stand, farther than was searched: put it nearer in the scene, and calibrate again.",
             f"searched: {limits.within * 1e3:.0f} mm and {math.degrees(limits.angle_within):.1f}°",
             Reason.NOT_CONVERGED,
+            name=surface.name,
+            moved=moved * 1000.0,
+            turned=math.degrees(turned),
         )
 
 
@@ -193,11 +202,14 @@ def _refuse_ambiguous(surface: RobotSurface, ends: list[End]) -> None:
             between = other.fit.base_from_camera @ np.linalg.inv(best.fit.base_from_camera)
             at_middle = between[:3, :3] @ best.fit.centre + between[:3, 3] - best.fit.centre
             raise CalibrationRefused(
-                f"Two poses of {surface.name} explain the image equally well, "
-                f"{np.linalg.norm(at_middle) * 1e3:.0f} mm and {math.degrees(angle_of(between[:3, :3])):.1f}° "
+                "Two poses of {name} explain the image equally well, "
+                "{norm:.0f} mm and {between:.1f}° "
                 "apart. Move the robot or the camera, then try again.",
                 f"scores {best.compared.score:.3f} and {other.compared.score:.3f}",
                 Reason.AMBIGUOUS,
+                name=surface.name,
+                norm=np.linalg.norm(at_middle) * 1000.0,
+                between=math.degrees(angle_of(between[:3, :3])),
             )
 
 

@@ -85,10 +85,11 @@ class Search:
         chosen = np.flatnonzero(near)
         if len(chosen) < LEAST_POINTS:
             raise CalibrationRefused(
-                f"The camera sees hardly anything at the expected place of {surface.name}. Check where the "
+                "The camera sees hardly anything at the expected place of {name}. Check where the "
                 "camera looks, and whether its pose and that of the robot are correct to a few centimetres.",
                 f"{len(chosen)} of {len(cloud)} points are near the model; at least {LEAST_POINTS} are needed",
                 Reason.NO_OVERLAP,
+                name=surface.name,
             )
         if len(chosen) > MOST_POINTS:
             chosen = self._random.choice(chosen, MOST_POINTS, replace=False)
@@ -164,9 +165,10 @@ class Search:
 
     def _unlike(self, detail: str) -> CalibrationRefused:
         return CalibrationRefused(
-            f"What the camera sees near the expected place of {self._surface.name} does not look like it.",
+            "What the camera sees near the expected place of {name} does not look like it.",
             detail,
             Reason.NO_OVERLAP,
+            name=self._surface.name,
         )
 
     def compare(self, base_from_camera: Floats, most_rays: int) -> Compared:

@@ -35,17 +35,20 @@ class RobotSurface:
 
     def __post_init__(self) -> None:
         if self.vertices.ndim != 2 or self.vertices.shape[1] != 3 or not len(self.vertices):
-            raise InvalidData(f"The model of {self.name} has no vertices with three coordinates.")
+            raise InvalidData("The model of {name} has no vertices with three coordinates.", name=self.name)
         if self.triangles.ndim != 2 or self.triangles.shape[1] != 3 or not len(self.triangles):
-            raise InvalidData(f"The model of {self.name} has no triangles, so it is invisible.")
+            raise InvalidData("The model of {name} has no triangles, so it is invisible.", name=self.name)
         if len(self.triangles) > MOST_TRIANGLES:
             raise InvalidData(
-                f"The model of {self.name} has {len(self.triangles)} triangles; the maximum is {MOST_TRIANGLES}."
+                "The model of {name} has {count} triangles; the maximum is {most_triangles}.",
+                name=self.name,
+                count=len(self.triangles),
+                most_triangles=MOST_TRIANGLES,
             )
         if not np.isfinite(self.vertices).all():
-            raise InvalidData(f"The model of {self.name} has vertices that are not finite.")
+            raise InvalidData("The model of {name} has vertices that are not finite.", name=self.name)
         if self.triangles.min() < 0 or self.triangles.max() >= len(self.vertices):
-            raise InvalidData(f"The model of {self.name} has a triangle with a missing vertex.")
+            raise InvalidData("The model of {name} has a triangle with a missing vertex.", name=self.name)
 
     @classmethod
     def of_links(cls, links: Iterable[tuple[Floats, Indices, Floats]], name: str = "the robot") -> "RobotSurface":
@@ -58,7 +61,7 @@ class RobotSurface:
             triangles.append(np.asarray(indices, dtype=np.int64) + count)
             count += len(own)
         if not vertices:
-            raise InvalidData(f"The model of {name} has no links with a shape.")
+            raise InvalidData("The model of {name} has no links with a shape.", name=name)
         return cls(np.concatenate(vertices), np.concatenate(triangles), name)
 
     @property

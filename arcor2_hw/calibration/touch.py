@@ -96,7 +96,9 @@ def frame_by_points(known: Sequence[Position], touched: Sequence[Position]) -> T
     """
     if len(known) != len(touched):
         raise InvalidData(
-            f"{len(known)} points are known and {len(touched)} were touched. Give the same number of both."
+            "{count} points are known and {other_count} were touched. Give the same number of both.",
+            count=len(known),
+            other_count=len(touched),
         )
     ours, theirs = _points("known", known, 3), _points("touched", touched, 3)
     for name, points in (("known", ours), ("touched", theirs)):
@@ -152,10 +154,12 @@ def tip_by_touches(flange: Sequence[Pose]) -> TouchedTip:
     residual, worst = _rms(residuals), int(np.argmax(residuals))
     if residual > TIP_MISFIT:
         raise CalibrationRefused(
-            f"The touches agree on no point: {residual * 1e3:.1f} mm on the average, touch {worst + 1} is worst. Was"
+            "The touches agree on no point: {residual:.1f} mm on the average, touch {worst} is worst. Was"
             " the tip on the same point every time?",
             f"residuals {np.round(residuals * 1e3, 2).tolist()} mm",
             Reason.NOT_CONVERGED,
+            residual=residual * 1000.0,
+            worst=worst + 1,
         )
     variance = float(residuals @ residuals) / (3 * count - 6)
     covariance = variance * (vt.T / singular**2 @ vt)[:3, :3]
@@ -191,7 +195,11 @@ def orientation_by_alignment(flange: Sequence[Orientation], reference: Orientati
         CalibrationRefused: The orientations differ by more than measurement errors.
     """
     if not 1 <= len(flange) <= _MOST:
-        raise InvalidData(f"A tool's orientation needs 1 to {_MOST} orientations of the flange, not {len(flange)}.")
+        raise InvalidData(
+            "A tool's orientation needs 1 to {most} orientations of the flange, not {count}.",
+            most=_MOST,
+            count=len(flange),
+        )
     tools = [each.inverted() * reference for each in flange]
     quaternions = np.array([tuple(tool) for tool in tools])
     mean = Orientation(*map(float, np.linalg.eigh(quaternions.T @ quaternions)[1][:, -1]))  # Markley's mean
@@ -199,10 +207,12 @@ def orientation_by_alignment(flange: Sequence[Orientation], reference: Orientati
     residual, worst = _rms(residuals), int(np.argmax(residuals))
     if residuals[worst] > TURN_MISFIT:
         raise CalibrationRefused(
-            f"The alignments differ by {math.degrees(residuals[worst]):.1f}°; number {worst + 1} is worst."
+            "The alignments differ by {residual:.1f}°; number {worst} is worst."
             " Was the tool put along the same axes every time?",
             f"residuals {np.round(np.degrees(residuals), 2).tolist()} °",
             Reason.NOT_CONVERGED,
+            residual=math.degrees(residuals[worst]),
+            worst=worst + 1,
         )
     checked = len(tools) > 1
     good = checked and residual <= TURN_FITS
@@ -251,21 +261,35 @@ def orientation_by_points(flange: Orientation, tip: Position, along_z: Position,
 # ---------------------------------------------------------------------------------------------------- what they share
 def _points(name: str, points: Sequence[Position], least: int) -> Floats:
     if not least <= len(points) <= _MOST:
-        raise InvalidData(f"{least} to {_MOST} {name} points are needed, not {len(points)}.")
+        raise InvalidData(
+            "{least} to {most} {name} points are needed, not {count}.",
+            least=least,
+            most=_MOST,
+            name=name,
+            count=len(points),
+        )
     found = np.array([tuple(point) for point in points], dtype=np.float64)
     if not np.isfinite(found).all():
         wrong = int(np.argmin(np.isfinite(found).all(axis=1)))
-        raise InvalidData(f"Point {wrong + 1} of the {name} points is not finite.")
+        raise InvalidData("Point {wrong} of the {name} points is not finite.", wrong=wrong + 1, name=name)
     if np.abs(found).max(initial=0.0) > _FARTHEST:
         wrong = int(np.argmax(np.abs(found).max(axis=1)))
-        raise InvalidData(f"Point {wrong + 1} of the {name} points is farther away than {_FARTHEST:g} m.")
+        raise InvalidData(
+            "Point {wrong} of the {name} points is farther away than {farthest:g} m.",
+            wrong=wrong + 1,
+            name=name,
+            farthest=_FARTHEST,
+        )
     return found
 
 
 def _too_near(what: str, to: str) -> CalibrationRefused:
     return CalibrationRefused(
-        f"{what} and {to} are less than {SHORTEST * 1e3:.0f} mm apart. Take points farther apart.",
+        "{what} and {to} are less than {shortest:.0f} mm apart. Take points farther apart.",
         reason=Reason.DEGENERATE,
+        what=what,
+        to=to,
+        shortest=SHORTEST * 1000.0,
     )
 
 
@@ -280,10 +304,13 @@ def _refuse_misfit(residuals: Floats, points: Floats, what: str) -> None:
     spread = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
     if _rms(residuals) > MISFIT * spread:
         raise CalibrationRefused(
-            f"{what}: {_rms(residuals) * 1e3:.1f} mm on the average, point {int(np.argmax(residuals)) + 1} is worst."
+            "{what}: {residual:.1f} mm on the average, point {worst} is worst."
             " Was every point touched, and in this order?",
             f"residuals {np.round(residuals * 1e3, 2).tolist()} mm",
             Reason.NOT_CONVERGED,
+            what=what,
+            residual=_rms(residuals) * 1000.0,
+            worst=int(np.argmax(residuals)) + 1,
         )
 
 

@@ -87,7 +87,7 @@ class Client(Requests):
         self._robots: dict[tuple[str, str], RegisterForRobotEventArgs] = {}
         self._wire: Wire | None = None
         self._joined = asyncio.Event()
-        self._end: Exception | None = NotConnected(f"There is no connection to {self._url}.")
+        self._end: Exception | None = NotConnected("There is no connection to {url}.", url=self._url)
         self._lost_at = 0.0
         self._keeper: asyncio.Task[None] | None = None
         self._own: EventStream[Event] = EventStream()
@@ -154,7 +154,7 @@ class Client(Requests):
 
     async def close(self) -> None:
         """Close the connection and end all streams. It does nothing when the connection is closed."""
-        self._finish(None, ConnectionLost(f"The connection to {self._url} is closed."))
+        self._finish(None, ConnectionLost("The connection to {url} is closed.", url=self._url))
         if self._keeper is not None:
             self._keeper.cancel()
             await asyncio.gather(self._keeper, return_exceptions=True)
@@ -226,7 +226,7 @@ class Client(Requests):
             message = await wire.ask(name, args, False, self._timeout)
         except (Unsent, Unanswered):
             await wire.closed.wait()
-            raise wire.refused or ConnectionLost(f"The connection to {self._url} is closed.") from None
+            raise wire.refused or ConnectionLost("The connection to {url} is closed.", url=self._url) from None
         if not message.result:
             raise refusal(name, message.messages, reason=message.code)
 
@@ -248,7 +248,7 @@ class Client(Requests):
             await wire.close()
             refused = wire.refused
             if refused is not None or not self._reconnect:
-                self._finish(refused, refused or ConnectionLost(f"The connection to {self._url} is closed."))
+                self._finish(refused, refused or ConnectionLost("The connection to {url} is closed.", url=self._url))
                 return
             pause = FIRST_PAUSE
             while True:
@@ -315,7 +315,10 @@ class Client(Requests):
                         await self._joined.wait()
             except TimeoutError:
                 raise NotConnected(
-                    f"There was no connection to {self._url} within {limit:g} s: {name} was not sent."
+                    "There was no connection to {url} within {limit:g} s: {name} was not sent.",
+                    url=self._url,
+                    limit=limit,
+                    name=name,
                 ) from None
             if self._end is not None:
                 raise self._end.with_traceback(None)
@@ -330,7 +333,7 @@ class Client(Requests):
         try:
             return msgspec.json.decode(message.data, type=kind)
         except msgspec.ValidationError as e:
-            raise InvalidData(f"The server's answer to {name} is invalid.", str(e)) from e
+            raise InvalidData("The server's answer to {name} is invalid.", str(e), name=name) from e
 
     def _remember(self, args: Any, dry_run: bool) -> None:
         """Remember what has to be sent again after a connection loss."""
@@ -376,5 +379,7 @@ class Client(Requests):
                     if not names or event.event in names:
                         return event
         except TimeoutError:
-            raise DeviceTimeout(f"No event {' or '.join(names) or 'at all'} within {timeout:g} s.") from None
-        raise ConnectionLost(f"The connection to {self._url} is closed.")
+            raise DeviceTimeout(
+                "No event {names} within {timeout:g} s.", names=" or ".join(names) or "at all", timeout=timeout
+            ) from None
+        raise ConnectionLost("The connection to {url} is closed.", url=self._url)

@@ -140,15 +140,19 @@ class Rest:
         try:
             return msgspec.convert(_snaked(msgspec.json.decode(answer.content)), kind)
         except msgspec.MsgspecError as error:
-            raise InvalidData(f"The answer of {self._url}{path} is invalid.", str(error)) from error
+            raise InvalidData("The answer of {url}{path} is invalid.", str(error), url=self._url, path=path) from error
 
     async def _send(self, method: str, path: str, **more: Any) -> httpx.Response:
         try:
             answer = await self._http.request(method, path, **more)
         except httpx.TimeoutException as error:
-            raise DeviceTimeout(f"{self._url} did not answer {method} {path} in time.", str(error)) from error
+            raise DeviceTimeout(
+                "{url} did not answer {method} {path} in time.", str(error), url=self._url, method=method, path=path
+            ) from error
         except (httpx.HTTPError, httpx.InvalidURL) as error:
-            raise ConnectionLost(f"The server at {self._url} does not answer: {error}", str(error)) from error
+            raise ConnectionLost(
+                "The server at {url} does not answer: {reason}", str(error), url=self._url, reason=error
+            ) from error
         if not answer.is_success:
             raise _refusal(f"{method} {path}", answer.status_code, answer.content)
         return answer
@@ -165,9 +169,11 @@ class Rest:
                         file.write(chunk)
             partial.replace(target)
         except httpx.TimeoutException as error:
-            raise DeviceTimeout(f"{self._url} did not send {path} in time.", str(error)) from error
+            raise DeviceTimeout("{url} did not send {path} in time.", str(error), url=self._url, path=path) from error
         except httpx.HTTPError as error:
-            raise ConnectionLost(f"{self._url} sent only a part of {path}: {error}", str(error)) from error
+            raise ConnectionLost(
+                "{url} sent only a part of {path}: {reason}", str(error), url=self._url, path=path, reason=error
+            ) from error
         finally:
             partial.unlink(missing_ok=True)
 

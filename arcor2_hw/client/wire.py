@@ -112,7 +112,7 @@ class Wire:
         except (OSError, TimeoutError, InvalidHandshake, InvalidURI, EOFError) as e:
             # ssl.SSLError is an OSError; the message names an untrusted certificate.
             why = f": {e}" if isinstance(e, ssl.SSLError | InvalidHandshake | InvalidURI) else "."
-            raise ConnectionLost(f"The server at {url} does not answer{why}", str(e)) from e
+            raise ConnectionLost("The server at {url} does not answer{reason}", str(e), url=url, reason=why) from e
         return cls(socket, url, deliver)
 
     async def close(self) -> None:
@@ -128,7 +128,9 @@ class Wire:
         if self._socket.close_code != NOT_ADMITTED:
             return None
         return NotAdmitted(
-            f"The server at {self._url} does not admit this client: {self._socket.close_reason or 'no valid token'}"
+            "The server at {url} does not admit this client: {close_reason}",
+            url=self._url,
+            close_reason=self._socket.close_reason or "no valid token",
         )
 
     async def _follow(self) -> None:

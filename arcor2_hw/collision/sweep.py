@@ -50,7 +50,7 @@ class Sweep:
 
     def __init__(self, world: CollisionWorld, robot: str, arm: Arm, resolution: float = RESOLUTION) -> None:
         if not 1e-4 <= resolution <= 1.0:
-            raise InvalidData(f"The resolution must be 0.0001 to 1 m, not {resolution!r}.")
+            raise InvalidData("The resolution must be 0.0001 to 1 m, not {resolution!r}.", resolution=resolution)
         self.world, self.robot, self.arm, self.resolution = world, robot, arm, resolution
         self._standing = world.robot(robot)
         self._q = self._standing.q.copy()
@@ -160,8 +160,10 @@ class Sweep:
         count = max(1, math.ceil(self.travel(a, b) / resolution - 1e-9))
         if count > MOST_CHECKS:
             raise InvalidData(
-                f"A motion of {self.arm.model.name} needs {count} collision checks, but at most {MOST_CHECKS} "
-                "are allowed."
+                "A motion of {name} needs {count} collision checks, but at most {most_checks} are allowed.",
+                name=self.arm.model.name,
+                count=count,
+                most_checks=MOST_CHECKS,
             )
         return count
 

@@ -63,7 +63,7 @@ class WorldState:
 
     def __init__(self, margin: float = 0.0) -> None:
         if not 0.0 <= margin <= 1.0:
-            raise InvalidData(f"The margin must be 0 to 1 m, not {margin!r}.")
+            raise InvalidData("The margin must be 0 to 1 m, not {margin!r}.", margin=margin)
         self.margin = margin
         self.revision = 0
         self.changes: collections.deque[Change] = collections.deque(maxlen=MAX_CHANGES)
@@ -85,7 +85,7 @@ class WorldState:
             InvalidData: The pose is not finite.
         """
         if name in self.robots:
-            raise Conflict(f"Body {name} cannot be added: a robot has that id.")
+            raise Conflict("Body {name} cannot be added: a robot has that id.", name=name)
         check(shape, name)
         placed = _matrix(pose, name)
         if name in self._held or name in self._bodies:
@@ -160,7 +160,7 @@ class WorldState:
         try:
             return self._bodies[name]
         except KeyError:
-            raise NotFound(f"There is no body {name!r}.") from None
+            raise NotFound("There is no body {name!r}.", name=name) from None
 
     def _insert(self, name: str, shape: Shape, pose: Array) -> None:
         geometry = coal_geometry(shape)
@@ -189,7 +189,7 @@ class WorldState:
             InvalidData: The pose or a joint value is not finite.
         """
         if name in self.robots or name in self._bodies or name in self._held:
-            raise Conflict(f"Robot {name} cannot be added: the id is taken.")
+            raise Conflict("Robot {name} cannot be added: the id is taken.", name=name)
         given = model.neutral() if q is None else q
         robot = CollisionRobot(name, model, _matrix(base, name), _joints(model, given), self.margin)
         self.robots[name] = robot
@@ -218,7 +218,7 @@ class WorldState:
         try:
             return self.robots[name]
         except KeyError:
-            raise NotFound(f"There is no robot {name!r}.") from None
+            raise NotFound("There is no robot {name!r}.", name=name) from None
 
     def move_robot(self, name: str, base: Pose) -> None:
         """Move the base of a robot, with everything attached to it.
@@ -261,10 +261,15 @@ class WorldState:
         """
         holder = self.robot(robot)
         if name in self._held:
-            raise Conflict(f"{name} cannot be attached to {robot}: it is attached to {self._held[name]}.")
+            raise Conflict(
+                "{name} cannot be attached to {robot}: it is attached to {held}.",
+                name=name,
+                robot=robot,
+                held=self._held[name],
+            )
         body = self._body(name)
         if link not in holder.model.description.links:
-            raise NotFound(f"{holder.model.name} has no link {link!r}.")
+            raise NotFound("{name} has no link {link!r}.", name=holder.model.name, link=link)
         in_link = np.linalg.inv(holder.link_frames(holder.q)[link]) @ body.pose
         self.delete(name)
         holder.held[name] = AttachedBody(name, body.shape, link, in_link, frozenset(touching))
@@ -280,7 +285,7 @@ class WorldState:
             NotFound: The body is not attached.
         """
         if name not in self._held:
-            raise NotFound(f"{name!r} is not attached to a robot.")
+            raise NotFound("{name!r} is not attached to a robot.", name=name)
         pose = self.pose(name)
         self.move(name, pose)
         return pose
@@ -341,14 +346,14 @@ class WorldState:
 
 def _matrix(pose: Pose, name: str) -> Array:
     if not all(map(np.isfinite, pose.position)):
-        raise InvalidData(f"The pose of {name} has numbers that are not finite.")
+        raise InvalidData("The pose of {name} has numbers that are not finite.", name=name)
     return pose.matrix()
 
 
 def _joints(model: RobotModel, q: Array) -> Array:
     given = np.array(q, dtype=np.float64)
     if given.shape != (len(model.joints),) or not np.isfinite(given).all():
-        raise InvalidData(f"{model.name} needs {len(model.joints)} finite joint values.")
+        raise InvalidData("{name} needs {count} finite joint values.", name=model.name, count=len(model.joints))
     return given
 
 

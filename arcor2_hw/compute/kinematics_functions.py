@@ -121,7 +121,12 @@ def place_in_link(task: t.PlaceInLink, state: WorkerState) -> Pose:
     model = state.robot(task.model)
     frames = model.link_poses(model.values(task.joints))
     if task.link not in frames:
-        raise NotFound(f"{model.name} has no link {task.link!r}. Its links: {', '.join(frames)}.")
+        raise NotFound(
+            "{name} has no link {link!r}. Its links: {frames}.",
+            name=model.name,
+            link=task.link,
+            frames=", ".join(frames),
+        )
     return (task.model.base * Pose.from_matrix(frames[task.link])).inverted() * task.pose
 
 

@@ -36,9 +36,11 @@ def _read(task: PrepareAsset) -> bytes:
         with Path(task.file.path).open("rb") as file:
             content = file.read(MAX_PACKAGE + 1)
     except OSError as error:
-        raise BadMesh(f"The mesh {task.file.name} cannot be read: {error.strerror}.") from error
+        raise BadMesh(
+            "The mesh {name} cannot be read: {reason}.", name=task.file.name, reason=error.strerror
+        ) from error
     if len(content) > MAX_PACKAGE:
-        raise BadMesh(f"{task.file.name} is larger than {MAX_PACKAGE} bytes.")
+        raise BadMesh("{name} is larger than {max_package} bytes.", name=task.file.name, max_package=MAX_PACKAGE)
     return content
 
 
@@ -50,7 +52,7 @@ def _mesh(content: bytes, name: str, state: WorkerState) -> PreparedAsset:
     state.progress(0.4, f"reducing {name}: {len(surface.triangles)} triangles")
     small = simplification.simplified(surface, simplification.budget(surface.vertices))
     if not len(small.triangles):
-        raise BadMesh(f"All triangles of the mesh {name} have zero area.")
+        raise BadMesh("All triangles of the mesh {name} have zero area.", name=name)
     state.progress(0.8, f"normals of {name}")
     made = glb.encode_glb({"mesh": simplification.with_normals(small)}, {})
     return PreparedAsset(made, len(small.triangles), len(surface.triangles))
@@ -69,7 +71,7 @@ def _robot(content: bytes, name: str, state: WorkerState) -> PreparedAsset:
     at, text = package.urdf()
     root = parse_xml(text, at)
     if root.tag != "robot":
-        raise ModelError(f"{at} describes a {root.tag}, not a robot.")
+        raise ModelError("{at} describes a {tag}, not a robot.", at=at, tag=root.tag)
     found = root.iterfind("link/visual/geometry/mesh")
     references = list(dict.fromkeys(each.get("filename", "") for each in found))
     surfaces: dict[str, Any] = {}

@@ -70,7 +70,11 @@ def _answer(work: m.Work, state: WorkerState) -> m.Done | m.Failed:
     try:
         value = m.encode_value(function_of(work.task)(work.task, state))
         if len(value) > MAX_ANSWER:
-            raise InvalidData(f"The answer is larger than allowed: {len(value)} bytes, at most {MAX_ANSWER}.")
+            raise InvalidData(
+                "The answer is larger than allowed: {count} bytes, at most {max_answer}.",
+                count=len(value),
+                max_answer=MAX_ANSWER,
+            )
         return m.Done(value)
     except Arcor2Error as error:
         return failed(error)
@@ -79,7 +83,9 @@ def _answer(work: m.Work, state: WorkerState) -> m.Done | m.Failed:
             raise
         return failed(
             NotInstalled(
-                f"{error.name} is not installed. Install arcor2-hw with the extras vision and kinematics.", str(error)
+                "{name} is not installed. Install arcor2-hw with the extras vision and kinematics.",
+                str(error),
+                name=error.name,
             )
         )
     except MemoryError:

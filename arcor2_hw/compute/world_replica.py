@@ -127,12 +127,17 @@ class WorldReplica:
         world, pose = self.collisions, body.pose
         if body.attachment is not None:
             if body.attachment.robot not in world.robots:
-                raise NotFound(f"{body.id} is attached to {body.attachment.robot}, which is not in the world.")
+                raise NotFound(
+                    "{id} is attached to {robot}, which is not in the world.", id=body.id, robot=body.attachment.robot
+                )
             standing = world.robot(body.attachment.robot)
             frames = standing.link_frames(standing.q)
             if body.attachment.link not in frames:
                 raise NotFound(
-                    f"{body.id} is attached to {body.attachment.link}, which is no link of {body.attachment.robot}."
+                    "{id} is attached to {link}, which is no link of {robot}.",
+                    id=body.id,
+                    link=body.attachment.link,
+                    robot=body.attachment.robot,
                 )
             pose = type(pose).from_matrix(frames[body.attachment.link] @ pose.matrix())
         if old is not None and old.shape == body.shape:
@@ -207,7 +212,9 @@ def mesh_of(shape: MeshShape) -> shapes.TriangleMesh:
         with path.open("rb") as file:
             content = file.read(MAX_MESH + 1)
     except OSError as error:
-        raise BadMesh(f"The mesh {shape.file.name} cannot be read: {error.strerror}.") from error
+        raise BadMesh(
+            "The mesh {name} cannot be read: {reason}.", name=shape.file.name, reason=error.strerror
+        ) from error
     return read_mesh(content, shape.file.name, shape.scale)
 
 

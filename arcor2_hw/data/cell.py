@@ -68,14 +68,16 @@ def read_cell(path: Path) -> Cell:
     """
     try:
         if path.stat().st_size > MAX_SIZE:
-            raise InvalidData(f"{path} is larger than {MAX_SIZE} bytes, so it is not a cell.yaml")
+            raise InvalidData(
+                "{path} is larger than {max_size} bytes, so it is not a cell.yaml", path=path, max_size=MAX_SIZE
+            )
         return msgspec.yaml.decode(path.read_bytes(), type=Cell)
     except FileNotFoundError:
-        raise NotFound(f"there is no {path}") from None
+        raise NotFound("there is no {path}", path=path) from None
     except OSError as error:
-        raise InvalidData(f"{path} cannot be read: {error.strerror}") from None
+        raise InvalidData("{path} cannot be read: {reason}", path=path, reason=error.strerror) from None
     except msgspec.DecodeError as error:  # also raised for a wrong value
-        raise InvalidData(f"{path}: {error}") from None
+        raise InvalidData("{path}: {reason}", path=path, reason=error) from None
 
 
 def overlay(cell: Cell, scene: Scene) -> list[SceneObjectOverride]:
@@ -94,7 +96,11 @@ def overlay(cell: Cell, scene: Scene) -> list[SceneObjectOverride]:
             continue
         if device.type != scene_object.type:
             raise InvalidData(
-                f"{device.name} is a {scene_object.type} in the scene {scene.name} and a {device.type} in the cell file"
+                "{name} is a {type} in the scene {scene_name} and a {device_type} in the cell file",
+                name=device.name,
+                type=scene_object.type,
+                scene_name=scene.name,
+                device_type=device.type,
             )
         found.append(SceneObjectOverride(scene_object.id, parameters_of(device)))
     return found

@@ -50,11 +50,13 @@ def _chain(lookup: ProjectLookup, point: BareActionPoint) -> Iterable[Pose]:
         except NotFound:
             obj = lookup.scene_object(parent)
             if isinstance(obj.pose, Unset):
-                raise InvalidProject(f"{obj.name} has no pose and cannot be the parent of {point.name}") from None
+                raise InvalidProject(
+                    "{name} has no pose and cannot be the parent of {point_name}", name=obj.name, point_name=point.name
+                ) from None
             yield obj.pose
             return
         if above.id in seen:
-            raise InvalidProject(f"action point {point.name} is its own ancestor")
+            raise InvalidProject("action point {name} is its own ancestor", name=point.name)
         seen.add(above.id)
         yield Pose(above.position)
         parent = above.parent
@@ -93,39 +95,41 @@ class ProjectIndex:
         try:
             return self._objects[object_id]
         except KeyError:
-            raise NotFound(f"the scene has no object {object_id}") from None
+            raise NotFound("the scene has no object {object_id}", object_id=object_id) from None
 
     def action_point(self, action_point_id: str) -> BareActionPoint:
         """Return an action point."""
         try:
             return self._points[action_point_id]
         except KeyError:
-            raise NotFound(f"the project has no action point {action_point_id}") from None
+            raise NotFound(
+                "the project has no action point {action_point_id}", action_point_id=action_point_id
+            ) from None
 
     def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
         """Return an orientation with its action point."""
         try:
             return self._orientations[orientation_id]
         except KeyError:
-            raise NotFound(f"the project has no orientation {orientation_id}") from None
+            raise NotFound("the project has no orientation {orientation_id}", orientation_id=orientation_id) from None
 
     def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
         """Return joints with their action point."""
         try:
             return self._joints[joints_id]
         except KeyError:
-            raise NotFound(f"the project has no joints {joints_id}") from None
+            raise NotFound("the project has no joints {joints_id}", joints_id=joints_id) from None
 
     def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
         """Return an action with its action point."""
         try:
             return self._actions[action_id]
         except KeyError:
-            raise NotFound(f"the project has no action {action_id}") from None
+            raise NotFound("the project has no action {action_id}", action_id=action_id) from None
 
     def parameter(self, parameter_id: str) -> ProjectParameter:
         """Return a project parameter."""
         try:
             return self._parameters[parameter_id]
         except KeyError:
-            raise NotFound(f"the project has no parameter {parameter_id}") from None
+            raise NotFound("the project has no parameter {parameter_id}", parameter_id=parameter_id) from None

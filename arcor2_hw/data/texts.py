@@ -42,7 +42,10 @@ def check_texts(value: Any, field: str = "") -> None:
         limit = LIMITS.get(field, OTHER)
         if limit is not None and len(value) > limit:
             raise TextTooLong(
-                f"{field or 'A text'} has {len(value)} characters; at most {limit} are allowed. Shorten it."
+                "{field} has {count} characters; at most {limit} are allowed. Shorten it.",
+                field=field or "A text",
+                count=len(value),
+                limit=limit,
             )
     elif isinstance(value, msgspec.Struct):
         for name in value.__struct_fields__:

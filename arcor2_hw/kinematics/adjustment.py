@@ -55,14 +55,19 @@ def with_origins(description: Description, origins: Mapping[str, Array]) -> Desc
         ModelError: There is no such joint.
     """
     if unknown := origins.keys() - {joint.name for joint in description.joints}:
-        raise ModelError(f"{description.name} has no joint {', '.join(sorted(unknown))}.")
+        raise ModelError("{name} has no joint {unknown}.", name=description.name, unknown=", ".join(sorted(unknown)))
     moved = (replace(joint, origin=origins.get(joint.name, joint.origin)) for joint in description.joints)
     return replace(description, joints=tuple(moved))
 
 
 def _number(description: Description, setting: Setting, value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise ModelError(f"{description.name}: {setting.name} must be a finite number, not {value!r}.")
+        raise ModelError(
+            "{name}: {setting_name} must be a finite number, not {value!r}.",
+            name=description.name,
+            setting_name=setting.name,
+            value=value,
+        )
     return float(value)
 
 
@@ -72,7 +77,13 @@ def _adjusted(description: Description, joint: Joint, component: str, value: flo
     if component in ("lower", "upper"):
         lower, upper = (value, joint.upper) if component == "lower" else (joint.lower, value)
         if lower > upper and component == "upper":  # a new lower limit has been set before
-            raise ModelError(f"{description.name}: the limits of {joint.name} cross: {lower:g} to {upper:g}.")
+            raise ModelError(
+                "{name}: the limits of {joint_name} cross: {lower:g} to {upper:g}.",
+                name=description.name,
+                joint_name=joint.name,
+                lower=lower,
+                upper=upper,
+            )
         return replace(joint, lower=lower, upper=upper)
     at = ORIGIN.index(component)
     origin = joint.origin.copy()
@@ -92,9 +103,19 @@ def _nominal(description: Description, setting: Setting) -> float:
             joint = next(joint for joint in description.joints if joint.name == other.of)
             value = float(joint.origin[ORIGIN.index(other.component), 3])
             if abs(value) < _TINY:
-                raise ZeroLength(f"{description.name}: {setting.name} is zero, so {setting.of} has no length.")
+                raise ZeroLength(
+                    "{name}: {setting_name} is zero, so {of} has no length.",
+                    name=description.name,
+                    setting_name=setting.name,
+                    of=setting.of,
+                )
             return value
-    raise ModelError(f"{description.name}: {setting.of} cannot follow {setting.name}, because no joint does.")
+    raise ModelError(
+        "{name}: {of} cannot follow {setting_name}, because no joint does.",
+        name=description.name,
+        of=setting.of,
+        setting_name=setting.name,
+    )
 
 
 def _stretched(geometry: Geometry, axis: int, ratio: float) -> Geometry:

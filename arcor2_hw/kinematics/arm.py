@@ -86,7 +86,7 @@ class Arm:
         self.steps = tuple(steps)
         columns = sorted({step.column for step in steps if step.axis is not None})
         if not columns:
-            raise ModelError(f"{model.name}: no joint moves {end_effector.link}.")
+            raise ModelError("{name}: no joint moves {link}.", name=model.name, link=end_effector.link)
         self.indices = np.array(columns)
         self.joint_names = tuple(model.joint_names[column] for column in columns)
         self.lower, self.upper = model.lower[self.indices], model.upper[self.indices]
@@ -182,10 +182,12 @@ class Arm:
         """
         given = {joint.name: joint.value for joint in joints}
         if missing := [name for name in self.joint_names if name not in given]:
-            raise ModelError(f"Joints of {self.model.name} are missing: {', '.join(missing)}.")
+            raise ModelError(
+                "Joints of {name} are missing: {missing}.", name=self.model.name, missing=", ".join(missing)
+            )
         values = np.array([given[name] for name in self.joint_names], dtype=np.float64)
         if not np.isfinite(values).all():
-            raise ModelError(f"The joints of {self.model.name} must be finite numbers.")
+            raise ModelError("The joints of {name} must be finite numbers.", name=self.model.name)
         return values
 
     def named(self, q: Array) -> list[robot.Joint]:

@@ -155,13 +155,15 @@ def describe(content: bytes, name: str) -> Description:
     """
     root = parse_xml(content, name)
     if root.tag != "robot":
-        raise ModelError(f"{name} describes a {root.tag}, not a robot.")
+        raise ModelError("{name} describes a {tag}, not a robot.", name=name, tag=root.tag)
     robot = root.get("name") or name
     links = _unique([_link(each, robot) for each in root.findall("link")], f"{robot}: link")
     if not links:
-        raise ModelError(f"{robot} has no links.")
+        raise ModelError("{robot} has no links.", robot=robot)
     if len(links) > MAX_PARTS:
-        raise UnsafeDescription(f"{robot} has {len(links)} links; the maximum is {MAX_PARTS}.")
+        raise UnsafeDescription(
+            "{robot} has {count} links; the maximum is {max_parts}.", robot=robot, count=len(links), max_parts=MAX_PARTS
+        )
     joints = _unique([_joint(each, robot) for each in root.findall("joint")], f"{robot}: joint")
     base, ordered = _tree(robot, links, joints.values())
     _check_mimics(robot, joints)
@@ -181,7 +183,7 @@ def _unique(parts: Iterable[_Part], what: str) -> dict[str, _Part]:
     found: dict[str, _Part] = {}
     for part in parts:
         if part.name in found:
-            raise ModelError(f"{what} {part.name} is defined twice.")
+            raise ModelError("{what} {name} is defined twice.", what=what, name=part.name)
         found[part.name] = part
     return found
 
@@ -190,7 +192,7 @@ def _unique(parts: Iterable[_Part], what: str) -> dict[str, _Part]:
 def _text(element: Element, attribute: str, where: str) -> str:
     value = element.get(attribute)
     if not value:
-        raise ModelError(f"{where}: {element.tag} has no {attribute}.")
+        raise ModelError("{place}: {tag} has no {attribute}.", place=where, tag=element.tag, attribute=attribute)
     return value
 
 
@@ -203,7 +205,14 @@ def _numbers(element: Element, attribute: str, default: tuple[float, ...], where
     except ValueError:
         found = ()
     if len(found) != len(default) or not all(map(math.isfinite, found)):
-        raise ModelError(f"{where}: {attribute} of {element.tag} must be {len(default)} numbers, not {value!r}.")
+        raise ModelError(
+            "{place}: {attribute} of {tag} must be {count} numbers, not {value!r}.",
+            place=where,
+            attribute=attribute,
+            tag=element.tag,
+            count=len(default),
+            value=value,
+        )
     return found
 
 
@@ -242,7 +251,7 @@ def _geometry(element: Element, where: str) -> Geometry:
     found = element.find("geometry")
     what = found[0] if found is not None and len(found) else None
     if what is None:
-        raise ModelError(f"{where}: the geometry is missing.")
+        raise ModelError("{place}: the geometry is missing.", place=where)
     origin = _origin(element, where)
     match what.tag:
         case "mesh":
@@ -255,7 +264,7 @@ def _geometry(element: Element, where: str) -> Geometry:
             return Geometry(Primitive(kind, sizes), origin)
         case "sphere":
             return Geometry(Primitive("sphere", (_number(what, "radius", 0.0, where),)), origin)
-    raise ModelError(f"{where}: geometry of kind {what.tag} is not supported.")
+    raise ModelError("{place}: geometry of kind {tag} is not supported.", place=where, tag=what.tag)
 
 
 def _joint(element: Element, robot: str) -> Joint:
@@ -263,16 +272,18 @@ def _joint(element: Element, robot: str) -> Joint:
     where = f"{robot}: joint {name}"
     kind = _text(element, "type", where)
     if kind not in KINDS:
-        raise ModelError(f"{where} is of type {kind}; supported are {', '.join(KINDS)}.")
+        raise ModelError(
+            "{place} is of type {type}; supported are {kinds}.", place=where, type=kind, kinds=", ".join(KINDS)
+        )
     parent, child = (element.find(each) for each in ("parent", "child"))
     if parent is None or child is None:
-        raise ModelError(f"{where} needs a parent and a child.")
+        raise ModelError("{place} needs a parent and a child.", place=where)
     x, y, z = (1.0, 0.0, 0.0)
     if (axis := element.find("axis")) is not None:
         x, y, z = _numbers(axis, "xyz", (1.0, 0.0, 0.0), where)
     length = math.hypot(x, y, z)
     if kind != "fixed" and length < 1e-6:
-        raise ModelError(f"{where} has an axis of length zero.")
+        raise ModelError("{place} has an axis of length zero.", place=where)
     lower, upper, velocity = _limits(element, kind, where)
     return Joint(
         name,
@@ -298,10 +309,15 @@ def _limits(element: Element, kind: str, where: str) -> tuple[float, float, floa
     if found is None:
         if element.find("mimic") is not None:
             return -math.inf, math.inf, velocity
-        raise ModelError(f"{where} has no limit.")
+        raise ModelError("{place} has no limit.", place=where)
     lower, upper = _number(found, "lower", 0.0, where), _number(found, "upper", 0.0, where)
     if lower > upper:
-        raise ModelError(f"{where}: its lower limit {lower:g} is above the upper limit {upper:g}.")
+        raise ModelError(
+            "{place}: its lower limit {lower:g} is above the upper limit {upper:g}.",
+            place=where,
+            lower=lower,
+            upper=upper,
+        )
     return lower, upper, velocity
 
 
@@ -327,10 +343,19 @@ def _tree(robot: str, links: Mapping[str, Link], joints: Iterable[Joint]) -> tup
     for joint in joints:
         for link in (joint.parent, joint.child):
             if link not in links:
-                raise ModelError(f"{robot}: joint {joint.name} refers to the link {link}, which does not exist.")
+                raise ModelError(
+                    "{robot}: joint {name} refers to the link {link}, which does not exist.",
+                    robot=robot,
+                    name=joint.name,
+                    link=link,
+                )
         if joint.child in to:
             raise JointLoop(
-                f"{robot}: the joints {to[joint.child].name} and {joint.name} have the same child link {joint.child}."
+                "{robot}: the joints {name} and {joint_name} have the same child link {child}.",
+                robot=robot,
+                name=to[joint.child].name,
+                joint_name=joint.name,
+                child=joint.child,
             )
         to[joint.child] = joint
         behind.setdefault(joint.parent, []).append(joint)
@@ -343,9 +368,11 @@ def _tree(robot: str, links: Mapping[str, Link], joints: Iterable[Joint]) -> tup
     if not roots or (len(roots) == 1 and len(ordered) < len(to)):
         reached = {joint.name for joint in ordered}
         around = [joint.name for joint in to.values() if joint.name not in reached]
-        raise JointLoop(f"{robot}: the joints {', '.join(around)} form a loop.")
+        raise JointLoop("{robot}: the joints {around} form a loop.", robot=robot, around=", ".join(around))
     if len(roots) > 1:
-        raise ModelError(f"{robot}: multiple root links: {', '.join(roots)}. Exactly one is allowed.")
+        raise ModelError(
+            "{robot}: multiple root links: {roots}. Exactly one is allowed.", robot=robot, roots=", ".join(roots)
+        )
     return roots[0], tuple(ordered)
 
 
@@ -355,9 +382,19 @@ def _check_mimics(robot: str, joints: Mapping[str, Joint]) -> None:
         if mimic is None:
             continue
         if (other := joints.get(mimic.joint)) is None or other.kind == "fixed":
-            raise ModelError(f"{robot}: joint {joint.name} mimics {mimic.joint}, which is not a moving joint.")
+            raise ModelError(
+                "{robot}: joint {name} mimics {joint}, which is not a moving joint.",
+                robot=robot,
+                name=joint.name,
+                joint=mimic.joint,
+            )
         if other.mimic is not None:
-            raise ModelError(f"{robot}: joint {joint.name} mimics {mimic.joint}, which itself mimics another joint.")
+            raise ModelError(
+                "{robot}: joint {name} mimics {joint}, which itself mimics another joint.",
+                robot=robot,
+                name=joint.name,
+                joint=mimic.joint,
+            )
 
 
 def _leaves(found: Description) -> tuple[EndEffector, ...]:
@@ -372,15 +409,17 @@ def _leaves(found: Description) -> tuple[EndEffector, ...]:
 def _end_effector(element: Element, found: Description) -> EndEffector:
     link = _text(element, "link", found.name)
     if link not in found.links:
-        raise ModelError(f"{found.name}: the end effector {link} is not a link of the robot.")
+        raise ModelError("{name}: the end effector {link} is not a link of the robot.", name=found.name, link=link)
     where = f"{found.name}: end effector {link}"
     free = frozenset((element.get("free") or "").split())
     if free not in (frozenset(), frozenset({"rz"}), frozenset(ORIGIN[3:])):
-        raise ModelError(f"{where}: free must be empty, rz, or rx ry rz, not {element.get('free')!r}.")
+        raise ModelError(
+            "{place}: free must be empty, rz, or rx ry rz, not {element!r}.", place=where, element=element.get("free")
+        )
     position = _number(element, "position_tolerance", EndEffector.position_tolerance, where)
     orientation = _number(element, "orientation_tolerance", EndEffector.orientation_tolerance, where)
     if not (0.0 < position < 0.1 and 0.0 < orientation < 0.5):
-        raise ModelError(f"{where}: the tolerances must be above 0, and below 0.1 m and 0.5 rad.")
+        raise ModelError("{place}: the tolerances must be above 0, and below 0.1 m and 0.5 rad.", place=where)
     return EndEffector(link, free, position, orientation)
 
 
@@ -389,11 +428,16 @@ def _setting(element: Element, found: Description) -> Setting:
     where = f"{found.name}: setting {name}"
     if (joint := element.get("joint")) is not None:
         if joint not in {each.name for each in found.joints}:
-            raise ModelError(f"{where}: there is no joint {joint}.")
+            raise ModelError("{place}: there is no joint {joint}.", place=where, joint=joint)
         if component not in (*ORIGIN, "lower", "upper", "velocity"):
-            raise ModelError(f"{where}: a joint has no component {component}.")
+            raise ModelError("{place}: a joint has no component {component}.", place=where, component=component)
         return Setting(name, "joint", joint, component)
     link = _text(element, "link", where)
     if link not in found.links or component not in ORIGIN[:3]:
-        raise ModelError(f"{where}: {component} of the link {link} cannot follow a setting.")
+        raise ModelError(
+            "{place}: {component} of the link {link} cannot follow a setting.",
+            place=where,
+            component=component,
+            link=link,
+        )
     return Setting(name, "link", link, component)

@@ -76,13 +76,19 @@ def calibrated(model: RobotModel, end_effector: str, rows: Sequence[DhRow]) -> R
     arm = model.arm(end_effector)
     moving = [step for step in arm.steps if step.axis is not None]
     if len(moving) != len(rows) or any(step.prismatic or not np.allclose(step.axis, (0, 0, 1)) for step in moving):  # type: ignore[arg-type]
-        raise ModelError(f"{model.name} cannot be described by {len(rows)} DH rows: its joints do not match them.")
+        raise ModelError(
+            "{name} cannot be described by {count} DH rows: its joints do not match them.",
+            name=model.name,
+            count=len(rows),
+        )
     if not np.isfinite(rows).all():
-        raise ModelError(f"The calibration of {model.name} has numbers that are not finite.")
+        raise ModelError("The calibration of {name} has numbers that are not finite.", name=model.name)
     names = [step.name for step in arm.steps]
     first, last = names.index(moving[0].name), names.index(moving[-1].name)
     if len(moving) != last - first + 1 or last + 1 == len(names):
-        raise ModelError(f"{model.name} cannot be described by DH rows: it has fixed joints between its joints.")
+        raise ModelError(
+            "{name} cannot be described by DH rows: it has fixed joints between its joints.", name=model.name
+        )
     origins: dict[str, Array] = {}
     nominal, before, at = np.eye(4), np.eye(4), np.eye(4)
     for number, step in enumerate(moving):
@@ -94,7 +100,9 @@ def calibrated(model: RobotModel, end_effector: str, rows: Sequence[DhRow]) -> R
         before = placed
     end = at @ rows[-1].matrix()
     if np.abs(end - nominal @ arm.steps[last + 1].origin).max() > FARTHEST:
-        raise ModelError(f"The calibration does not belong to {model.name}: its end differs by more than 50 mm.")
+        raise ModelError(
+            "The calibration does not belong to {name}: its end differs by more than 50 mm.", name=model.name
+        )
     origins[names[last + 1]] = np.linalg.inv(before) @ end
     return model.with_origins(origins)
 
@@ -106,7 +114,7 @@ def calibrated_model(nominal: RobotModel, calibration: KinematicCalibration) -> 
         ModelError: The calibration belongs to another kind of robot.
     """
     if not nominal.end_effectors:
-        raise ModelError(f"{nominal.name} has no end effector, so no calibration can be applied.")
+        raise ModelError("{name} has no end effector, so no calibration can be applied.", name=nominal.name)
     # All end effectors share the joints of the arm.
     return calibrated(nominal, next(iter(nominal.end_effectors)), rows_of(calibration))
 
@@ -116,7 +124,9 @@ def _onto(axis_frame: Array, nominal: Array, what: str) -> Array:
     z, at = axis_frame[:3, 2], axis_frame[:3, 3]
     origin = at + z * float(z @ (nominal[:3, 3] - at))
     if np.linalg.norm(origin - nominal[:3, 3]) > FARTHEST or np.linalg.norm(z - nominal[:3, 2]) > FARTHEST:
-        raise ModelError(f"The calibration belongs to another robot: {what} differs by more than 50 mm or 0.05 rad.")
+        raise ModelError(
+            "The calibration belongs to another robot: {what} differs by more than 50 mm or 0.05 rad.", what=what
+        )
     x = nominal[:3, 0] - z * float(z @ nominal[:3, 0])
     x /= np.linalg.norm(x)
     out = np.eye(4)

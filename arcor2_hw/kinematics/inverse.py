@@ -89,8 +89,10 @@ class InverseKinematics:
             hit = hit or reason
         at = ", ".join(f"{value:.3f}" for value in target[:3, 3])
         if hit:
-            raise OnlyInCollision(f"{self.arm.model.name} reaches the pose only in collision: {hit}.", f"at {at}")
-        raise OutOfReach(f"{self.arm.model.name} cannot reach the pose.", f"at {at} in its root's frame")
+            raise OnlyInCollision(
+                "{name} reaches the pose only in collision: {hit}.", f"at {at}", name=self.arm.model.name, hit=hit
+            )
+        raise OutOfReach("{name} cannot reach the pose.", f"at {at} in its root's frame", name=self.arm.model.name)
 
     def solutions(
         self, target: Array, seed: Array | None = None, check: CollisionCheck | None = None, *, turns: bool = False
@@ -117,11 +119,13 @@ class InverseKinematics:
 
     def _checked(self, target: Array, seed: Array | None) -> Array:
         if target.shape != (4, 4) or not np.isfinite(target).all():
-            raise OutOfReach(f"The pose for {self.arm.model.name} has numbers that are not finite.")
+            raise OutOfReach("The pose for {name} has numbers that are not finite.", name=self.arm.model.name)
         if seed is None:
             seed = self.arm.middle()
         if seed.shape != (self.arm.dof,) or not np.isfinite(seed).all():
-            raise OutOfReach(f"{self.arm.model.name} needs {self.arm.dof} finite joint values as a seed.")
+            raise OutOfReach(
+                "{name} needs {dof} finite joint values as a seed.", name=self.arm.model.name, dof=self.arm.dof
+            )
         return seed
 
     # -------------------------------------------------------------------------------- candidates

@@ -26,7 +26,7 @@ class JointSet:
         self.name = name
         self.joints = tuple(joints)
         if not self.joints:
-            raise ModelError(f"{self.name} has no joint that moves.")
+            raise ModelError("{name} has no joint that moves.", name=self.name)
         self.joint_names = tuple(joint.name for joint in self.joints)
         self.lower = np.array([joint.lower for joint in self.joints])
         self.upper = np.array([joint.upper for joint in self.joints])
@@ -48,13 +48,18 @@ class JointSet:
         found: dict[str, float] = {}
         for joint in joints:
             if joint.name in found:
-                raise ModelError(f"The joint {joint.name} of {self.name} is given twice.")
+                raise ModelError("The joint {name} of {owner} is given twice.", name=joint.name, owner=self.name)
             if joint.name in self._column and not np.isfinite(joint.value):
-                raise ModelError(f"The joint {joint.name} of {self.name} must be a finite number, not {joint.value!r}.")
+                raise ModelError(
+                    "The joint {name} of {owner} must be a finite number, not {value!r}.",
+                    name=joint.name,
+                    owner=self.name,
+                    value=joint.value,
+                )
             found[joint.name] = joint.value
         missing = [name for name in self.joint_names if name not in found]
         if missing and others is None:
-            raise ModelError(f"Joints of {self.name} are missing: {', '.join(missing)}.")
+            raise ModelError("Joints of {name} are missing: {missing}.", name=self.name, missing=", ".join(missing))
         out = np.zeros(len(self.joints)) if others is None else np.array(others, dtype=np.float64)
         for name, number in self._column.items():
             out[number] = found.get(name, out[number])

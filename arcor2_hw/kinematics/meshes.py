@@ -60,7 +60,7 @@ def kind_of(content: bytes, name: str) -> str:
     binary = len(content) >= 84 and len(content) == 84 + 50 * int(struct.unpack_from("<I", content, 80)[0])
     if binary or content.startswith(b"solid"):
         return "stl"
-    raise BadMesh(f"The format of the mesh {name} is unknown. Supported are {', '.join(KINDS)}.")
+    raise BadMesh("The format of the mesh {name} is unknown. Supported are {kinds}.", name=name, kinds=", ".join(KINDS))
 
 
 def read_mesh(
@@ -123,7 +123,9 @@ def _parse(content: bytes, kind: str, name: str) -> tuple[Array, Triangles]:
         vertices = np.asarray(whole.vertices, dtype=np.float64).reshape(-1, 3)
         return vertices, np.asarray(whole.faces, dtype=np.int64).reshape(-1, 3)
     except Exception as error:
-        raise BadMesh(f"The mesh {name} is damaged or not a mesh.", f"{type(error).__name__}: {error}") from error
+        raise BadMesh(
+            "The mesh {name} is damaged or not a mesh.", f"{type(error).__name__}: {error}", name=name
+        ) from error
 
 
 def _parse_coloured(content: bytes, kind: str, name: str) -> tuple[Array, Triangles, NDArray[np.float32] | None]:
@@ -134,9 +136,11 @@ def _parse_coloured(content: bytes, kind: str, name: str) -> tuple[Array, Triang
         meshes = [each for each in scene.dump() if isinstance(each, trimesh.Trimesh) and len(each.faces)]
         parts = [_part(mesh, linear=kind == "glb") for mesh in meshes]
     except Exception as error:
-        raise BadMesh(f"The mesh {name} is damaged or not a mesh.", f"{type(error).__name__}: {error}") from error
+        raise BadMesh(
+            "The mesh {name} is damaged or not a mesh.", f"{type(error).__name__}: {error}", name=name
+        ) from error
     if not parts:
-        raise BadMesh(f"The mesh {name} has no triangles.")
+        raise BadMesh("The mesh {name} has no triangles.", name=name)
     starts = np.cumsum([0, *(len(vertices) for vertices, _, _ in parts)])
     vertices = np.concatenate([vertices for vertices, _, _ in parts])
     triangles = np.concatenate([faces + start for (_, faces, _), start in zip(parts, starts, strict=False)])
@@ -195,7 +199,12 @@ def _checked_format(content: bytes, name: str, most_bytes: int) -> str:
     """Return the format of a mesh that is safe to parse."""
     kind = kind_of(content, name)
     if len(content) > most_bytes:
-        raise BadMesh(f"The mesh {name} has {len(content)} bytes; the maximum is {most_bytes}.")
+        raise BadMesh(
+            "The mesh {name} has {count} bytes; the maximum is {most_bytes}.",
+            name=name,
+            count=len(content),
+            most_bytes=most_bytes,
+        )
     if kind == "dae":
         _refuse_entities(content, name)
     if kind == "glb":
@@ -206,28 +215,33 @@ def _checked_format(content: bytes, name: str, most_bytes: int) -> str:
 def _checked(vertices: Array, triangles: Triangles, name: str, most_triangles: int) -> Array:
     """Return the vertices; those that no triangle uses are made finite."""
     if not len(triangles):
-        raise BadMesh(f"The mesh {name} has no triangles.")
+        raise BadMesh("The mesh {name} has no triangles.", name=name)
     if len(triangles) > most_triangles:
-        raise BadMesh(f"The mesh {name} has {len(triangles)} triangles; the maximum is {most_triangles}.")
+        raise BadMesh(
+            "The mesh {name} has {count} triangles; the maximum is {most_triangles}.",
+            name=name,
+            count=len(triangles),
+            most_triangles=most_triangles,
+        )
     if triangles.min() < 0 or triangles.max() >= len(vertices):
-        raise BadMesh(f"The mesh {name} has triangles that refer to missing vertices.")
+        raise BadMesh("The mesh {name} has triangles that refer to missing vertices.", name=name)
     if not np.isfinite(vertices[np.unique(triangles)]).all():
-        raise BadMesh(f"The mesh {name} has vertices that are not finite.")
+        raise BadMesh("The mesh {name} has vertices that are not finite.", name=name)
     return np.where(np.isfinite(vertices), vertices, 0.0)
 
 
 def _refuse_far(used: Array, name: str) -> None:
     if np.abs(used).max() > _FARTHEST:
-        raise BadMesh(f"The mesh {name} extends beyond {_FARTHEST:g} m. Check its units.")
+        raise BadMesh("The mesh {name} extends beyond {farthest:g} m. Check its units.", name=name, farthest=_FARTHEST)
 
 
 def _refuse_entities(content: bytes, name: str) -> None:
     """Reject what makes an XML parser read other files or expand without bounds."""
     if b"\0" in content[:4096]:
-        raise BadMesh(f"The mesh {name} must be encoded in UTF-8.")
+        raise BadMesh("The mesh {name} must be encoded in UTF-8.", name=name)
     lowered = content.lower()
     if b"<!doctype" in lowered or b"<!entity" in lowered:
-        raise BadMesh(f"The mesh {name} has a document type, which is not allowed. Remove it.")
+        raise BadMesh("The mesh {name} has a document type, which is not allowed. Remove it.", name=name)
 
 
 def _refuse_compressed(content: bytes, name: str) -> None:
@@ -240,8 +254,9 @@ def _refuse_compressed(content: bytes, name: str) -> None:
     packed = {"KHR_draco_mesh_compression", "EXT_meshopt_compression"} & {str(each) for each in required}
     if packed:
         raise BadMesh(
-            f"The mesh {name} is compressed ({', '.join(sorted(packed))}), which is not supported. Export it "
-            "without compression."
+            "The mesh {name} is compressed ({packed}), which is not supported. Export it without compression.",
+            name=name,
+            packed=", ".join(sorted(packed)),
         )
 
 
@@ -255,7 +270,7 @@ def _unit(content: bytes, kind: str, name: str) -> float:
     except ValueError:
         unit = 0.0
     if not 1e-6 <= unit <= 1e3:
-        raise BadMesh(f"The mesh {name} has an invalid unit.")
+        raise BadMesh("The mesh {name} has an invalid unit.", name=name)
     return unit
 
 

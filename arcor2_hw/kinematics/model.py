@@ -113,7 +113,12 @@ class RobotModel(JointSet):
         """
         if end_effector not in self.description.links:
             known = ", ".join(self.end_effectors)
-            raise NotFound(f"{self.name} has no end effector {end_effector!r}. Available: {known}.")
+            raise NotFound(
+                "{name} has no end effector {end_effector!r}. Available: {known}.",
+                name=self.name,
+                end_effector=end_effector,
+                known=known,
+            )
         steps: list[Step] = []
         link = end_effector
         to = {joint.child: joint for joint in self.description.joints}
@@ -153,8 +158,12 @@ class RobotModel(JointSet):
                 and np.linalg.norm(np.cross(apart, axis)) < _TOUCHING
             ):
                 raise ZeroLength(
-                    f"{self.name}: the link {other.child} has no length between the joints {other.name} and"
-                    f" {joint.name}, which turn about the same axis."
+                    "{name}: the link {child} has no length between the joints {other_name} and"
+                    " {joint_name}, which turn about the same axis.",
+                    name=self.name,
+                    child=other.child,
+                    other_name=other.name,
+                    joint_name=joint.name,
                 )
 
     def _shapes(self) -> tuple[tuple[LinkShape, ...], tuple[LinkShape, ...]]:
@@ -176,7 +185,9 @@ class RobotModel(JointSet):
         what = geometry.what
         if isinstance(what, MeshFile):
             if 0.0 in what.scale:
-                raise ZeroLength(f"{where}: the mesh {what.reference} has a scale of zero.")
+                raise ZeroLength(
+                    "{place}: the mesh {reference} has a scale of zero.", place=where, reference=what.reference
+                )
             path = self._package.locate(what.reference, self._beside)
             mesh = read_mesh(self._package.read(path, MAX_MESH), path, what.scale, upright=False)
             return mesh if use == "exact" else shapes.hull_of(mesh.vertices, f"{where}: the mesh {path}")

@@ -48,12 +48,14 @@ class Package:
             if source.is_dir():
                 return cls._of_folder(source, name)
             if not source.is_file():
-                raise ModelError(f"There is no robot model {name}.")
+                raise ModelError("There is no robot model {name}.", name=name)
             if source.stat().st_size > MAX_PACKAGE:
-                raise UnsafeDescription(f"{name} is larger than {MAX_PACKAGE} bytes.")
+                raise UnsafeDescription(
+                    "{name} is larger than {max_package} bytes.", name=name, max_package=MAX_PACKAGE
+                )
             return cls._of_bytes(source.read_bytes(), name)
         except OSError as error:
-            raise ModelError(f"{name} cannot be read: {error.strerror}", str(error)) from error
+            raise ModelError("{name} cannot be read: {reason}", str(error), name=name, reason=error.strerror) from error
 
     @classmethod
     def _of_folder(cls, folder: Path, name: str) -> Self:
@@ -64,10 +66,12 @@ class Package:
                 continue
             inner = path.relative_to(folder).as_posix()
             if not path.resolve().is_relative_to(root):
-                raise UnsafeDescription(f"{name}: {inner} is a link to a file outside of the folder.")
+                raise UnsafeDescription(
+                    "{name}: {inner} is a link to a file outside of the folder.", name=name, inner=inner
+                )
             sizes[inner] = path.stat().st_size
             if len(sizes) > MAX_FILES:
-                raise UnsafeDescription(f"{name} has more than {MAX_FILES} files.")
+                raise UnsafeDescription("{name} has more than {max_files} files.", name=name, max_files=MAX_FILES)
 
         def read(inner: str, limit: int) -> bytes:
             with (folder / inner).open("rb") as file:
@@ -83,20 +87,26 @@ class Package:
         try:
             archive = zipfile.ZipFile(io.BytesIO(content))
         except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
-            raise ModelError(f"{name} is not a zip archive.", str(error)) from error
+            raise ModelError("{name} is not a zip archive.", str(error), name=name) from error
         sizes: dict[str, int] = {}
         for each in archive.infolist():
             if each.is_dir():
                 continue
             if _outside(each.filename):
-                raise UnsafeDescription(f"{name}: the file {each.filename!r} is outside of the archive.")
+                raise UnsafeDescription(
+                    "{name}: the file {filename!r} is outside of the archive.", name=name, filename=each.filename
+                )
             if each.flag_bits & 1:
-                raise UnsafeDescription(f"{name}: the file {each.filename!r} is encrypted.")
+                raise UnsafeDescription(
+                    "{name}: the file {filename!r} is encrypted.", name=name, filename=each.filename
+                )
             sizes[posixpath.normpath(each.filename)] = each.file_size
         if len(sizes) > MAX_FILES:
-            raise UnsafeDescription(f"{name} has more than {MAX_FILES} files.")
+            raise UnsafeDescription("{name} has more than {max_files} files.", name=name, max_files=MAX_FILES)
         if sum(sizes.values()) > MAX_PACKAGE:
-            raise UnsafeDescription(f"{name} is larger than {MAX_PACKAGE} bytes when unpacked.")
+            raise UnsafeDescription(
+                "{name} is larger than {max_package} bytes when unpacked.", name=name, max_package=MAX_PACKAGE
+            )
         entries = {posixpath.normpath(each.filename): each for each in archive.infolist()}
 
         def read(inner: str, limit: int) -> bytes:
@@ -104,11 +114,11 @@ class Package:
                 with archive.open(entries[inner]) as file:
                     return file.read(limit + 1)
             except (zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError, ValueError, OSError) as error:
-                raise ModelError(f"{name}: the file {inner} is damaged.", str(error)) from error
+                raise ModelError("{name}: the file {inner} is damaged.", str(error), name=name, inner=inner) from error
             except Exception as error:
                 if type(error).__name__ != "error":  # the error of zlib is not a public class
                     raise
-                raise ModelError(f"{name}: the file {inner} is damaged.", str(error)) from error
+                raise ModelError("{name}: the file {inner} is damaged.", str(error), name=name, inner=inner) from error
 
         return cls(name, sizes, read)
 
@@ -123,7 +133,9 @@ class Package:
             content = self._read(inner, limit)
             if len(content) <= limit:
                 return content
-        raise UnsafeDescription(f"{self.name}: {inner} is larger than {limit} bytes.")
+        raise UnsafeDescription(
+            "{name}: {inner} is larger than {limit} bytes.", name=self.name, inner=inner, limit=limit
+        )
 
     def urdf(self) -> tuple[str, bytes]:
         """Return path and content of the URDF file.
@@ -137,9 +149,14 @@ class Package:
             depth = min(name.count("/") for name in found)
             found = [name for name in found if name.count("/") == depth]
         if not found:
-            raise ModelError(f"{self.name} has no URDF file.")
+            raise ModelError("{name} has no URDF file.", name=self.name)
         if len(found) > 1:
-            raise ModelError(f"{self.name} has {len(found)} URDF files: {', '.join(found)}. Exactly one is allowed.")
+            raise ModelError(
+                "{name} has {count} URDF files: {found}. Exactly one is allowed.",
+                name=self.name,
+                count=len(found),
+                found=", ".join(found),
+            )
         return found[0], self.read(found[0], MAX_URDF)
 
     def locate(self, reference: str, beside: str) -> str:
@@ -161,13 +178,19 @@ class Package:
         if not rest:
             scheme, rest = "", reference.removeprefix("file:")
         if scheme not in ("", "package", "model"):
-            raise UnsafeDescription(f"{self.name}: {reference!r} is not a file of the package.")
+            raise UnsafeDescription(
+                "{name}: {reference!r} is not a file of the package.", name=self.name, reference=reference
+            )
         wanted = unquote(rest).replace("\\", "/")
         if _outside(wanted) and scheme:
-            raise UnsafeDescription(f"{self.name}: {reference!r} is outside of the package.")
+            raise UnsafeDescription(
+                "{name}: {reference!r} is outside of the package.", name=self.name, reference=reference
+            )
         at = posixpath.normpath(wanted if scheme else posixpath.join(posixpath.dirname(beside), wanted))
         if _outside(at):
-            raise UnsafeDescription(f"{self.name}: {reference!r} is outside of the package.")
+            raise UnsafeDescription(
+                "{name}: {reference!r} is outside of the package.", name=self.name, reference=reference
+            )
         parts = at.split("/")
         for first in range(len(parts)):
             tail = "/".join(parts[first:])
@@ -176,7 +199,7 @@ class Package:
             behind = [name for name in self.names if name.endswith(f"/{tail}")]
             if len(behind) == 1:
                 return behind[0]
-        raise MissingMesh(f"{self.name}: the mesh {reference} is missing.")
+        raise MissingMesh("{name}: the mesh {reference} is missing.", name=self.name, reference=reference)
 
 
 def _outside(path: str) -> bool:

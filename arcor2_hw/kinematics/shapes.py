@@ -71,7 +71,13 @@ def check(shape: Shape, what: str) -> None:
         return
     for name, value in msgspec.structs.asdict(shape).items():
         if not (np.isfinite(value) and value > _TINY) and not (isinstance(shape, Capsule) and name == "length"):
-            raise ZeroLength(f"{what}: {name} of a {type(shape).__name__.lower()} must be above zero, not {value!r}.")
+            raise ZeroLength(
+                "{what}: {name} of a {type} must be above zero, not {value!r}.",
+                what=what,
+                name=name,
+                type=type(shape).__name__.lower(),
+                value=value,
+            )
 
 
 def hull_of(vertices: Array, what: str) -> Hull:
@@ -85,7 +91,7 @@ def hull_of(vertices: Array, what: str) -> Hull:
     try:
         found = ConvexHull(vertices)
     except (QhullError, ValueError) as error:
-        raise BadMesh(f"{what} is flat and has no volume.", str(error).splitlines()[0]) from error
+        raise BadMesh("{what} is flat and has no volume.", str(error).splitlines()[0], what=what) from error
     number = np.full(len(vertices), -1)
     number[found.vertices] = np.arange(len(found.vertices))
     triangles = number[found.simplices]
@@ -110,7 +116,7 @@ def of_model(model: object_type.Models, mesh: TriangleMesh | None = None, use: M
     if not isinstance(model, object_type.Mesh):
         return primitive_of(model)
     if mesh is None:
-        raise BadMesh(f"The mesh {model.asset_id} of {model.id} was not read.")
+        raise BadMesh("The mesh {asset_id} of {id} was not read.", asset_id=model.asset_id, id=model.id)
     return mesh if use == "exact" else hull_of(mesh.vertices, f"The mesh {model.asset_id}")
 
 

@@ -27,15 +27,17 @@ def parse_xml(content: bytes, name: str) -> Element:
     depth = 0
 
     def refuse(*_: object) -> None:
-        raise UnsafeDescription(f"{name} has a document type or an entity, which is not allowed. Remove it.")
+        raise UnsafeDescription("{name} has a document type or an entity, which is not allowed. Remove it.", name=name)
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth
         depth += 1
         if depth > MAX_DEPTH:
-            raise UnsafeDescription(f"{name} is nested deeper than {MAX_DEPTH} elements.")
+            raise UnsafeDescription(
+                "{name} is nested deeper than {max_depth} elements.", name=name, max_depth=MAX_DEPTH
+            )
         if tag.startswith("xacro:"):
-            raise ModelError(f"{name} is a xacro file. Convert it to a URDF first.")
+            raise ModelError("{name} is a xacro file. Convert it to a URDF first.", name=name)
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -51,4 +53,4 @@ def parse_xml(content: bytes, name: str) -> Element:
         parser.Parse(content, True)
         return builder.close()
     except (expat.ExpatError, ValueError, AssertionError, LookupError) as error:
-        raise ModelError(f"{name} is not valid XML: {error}.") from error
+        raise ModelError("{name} is not valid XML: {reason}.", name=name, reason=error) from error

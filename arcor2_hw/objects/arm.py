@@ -43,14 +43,14 @@ class StopGuard:
     def check(self, what: str) -> None:
         """Raise Cancelled, naming the command, if a stop was requested."""
         if self.stopped():
-            raise Cancelled(f"{what} was stopped.")
+            raise Cancelled("{what} was stopped.", what=what)
 
 
 @contextlib.contextmanager
 def exclusive_motion(lock: threading.Lock, arm: str) -> Iterator[None]:
     """Hold the motion lock of an arm. Raise Refused if the arm is executing another motion."""
     if not lock.acquire(blocking=False):
-        raise Refused(f"{arm} is moving already. Wait until the motion ends, or stop it.")
+        raise Refused("{arm} is moving already. Wait until the motion ends, or stop it.", arm=arm)
     try:
         yield
     finally:
@@ -86,14 +86,23 @@ def joint_values(
         raise wrong(f"The joints of {arm} are {', '.join(limits)}; received: {', '.join(values)}.")
     for name, (low, high) in limits.items():
         if not low - slack <= values[name] <= high + slack:
-            raise OutOfRange(f"{name} of {arm} must be {low:.3f} to {high:.3f} rad, not {values[name]!r}.")
+            raise OutOfRange(
+                "{name} of {arm} must be {low:.3f} to {high:.3f} rad, not {value!r}.",
+                name=name,
+                arm=arm,
+                low=low,
+                high=high,
+                value=values[name],
+            )
     return [min(max(values[name], low), high) for name, (low, high) in limits.items()]
 
 
 def check_end_effector(arm: str, end_effector: str) -> None:
     """Raise NotFound unless the end effector is the only one of an arm."""
     if end_effector != TCP:
-        raise NotFound(f"{arm} has no end effector {end_effector!r}, only {TCP!r}.")
+        raise NotFound(
+            "{arm} has no end effector {end_effector!r}, only {tcp!r}.", arm=arm, end_effector=end_effector, tcp=TCP
+        )
 
 
 def check_confirmed(confirmed_by: str) -> None:

@@ -81,7 +81,7 @@ class Camera(CollisionObject):
             NoDepth: The frame has no depth image.
         """
         if frame.depth is None:
-            raise NoDepth(f"{self.name}: the frame has no depth")
+            raise NoDepth("{name}: the frame has no depth", name=self.name)
         return cloud(frame.depth, frame.note.parameters)
 
     def depth_range(self) -> tuple[float, float]:

@@ -52,7 +52,7 @@ class PictureNote(Data, frozen=True):
         try:
             return msgspec.json.decode(text, type=cls)
         except (msgspec.MsgspecError, ValueError) as error:
-            raise InvalidData(f"the note in the image on how it was taken is invalid: {error}") from error
+            raise InvalidData("the note in the image on how it was taken is invalid: {reason}", reason=error) from error
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,7 +55,7 @@ class Generic(abc.ABC):
             NotFound: The type has no settings.
         """
         if self._settings is None:
-            raise NotFound(f"{self.name} has no settings")
+            raise NotFound("{name} has no settings", name=self.name)
         return self._settings
 
     @classmethod
@@ -133,7 +133,7 @@ class Generic(abc.ABC):
         Raises:
             NotFound: There is no such active alarm.
         """
-        raise NotFound(f"{self.name} has no active alarm {code}")
+        raise NotFound("{name} has no active alarm {code}", name=self.name, code=code)
 
     # -------------------------------------------------------------------------------- control: optional hooks
     def take_control(self) -> None:  # noqa: B027

@@ -98,7 +98,11 @@ class HoldsParts:
         """
         found = None if self._find_object is None else self._find_object(object_name)
         if not isinstance(found, CollisionObject):
-            raise NotFound(f"{self.name} cannot grip {object_name}: the scene has no collision object of that name")
+            raise NotFound(
+                "{name} cannot grip {object_name}: the scene has no collision object of that name",
+                name=self.name,
+                object_name=object_name,
+            )
         self._part_object = found
 
     # -------------------------------------------------------------------------------- for drivers

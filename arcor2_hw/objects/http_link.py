@@ -47,19 +47,21 @@ class HttpLink:
         """
         with self._one_request:
             if self._client is None:
-                raise ConnectionLost(f"{self.who}: the connection is closed")
+                raise ConnectionLost("{device}: the connection is closed", device=self.who)
             try:
                 answer = self._client.request(method, path, json=body)
                 content = answer.json()
             except httpx.TimeoutException as e:
-                raise DeviceTimeout(f"{self.who} did not answer within {self._timeout:g} s", str(e)) from e
+                raise DeviceTimeout(
+                    "{device} did not answer within {timeout:g} s", str(e), device=self.who, timeout=self._timeout
+                ) from e
             except httpx.ConnectError as e:
-                raise NotConnected(f"{self.who} cannot be reached", str(e)) from e
+                raise NotConnected("{device} cannot be reached", str(e), device=self.who) from e
             except httpx.HTTPError as e:
-                raise ConnectionLost(f"{self.who}: the connection was lost", str(e)) from e
+                raise ConnectionLost("{device}: the connection was lost", str(e), device=self.who) from e
             except ValueError as e:
-                raise DeviceFault(f"{self.who} sent what it never sends", str(e)) from e
+                raise DeviceFault("{device} sent what it never sends", str(e), device=self.who) from e
         if answer.is_error:
             why = content.get("error", answer.status_code) if isinstance(content, dict) else answer.status_code
-            raise Refused(f"{self.who} refuses: {why}")
+            raise Refused("{device} refuses: {reason}", device=self.who, reason=why)
         return content

@@ -61,10 +61,12 @@ class Line:
             else:
                 self._open = _Serial(self._port, self._baud_rate)
         except TimeoutError:
-            raise DeviceTimeout(f"{self.who} cannot be reached within {timeout:.1f} s") from None
+            raise DeviceTimeout(
+                "{device} cannot be reached within {timeout:.1f} s", device=self.who, timeout=timeout
+            ) from None
         except (OSError, ValueError) as error:
             why = "is used by another program" if "exclusively" in str(error) else "cannot be opened"
-            raise NotConnected(f"{self.who}: the port {why}", str(error)) from error
+            raise NotConnected("{device}: the port {reason}", str(error), device=self.who, reason=why) from error
         self.loss = None
 
     def close(self) -> None:
@@ -78,7 +80,7 @@ class Line:
     def held(self, patience: float = 0.0) -> Iterator[None]:
         """Use the line exclusively. Raises Refused when it is in use for `patience` s, by default 4 answer times."""
         if not self._one_user.acquire(timeout=patience or 4.0 * self.answer_timeout):
-            raise Refused(f"{self.who} is busy with another call")
+            raise Refused("{device} is busy with another call", device=self.who)
         try:
             yield
         finally:
@@ -101,7 +103,7 @@ class Line:
         try:
             port.write(data)
         except TimeoutError as error:
-            raise self.broken(DeviceTimeout(f"{self.who} takes no bytes", str(error))) from error
+            raise self.broken(DeviceTimeout("{device} takes no bytes", str(error), device=self.who)) from error
         except (OSError, TypeError) as error:
             raise self._lost(error) from error
 
@@ -175,7 +177,7 @@ class Line:
     def _required(self) -> "_Port":
         port = self._open
         if port is None:
-            raise self.loss_again() or NotConnected(f"{self.who} is not connected")
+            raise self.loss_again() or NotConnected("{device} is not connected", device=self.who)
         return port
 
     def _lost(self, error: Exception) -> DeviceError:

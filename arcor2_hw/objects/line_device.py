@@ -72,7 +72,7 @@ class LineDevice(Connected):
         except ConnectionLost as error:
             raise self.line.loss_again() or error from None
         except NotConnected as error:
-            raise NotConnected(f"{self.who} is not connected", error.detail) from None
+            raise NotConnected("{device} is not connected", error.detail, device=self.who) from None
         if (loss := self.line.loss_again()) is not None:
             raise loss
 
@@ -110,7 +110,7 @@ class LineDevice(Connected):
         try:
             self.line.open(timeout)
             if self._ending:
-                raise NotConnected(f"{self.who} is being disconnected")
+                raise NotConnected("{device} is being disconnected", device=self.who)
             with self.line.held():
                 self.greet(deadline)
         except DeviceError:

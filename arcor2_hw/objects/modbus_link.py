@@ -111,7 +111,9 @@ class ModbusLink:
         try:
             from arcor2_hw.objects import modbus_client
         except ImportError as error:
-            raise NotConnected(f"{self.who}: pymodbus is not installed (arcor2-hw[modbus])", str(error)) from error
+            raise NotConnected(
+                "{device}: pymodbus is not installed (arcor2-hw[modbus])", str(error), device=self.who
+            ) from error
         client: Client
         if self._serial_port:
             client = modbus_client.SerialClient(self._serial_port, *self._format, timeout)
@@ -120,9 +122,11 @@ class ModbusLink:
         started = time.monotonic()
         if not client.connect():
             if time.monotonic() - started >= timeout:
-                raise DeviceTimeout(f"{self.who} did not take the connection within {timeout:.1f} s")
+                raise DeviceTimeout(
+                    "{device} did not take the connection within {timeout:.1f} s", device=self.who, timeout=timeout
+                )
             why = "the port cannot be opened" if self._serial_port else "nobody takes the connection"
-            raise NotConnected(f"{self.who} cannot be reached: {why}")
+            raise NotConnected("{device} cannot be reached: {reason}", device=self.who, reason=why)
         self._client = client
 
     def _close(self) -> None:
@@ -213,7 +217,13 @@ class ModbusLink:
     ) -> list[int]:
         words = self._read(send, kind, address, count, timeout).registers
         if len(words) != count:
-            raise DeviceFault(f"{self.who} gave {len(words)} of {count} {kind}")
+            raise DeviceFault(
+                "{device} gave {count} of {expected} {type}",
+                device=self.who,
+                count=len(words),
+                expected=count,
+                type=kind,
+            )
         return list(words)
 
     def _bits(
@@ -221,7 +231,13 @@ class ModbusLink:
     ) -> list[bool]:
         bits = self._read(send, kind, address, count, timeout).bits
         if not count <= len(bits) <= count + 7:  # whole bytes come
-            raise DeviceFault(f"{self.who} gave {len(bits)} of {count} {kind}")
+            raise DeviceFault(
+                "{device} gave {count} of {expected} {type}",
+                device=self.who,
+                count=len(bits),
+                expected=count,
+                type=kind,
+            )
         return list(bits[:count])
 
     def _read(
@@ -237,13 +253,15 @@ class ModbusLink:
         try:
             return self._request(send, what, limit)
         except _NoAnswer as error:
-            raise DeviceTimeout(f"{self.who}: {error} twice") from error.__cause__
+            raise DeviceTimeout("{device}: {reason} twice", device=self.who, reason=error) from error.__cause__
 
     def _write(self, send: "Callable[[Client], ModbusPDU]", what: str, timeout: float | None) -> None:
         try:
             self._request(send, what, timeout or self._timeout)
         except _NoAnswer as error:
-            raise DeviceTimeout(f"{self.who}: {error}; it may have been obeyed") from error.__cause__
+            raise DeviceTimeout(
+                "{device}: {reason}; it may have been obeyed", device=self.who, reason=error
+            ) from error.__cause__
 
     def _request(
         self, send: "Callable[[Client], ModbusPDU]", what: str | tuple[str, int, int], timeout: float
@@ -270,8 +288,12 @@ class ModbusLink:
         if answer.isError():
             code = int(getattr(answer, "exception_code", 0))
             raise DeviceFault(
-                f"{self.who} refuses {_title(what)}: {self._exceptions.get(code, 'exception')} (exception {code})",
+                "{device} refuses {what}: {meaning} (exception {code})",
                 fault_code=code,
+                device=self.who,
+                what=_title(what),
+                meaning=self._exceptions.get(code, "exception"),
+                code=code,
             )
         return answer
 
@@ -293,7 +315,7 @@ class ModbusLink:
         return _NoAnswer(f"what came is no valid answer ({_title(what)}: {type(error).__name__})")
 
     def _not_connected(self) -> NotConnected:
-        return NotConnected(f"{self.who} is not connected")
+        return NotConnected("{device} is not connected", device=self.who)
 
     def _give_up(self) -> None:
         self._close()
@@ -303,7 +325,9 @@ class ModbusLink:
     def _lost(self, error: Exception) -> ConnectionLost:
         self._close()
         self._usable = False
-        self._loss = ConnectionLost(f"{self.who}: the connection was lost", f"{type(error).__name__}: {error}")
+        self._loss = ConnectionLost(
+            "{device}: the connection was lost", f"{type(error).__name__}: {error}", device=self.who
+        )
         return self._loss
 
 

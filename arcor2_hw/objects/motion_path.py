@@ -38,7 +38,7 @@ class MotionPath:
         present = {joint.name: joint.value for joint in now}
         for joint in self.waypoints[0]:
             if abs(present[joint.name] - joint.value) > JOINT_TOLERANCE:
-                raise Refused(f"{name} was moved while its path was planned. Start the move again.")
+                raise Refused("{name} was moved while its path was planned. Start the move again.", name=name)
 
     def timed(self, tcp_speed: float | None = None) -> "Trajectory":
         """Return joint values and velocities over time, for controllers that need them; see `Trajectory.sampled`.

@@ -107,8 +107,8 @@ class Observing:
         if self.online:
             return
         if self._state is Connection.LOST:
-            raise ConnectionLost(f"the connection to {self.what} is lost", str(self._reason or ""))
-        raise NotConnected(f"{self.what} is not connected", str(self._reason or ""))
+            raise ConnectionLost("the connection to {what} is lost", str(self._reason or ""), what=self.what)
+        raise NotConnected("{what} is not connected", str(self._reason or ""), what=self.what)
 
     def begin(self, what: str) -> GoOn:
         """Return the check for work that starts now: it raises Cancelled after `cancel`, ConnectionLost after a loss.
@@ -120,7 +120,7 @@ class Observing:
 
         def check() -> None:
             if self._cancelled != cancelled:
-                raise Cancelled(f"{self.what}: {what} was stopped")
+                raise Cancelled("{device}: {call} was stopped", device=self.what, call=what)
             self.check_unbroken(losses)
 
         return check
@@ -132,7 +132,9 @@ class Observing:
     def check_unbroken(self, losses: int) -> None:
         """Return while the device is observed and was since `losses` was read. Raises ConnectionLost, NotConnected."""
         if self.losses != losses:
-            raise ConnectionLost(f"{self.what}: the connection was lost", str(self._loss or "")) from self._loss
+            raise ConnectionLost(
+                "{what}: the connection was lost", str(self._loss or ""), what=self.what
+            ) from self._loss
         self.check()
 
     def start(self, timeout: float) -> None:
@@ -189,7 +191,7 @@ class Observing:
         if self._ending is not None:
             self._ending.join(timeout)
             if self._ending.is_alive():
-                raise DeviceTimeout(f"the last connection to {self.what} is still being closed")
+                raise DeviceTimeout("the last connection to {what} is still being closed", what=self.what)
             self._ending = None
 
     def _run(self, stopping: threading.Event) -> None:
@@ -215,7 +217,7 @@ class Observing:
         except Exception as e:
             if self._state is not Connection.LOST:  # else it is in the log already, and attempts go on
                 log.exception("%s: an error inside the driver", self.what)
-            return ConnectionLost(f"{self.what}: an error inside the driver", f"{type(e).__name__}: {e}")
+            return ConnectionLost("{what}: an error inside the driver", f"{type(e).__name__}: {e}", what=self.what)
         return None
 
     def _come_back(self, stopping: threading.Event, loss: DeviceError) -> None:

@@ -143,12 +143,19 @@ def build_world(
 def _attach(world: "CollisionWorld", name: str, shape: "Shape", attachment: Attachment, in_link: Pose) -> None:
     if attachment.robot not in world.robots:
         raise Refused(
-            f"The pose of {name} is unknown, because the joints of {attachment.robot}, which holds it, are unknown."
+            "The pose of {name} is unknown, because the joints of {robot}, which holds it, are unknown.",
+            name=name,
+            robot=attachment.robot,
         )
     standing = world.robot(attachment.robot)
     frames = standing.link_frames(standing.q)
     if attachment.link not in frames:
-        raise Refused(f"{name} is attached to {attachment.link}, which is no link of {attachment.robot}")
+        raise Refused(
+            "{name} is attached to {link}, which is no link of {robot}",
+            name=name,
+            link=attachment.link,
+            robot=attachment.robot,
+        )
     world.put(name, shape, Pose.from_matrix(frames[attachment.link]) * in_link)
     world.attach(name, attachment.robot, attachment.link, touching=attachment.touching)
 
@@ -163,7 +170,11 @@ def _require_all_joints(robot: Robot, model: "RobotModel", joints: Sequence[Join
     for name in model.end_effectors:
         for joint in model.arm(name).joint_names:
             if joint not in given:
-                raise Refused(f"The position of {robot.name} is unknown, because it does not report the joint {joint}.")
+                raise Refused(
+                    "The position of {name} is unknown, because it does not report the joint {joint}.",
+                    name=robot.name,
+                    joint=joint,
+                )
 
 
 def _copied(pose: Pose) -> Pose:

@@ -37,9 +37,19 @@ class PointActions(abc.ABC):
         """Return the point of a name. Raises OutOfRange when there is none, Refused when it is of another kind."""
         point = self.io_points.get(name)
         if point is None:
-            raise OutOfRange(f"{self.who} has no point {name!r}; there are {', '.join(self.io_points)}")
+            raise OutOfRange(
+                "{device} has no point {name!r}; there are {io_points}",
+                device=self.who,
+                name=name,
+                io_points=", ".join(self.io_points),
+            )
         if kind not in (None, point.kind):
-            raise Refused(f"{self.who}: {name} is {self.point_label(name)}; this needs a point of the other kind")
+            raise Refused(
+                "{device}: {name} is {point_label}; this needs a point of the other kind",
+                device=self.who,
+                name=name,
+                point_label=self.point_label(name),
+            )
         return point
 
     def point_label(self, name: str) -> str:
@@ -94,7 +104,13 @@ class PointActions(abc.ABC):
 
     def bad_reading(self, name: str) -> DeviceFault:
         """Return the error for a point whose value is bad."""
-        return DeviceFault(f"{self.who}: {name} ({self.point_label(name)}) is bad", fault_code="bad")
+        return DeviceFault(
+            "{device}: {name} ({point_label}) is bad",
+            fault_code="bad",
+            device=self.who,
+            name=name,
+            point_label=self.point_label(name),
+        )
 
     @action
     def write_digital(self, name: str, value: bool, *, an: str | None = None) -> None:

@@ -20,9 +20,16 @@ def entries(text: str, separator: str, parameter: str) -> dict[str, list[str]]:
     for entry in filter(None, (part.strip() for part in text.split(separator))):
         name, sign, rest = entry.partition("=")
         if not sign or not name.isidentifier() or not rest.strip():
-            raise OutOfRange(f"{parameter} must be a list of name=..., separated by {separator!r}, not {entry!r}")
+            raise OutOfRange(
+                "{parameter} must be a list of name=..., separated by {separator!r}, not {entry!r}",
+                parameter=parameter,
+                separator=separator,
+                entry=entry,
+            )
         if name in found:
-            raise OutOfRange(f"{parameter} must name each point once: {name!r} is in it twice")
+            raise OutOfRange(
+                "{parameter} must name each point once: {name!r} is in it twice", parameter=parameter, name=name
+            )
         found[name] = rest.split()
     return found
 
@@ -57,11 +64,24 @@ def io_point(
         key, sign, value = word.partition("=")
         if not sign or not value or key not in known or key in options:
             allowed = ", ".join(sorted(known)) or "no options"
-            raise OutOfRange(f"{parameter} must give {name} ({kind}) only {allowed}, each once, not {word!r}")
+            raise OutOfRange(
+                "{parameter} must give {name} ({type}) only {allowed}, each once, not {word!r}",
+                parameter=parameter,
+                name=name,
+                type=kind,
+                allowed=allowed,
+                word=word,
+            )
         options[key] = value
     on_loss = options.get("on_loss", default_on_loss)
     if on_loss not in safe_states:
-        raise OutOfRange(f"{parameter} must give {name} an on_loss of {', '.join(safe_states)}, not {on_loss!r}")
+        raise OutOfRange(
+            "{parameter} must give {name} an on_loss of {safe_states}, not {on_loss!r}",
+            parameter=parameter,
+            name=name,
+            safe_states=", ".join(safe_states),
+            on_loss=on_loss,
+        )
     point = IOPoint(
         name=name,
         direction=PointDirection.INPUT if kind in ("DI", "AI") else PointDirection.OUTPUT,
@@ -72,9 +92,14 @@ def io_point(
         on_loss=OnLoss(on_loss) if kind in ("DO", "AO") else UNSET,
     )
     if point.scale == 0.0:
-        raise OutOfRange(f"{parameter} must give {name} a scale other than 0")
+        raise OutOfRange("{parameter} must give {name} a scale other than 0", parameter=parameter, name=name)
     if not 0.0 <= point.debounce <= LONGEST_DEBOUNCE:
-        raise OutOfRange(f"{parameter} must give {name} a debounce of 0 to {LONGEST_DEBOUNCE:g} s")
+        raise OutOfRange(
+            "{parameter} must give {name} a debounce of 0 to {longest_debounce:g} s",
+            parameter=parameter,
+            name=name,
+            longest_debounce=LONGEST_DEBOUNCE,
+        )
     return point
 
 
@@ -84,5 +109,11 @@ def _number(text: str, key: str, name: str, parameter: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise OutOfRange(f"{parameter} must give {name} a number as {key}, not {text!r}")
+        raise OutOfRange(
+            "{parameter} must give {name} a number as {key}, not {text!r}",
+            parameter=parameter,
+            name=name,
+            key=key,
+            text=text,
+        )
     return value

@@ -142,7 +142,7 @@ class PolledControl(Connected, typing.Generic[T]):
         if not self.in_control:
             owner = self.control_owner()
             why = f"{owner} has control" if owner and self.why_not == NOBODY else self.why_not
-            raise NotInControl(f"{self.who}: {what} is refused: {why}")
+            raise NotInControl("{device}: {what} is refused: {reason}", device=self.who, what=what, reason=why)
 
     def send(self, what: str, write: Callable[[], None], go_on: GoOn | None = None) -> None:
         """Send a command, unless a stop or a loss came first. Raises NotInControl naming `what`."""
@@ -156,7 +156,9 @@ class PolledControl(Connected, typing.Generic[T]):
     def act(self, what: str) -> Iterator[GoOn]:
         """Do work that takes its time; the value is for `send` and `wait`. Raises Refused while other work runs."""
         if not self._acting.acquire(blocking=False):
-            raise Refused(f"{self.who} is busy ({self._doing}): {what} has to wait")
+            raise Refused(
+                "{device} is busy ({doing}): {what} has to wait", device=self.who, doing=self._doing, what=what
+            )
         try:
             self._doing = what
             yield self.begin(what)
@@ -167,7 +169,7 @@ class PolledControl(Connected, typing.Generic[T]):
         """Wait until the device does not work any more. Raises DeviceFault when it reports a fault then."""
         end = self.wait(lambda state: not self.is_busy(state), timeout, what, go_on)
         if fault := self.fault_of(end):
-            raise DeviceFault(f"{self.who}: {what} failed", fault_code=fault)
+            raise DeviceFault("{device}: {what} failed", fault_code=fault, device=self.who, what=what)
         return end
 
     def stop_waiting(self) -> None:
@@ -202,7 +204,7 @@ class PolledControl(Connected, typing.Generic[T]):
         with self._taking_control:
             owner = self.owner_of(self.fresh())
             if owner not in (None, US):
-                raise NotInControl(f"{self.who}: control is refused: {owner} has it")
+                raise NotInControl("{device}: control is refused: {owner} has it", device=self.who, owner=owner)
             if self.in_control:
                 return
             losses = self.observing.losses

@@ -41,7 +41,9 @@ class PolledMachine(PolledControl[T], Machine):
         self._command(MachineCommand.START, *arguments, go_on=go_on)
         end = self.wait(lambda read: not self.is_busy(read), timeout, "running", go_on)
         if (state := self.state_of(end)) not in (MachineState.COMPLETE, MachineState.IDLE):
-            raise DeviceFault(f"{self.who} did not finish: it is {state.name}", fault_code=self.fault_of(end))
+            raise DeviceFault(
+                "{device} did not finish: it is {name}", fault_code=self.fault_of(end), device=self.who, name=state.name
+            )
         return end
 
     # -------------------------------------------------------------------------------- hooks of PolledControl
@@ -55,7 +57,12 @@ class PolledMachine(PolledControl[T], Machine):
 
     def _command(self, command: MachineCommand, *arguments: int, go_on: GoOn | None = None) -> None:
         if (state := self.state_of(self.fresh())) not in ALLOWED[command]:
-            raise Refused(f"{self.who}: {command.name} is not allowed in {state.name}")
+            raise Refused(
+                "{device}: {name} is not allowed in {state_name}",
+                device=self.who,
+                name=command.name,
+                state_name=state.name,
+            )
         self.send(command.name, lambda: self.write_command(command, *arguments), go_on)
 
 

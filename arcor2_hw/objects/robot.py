@@ -93,7 +93,7 @@ class Robot(GenericWithPose):
             NotConnected: It is not connected.
         """
         if self.move_in_progress:
-            raise Refused(f"{self.name} is moving already")
+            raise Refused("{name} is moving already", name=self.name)
 
     def move_to_calibration_pose(self) -> None:
         """Move to a pose in which a camera sees the robot well."""

@@ -39,7 +39,7 @@ class RobotTools:
         self.made_of = settings, package, calibration
         self._surroundings: Surroundings = robot.surroundings
         if package is None:
-            raise Refused(f"{robot.name} has no model (URDF), so kinematics cannot be computed")
+            raise Refused("{name} has no model (URDF), so kinematics cannot be computed", name=robot.name)
         self.model = _load(robot, settings, package, calibration)
         self.model.name = robot.name
         self._arms: dict[str, Arm] = {}
@@ -95,7 +95,9 @@ class RobotTools:
             return shapes.of_model(model)
         file, scale = obstacle.file or self._surroundings.asset(model.asset_id), obstacle.scale
         if file is None or not file.is_file():
-            raise Refused(f"the mesh of {obstacle.name} is not available, so paths cannot be checked for collisions")
+            raise Refused(
+                "the mesh of {name} is not available, so paths cannot be checked for collisions", name=obstacle.name
+            )
         if (file, scale) not in self._meshes:
             with file.open("rb") as opened:
                 self._meshes[file, scale] = read_mesh(opened.read(MAX_MESH + 1), model.asset_id, scale)
@@ -110,7 +112,7 @@ def _load(
         from arcor2_hw.kinematics.model import RobotModel
     except ImportError as error:
         raise Refused(
-            f"{robot.name}: kinematics are not available. Install arcor2-hw[kinematics].", str(error)
+            "{name}: kinematics are not available. Install arcor2-hw[kinematics].", str(error), name=robot.name
         ) from error
     try:
         nominal = RobotModel.load(package, settings)

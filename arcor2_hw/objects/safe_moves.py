@@ -273,22 +273,36 @@ class SafeMoves:
         """
         obstacle = next((each for each in self._robot.surroundings.obstacles() if each.name == name), None)
         if obstacle is None:
-            raise NotFound(f"{self._robot.name} cannot hold {name}: the scene has no collision object of that name")
+            raise NotFound(
+                "{name} cannot hold {other_name}: the scene has no collision object of that name",
+                name=self._robot.name,
+                other_name=name,
+            )
         if obstacle.attachment is not None:
-            raise Refused(f"{self._robot.name} cannot hold {name}: {obstacle.attachment.robot} holds it")
+            raise Refused(
+                "{name} cannot hold {other_name}: {robot} holds it",
+                name=self._robot.name,
+                other_name=name,
+                robot=obstacle.attachment.robot,
+            )
         self._robot.hold_part(HeldPart(name, link, self._link_pose(link, joints).inverted() * obstacle.pose))
 
     def release(self, name: str, joints: Sequence[Joint]) -> Pose:
         """Detach an object and return its present pose. Raises NotFound when the robot does not hold it."""
         part = self._robot.drop_part(name)
         if part is None:
-            raise NotFound(f"{self._robot.name} does not hold {name}")
+            raise NotFound("{name} does not hold {other_name}", name=self._robot.name, other_name=name)
         return self._link_pose(part.link, joints) * part.in_link
 
     def _link_pose(self, link: str, joints: Sequence[Joint]) -> Pose:
         frames = self._tools().model.link_poses(self._q(joints))
         if link not in frames:
-            raise NotFound(f"{self._robot.name} has no link {link!r}. Its links: {', '.join(frames)}")
+            raise NotFound(
+                "{name} has no link {link!r}. Its links: {frames}",
+                name=self._robot.name,
+                link=link,
+                frames=", ".join(frames),
+            )
         return self._robot.pose * Pose.from_matrix(frames[link])
 
     # -------------------------------------------------------------------------------- inside

@@ -29,7 +29,14 @@ class Range:
 def within(name: str, value: float, low: float, high: float, unit: str = "") -> None:
     """Raise OutOfRange, which names the parameter, unless a number is finite and in the range."""
     if not (math.isfinite(value) and low <= value <= high):
-        raise OutOfRange(f"{name} must be {low:g} to {high:g}{unit and ' ' + unit}, not {value!r}")
+        raise OutOfRange(
+            "{name} must be {low:g} to {high:g}{unit}, not {value!r}",
+            name=name,
+            low=low,
+            high=high,
+            unit=unit and " " + unit,
+            value=value,
+        )
 
 
 @dataclasses.dataclass
@@ -58,9 +65,9 @@ class Settings:
 def check_host(host: str, port: int = 1) -> None:
     """Check the settings `host`, a name or an address, and `port`."""
     if not HOST.fullmatch(host):
-        raise OutOfRange(f"host must be the name or address of the device, not {host!r}")
+        raise OutOfRange("host must be the name or address of the device, not {host!r}", host=host)
     if not 1 <= port <= 65535:
-        raise OutOfRange(f"port must be 1 to 65535, not {port!r}")
+        raise OutOfRange("port must be 1 to 65535, not {port!r}", port=port)
 
 
 def check_url(name: str, url: str, *schemes: str) -> urllib.parse.SplitResult:
@@ -72,9 +79,9 @@ def check_url(name: str, url: str, *schemes: str) -> urllib.parse.SplitResult:
     except ValueError:
         raise OutOfRange(problem) from None
     if "@" in parts.netloc or parts.query or parts.fragment:
-        raise OutOfRange(f"{problem}, without user, password, query and fragment")
+        raise OutOfRange("{problem}, without user, password, query and fragment", problem=problem)
     if not sound or parts.scheme not in schemes or not url.startswith(parts.scheme) or not url.isprintable():
-        raise OutOfRange(f"{problem}, not {url!r}")
+        raise OutOfRange("{problem}, not {url!r}", problem=problem, url=url)
     return parts
 
 
@@ -86,7 +93,7 @@ def check_serial_port(name: str, port: str, *, sockets: bool = True) -> None:
     if sockets and port.startswith("socket://"):
         parts = check_url(name, port, "socket")
         if parts.port is None or parts.path.strip("/"):
-            raise OutOfRange(f"{name} must be socket://host:port, not {port!r}")
+            raise OutOfRange("{name} must be socket://host:port, not {port!r}", name=name, port=port)
         return
     problem = f"{name} must be the path of a serial device{', or socket://host:port' if sockets else ''}, not {port!r}"
     if not port.startswith("/") or "\0" in port:
@@ -110,7 +117,13 @@ def device_file(name: str, path: str) -> str:
     found = _normal(directories[0] / path)
     if not any(found.is_relative_to(directory) for directory in directories):
         places = " or ".join(map(str, directories))
-        raise OutOfRange(f"{name} must be in {places}, not {path!r}. Move the file there, or set {DEVICE_FILES}.")
+        raise OutOfRange(
+            "{name} must be in {places}, not {path!r}. Move the file there, or set {device_files}.",
+            name=name,
+            places=places,
+            path=path,
+            device_files=DEVICE_FILES,
+        )
     return str(found)
 
 
@@ -125,8 +138,11 @@ def secret_file(name: str, path: str, host: str | None) -> str:
     wanted = (host or "").lower()
     if found and directories and not any(Path(found).is_relative_to(each / wanted) for each in directories if wanted):
         raise OutOfRange(
-            f"{name} must be in {directories[0] / wanted}, not {path!r}: "
-            f"a secret is sent only to the host that its directory is named after. Move the file there."
+            "{name} must be in {directorie}, not {path!r}: "
+            "a secret is sent only to the host that its directory is named after. Move the file there.",
+            name=name,
+            directorie=directories[0] / wanted,
+            path=path,
         )
     return found
 

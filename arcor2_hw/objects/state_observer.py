@@ -128,7 +128,12 @@ class StateObserver(Generic[T]):
         self.observing.check()
         newest, age = self._newest, self._age()
         if newest is None or age > self.fresh_for:
-            raise Stale(f"{self.who}: the newest state is {age:.2f} s old; at most {self.fresh_for:g} s are allowed")
+            raise Stale(
+                "{device}: the newest state is {age:.2f} s old; at most {fresh_for:g} s are allowed",
+                device=self.who,
+                age=age,
+                fresh_for=self.fresh_for,
+            )
         return newest
 
     def _age(self) -> float:
@@ -166,7 +171,12 @@ class StateObserver(Generic[T]):
                     if newest is not None and newest.asked >= began and holds(newest.value):
                         return newest
                     if clock() >= timeout:
-                        raise DeviceTimeout(f"{self.who}: {what} took longer than {timeout:.3g} s")
+                        raise DeviceTimeout(
+                            "{device}: {what} took longer than {timeout:.3g} s",
+                            device=self.who,
+                            what=what,
+                            timeout=timeout,
+                        )
                     self._changed.wait(min(timeout, LONGEST_STEP))
             finally:
                 self._waiting -= 1

@@ -152,13 +152,13 @@ class UrdfRobot(Robot):
 
     def _go(self, plan: Callable[[list[Joint], Stopped], MotionPath], speed: float) -> None:
         if not (math.isfinite(speed) and 0.0 < speed <= 1.0):
-            raise OutOfRange(f"{self.name}: speed must be above 0 and at most 1, not {speed!r}")
+            raise OutOfRange("{name}: speed must be above 0 and at most 1, not {speed!r}", name=self.name, speed=speed)
         stops = self._stops
         self.check_if_ready_to_move()
         with self._moving():
             way = plan(self.robot_joints(), lambda: self._stops != stops)
             if self._stops != stops:
-                raise Cancelled(f"The move of {self.name} was stopped before it started.")
+                raise Cancelled("The move of {name} was stopped before it started.", name=self.name)
             way.require_begin(self.name, self.robot_joints())
             with self.safe_moves.monitored(way):
                 self.follow(way)
@@ -166,7 +166,7 @@ class UrdfRobot(Robot):
     @contextlib.contextmanager
     def _moving(self) -> Iterator[None]:
         if not self._move_lock.acquire(blocking=False):
-            raise Refused(f"{self.name} is moving already")
+            raise Refused("{name} is moving already", name=self.name)
         try:
             yield
         finally:
@@ -175,14 +175,31 @@ class UrdfRobot(Robot):
     # -------------------------------------------------------------------------------- checks
     def _check_end_effector(self, end_effector: str) -> None:
         if end_effector not in (known := self.safe_moves.end_effectors()):
-            raise NotFound(f"{self.name} has no end effector {end_effector!r}. Available: {', '.join(known)}")
+            raise NotFound(
+                "{name} has no end effector {end_effector!r}. Available: {known}",
+                name=self.name,
+                end_effector=end_effector,
+                known=", ".join(known),
+            )
 
     def _check_joints(self, joints: list[Joint]) -> None:
         limits = self.joint_limits()
         given = {joint.name: joint.value for joint in joints}
         if len(given) != len(joints) or given.keys() != limits.keys():
-            raise InvalidData(f"{self.name} has the joints {', '.join(limits)}, not {', '.join(given)}")
+            raise InvalidData(
+                "{name} has the joints {limits}, not {given}",
+                name=self.name,
+                limits=", ".join(limits),
+                given=", ".join(given),
+            )
         for name, value in given.items():
             low, high = limits[name]
             if not low - SLACK <= value <= high + SLACK:
-                raise OutOfRange(f"{name} of {self.name} must be {low:.3f} to {high:.3f}, not {value!r}")
+                raise OutOfRange(
+                    "{name} of {owner} must be {low:.3f} to {high:.3f}, not {value!r}",
+                    name=name,
+                    owner=self.name,
+                    low=low,
+                    high=high,
+                    value=value,
+                )

@@ -134,7 +134,9 @@ def require_free(sweep: Sweep, way: Sequence[Array], name: str) -> None:
     if (hit := sweep.first_hit(way)) is not None:
         length = float(np.linalg.norm(sweep.arm.forward(way[-1])[:3, 3] - sweep.arm.forward(way[0])[:3, 3]))
         where = f"{hit.share * length:.3f} m along its line"
-        raise MotionInCollision(f"{name} cannot go straight: {where} it is in collision: {hit.what}.")
+        raise MotionInCollision(
+            "{name} cannot go straight: {place} it is in collision: {what}.", name=name, place=where, what=hit.what
+        )
 
 
 # ------------------------------------------------------------------------------------------------ corners

@@ -83,7 +83,9 @@ class Planner:
         goals = [q for q, hit in hits if not hit]
         if not goals:
             at = ", ".join(f"{value:.3f}" for value in target[:3, 3])
-            raise OnlyInCollision(f"{self.name} reaches the pose only in collision: {hits[0][1]}.", f"at {at}")
+            raise OnlyInCollision(
+                "{name} reaches the pose only in collision: {hit}.", f"at {at}", name=self.name, hit=hits[0][1]
+            )
         return self.to_any(start, goals, within=within, seed=seed, stopped=stopped)
 
     def to_joints(
@@ -110,7 +112,7 @@ class Planner:
         """
         self._check(goal, "to", 1e-4)
         if hit := self.sweep.hit(goal):
-            raise GoalInCollision(f"{self.name} would be in collision at the goal: {hit}.")
+            raise GoalInCollision("{name} would be in collision at the goal: {hit}.", name=self.name, hit=hit)
         return self.to_any(start, [goal], within=within, seed=seed, stopped=stopped)
 
     def to_any(
@@ -125,7 +127,7 @@ class Planner:
         """Plan a path to the nearest possible of several collision-free goals; see `to_joints`."""
         self._check(start, "from", BEYOND)
         if hit := self.sweep.hit(start):
-            raise StartInCollision(f"{self.name} is in collision at the start: {hit}.")
+            raise StartInCollision("{name} is in collision at the start: {hit}.", name=self.name, hit=hit)
         goals = sorted(goals, key=lambda q: self._length([start, q]))[:MOST_GOALS]
         for goal in goals:
             if self.sweep.is_free_between(start, goal):
@@ -141,15 +143,24 @@ class Planner:
                 return way
         between = self.sweep.first_hit([start, goals[0]])
         hit = f"; the direct path meets {between.what}" if between is not None else ""
-        raise NoPath(f"{self.name} found no collision-free path within {within:g} s{hit}.")
+        raise NoPath(
+            "{name} found no collision-free path within {within:g} s{hit}.", name=self.name, within=within, hit=hit
+        )
 
     def _check(self, q: Array, which: str, slack: float) -> None:
         if q.shape != (self.arm.dof,) or not np.isfinite(q).all():
-            raise InvalidData(f"{self.name} needs {self.arm.dof} finite joint values to plan {which}.")
+            raise InvalidData(
+                "{name} needs {dof} finite joint values to plan {which}.", name=self.name, dof=self.arm.dof, which=which
+            )
         if not self.arm.within(q, slack):
             over = (q < self.arm.lower - slack) | (q > self.arm.upper + slack)
             names = ", ".join(name for name, is_over in zip(self.arm.joint_names, over, strict=True) if is_over)
-            raise InvalidData(f"{self.name} cannot move {which} there: {names} would be beyond the limits.")
+            raise InvalidData(
+                "{name} cannot move {which} there: {names} would be beyond the limits.",
+                name=self.name,
+                which=which,
+                names=names,
+            )
 
     def _length(self, way: Sequence[Array]) -> float:
         """Return the length of a path in joint values times their levers, m."""
@@ -215,7 +226,7 @@ class _Search:
 
     def _over(self) -> bool:
         if self._stopped is not None and self._stopped():
-            raise Cancelled(f"Planning for {self._planner.name} was cancelled.")
+            raise Cancelled("Planning for {name} was cancelled.", name=self._planner.name)
         return time.monotonic() > self._deadline
 
     def _free(self, a: Array, b: Array, resolution: float) -> bool:

@@ -43,7 +43,7 @@ class MotionLimits:
     def __post_init__(self) -> None:
         for name, values in vars(self).items():
             if values.shape != self.velocity.shape or not (np.isfinite(values) & (values > 0.0)).all():
-                raise InvalidData(f"The {name} of each joint must be above zero.")
+                raise InvalidData("The {name} of each joint must be above zero.", name=name)
 
     @classmethod
     def of(cls, arm: Arm, speed: float = 1.0, ramp: float = RAMP) -> "MotionLimits":
@@ -58,7 +58,7 @@ class MotionLimits:
             InvalidData: `speed` is out of range.
         """
         if not 0.0 < speed <= 1.0:
-            raise InvalidData(f"speed must be above 0 and at most 1, not {speed!r}.")
+            raise InvalidData("speed must be above 0 and at most 1, not {speed!r}.", speed=speed)
         most = np.where(np.isfinite(arm.velocity) & (arm.velocity > 0.0), arm.velocity, FASTEST)
         return cls(most * speed, most / ramp, most / (ramp * JERK_RAMP))
 
@@ -114,7 +114,7 @@ def _segment(start: Array, goal: Array, limits: MotionLimits) -> tuple[float, Ca
     found = RuckigTrajectory(1)
     result = Ruckig(1).calculate(given, found)
     if result not in (Result.Working, Result.Finished):
-        raise InvalidData(f"No motion within the limits was found: {result}.")
+        raise InvalidData("No motion within the limits was found: {result}.", result=result)
 
     def at(time: float) -> tuple[Array, Array]:
         position, velocity, _ = found.at_time(time)

@@ -102,7 +102,7 @@ class Calls:
                 self._post(m.CallFailed(message.id, error_data(describe(device, error), device.id)))
 
         if device.stop_method is None:
-            answer(device, Arcor2Error(f"{device.name} cannot be stopped: its type has no stop()"))
+            answer(device, Arcor2Error("{name} cannot be stopped: its type has no stop()", name=device.name))
             return
         self.stop(device, answer)
         self._stopping(device)
@@ -141,5 +141,5 @@ class Calls:
         stop, interrupted = begun
         self._clock.after(STOP_DEADLINE, lambda: device.stop_lane.expire(stop, STOP_DEADLINE))
         if interrupted is not None:
-            cancelled = Cancelled(f"{device.name}: {interrupted.method} was stopped")
+            cancelled = Cancelled("{name}: {method} was stopped", name=device.name, method=interrupted.method)
             self._clock.after(STOP_GRACE, lambda: interrupted.give_up(cancelled))

@@ -58,7 +58,9 @@ def recipes(
         try:
             cls = classes.get(scene_object.type)
             if cls is None:
-                raise NotFound(f"{scene_object.name}: object type {scene_object.type} is not there")
+                raise NotFound(
+                    "{name}: object type {type} is not there", name=scene_object.name, type=scene_object.type
+                )
             own = secrets.get(scene_object.id, ObjectSecrets())
             found.append(recipe(scene_object, cls, models.get(scene_object.type), overridden, own))
         except Arcor2Error as error:
@@ -90,7 +92,9 @@ def scene_recipes(
             broken[name] = error
     for one in objects:
         if (problem := broken.get(one.type)) is not None:
-            fault = SceneFault(one.id, NotConnected(f"{one.name}: {problem}", problem.detail))
+            fault = SceneFault(
+                one.id, NotConnected("{name}: {problem}", problem.detail, name=one.name, problem=problem)
+            )
             if failed is None:
                 raise fault
             failed(fault)
@@ -132,14 +136,14 @@ class Cell:
         except KeyError:
             if (error := self._absent.get(object_id)) is not None:
                 raise NotConnected(str(error), error.detail) from None
-            raise NotFound(f"the scene has no object {object_id}") from None
+            raise NotFound("the scene has no object {object_id}", object_id=object_id) from None
 
     def find(self, name: str) -> Generic:
         """Return the instance of an object by its name or id, for another object; NotFound, NotConnected."""
         for device in self:
             if name in (device.name, device.id):
                 return device.require()
-        raise NotFound(f"the scene has no object {name}")
+        raise NotFound("the scene has no object {name}", name=name)
 
     def find_robot(self, name: str) -> Robot:
         """Return a robot by its name or id, for a gripper; for an empty name the only robot of the scene.
@@ -151,11 +155,13 @@ class Cell:
         if name:
             found = self.find(name)
             if not isinstance(found, Robot):
-                raise NotFound(f"{name} is no robot")
+                raise NotFound("{name} is no robot", name=name)
             return found
         robots = [device for device in self if issubclass(device.recipe.cls, Robot)]
         if len(robots) != 1:
-            raise NotFound(f"the scene has {len(robots)} robots; name the one that carries the gripper in its settings")
+            raise NotFound(
+                "the scene has {count} robots; name the one that carries the gripper in its settings", count=len(robots)
+            )
         robot = robots[0].require()
         assert isinstance(robot, Robot)
         return robot
@@ -212,14 +218,14 @@ class Cell:
         device = self[object_id]
         connection = None if device.instance is None else device.instance.connection
         if device.failure is None and connection is not Connection.FAILED:
-            raise Refused(f"{device.name} has not failed")
+            raise Refused("{name} has not failed", name=device.name)
 
     def retry(self, how: Recipe) -> None:
         """Create and connect an object that has failed once more; SceneFault when it fails again."""
         object_id = how.scene_object.id
         former = self._devices.get(object_id)
         if former is not None and former.failure is None:
-            former.fail(NotConnected(f"{former.name} is being connected anew"))
+            former.fail(NotConnected("{name} is being connected anew", name=former.name))
         if former is not None and former.closed_by is not None:
             former.closed_by.wait(CLOSE_DEADLINE)  # both would be at the same port
         device = self._make(how)

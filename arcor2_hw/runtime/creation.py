@@ -52,9 +52,9 @@ def module_name(type_name: str) -> str:
 def _class_of(module: ModuleType, name: str) -> type[Generic]:
     found = getattr(module, name, None)
     if not isinstance(found, type):
-        raise NotFound(f"object type {name}: module {module.__name__} has no such class")
+        raise NotFound("object type {name}: module {module} has no such class", name=name, module=module.__name__)
     if not issubclass(found, Generic):
-        raise InvalidData(f"object type {name} does not derive from Generic")
+        raise InvalidData("object type {name} does not derive from Generic", name=name)
     return found
 
 
@@ -67,7 +67,9 @@ def _import(module: str, type_name: str) -> ModuleType:
         if isinstance(error, KeyboardInterrupt):
             raise
         detail = f"{type(error).__name__}: {error}"
-        raise InvalidData(f"object type {type_name} cannot be imported: {detail}", module) from error
+        raise InvalidData(
+            "object type {type_name} cannot be imported: {details}", module, type_name=type_name, details=detail
+        ) from error
 
 
 def write_sources(types: Iterable[TypeCode]) -> str | None:
@@ -86,7 +88,7 @@ def write_sources(types: Iterable[TypeCode]) -> str | None:
     for code in uploaded:
         module = code.module or module_name(code.name)
         if not module.isidentifier():
-            raise InvalidData(f"object type {code.name}: {module!r} is no name of a module")
+            raise InvalidData("object type {name}: {module!r} is no name of a module", name=code.name, module=module)
         (package / f"{module}.py").write_text(code.source, encoding="utf-8")
     for known in [name for name in sys.modules if name == "object_types" or name.startswith("object_types.")]:
         del sys.modules[known]
@@ -120,7 +122,7 @@ def find_type(name: str) -> type[Generic]:
     base = getattr(objects, name, None)
     if isinstance(base, type) and issubclass(base, Generic):
         return base
-    raise NotFound(f"object type {name} is not known here")
+    raise NotFound("object type {name} is not known here", name=name)
 
 
 # ------------------------------------------------------------------------------------------------ settings
@@ -133,7 +135,9 @@ def settings_type(cls: type[Generic]) -> type[Settings] | None:
         try:
             hint = typing.get_type_hints(constructor).get("settings")
         except (NameError, TypeError, AttributeError) as error:
-            raise InvalidData(f"object type {cls.__name__}: the hints of __init__ cannot be read: {error}") from error
+            raise InvalidData(
+                "object type {cls}: the hints of __init__ cannot be read: {reason}", cls=cls.__name__, reason=error
+            ) from error
         if hint is None:
             if any(p.kind is p.VAR_KEYWORD for p in inspect.signature(constructor).parameters.values()):
                 continue  # passes them on to the next base
@@ -164,8 +168,10 @@ def with_secrets(name: str, parameters: Mapping[str, Parameter], secrets: Object
             if secrets.problem:
                 raise AddressChanged(secrets.problem)
             raise InvalidData(
-                f"{name}: the secret setting {key} is not stored on this server. Enter it in the settings of {name}, "
-                "or in the cell file."
+                "{name}: the secret setting {key} is not stored on this server. Enter it in the settings of {name}, "
+                "or in the cell file.",
+                name=name,
+                key=key,
             )
         found[key] = Parameter(key, parameter.type, msgspec.json.encode(secrets.values[key]).decode())
     return found
@@ -176,29 +182,45 @@ def fill_settings(cls: type[Generic], name: str, parameters: Mapping[str, Parame
     kind = settings_type(cls)
     if kind is None:
         if parameters:
-            raise InvalidData(f"{name}: {cls.__name__} has no settings, but {', '.join(parameters)} is given")
+            raise InvalidData(
+                "{name}: {cls} has no settings, but {parameters} is given",
+                name=name,
+                cls=cls.__name__,
+                parameters=", ".join(parameters),
+            )
         return None
     hints = typing.get_type_hints(kind)
     fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
     values: dict[str, Any] = {}
     for parameter in parameters.values():
         if parameter.name not in fields:
-            raise InvalidData(f"{name}: {cls.__name__} has no setting {parameter.name}")
+            raise InvalidData(
+                "{name}: {cls} has no setting {parameter_name}",
+                name=name,
+                cls=cls.__name__,
+                parameter_name=parameter.name,
+            )
         try:
             values[parameter.name] = _setting(hints[parameter.name], parameter)
         except (msgspec.DecodeError, msgspec.ValidationError, ValueError, TypeError) as error:
-            raise InvalidData(f"{name}: setting {parameter.name}: {error}", parameter.value) from error
+            raise InvalidData(
+                "{name}: setting {parameter_name}: {reason}",
+                parameter.value,
+                name=name,
+                parameter_name=parameter.name,
+                reason=error,
+            ) from error
     missing = [
         f.name
         for f in fields.values()
         if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING and f.name not in values
     ]
     if missing:
-        raise InvalidData(f"{name}: setting {', '.join(missing)} is missing")
+        raise InvalidData("{name}: setting {missing} is missing", name=name, missing=", ".join(missing))
     try:
         return kind(**values)
     except (ValueError, TypeError, AssertionError) as error:  # a dataclass may check itself
-        raise InvalidData(f"{name}: settings: {error}") from error
+        raise InvalidData("{name}: settings: {reason}", name=name, reason=error) from error
 
 
 def address_of(settings: Settings | None) -> str:
@@ -251,7 +273,7 @@ def recipe(
     """
     name = scene_object.name
     if cls.abstract():
-        raise InvalidData(f"{name}: object type {cls.__name__} is abstract")
+        raise InvalidData("{name}: object type {cls} is abstract", name=name, cls=cls.__name__)
     parameters = {parameter.name: parameter for parameter in scene_object.parameters}
     for override in overrides:
         if override.id == scene_object.id:
@@ -260,7 +282,7 @@ def recipe(
     arguments: list[Any] = [scene_object.id, name]
     if issubclass(cls, GenericWithPose):
         if isinstance(scene_object.pose, Unset):
-            raise InvalidData(f"{name}: {cls.__name__} needs a pose")
+            raise InvalidData("{name}: {cls} needs a pose", name=name, cls=cls.__name__)
         arguments.append(scene_object.pose)
         if issubclass(cls, CollisionObject):
             arguments.append(None if model is None or model.type.value == "None" else model.model())

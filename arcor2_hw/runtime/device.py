@@ -139,7 +139,10 @@ class Device:
         """Raise ConnectionLost while the connection is lost."""
         if self.require().connection is Connection.LOST:
             raise ConnectionLost(
-                f"{self.name}: {method} was not done: the connection is lost", self.connection_reason()
+                "{name}: {method} was not done: the connection is lost",
+                self.connection_reason(),
+                name=self.name,
+                method=method,
             )
 
     def fail(self, error: Arcor2Error) -> None:
@@ -190,9 +193,11 @@ class Device:
     def require(self) -> Generic:
         """Return the instance; NotConnected when there is none, or it has failed."""
         if self.failure is not None:
-            raise NotConnected(f"{self.name} is not there: {self.failure}", self.failure.detail)
+            raise NotConnected(
+                "{name} is not there: {failure}", self.failure.detail, name=self.name, failure=self.failure
+            )
         if self.instance is None:
-            raise NotConnected(f"{self.name} is not up")
+            raise NotConnected("{name} is not up", name=self.name)
         return self.instance
 
     def take_control(self) -> None:
@@ -210,7 +215,9 @@ class Device:
         """
         instance = self.require()
         if method.startswith("_") or (not hasattr(type(instance), method) and method not in vars(instance)):
-            raise InvalidData(f"{self.name} ({type(instance).__name__}) has no method {method}")
+            raise InvalidData(
+                "{name} ({type}) has no method {method}", name=self.name, type=type(instance).__name__, method=method
+            )
         static = inspect.getattr_static(type(instance), method, None)
         if not callable(static) and not isinstance(static, staticmethod | classmethod):
             return Job(method, getattr, (instance, method), notify=notify), deadline_of(static)
@@ -236,7 +243,7 @@ class Device:
         """Return the name of the method that cancels an action; InvalidData when there is none."""
         method = type(self.require()).CANCEL_MAPPING.get(action)
         if method is None:
-            raise InvalidData(f"{self.name}.{action} cannot be cancelled")
+            raise InvalidData("{name}.{action} cannot be cancelled", name=self.name, action=action)
         return method
 
     def _cancel_method(self, action: str) -> Callable[[], Any] | None:
@@ -294,7 +301,7 @@ def describe(device: Device, error: BaseException) -> Arcor2Error:
     address = device.recipe.address
     text = str(error) or type(error).__name__
     if isinstance(error, Arcor2NotImplemented):
-        return DeviceError(f"{where}: not implemented: {text}")
+        return DeviceError("{place}: not implemented: {text}", place=where, text=text)
     prefix = "" if text.startswith(device.name) else f"{where}: "
     suffix = (
         f" [{address}]" if address and not any(part.split(" ", 1)[-1] in text for part in address.split(", ")) else ""
@@ -308,7 +315,7 @@ def describe(device: Device, error: BaseException) -> Arcor2Error:
         named.__cause__ = error
         return named
     kind = "" if text == type(error).__name__ else f"{type(error).__name__}: "
-    wrapped = DeviceError(f"{prefix}{kind}{text}{suffix}")
+    wrapped = DeviceError("{prefix}{type}{text}{suffix}", prefix=prefix, type=kind, text=text, suffix=suffix)
     wrapped.__cause__ = error
     return wrapped
 

@@ -16,11 +16,13 @@ def read_document(path: Path, kind: type[T]) -> T:
     try:
         raw = path.read_bytes()
     except OSError as error:
-        raise InvalidPackage(f"the package has no readable {path.name}", str(error)) from error
+        raise InvalidPackage("the package has no readable {name}", str(error), name=path.name) from error
     try:
         return msgspec.json.decode(raw, type=kind)
     except msgspec.MsgspecError as error:
         try:
             return msgspec.convert(humps.decamelize(msgspec.json.decode(raw)), kind)
         except (msgspec.MsgspecError, ValueError):
-            raise InvalidPackage(f"{path.name} of the package is damaged: {error}", str(path)) from error
+            raise InvalidPackage(
+                "{name} of the package is damaged: {reason}", str(path), name=path.name, reason=error
+            ) from error

@@ -94,15 +94,15 @@ class Holds:
                     hold.let_go.append(message.id)
                     return hold
                 if hold.ending:
-                    raise hold.error or Refused(f"{device.name}: that hold was ended")
+                    raise hold.error or Refused("{name}: that hold was ended", name=device.name)
             elif message.until == 0.0:
                 return None
             elif hold is not None:
-                raise Refused(f"{device.name} is held already")
+                raise Refused("{name} is held already", name=device.name)
             elif message.hold <= self._ended.get(message.object_id, 0):
-                raise Refused(f"{device.name}: that hold has ended")
+                raise Refused("{name}: that hold has ended", name=device.name)
             if message.until <= time.monotonic():
-                raise Refused(f"{device.name}: the lease had run out when it came")
+                raise Refused("{name}: the lease had run out when it came", name=device.name)
             if hold is None:
                 hold = self._held[message.object_id] = _Hold(device, message)
             hold.newest = message
@@ -113,7 +113,7 @@ class Holds:
         """End a hold that has run out. On the clock's thread, when a lease ends."""
         if hold.newest.until <= time.monotonic():
             what = "jog" if hold.kind is HoldKind.JOG else "hold"
-            self.end(hold, Cancelled(f"{hold.device.name}: the {what} was not renewed in time"))
+            self.end(hold, Cancelled("{name}: the {what} was not renewed in time", name=hold.device.name, what=what))
 
     # -------------------------------------------------------------------------------- acting
     def _act(self, hold: _Hold) -> None:
@@ -147,7 +147,7 @@ class Holds:
             if hold.kind is HoldKind.JOG:
                 hold.jog = Jog(robot, hold.arm)
         if hold.ending:  # while control was being taken
-            raise hold.error or Cancelled(f"{device.name} was let go before it moved")
+            raise hold.error or Cancelled("{name} was let go before it moved", name=device.name)
         lease = hold.newest
         if hold.jog is not None:
             return hold.jog.drive(lease)
@@ -179,7 +179,7 @@ class Holds:
         """End the hold of a device that is being stopped."""
         hold = self._held.get(device.id)
         if hold is not None:
-            self.end(hold, Cancelled(f"{device.name} was stopped"))
+            self.end(hold, Cancelled("{name} was stopped", name=device.name))
 
     def teaching_ended(self, device: Device, arm: Mapping[str, Any], error: Arcor2Error) -> None:
         """End the hold of an arm whose hand teaching has ended, or report that, and make the arm stiff."""
@@ -203,7 +203,7 @@ class Holds:
             hold.ending, hold.error = True, error
             self._teaching.set(hold.device, hold.arm, False)
             numbers, hold.unanswered = hold.unanswered, []
-        why = error or Cancelled(f"{hold.device.name} was let go")
+        why = error or Cancelled("{name} was let go", name=hold.device.name)
         for number in numbers:
             self._post(m.CallFailed(number, error_data(why, hold.device.id)))
         if hold.kind is HoldKind.JOG:

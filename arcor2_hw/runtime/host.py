@@ -140,7 +140,9 @@ class Host:
         except ProgramStopped:  # closed, or the server gone, while objects were coming up
             return True
         except Exception as error:  # noqa: BLE001 - whatever a type does when it is loaded
-            fault = SceneFault("", Arcor2Error(f"{type(error).__name__}: {error}", traceback_text(error)))
+            fault = SceneFault(
+                "", Arcor2Error("{type}: {reason}", traceback_text(error), type=type(error).__name__, reason=error)
+            )
         if fault is not None:
             self._cell.close()
             self.link.post(m.SceneFailed(error_data(fault.error, fault.object_id)))

@@ -77,15 +77,17 @@ class Jog:
         """Return the remaining seconds of a lease; Refused when there are too few."""
         left = lease.until - time.monotonic()
         if left < LEAST_VALID:
-            raise Refused(f"{self._robot.name}: the lease had run out when the robot was ready for it")
+            raise Refused("{name}: the lease had run out when the robot was ready for it", name=self._robot.name)
         return left
 
     def _check_end_effector(self, named: str | None) -> None:
         have = ", ".join(sorted(self._end_effectors))
         if named is not None and named not in self._end_effectors:
-            raise InvalidData(f"{self._robot.name} has no end effector {named!r}; it has {have}")
+            raise InvalidData(
+                "{name} has no end effector {named!r}; it has {have}", name=self._robot.name, named=named, have=have
+            )
         if named is None and len(self._end_effectors) > 1:
-            raise InvalidData(f"{self._robot.name} has several end effectors: name one of {have}")
+            raise InvalidData("{name} has several end effectors: name one of {have}", name=self._robot.name, have=have)
 
     def _drive_joints(self, lease: Lease, asked: list[Joint], joints: list[Joint]) -> float:
         valid_for = self._left(lease)
@@ -93,7 +95,10 @@ class Jog:
         names = [joint.name for joint in joints]
         if unknown := wanted.keys() - set(names):
             raise InvalidData(
-                f"{self._robot.name} has no joint {', '.join(sorted(unknown))}; it has {', '.join(names)}"
+                "{name} has no joint {unknown}; it has {names}",
+                name=self._robot.name,
+                unknown=", ".join(sorted(unknown)),
+                names=", ".join(names),
             )
         velocities = [wanted.get(name, 0.0) for name in names]
         scale = min(1.0, *(self._room(joint, rate, valid_for) for joint, rate in zip(joints, velocities, strict=True)))
@@ -130,7 +135,12 @@ class Jog:
         left = limits[1] - joint.value if rate > 0.0 else joint.value - limits[0]
         if left <= AT_LIMIT:
             side = "upper" if rate > 0.0 else "lower"
-            raise OutOfRange(f"{self._robot.name}: the joint {joint.name} is at its {side} limit")
+            raise OutOfRange(
+                "{name}: the joint {joint_name} is at its {side} limit",
+                name=self._robot.name,
+                joint_name=joint.name,
+                side=side,
+            )
         return min(1.0, left / (abs(rate) * (valid_for + COMES_TO_REST)))
 
     def _room_of_twist(self, twist: Twist, joints: list[Joint], valid_for: float, scale: float) -> float:

@@ -143,9 +143,23 @@ class Lane:
             current = self._current
             busy = "" if current is None else f": the device is busy with {current.method}"
             job.finish(
-                None, DeviceTimeout(f"{self.device}: {job.method} did not get its turn within {deadline:g} s{busy}")
+                None,
+                DeviceTimeout(
+                    "{device}: {method} did not get its turn within {deadline:g} s{busy}",
+                    device=self.device,
+                    method=job.method,
+                    deadline=deadline,
+                    busy=busy,
+                ),
             )
-        elif job.give_up(DeviceTimeout(f"{self.device}: {job.method} did not finish within {deadline:g} s")):
+        elif job.give_up(
+            DeviceTimeout(
+                "{device}: {method} did not finish within {deadline:g} s",
+                device=self.device,
+                method=job.method,
+                deadline=deadline,
+            )
+        ):
             for waiting in self._drain():
                 waiting.finish(None, self._hung(job))
 
@@ -159,7 +173,10 @@ class Lane:
     def cancel_waiting(self) -> None:
         """Cancel the calls that have not started."""
         for waiting in self._drain():
-            waiting.finish(None, Cancelled(f"{self.device}: {waiting.method} was stopped before it began"))
+            waiting.finish(
+                None,
+                Cancelled("{device}: {method} was stopped before it began", device=self.device, method=waiting.method),
+            )
 
     def check_wanted(self) -> None:
         """Raise Cancelled if the running call was stopped or given up. To be called on the lane, before it acts.
@@ -171,7 +188,7 @@ class Lane:
             return
         job.since = time.monotonic()
         if job.ended or job.epoch != self._epoch:
-            raise Cancelled(f"{self.device}: {job.method} was stopped before it began")
+            raise Cancelled("{device}: {method} was stopped before it began", device=self.device, method=job.method)
 
     # -------------------------------------------------------------------------------- state
     @property
@@ -204,8 +221,10 @@ class Lane:
     # -------------------------------------------------------------------------------- inside
     def _hung(self, job: Job) -> DeviceTimeout:
         return DeviceTimeout(
-            f"{self.device} is still busy with {job.method}, which was given up",
+            "{device} is still busy with {method}, which was given up",
             f"it began {time.monotonic() - job.since:.1f} s ago",
+            device=self.device,
+            method=job.method,
         )
 
     def _drain(self) -> list[Job]:
@@ -231,7 +250,10 @@ class Lane:
             self._current = job  # before the check whether it has ended, so that its deadline finds it here
             if job.ended or job.epoch != self._epoch:
                 self._current = None
-                job.finish(None, Cancelled(f"{self.device}: {job.method} was stopped before it began"))
+                job.finish(
+                    None,
+                    Cancelled("{device}: {method} was stopped before it began", device=self.device, method=job.method),
+                )
                 continue
             value: Any = None
             error: BaseException | None = None
@@ -240,7 +262,12 @@ class Lane:
             except BaseException as caught:  # noqa: BLE001 - whatever a driver raises belongs to its caller
                 error = caught
             if job.epoch != self._epoch and not isinstance(error, Arcor2Error):
-                error = Cancelled(f"{self.device}: {job.method} was stopped", "" if error is None else repr(error))
+                error = Cancelled(
+                    "{device}: {method} was stopped",
+                    "" if error is None else repr(error),
+                    device=self.device,
+                    method=job.method,
+                )
             self._current = None
             job.finish(value, error)
             del job, value, error

@@ -85,7 +85,9 @@ class Places:
         try:
             point = self._points[action_point_id]
         except KeyError:
-            raise NotFound(f"the project has no action point {action_point_id}") from None
+            raise NotFound(
+                "the project has no action point {action_point_id}", action_point_id=action_point_id
+            ) from None
         return msgspec.structs.replace(point, position=self.position(action_point_id), parent=msgspec.UNSET)
 
     def position(self, action_point_id: str) -> Position:
@@ -93,28 +95,30 @@ class Places:
         try:
             return copy.deepcopy(self._positions[action_point_id])
         except KeyError:
-            raise NotFound(f"the project has no action point {action_point_id}") from None
+            raise NotFound(
+                "the project has no action point {action_point_id}", action_point_id=action_point_id
+            ) from None
 
     def pose(self, orientation_id: str) -> Pose:
         """Return the pose in the world of an action point with this orientation."""
         try:
             return self._marked(self._poses[orientation_id], orientation_id)
         except KeyError:
-            raise NotFound(f"the project has no orientation {orientation_id}") from None
+            raise NotFound("the project has no orientation {orientation_id}", orientation_id=orientation_id) from None
 
     def joints(self, joints_id: str) -> ProjectRobotJoints:
         """Return joints of an action point."""
         try:
             return self._marked(self._joints[joints_id], joints_id)
         except KeyError:
-            raise NotFound(f"the project has no joints {joints_id}") from None
+            raise NotFound("the project has no joints {joints_id}", joints_id=joints_id) from None
 
     def parameter(self, parameter_id: str) -> Any:
         """Return the value of a project parameter."""
         try:
             return self._parameters[parameter_id]
         except KeyError:
-            raise NotFound(f"the project has no parameter {parameter_id}") from None
+            raise NotFound("the project has no parameter {parameter_id}", parameter_id=parameter_id) from None
 
 
 def put_on_path(directory: Path) -> None:

@@ -111,7 +111,10 @@ class Program:
         self._action_ids = {a.name: a.id for point in project.action_points for a in point.actions}
         self._joints_points = {j.id: point.id for point in project.action_points for j in point.robot_joints}
         if unknown := self.breakpoints.difference((p.id for p in project.action_points), self._action_ids.values()):
-            raise NotFound(f"a breakpoint is set on {', '.join(sorted(unknown))}, which is no action point or action")
+            raise NotFound(
+                "a breakpoint is set on {unknown}, which is no action point or action",
+                unknown=", ".join(sorted(unknown)),
+            )
 
     def started(self, info: PackageInfoData) -> None:
         """Report that all devices are connected and the first action follows."""
@@ -153,10 +156,10 @@ class Program:
         action_id: str | None = None
         if self._action_ids:
             if name is None:
-                raise InvalidData(f"{what} is called without the name of its action (an=...)")
+                raise InvalidData("{what} is called without the name of its action (an=...)", what=what)
             action_id = self._action_ids.get(name)
             if action_id is None:
-                raise InvalidData(f"{what}: the project has no action named {name!r}")
+                raise InvalidData("{what}: the project has no action named {name!r}", what=what, name=name)
         points = self.points_of(arguments)
         thread = None if self.in_main_thread else threading.get_ident()
         data = ActionStateBeforeData(
@@ -205,7 +208,7 @@ class Program:
 
     def device_lost(self, device: Device, reason: str) -> bool:
         """Stop because a device is lost; return whether that was necessary."""
-        error = ConnectionLost(f"{device.name}: the connection is lost, so the program was stopped", reason)
+        error = ConnectionLost("{name}: the connection is lost, so the program was stopped", reason, name=device.name)
         with self._telling:
             if self.ended or self.stop_requested or self.error is not None:
                 return False

@@ -80,7 +80,9 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
     def call(*arguments: Any, an: str | None = None, **keywords: Any) -> Any:
         if on_any_lane():
             if an is not None:
-                raise InvalidData(f"{what} is called inside another action and must not have a name (an={an!r})")
+                raise InvalidData(
+                    "{what} is called inside another action and must not have a name (an={an!r})", what=what, an=an
+                )
             return lane.call(name, bound, arguments, keywords, deadline)
         if not program.in_main_thread:
             return run(an, arguments, keywords)

@@ -51,7 +51,7 @@ def bus_options(named: str) -> dict[str, Any]:
     if kind == "slcan" and rest:
         channel, _, rate = rest.partition("@")
         if rate and not rate.isdigit():
-            raise InvalidData(f"{named}: {rate!r} is no bit rate")
+            raise InvalidData("{named}: {rate!r} is no bit rate", named=named, rate=rate)
         return {
             "interface": "slcan",
             "channel": channel,
@@ -67,7 +67,8 @@ def bus_options(named: str) -> dict[str, Any]:
         if host and port.isdigit() and bus:
             return {"interface": "socketcand", "host": host, "port": int(port), "channel": bus}
     raise InvalidData(
-        f"{named!r} is no CAN bus; one is slcan:/dev/ttyUSB0@500000, socketcan:can0 or socketcand:HOST:PORT/can0"
+        "{named!r} is no CAN bus; one is slcan:/dev/ttyUSB0@500000, socketcan:can0 or socketcand:HOST:PORT/can0",
+        named=named,
     )
 
 
@@ -84,14 +85,14 @@ def can_nodes(named: str) -> list[Found]:
     try:
         network.connect(**options)
     except (can.CanError, OSError, ValueError) as error:
-        raise NotConnected(f"{named} cannot be opened: {error}") from error
+        raise NotConnected("{named} cannot be opened: {reason}", named=named, reason=error) from error
     try:
         time.sleep(LISTENS)
         network.scanner.search()
         time.sleep(ANSWERS)
         return [_node(network, named, number) for number in sorted(network.scanner.nodes)]
     except (can.CanError, OSError) as error:
-        raise NotConnected(f"{named} was lost: {error}") from error
+        raise NotConnected("{named} was lost: {reason}", named=named, reason=error) from error
     finally:
         network.disconnect()
 

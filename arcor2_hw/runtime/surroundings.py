@@ -62,7 +62,7 @@ class SceneSurroundings(ByReference):
                 assert isinstance(instance, Robot)
                 joints = device.watch_lane.call("robot_joints", instance.robot_joints, deadline=JOINTS_WITHIN)
             except Arcor2Error as error:
-                raise Refused(f"The position of {device.name} is unknown: {error}") from error
+                raise Refused("The position of {name} is unknown: {reason}", name=device.name, reason=error) from error
             found.append((instance, joints))
         return found
 

@@ -61,10 +61,12 @@ class Teaching:
         with self._lock:
             if self._arms.pop(_key(device, arm), None) is None:
                 return  # switched off meanwhile
-        error: Arcor2Error = Cancelled(f"{device.name}: hand teaching was ended by the robot")
+        error: Arcor2Error = Cancelled("{name}: hand teaching was ended by the robot", name=device.name)
         if safety in ENDED_BY:
             what = safety.replace("_", " ")
-            error = SafetyStop(f"{device.name}: hand teaching was ended, safety state: {what}", "", safety)
+            error = SafetyStop(
+                "{name}: hand teaching was ended, safety state: {what}", "", safety, name=device.name, what=what
+            )
         self._ended(device, arm, error)
 
 

@@ -121,16 +121,26 @@ def decode_arguments(bound: Any, arguments: Mapping[str, bytes], whose: str) -> 
     result: dict[str, Any] = {}
     for name, raw in arguments.items():
         if name not in signature.parameters and not takes_any:
-            raise InvalidData(f"{whose}: {function.__name__} has no parameter {name}")
+            raise InvalidData(
+                "{whose}: {function} has no parameter {name}", whose=whose, function=function.__name__, name=name
+            )
         try:
             result[name] = _decode(raw, hints.get(name, Any))
         except (InvalidData, UnicodeDecodeError) as error:
-            raise InvalidData(f"{whose}: {function.__name__}: parameter {name}: {error}") from error
+            raise InvalidData(
+                "{whose}: {function}: parameter {name}: {reason}",
+                whose=whose,
+                function=function.__name__,
+                name=name,
+                reason=error,
+            ) from error
     missing = [
         p.name
         for p in parameters[1 if bound is not function else 0 :]
         if p.default is p.empty and p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY) and p.name not in result
     ]
     if missing:
-        raise InvalidData(f"{whose}: {function.__name__} needs {', '.join(missing)}")
+        raise InvalidData(
+            "{whose}: {function} needs {missing}", whose=whose, function=function.__name__, missing=", ".join(missing)
+        )
     return result

@@ -215,11 +215,22 @@ def bench_of(entry: CellDevice) -> type[Bench]:
     except Arcor2Error as error:
         raise type(error)(f"{entry.name}: {error}") from error
     if kind.__name__ != entry.type:
-        raise InvalidData(f"{entry.name}: the bench {entry.bench} is for {kind.__name__}, not for {entry.type}")
+        raise InvalidData(
+            "{name}: the bench {bench} is for {type}, not for {entry_type}",
+            name=entry.name,
+            bench=entry.bench,
+            type=kind.__name__,
+            entry_type=entry.type,
+        )
     try:
         places(all_settings(entry, kind), _named(entry))
     except KeyError as error:
-        raise InvalidData(f"{entry.name}: wire names {error}, which is not a setting of {entry.type}") from None
+        raise InvalidData(
+            "{name}: wire names {reason}, which is not a setting of {type}",
+            name=entry.name,
+            reason=error,
+            type=entry.type,
+        ) from None
     # A custom bench without settings from the cell has its own device, and decides itself whether it is real.
     own = not issubclass(base, CellBench) and not entry.settings and isinstance(entry.real, Unset)
     real = base.real or (not own and is_real(entry, kind))
@@ -232,9 +243,11 @@ def _bench_named(entry: CellDevice) -> type[Bench]:
     try:
         found = getattr(importlib.import_module(module), name, None)
     except ImportError as error:
-        raise InvalidData(f"{entry.name}: the bench {entry.bench} cannot be imported: {error}") from error
+        raise InvalidData(
+            "{name}: the bench {bench} cannot be imported: {reason}", name=entry.name, bench=entry.bench, reason=error
+        ) from error
     if not (isinstance(found, type) and issubclass(found, Bench)):
-        raise InvalidData(f"{entry.name}: {entry.bench} is not a bench")
+        raise InvalidData("{name}: {bench} is not a bench", name=entry.name, bench=entry.bench)
     return found
 
 
@@ -247,5 +260,5 @@ def benches_of_files(files: Iterable[str]) -> list[type[Bench]]:
     entries = [entry for file in files for entry in read_cell(Path(file)).devices]
     names = [entry.name for entry in entries]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise InvalidData(f"several cell.yaml files have devices of the same name: {', '.join(twice)}")
+        raise InvalidData("several cell.yaml files have devices of the same name: {twice}", twice=", ".join(twice))
     return [bench_of(entry) for entry in entries]

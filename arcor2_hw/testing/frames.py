@@ -148,4 +148,6 @@ def reader(kind: str, words: Sequence[str]) -> Frames:
         return Lines(words)
     if kind == "canopen-slcan":
         return CanopenSlcan(words)
-    raise InvalidData(f"frames of the kind {kind} are not supported. Available: {', '.join(KINDS)}")
+    raise InvalidData(
+        "frames of the kind {type} are not supported. Available: {kinds}", type=kind, kinds=", ".join(KINDS)
+    )

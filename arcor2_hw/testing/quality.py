@@ -127,9 +127,11 @@ def _read(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except FileNotFoundError:
-        raise NotFound(f"there is no {FILE} in {path.parent.name}") from None
+        raise NotFound("there is no {file} in {name}", file=FILE, name=path.parent.name) from None
     except OSError as error:
-        raise InvalidData(f"{path.parent.name}/{FILE} cannot be read: {error.strerror}") from None
+        raise InvalidData(
+            "{name}/{file} cannot be read: {reason}", name=path.parent.name, file=FILE, reason=error.strerror
+        ) from None
 
 
 def read(path: Path) -> Quality:
@@ -142,4 +144,4 @@ def read(path: Path) -> Quality:
     try:
         return msgspec.yaml.decode(_read(path), type=Quality)
     except msgspec.DecodeError as error:  # also raised for a wrong value
-        raise InvalidData(f"{path.parent.name}/{FILE}: {error}") from None
+        raise InvalidData("{name}/{file}: {reason}", name=path.parent.name, file=FILE, reason=error) from None

@@ -173,7 +173,7 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
             try:
                 values[name] = msgspec.convert(given_value, types[name], strict=False)
             except msgspec.ValidationError as error:
-                raise InvalidData(f"{variable}={text!r}: {error}") from None
+                raise InvalidData("{variable}={text!r}: {reason}", variable=variable, text=text, reason=error) from None
         values.update((name, value) for name, value in given.items() if value is not None)
         if values.get("streaming_period", 1) <= 0:
             values["streaming_period"] = 0.1
@@ -182,7 +182,7 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         try:
             return cls(**values)
         except ValueError as error:
-            raise InvalidData(f"ARCOR2_HW_TRUSTED_PROXIES: {error}") from None
+            raise InvalidData("ARCOR2_HW_TRUSTED_PROXIES: {reason}", reason=error) from None
 
 
 _VARIABLES: Final = {

@@ -36,7 +36,7 @@ class FlowActions(Generic):
 
         self._cancelled.clear()
         if self._cancelled.wait(seconds):
-            raise Cancelled(f"{self.name}: the wait was cancelled")
+            raise Cancelled("{name}: the wait was cancelled", name=self.name)
 
     def cancel(self) -> None:
         """Cancel the present wait."""

@@ -50,7 +50,12 @@ class RandomActions(Generic):
 
     def _check_range(self, range_min: float, range_max: float) -> None:
         if range_min > range_max:
-            raise InvalidData(f"{self.name}: range_min {range_min} is above range_max {range_max}")
+            raise InvalidData(
+                "{name}: range_min {range_min} is above range_max {range_max}",
+                name=self.name,
+                range_min=range_min,
+                range_max=range_max,
+            )
 
     @action
     def random_bool(self, probability: float = 0.5, *, an: str | None = None) -> bool:

@@ -32,7 +32,7 @@ class TimeActions(Generic):
 
         self._cancelled.clear()
         if self._cancelled.wait(seconds):
-            raise Cancelled(f"{self.name}: the sleep was cancelled")
+            raise Cancelled("{name}: the sleep was cancelled", name=self.name)
 
     def cancel(self) -> None:
         """Cancel the present sleep."""
@@ -60,4 +60,6 @@ class TimeActions(Generic):
         try:
             return time.monotonic() - self._started[stopwatch]
         except KeyError:
-            raise NotFound(f"{self.name}: stopwatch {stopwatch!r} was never started") from None
+            raise NotFound(
+                "{name}: stopwatch {stopwatch!r} was never started", name=self.name, stopwatch=stopwatch
+            ) from None

@@ -21,14 +21,14 @@ def loads(text: str | bytes) -> Any:
     try:
         return msgspec.json.decode(text)
     except (msgspec.MsgspecError, UnicodeEncodeError, RecursionError) as error:
-        raise JsonException(f"this is no JSON: {error}") from error
+        raise JsonException("this is no JSON: {reason}", reason=error) from error
 
 
 def loads_type(text: str | bytes, kind: type[T]) -> T:
     """Read JSON that has to be of a type, exactly: 1 is no float. JsonException."""
     value = loads(text)
     if type(value) is not kind:
-        raise JsonException(f"this is a {type(value).__name__}, not a {kind.__name__}")
+        raise JsonException("this is a {type}, not a {kind_name}", type=type(value).__name__, kind_name=kind.__name__)
     return value
 
 

@@ -111,7 +111,11 @@ class DeviceServer(Peer):
             return self.perform(message)
         with self._calls.running():
             if message.epoch != self._epoch:
-                raise Cancelled(f"{self._instance.name}: {header.name} was stopped before it began")
+                raise Cancelled(
+                    "{name}: {header_name} was stopped before it began",
+                    name=self._instance.name,
+                    header_name=header.name,
+                )
             if self._connected:
                 value = self.perform(message)
             else:
@@ -132,7 +136,7 @@ class DeviceServer(Peer):
         attributes = frozenset(name for name in getattr(instance, "__dict__", ()) if not name.startswith("_"))
         number = self.codec.export(instance)
         if number != 0:
-            raise InvalidData(f"{cls.__name__}: the constructor passed a reference to another process")
+            raise InvalidData("{cls}: the constructor passed a reference to another process", cls=cls.__name__)
         self._names = state.names_of(cls, attributes)
         self._instance = instance
         threading.Thread(target=self._publish_changes, name="state", daemon=True).start()
@@ -175,7 +179,7 @@ class DeviceServer(Peer):
             if name == "connection_reason":
                 value = value or next((each.reason for each in self._connections if each.reason), "")
         except Exception as error:  # noqa: BLE001 - whatever a driver raises
-            return False, InvalidData(f"{name}: {type(error).__name__}: {error}")
+            return False, InvalidData("{name}: {type}: {reason}", name=name, type=type(error).__name__, reason=error)
         return True, value
 
     def _publish_changes(self) -> None:

@@ -267,7 +267,7 @@ class Peer:
         if header.kind is Kind.WRITE:
             return setattr(target, header.name, self.codec.decode(message.payload))
         if header.kind is not Kind.CALL:
-            raise InvalidData(f"{header.kind!r} is no request")
+            raise InvalidData("{type!r} is no request", type=header.kind)
         arguments, keywords = self.codec.decode(message.payload)
         return (getattr(target, header.name) if header.name else target)(*arguments, **keywords)
 

@@ -81,7 +81,9 @@ class Codec:
         try:
             _Pickler(buffer, self).dump(value)
         except Exception as error:
-            raise InvalidData(f"a value of type {type(value).__name__} cannot leave its process: {error}") from error
+            raise InvalidData(
+                "a value of type {type} cannot leave its process: {reason}", type=type(value).__name__, reason=error
+            ) from error
         return buffer.getvalue()
 
     def decode(self, data: bytes) -> Any:
@@ -93,7 +95,7 @@ class Codec:
         try:
             return _Unpickler(io.BytesIO(data), self).load()
         except Exception as error:
-            raise InvalidData(f"a value from another process cannot be read: {error}") from error
+            raise InvalidData("a value from another process cannot be read: {reason}", reason=error) from error
 
     def encode_error(self, error: BaseException) -> bytes:
         """Pickle an error with its traceback as a note; one that cannot be pickled becomes its nearest typed base."""

@@ -157,7 +157,7 @@ class DeviceProcess(Peer):
 
 def _settings(stub: Any) -> Any:
     if stub._settings is None:
-        raise NotFound(f"{stub.name} has no settings")
+        raise NotFound("{name} has no settings", name=stub.name)
     return stub._settings
 
 

@@ -47,9 +47,11 @@ class Arms:
     def one(self, arm_id: str | None) -> str:
         """Return the arm. Raise InvalidData if none is named, NotFound for an unknown one."""
         if arm_id is None:
-            raise InvalidData(f"{self.name} has two arms. Specify one of {', '.join(ARMS)}.")
+            raise InvalidData("{name} has two arms. Specify one of {arms}.", name=self.name, arms=", ".join(ARMS))
         if arm_id not in ARMS:
-            raise NotFound(f"{self.name} has no arm {arm_id!r}, only {', '.join(ARMS)}.")
+            raise NotFound(
+                "{name} has no arm {arm_id!r}, only {arms}.", name=self.name, arm_id=arm_id, arms=", ".join(ARMS)
+            )
         return arm_id
 
     def some(self, arm_id: str | None) -> tuple[str, ...]:
@@ -68,4 +70,8 @@ class Arms:
         """Raise Refused unless the load of both arms is set."""
         if missing := [f"{arm}_mass" for arm in ARMS if self.settings.load(arm) is None]:
             names = " and ".join(missing)
-            raise Refused(f"{self.name}: {names} not set. Enter the mass at the flange before taking control.")
+            raise Refused(
+                "{name}: {names} not set. Enter the mass at the flange before taking control.",
+                name=self.name,
+                names=names,
+            )

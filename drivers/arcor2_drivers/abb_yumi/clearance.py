@@ -113,8 +113,11 @@ class Clearance:
         if least < min(self._least, float(gaps[0]) - APPROACH):
             gap = f"{least * 1e3:.0f} mm" if least > 0.0 else "touching it"
             raise Refused(
-                f"{self._name}: the {arm} arm would come too close to the {other_arm(arm)} arm.",
+                "{name}: the {arm} arm would come too close to the {other_arm} arm.",
                 f"nominal clearance {gap}, required {self._least * 1e3:.0f} mm",
+                name=self._name,
+                arm=arm,
+                other_arm=other_arm(arm),
             )
 
 

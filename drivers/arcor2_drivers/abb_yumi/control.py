@@ -70,8 +70,10 @@ class Control:
                 raise NotInControl(problem, rws.address)
             if not panel.ours:
                 raise Refused(
-                    f"{name} has {panel.program_names} loaded. Load Arcor2Left.pgf and Arcor2Right.pgf "
-                    "into T_ROB_L and T_ROB_R."
+                    "{name} has {program_names} loaded. Load Arcor2Left.pgf and Arcor2Right.pgf "
+                    "into T_ROB_L and T_ROB_R.",
+                    name=name,
+                    program_names=panel.program_names,
                 )
             self._take_mastership(rws)
             try:
@@ -94,7 +96,7 @@ class Control:
                 assert load is not None
                 session.set_tool(arm, self._arms.tools[arm], load)
         except BaseException:
-            session.end(NotInControl(f"Control of {self._arms.name} was not taken."))
+            session.end(NotInControl("Control of {name} was not taken.", name=self._arms.name))
             raise
         self._controlled_since = time.monotonic()
         self.session = session
@@ -109,7 +111,7 @@ class Control:
                 for arm in ARMS:
                     with contextlib.suppress(DeviceError):
                         self._end_lead_through(arm)
-            session.end(NotInControl(f"Control of {self._arms.name} was released."))
+            session.end(NotInControl("Control of {name} was released.", name=self._arms.name))
         self._release_mastership()
 
     def disconnect(self) -> None:
@@ -150,7 +152,7 @@ class Control:
             return session
         self._observer.observing.check()
         why = f": {session.ended}" if session is not None else ". Take control first."
-        raise NotInControl(f"Control of {self._arms.name} is not taken{why}")
+        raise NotInControl("Control of {name} is not taken{reason}", name=self._arms.name, reason=why)
 
     @property
     def rws(self) -> Rws:
@@ -166,7 +168,7 @@ class Control:
             stop_rapid(self.rws)
         finally:
             assert self.session is not None
-            self.session.end(NotInControl(f"{self._arms.name} was stopped by stopping RAPID."), wait=False)
+            self.session.end(NotInControl("{name} was stopped by stopping RAPID.", name=self._arms.name), wait=False)
             self._return_mastership()
 
     def _ask(self, rws: Rws) -> tuple[Panel, str]:
@@ -180,7 +182,13 @@ class Control:
         name = self._arms.name
         safety = safety_of(state, panel.collision == COLLISION and not self.collision_acknowledged)
         if safety is not Safety.NORMAL:
-            raise SafetyStop(f"{name} cannot be controlled: {label(safety)}", REMEDIES.get(safety, ""), safety.value)
+            raise SafetyStop(
+                "{name} cannot be controlled: {safety}",
+                REMEDIES.get(safety, ""),
+                safety.value,
+                name=name,
+                safety=label(safety),
+            )
         if panel.operation_mode != AUTOMATIC:
             problem = f"{name} is in operating mode {panel.operation_mode}. Select automatic mode at the pendant."
             raise NotInControl(problem, self._observer.rws.address)
@@ -266,11 +274,22 @@ class Control:
         safety = safety_of(state, panel.collision == COLLISION)
         code, title = self._last_event(rws)
         if safety is not Safety.NORMAL:
-            return SafetyStop(f"{label(safety)} of {name} ({rws.address})", f"{code} {title}".strip(), safety.value)
+            return SafetyStop(
+                "{safety} of {name} ({address})",
+                f"{code} {title}".strip(),
+                safety.value,
+                safety=label(safety),
+                name=name,
+                address=rws.address,
+            )
         if state != MOTORS_ON:
-            return NotInControl(f"The motors of {name} ({rws.address}) were switched off.", f"{code} {title}")
+            return NotInControl(
+                "The motors of {name} ({address}) were switched off.", f"{code} {title}", name=name, address=rws.address
+            )
         cause = title or "the event log has no cause"
-        return DeviceFault(f"RAPID stopped on {name} ({rws.address}): {cause}", f"{code}", code)
+        return DeviceFault(
+            "RAPID stopped on {name} ({address}): {cause}", f"{code}", code, name=name, address=rws.address, cause=cause
+        )
 
     def _last_event(self, rws: Rws) -> tuple[str, str]:
         """Return number and title of the latest error in the event log, or of its latest entry."""
@@ -318,7 +337,7 @@ class Control:
         for axis, value in zip("xyz", cog, strict=True):
             self._arms.within(f"cog {axis}", value, -0.5, 0.5)
         if inertia is not None:
-            raise Refused(f"{self._arms.name}: this driver cannot set an inertia. Leave it out.")
+            raise Refused("{name}: this driver cannot set an inertia. Leave it out.", name=self._arms.name)
         self.current().set_tool(arm, tcp, (mass, cog))
         self._arms.tools[arm], self._arms.loads[arm] = tcp, (mass, cog)
 
@@ -331,20 +350,24 @@ class Control:
         """Make an arm movable by hand, or stiff again. Raise Refused while an arm moves, or without lead-through."""
         self.current()
         if self._observer.panel().lead_through[arm] is None:
-            raise Refused(f"The controller of {self._arms.name} has no lead-through for {UNITS[arm]}.")
+            raise Refused(
+                "The controller of {name} has no lead-through for {units}.", name=self._arms.name, units=UNITS[arm]
+            )
         if enabled and moving:
-            raise Refused(f"{self._arms.name} is moving. Stop both arms before hand teaching.")
+            raise Refused("{name} is moving. Stop both arms before hand teaching.", name=self._arms.name)
         self._set_lead_through(arm, enabled)
 
     def check_stiff(self, arm: str) -> None:
         """Raise Refused while an arm, or the other one, from which it must keep clear, is moved by hand."""
         lead_through = self._observer.panel().lead_through
         if lead_through[arm]:
-            raise Refused(f"The {arm} arm of {self._arms.name} is in hand teaching mode.")
+            raise Refused("The {arm} arm of {name} is in hand teaching mode.", arm=arm, name=self._arms.name)
         if lead_through[other_arm(arm)]:
             raise Refused(
-                f"The {other_arm(arm)} arm of {self._arms.name} is in hand teaching mode; "
-                f"the {arm} arm cannot keep clear of it."
+                "The {arm} arm of {name} is in hand teaching mode; the {other_arm} arm cannot keep clear of it.",
+                arm=other_arm(arm),
+                name=self._arms.name,
+                other_arm=arm,
             )
 
     def _set_lead_through(self, arm: str, enabled: bool) -> None:

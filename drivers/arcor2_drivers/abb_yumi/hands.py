@@ -40,7 +40,9 @@ class Hands:
         assert 1.0 <= force <= 20.0
         width = self._move_fingers(arm, Code.HAND_GRIP, force)
         if width < HELD:
-            raise DeviceFault(f"The {arm.value} hand of {self.name} gripped nothing.", fault_code=NOTHING_HELD)
+            raise DeviceFault(
+                "The {value} hand of {name} gripped nothing.", fault_code=NOTHING_HELD, value=arm.value, name=self.name
+            )
         return width
 
     @action
@@ -91,11 +93,21 @@ class Hands:
         """Execute a command of the fingers and return their width, m."""
         setting = f"{arm.value}_gripper"
         if not getattr(self._yumi, setting):
-            raise Refused(f"The {arm.value} hand of {self.name} has no fingers: {setting} is not set.")
+            raise Refused(
+                "The {value} hand of {name} has no fingers: {setting} is not set.",
+                value=arm.value,
+                name=self.name,
+                setting=setting,
+            )
         return self._control.current().lines[arm.value].ask(code, *values, within=HAND_WITHIN)[0] / 1e3
 
     def _switch_air(self, arm: ArmId, code: Code, on: bool) -> None:
         setting = f"{arm.value}_suction"
         if not getattr(self._yumi, setting):
-            raise Refused(f"The {arm.value} hand of {self.name} has no suction cup: {setting} is not set.")
+            raise Refused(
+                "The {value} hand of {name} has no suction cup: {setting} is not set.",
+                value=arm.value,
+                name=self.name,
+                setting=setting,
+            )
         self._control.current().lines[arm.value].ask(code, float(on), within=HAND_WITHIN)

@@ -66,7 +66,7 @@ class Kinematics:
         line = session.lines[arm]
         tcp = self._arms.pose.inverted() * pose
         if not all(map(math.isfinite, (*tcp.position, *tcp.orientation))):
-            raise OutOfRange(f"{self._arms.name}: the numbers of a pose must be finite.")
+            raise OutOfRange("{name}: the numbers of a pose must be finite.", name=self._arms.name)
         flange = tcp * self._arms.tools[arm].inverted()
         near = np.array(seed) if seed is not None else self.present(arm)
         guess, error = nominal.nearest(arm, flange.matrix(), near)

@@ -70,7 +70,7 @@ class Motion:
         """Raise what prevents arms from moving."""
         for arm in arms:
             if self._locks[arm].locked():
-                raise Refused(f"The {arm} arm of {self._arms.name} is moving already.")
+                raise Refused("The {arm} arm of {name} is moving already.", arm=arm, name=self._arms.name)
             self._control.current()
             self._control.check_stiff(arm)
 
@@ -111,7 +111,12 @@ class Motion:
         self._arms.within("blend", blend, 0.0, 0.2)
         if not 1 <= len(waypoints) <= MOST_WAYPOINTS:
             given = len(waypoints)
-            raise OutOfRange(f"{self._arms.name}: waypoints must be 1 to {MOST_WAYPOINTS} poses, not {given}.")
+            raise OutOfRange(
+                "{name}: waypoints must be 1 to {most_waypoints} poses, not {given}.",
+                name=self._arms.name,
+                most_waypoints=MOST_WAYPOINTS,
+                given=given,
+            )
         with self._exclusive((arm,)):
             session, start = self._control.current(), self._kinematics.present(arm)
             line = session.lines[arm]
@@ -134,7 +139,12 @@ class Motion:
         self._arms.within("speed", speed, 0.001, 1.0)
         if set(targets) != set(ARMS):
             given = ", ".join(targets)
-            raise OutOfRange(f"{self._arms.name}: targets must be both {' and '.join(ARMS)}; received: {given}.")
+            raise OutOfRange(
+                "{name}: targets must be both {arms}; received: {given}.",
+                name=self._arms.name,
+                arms=" and ".join(ARMS),
+                given=given,
+            )
         guards = {arm: self._control.stops[arm].guard() for arm in ARMS}
         goals = {
             arm: self._arms.joint_values(target, arm) for arm, target in targets.items() if not isinstance(target, Pose)
@@ -182,8 +192,10 @@ class Motion:
             path = nominal.straight(arm, at, flange.matrix())
             if path is None:
                 raise Refused(
-                    f"The path of the {arm} arm of {self._arms.name} cannot be checked: nominal kinematics have no "
-                    "solution along the line. Use a joint move, or a pose in between."
+                    "The path of the {arm} arm of {name} cannot be checked: nominal kinematics have no "
+                    "solution along the line. Use a joint move, or a pose in between.",
+                    arm=arm,
+                    name=self._arms.name,
                 )
             paths.append(path)
             at = path[-1]
@@ -202,7 +214,7 @@ class Motion:
         duration = longest / (speed * self._arms.settings.max_joint_speed) + RAMP
         if duration > LONGEST:
             problem = f"{self._arms.name}: at speed {speed:g} the move would take {duration:.0f} s"
-            raise OutOfRange(f"{problem}; at most {LONGEST:.0f} s is allowed.")
+            raise OutOfRange("{problem}; at most {longest:.0f} s is allowed.", problem=problem, longest=LONGEST)
         return duration
 
     def _line_time(self, arm: str, poses: list[Pose], speed: float) -> float:
@@ -218,7 +230,9 @@ class Motion:
     def _start(self, session: ControlSession, arm: str, guard: StopGuard, code: Code, *values: float) -> Command:
         command = session.lines[arm].start(code, *values, stopped=guard.stopped)
         if command is None:
-            raise Cancelled(f"The move of the {arm} arm of {self._arms.name} was stopped before it started.")
+            raise Cancelled(
+                "The move of the {arm} arm of {name} was stopped before it started.", arm=arm, name=self._arms.name
+            )
         return command
 
     def _finish(
@@ -266,7 +280,7 @@ class Motion:
             last = now
             if budget < 0.0:
                 raise DeviceTimeout(
-                    f"A move of {self._arms.name} did not end within the computed time. It was stopped."
+                    "A move of {name} did not end within the computed time. It was stopped.", name=self._arms.name
                 )
 
     def _cause(self, session: ControlSession, guards: dict[str, StopGuard], error: DeviceError) -> DeviceError:
@@ -277,7 +291,7 @@ class Motion:
                 session.lines[arm].stop()
         lost = isinstance(session.ended, ConnectionLost) and min(stopped, default=0.0) > session.ended_at
         if stopped and not lost and not isinstance(session.ended, SafetyStop):
-            return Cancelled(f"The move of {self._arms.name} was stopped.")
+            return Cancelled("The move of {name} was stopped.", name=self._arms.name)
         if isinstance(error, CommandRefused):
             if error.status is Status.WATCHDOG:
                 return ConnectionLost(str(error), error.detail)
@@ -316,7 +330,7 @@ class Motion:
 
     def _no_rest(self) -> DeviceTimeout:
         problem = f"{self._arms.name} did not come to a standstill within {REST_WITHIN:g} s of a stop."
-        return DeviceTimeout(f"{problem} Press the emergency stop.")
+        return DeviceTimeout("{problem} Press the emergency stop.", problem=problem)
 
     def _await_rest(self, arms: tuple[str, ...]) -> None:
         """Wait for standstill of arms that were ours; without observation the watchdog stops them."""

@@ -99,7 +99,7 @@ def _speed(rws: Rws, panel: Panel) -> Panel:
     try:
         return panel._replace(speed_ratio=float(ratio) / 100.0)
     except ValueError:
-        raise ConnectionLost(f"{rws.who} returned an invalid speed ratio.", ratio) from None
+        raise ConnectionLost("{device} returned an invalid speed ratio.", ratio, device=rws.who) from None
 
 
 def _collision(rws: Rws, panel: Panel) -> Panel:
@@ -218,8 +218,13 @@ class Observer:
             return newest
         self.observing.check()
         if newest is None:
-            raise NotConnected(f"{self.who} has not been read yet.")
-        raise Stale(f"The state of {self.who} is {newest.age:.2f} s old; at most {self.fresh:g} s is allowed.")
+            raise NotConnected("{device} has not been read yet.", device=self.who)
+        raise Stale(
+            "The state of {device} is {age:.2f} s old; at most {fresh:g} s is allowed.",
+            device=self.who,
+            age=newest.age,
+            fresh=self.fresh,
+        )
 
     def panel(self) -> Panel:
         """Return the latest panel. Raise as `sample`."""
@@ -246,7 +251,9 @@ class Observer:
                 if left <= 0.0 or not self._received.wait(min(left, 0.2)):
                     self.observing.check()
                     if time.monotonic() > moment + within:
-                        raise DeviceTimeout(f"{self.who} has sent no new state for {within:g} s.")
+                        raise DeviceTimeout(
+                            "{device} has sent no new state for {within:g} s.", device=self.who, within=within
+                        )
         return newest
 
     # -------------------------------------------------------------------------------- on the observing thread
@@ -255,7 +262,11 @@ class Observer:
             self.version = self.rws.get("/rw/system", FIRST_WITHIN)[0].get("rwversion", "")
             if not self.version.startswith("6."):
                 version = self.version or "?"
-                raise Refused(f"{self.who} has RobotWare {version}. This driver supports RobotWare 6 (RWS 1.0) only.")
+                raise Refused(
+                    "{device} has RobotWare {version}. This driver supports RobotWare 6 (RWS 1.0) only.",
+                    device=self.who,
+                    version=version,
+                )
             self._sample = None
             self._panel = read_panel(self.rws)
             self._read()
@@ -304,7 +315,10 @@ class Observer:
                 joints[arm], targets[arm] = read_joints(jointtarget[0]), read_target(robtarget[0])
             except (IndexError, KeyError, ValueError):
                 raise ConnectionLost(
-                    f"{self.who} returned an invalid position of {unit}.", f"{jointtarget} {robtarget}"
+                    "{device} returned an invalid position of {unit}.",
+                    f"{jointtarget} {robtarget}",
+                    device=self.who,
+                    unit=unit,
                 ) from None
         sample = Sample(started, state, running, joints, targets, self._speeds(started, joints))
         with self._received:

@@ -73,13 +73,21 @@ class Rws:
             found = answer.json()["_embedded"]["_state"]
             return [{str(key): str(value) for key, value in state.items()} for state in found]
         except (ValueError, KeyError, TypeError, AttributeError):
-            raise ConnectionLost(f"{self.who} sent an invalid answer to {path}.", answer.text[:200]) from None
+            raise ConnectionLost(
+                "{device} sent an invalid answer to {path}.", answer.text[:200], device=self.who, path=path
+            ) from None
 
     def value(self, path: str, field: str, timeout: float = REQUEST_TIMEOUT) -> str:
         """Return a field of the first state of a resource."""
         states = self.get(path, timeout)
         if not states or field not in states[0]:
-            raise ConnectionLost(f"The answer of {self.who} to {path} has no field {field}.", str(states)[:200])
+            raise ConnectionLost(
+                "The answer of {device} to {path} has no field {field}.",
+                str(states)[:200],
+                device=self.who,
+                path=path,
+                field=field,
+            )
         return states[0][field]
 
     def act(self, path: str, action: str | None, body: Fields | None = None, timeout: float = REQUEST_TIMEOUT) -> None:
@@ -89,7 +97,7 @@ class Rws:
     @contextlib.contextmanager
     def _turn(self, timeout: float) -> Iterator[None]:
         if not self._lock.acquire(timeout=timeout):
-            raise DeviceTimeout(f"{self.who} is busy with another request.")
+            raise DeviceTimeout("{device} is busy with another request.", device=self.who)
         try:
             yield
         finally:
@@ -119,11 +127,18 @@ class Rws:
                     timeout=max(until - time.monotonic(), 0.01),
                 )
             except httpx.ConnectError as e:
-                raise NotConnected(f"{self.who} refuses the connection. Is the controller switched on?", str(e)) from e
+                raise NotConnected(
+                    "{device} refuses the connection. Is the controller switched on?", str(e), device=self.who
+                ) from e
             except httpx.TimeoutException as e:
-                raise DeviceTimeout(f"{self.who} did not answer {path} within {timeout:.2g} s.") from e
+                raise DeviceTimeout(
+                    "{device} did not answer {path} within {timeout:.2g} s.",
+                    device=self.who,
+                    path=path,
+                    timeout=timeout,
+                ) from e
             except httpx.HTTPError as e:
-                raise ConnectionLost(f"The connection to {self.who} broke.", f"{path}: {e}") from e
+                raise ConnectionLost("The connection to {device} broke.", f"{path}: {e}", device=self.who) from e
         self._fresh = False
         if answer.status_code >= 400:
             raise self._refusal(answer, path)
@@ -133,7 +148,9 @@ class Rws:
         """Return the error of an answer, with the controller's number and text."""
         status = answer.status_code
         if status == httpx.codes.UNAUTHORIZED:
-            return NotConnected(f"{self.who} rejects user {self._user!r} or the password.", path)
+            return NotConnected(
+                "{device} rejects user {user!r} or the password.", path, device=self.who, user=self._user
+            )
         given: Any = {}
         with contextlib.suppress(ValueError, KeyError, TypeError):
             given = answer.json()["_embedded"]["status"]
@@ -141,5 +158,5 @@ class Rws:
         detail = f"{path}: HTTP {status}" + (f", code {code}" if code != "" else "")
         reason = f": {text}" if text else f" with HTTP {status}"
         if status >= 500:
-            return DeviceFault(f"{self.who} failed{reason}", detail, code or status)
-        return Refused(f"{self.who} refuses{reason}", detail)
+            return DeviceFault("{device} failed{reason}", detail, code or status, device=self.who, reason=reason)
+        return Refused("{device} refuses{reason}", detail, device=self.who, reason=reason)

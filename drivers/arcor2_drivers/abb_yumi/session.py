@@ -82,7 +82,9 @@ def await_value(rws: Rws, path: str, field: str, value: str, within: float, what
     until = time.monotonic() + within
     while rws.value(path, field) != value:
         if time.monotonic() > until:
-            raise DeviceTimeout(f"{rws.who} did not {what} within {within:g} s.")
+            raise DeviceTimeout(
+                "{device} did not {what} within {within:g} s.", device=rws.who, what=what, within=within
+            )
         time.sleep(POLL)
 
 

@@ -106,7 +106,10 @@ class YumiSettings(Settings):
             if not getattr(self, name) < 0.0:
                 within(name, getattr(self, name), 0.001, MAX_PAYLOAD)
         if abs(self.left_port - self.right_port) < 2:
-            raise OutOfRange(f"right_port must differ from left_port {self.left_port} by at least 2: an arm uses two")
+            raise OutOfRange(
+                "right_port must differ from left_port {left_port} by at least 2: an arm uses two",
+                left_port=self.left_port,
+            )
 
     def port(self, arm: str) -> int:
         """Return the port of an arm's motion server."""

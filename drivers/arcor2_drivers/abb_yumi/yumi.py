@@ -216,7 +216,7 @@ class YuMi(Hands, MultiArmRobot):
         """Move the TCP of an arm in lines through poses in the world; `blend` is the corner radius, m, up to 0.2."""
         arm = self._arms.one(arm_id)
         if not linear:
-            raise Refused(f"{self.name} moves along paths in lines only. Set linear to true.")
+            raise Refused("{name} moves along paths in lines only. Set linear to true.", name=self.name)
         return self._motion.along(arm, waypoints, blend, speed, self._control.stops[arm].guard())
 
     def move_synchronously(self, targets: dict[str, Pose | list[Joint]], speed: float = 0.25) -> dict[str, MoveResult]:
@@ -299,19 +299,21 @@ class YuMi(Hands, MultiArmRobot):
     def acknowledge(self, code: str) -> None:
         """Raise Refused: only a named person can acknowledge a safety stop. Raise NotFound for an inactive alarm."""
         if code not in {alarm.code for alarm in self.alarms()}:
-            raise NotFound(f"{self.name} has no alarm {code}.")
+            raise NotFound("{name} has no alarm {code}.", name=self.name, code=code)
         if code == Safety.PROTECTIVE_STOP.value:
             raise Refused(
-                f"{code} of {self.name} must be acknowledged by the person who inspected the robot: "
-                "acknowledge_protective_stop(confirmed_by)."
+                "{code} of {name} must be acknowledged by the person who inspected the robot: "
+                "acknowledge_protective_stop(confirmed_by).",
+                code=code,
+                name=self.name,
             )
-        raise Refused(f"{code} of {self.name} must be acknowledged at the controller.")
+        raise Refused("{code} of {name} must be acknowledged at the controller.", code=code, name=self.name)
 
     def acknowledge_protective_stop(self, confirmed_by: str) -> None:
         """Acknowledge a collision, so that control can be taken again; the old motion does not continue."""
         check_confirmed(confirmed_by)
         if self._control.safety(self._observer.sample()) is not Safety.PROTECTIVE_STOP:
-            raise Refused(f"{self.name} has no protective stop.")
+            raise Refused("{name} has no protective stop.", name=self.name)
         self._control.collision_acknowledged = True
         log.warning("%s: collision acknowledged by %s", self.name, confirmed_by)
 

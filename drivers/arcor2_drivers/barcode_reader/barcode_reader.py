@@ -92,7 +92,7 @@ class BarcodeReader(LineDevice, Reader):
         self.check()
         go_on = self.begin("reading")
         if not self._reading.acquire(blocking=False):
-            raise Refused(f"{self.who} is reading already")
+            raise Refused("{device} is reading already", device=self.who)
         try:
             with self.held():
                 self._present_code = ""
@@ -138,7 +138,9 @@ class BarcodeReader(LineDevice, Reader):
         self.stop_waiting()
         timeout = 3.0 * self.line.answer_timeout
         if not self._reading.acquire(timeout=timeout):
-            raise DeviceTimeout(f"{self.who} did not end its reading within {timeout:g} s")
+            raise DeviceTimeout(
+                "{device} did not end its reading within {timeout:g} s", device=self.who, timeout=timeout
+            )
         self._reading.release()
 
     # -------------------------------------------------------------------------------- commands
@@ -152,7 +154,9 @@ class BarcodeReader(LineDevice, Reader):
         def found(came: bytes) -> str | None:
             for line in lines.LineBuffer().feed(came):
                 if lines.refused(line, command):
-                    raise DeviceFault(f"{self.who} does not know the command {command}", line)
+                    raise DeviceFault(
+                        "{device} does not know the command {command}", line, device=self.who, command=command
+                    )
                 if answers(line):
                     return line
             return None
@@ -170,7 +174,12 @@ class BarcodeReader(LineDevice, Reader):
 
         code = self.trigger(timeout)
         if isinstance(code, NoRead):
-            raise DeviceFault(f"{self.who}: no code was read within {timeout:g} s", fault_code="no_read")
+            raise DeviceFault(
+                "{device}: no code was read within {timeout:g} s",
+                fault_code="no_read",
+                device=self.who,
+                timeout=timeout,
+            )
         return code.text
 
     @action(deadline=LONGEST_SCAN + MARGIN)
@@ -191,5 +200,7 @@ class BarcodeReader(LineDevice, Reader):
         """Return the code that code_present found: once, and not after another reading has started."""
         code, self._present_code = self._present_code, ""
         if not code:
-            raise Refused(f"{self.who}: there is no code that code_present found and last_code has not returned yet")
+            raise Refused(
+                "{device}: there is no code that code_present found and last_code has not returned yet", device=self.who
+            )
         return code

@@ -50,14 +50,14 @@ class Bin(GenericWithPose):
             from . import models
         except ImportError as error:
             raise NotConnected(
-                f"{self.name}: Open3D or OpenCV is not installed here; they come with the extra `vision` "
-                "(arcor2-hw[vision])",
+                "{name}: Open3D or OpenCV is not installed here; they come with the extra `vision` (arcor2-hw[vision])",
                 str(error),
+                name=self.name,
             ) from error
         try:
             self._model = models.load(self._given)
         except models.BadModel as error:
-            raise NotConnected(f"{self.name}: {error}", self._given.part_mesh) from error
+            raise NotConnected("{name}: {reason}", self._given.part_mesh, name=self.name, reason=error) from error
         self._connected = Connection.ONLINE
 
     def disconnect(self) -> None:
@@ -72,7 +72,7 @@ class Bin(GenericWithPose):
 
     def _loaded(self) -> "Model":
         if self._model is None:
-            raise NotConnected(f"{self.name} is not connected")
+            raise NotConnected("{name} is not connected", name=self.name)
         return self._model
 
     def stop(self) -> None:
@@ -85,7 +85,7 @@ class Bin(GenericWithPose):
 
         def go_on() -> None:
             if self._stops != stops:
-                raise Cancelled(f"{self.name}: the search for a part was stopped")
+                raise Cancelled("{name}: the search for a part was stopped", name=self.name)
 
         return go_on
 
@@ -153,14 +153,19 @@ class Bin(GenericWithPose):
         try:
             note = PictureNote.of(picture)
         except InvalidData as error:
-            raise InvalidData(f"{self.name}: {error}") from error
+            raise InvalidData("{name}: {reason}", name=self.name, reason=error) from error
         age = (datetime.datetime.now(datetime.UTC) - datetime.datetime.fromisoformat(note.stamp)).total_seconds()
         if age > self._given.max_age:
             raise Stale(
-                f"{self.name}: the picture of {note.camera} is {age:.1f} s old, {self._given.max_age:g} s at most are "
-                "asked for"
+                "{name}: the picture of {camera} is {age:.1f} s old, {max_age:g} s at most are asked for",
+                name=self.name,
+                camera=note.camera,
+                age=age,
+                max_age=self._given.max_age,
             )
         depth = np.asarray(picture)
         if depth.ndim != 2 or depth.dtype != np.uint16:
-            raise OutOfRange(f"{self.name}: depth must be a picture of 16 bits, mm, not of mode {picture.mode}")
+            raise OutOfRange(
+                "{name}: depth must be a picture of 16 bits, mm, not of mode {mode}", name=self.name, mode=picture.mode
+            )
         return View(depth, note.parameters, (self.pose.inverted() * note.pose).matrix())

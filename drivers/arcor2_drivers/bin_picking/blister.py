@@ -47,7 +47,7 @@ class Blister(GenericWithPose):
         except (BadState, OSError) as error:
             self._connected = Connection.FAILED
             raise NotConnected(
-                f"{self.name}: the state file cannot be used: {error}", self._given.state_file
+                "{name}: the state file cannot be used: {reason}", self._given.state_file, name=self.name, reason=error
             ) from error
         self._connected = Connection.ONLINE
 
@@ -63,7 +63,7 @@ class Blister(GenericWithPose):
 
     def _check(self) -> None:
         if self._connected is not Connection.ONLINE:
-            raise NotConnected(f"{self.name} is not connected")
+            raise NotConnected("{name} is not connected", name=self.name)
 
     # -------------------------------------------------------------------------------- actions
     @action(quick=True)
@@ -72,7 +72,7 @@ class Blister(GenericWithPose):
         self._check()
         found = self._places.next(full=True)
         if found is None:
-            raise Empty(f"{self.name} is empty: fill it and tell so by refill")
+            raise Empty("{name} is empty: fill it and tell so by refill", name=self.name)
         self._offered = found
         return self._pose_of(*found)
 
@@ -81,7 +81,7 @@ class Blister(GenericWithPose):
         """Note that the part that next_part gave is gone."""
         self._check()
         if self._offered is None:
-            raise Empty(f"{self.name}: no part was given by next_part since the last was taken")
+            raise Empty("{name}: no part was given by next_part since the last was taken", name=self.name)
         self._note(*self._offered, False)
         self._offered = None
 
@@ -91,7 +91,7 @@ class Blister(GenericWithPose):
         self._check()
         found = self._places.next(full=False)
         if found is None:
-            raise Full(f"{self.name} is full: take it away and tell so by clear")
+            raise Full("{name} is full: take it away and tell so by clear", name=self.name)
         self._free = found
         return self._pose_of(*found)
 
@@ -100,7 +100,7 @@ class Blister(GenericWithPose):
         """Note that a part lies at the place that next_free gave."""
         self._check()
         if self._free is None:
-            raise Full(f"{self.name}: no place was given by next_free since the last part was put")
+            raise Full("{name}: no place was given by next_free since the last part was put", name=self.name)
         self._note(*self._free, True)
         self._free = None
 
@@ -170,7 +170,7 @@ class Blister(GenericWithPose):
         try:
             self._places.full(row, column)
         except IndexError as error:
-            raise OutOfRange(f"{self.name}: {error}") from None
+            raise OutOfRange("{name}: {reason}", name=self.name, reason=error) from None
 
     def _note(self, row: int, column: int, full: bool) -> None:
         try:
@@ -186,7 +186,7 @@ class Blister(GenericWithPose):
         self._offered = self._free = None
 
     def _unkept(self, error: OSError) -> NotConnected:
-        return NotConnected(f"{self.name}: the state cannot be kept, and is as before", str(error))
+        return NotConnected("{name}: the state cannot be kept, and is as before", str(error), name=self.name)
 
     def _pose_of(self, row: int, column: int) -> Pose:
         given = self._given

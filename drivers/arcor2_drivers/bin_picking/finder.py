@@ -127,7 +127,12 @@ def find(
     told = f"best quality {best.quality:.2f} (explained {best.explained:.2f}, covered {best.covered:.2f})"
     if too_large:
         raise PartsTouch("what lies there is larger than one part: parts touch, or something else lies there", told)
-    raise BadFit(f"what lies there does not fit the part: quality {best.quality:.2f}, {min_quality:g} asked for", told)
+    raise BadFit(
+        "what lies there does not fit the part: quality {quality:.2f}, {min_quality:g} asked for",
+        told,
+        quality=best.quality,
+        min_quality=min_quality,
+    )
 
 
 def _quality(fit: Fit) -> float:

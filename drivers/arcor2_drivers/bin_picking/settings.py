@@ -85,7 +85,7 @@ class BlisterSettings(Settings):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.rows * self.columns > MOST_PLACES:
-            raise OutOfRange(f"rows times columns must be at most {MOST_PLACES}")
+            raise OutOfRange("rows times columns must be at most {most_places}", most_places=MOST_PLACES)
         for name, count in (("row_pitch", self.rows), ("column_pitch", self.columns)):
             within(name, getattr(self, name), 0.0 if count == 1 else 0.0005, 2.0)
         self.state_file = device_file("state_file", self.state_file)

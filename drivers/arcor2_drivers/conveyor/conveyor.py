@@ -87,7 +87,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
         """Reset the fault `code`. Raises NotFound when there is no such fault, Refused while its cause is present."""
         now = self.fresh()
         if now.power not in FAULTY or f"{now.error_code:04X}h" != code:
-            raise NotFound(f"{self.who} has no alarm {code} to acknowledge")
+            raise NotFound("{device} has no alarm {code} to acknowledge", device=self.who, code=code)
         self.fault_reset()
 
     # -------------------------------------------------------------------------------- control
@@ -107,7 +107,13 @@ class Conveyor(PolledControl[State], Machine, Axis):
         link.write(cia402.DECELERATION, s.rate(s.acceleration))
         for entry, value in armed:
             if (stored := link.read(entry)) != value:
-                raise Refused(f"{self.who}: {entry.title} is {stored} after {value} was written")
+                raise Refused(
+                    "{device}: {title} is {stored} after {value} was written",
+                    device=self.who,
+                    title=entry.title,
+                    stored=stored,
+                    value=value,
+                )
         self._observer.listen()
         link.start_node()
         link.heartbeat()
@@ -122,7 +128,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
     def release_control(self) -> None:
         """Switch the torque off, and the monitoring of our heartbeat. Raises Refused while the belt moves."""
         if self.in_control and not self._motion.stands(self.fresh()):
-            raise Refused(f"{self.who}: release_control is refused while the belt moves: halt it")
+            raise Refused("{device}: release_control is refused while the belt moves: halt it", device=self.who)
         super().release_control()
 
     def owner_of(self, state: State) -> str | None:
@@ -148,9 +154,13 @@ class Conveyor(PolledControl[State], Machine, Axis):
         now = self.fresh()
         if not self.in_control:
             refused = f"{self.who}: {what} is refused in state {now.power}"
-            raise NotInControl(f"{refused}: {self.control_owner() or 'nobody'} has control")
+            raise NotInControl(
+                "{refused}: {control_owner} has control",
+                refused=refused,
+                control_owner=self.control_owner() or "nobody",
+            )
         if resting and not self._motion.stands(now):
-            raise Refused(f"{self.who}: {what} is refused while the belt moves: halt it first")
+            raise Refused("{device}: {what} is refused while the belt moves: halt it first", device=self.who, what=what)
         return now, go_on
 
     # -------------------------------------------------------------------------------- values
@@ -176,7 +186,12 @@ class Conveyor(PolledControl[State], Machine, Axis):
         self._check(position, velocity, what)
         now, go_on = self._begin(what)
         if not self._homed:
-            raise Refused(f"{self.who}: {what} is refused in state {now.power}: it is not homed")
+            raise Refused(
+                "{device}: {what} is refused in state {power}: it is not homed",
+                device=self.who,
+                what=what,
+                power=now.power,
+            )
         target = self._units.counts(position)
         with self._unit.act(what):
             self._motion.move(target, False, self._units.rate(velocity), target, what, go_on)
@@ -195,7 +210,12 @@ class Conveyor(PolledControl[State], Machine, Axis):
         """Run with `velocity`, m/s, until halted; return when it is reached."""
         what = f"run with {velocity:g} m/s"
         if not abs(velocity) <= self._units.max_speed:
-            raise OutOfRange(f"{self.who}: {what}: velocity must be at most {self._units.max_speed:g} m/s")
+            raise OutOfRange(
+                "{device}: {what}: velocity must be at most {max_speed:g} m/s",
+                device=self.who,
+                what=what,
+                max_speed=self._units.max_speed,
+            )
         _, go_on = self._begin(what, resting=False)
         with self._unit.act(what):
             self._motion.run(self._units.counts(velocity), what, go_on)
@@ -204,12 +224,29 @@ class Conveyor(PolledControl[State], Machine, Axis):
         s = self._units
         if not s.min_position <= position <= s.max_position:
             limits = f"{s.min_position:g} to {s.max_position:g} m"
-            raise OutOfRange(f"{self.who}: {what}: position must be {limits}, not {position:g} m")
+            raise OutOfRange(
+                "{device}: {what}: position must be {limits}, not {position:g} m",
+                device=self.who,
+                what=what,
+                limits=limits,
+                position=position,
+            )
         if not 0.0 < speed <= s.max_speed:
-            raise OutOfRange(f"{self.who}: {what}: speed must be above 0 and at most {s.max_speed:g} m/s")
+            raise OutOfRange(
+                "{device}: {what}: speed must be above 0 and at most {max_speed:g} m/s",
+                device=self.who,
+                what=what,
+                max_speed=s.max_speed,
+            )
         longest = LONGEST_MOVE * speed
         if abs(position - s.metres(self.current().position)) > longest:
-            raise OutOfRange(f"{self.who}: {what} would take longer than {LONGEST_MOVE:g} s at {speed:g} m/s")
+            raise OutOfRange(
+                "{device}: {what} would take longer than {longest_move:g} s at {speed:g} m/s",
+                device=self.who,
+                what=what,
+                longest_move=LONGEST_MOVE,
+                speed=speed,
+            )
 
     # -------------------------------------------------------------------------------- machine
     def machine_state(self) -> MachineState:
@@ -290,7 +327,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
         self._homed = True
         if self._observer.losses != losses:
             self._homed = False
-            raise ConnectionLost(f"{self.who}: the connection was lost while homing ended")
+            raise ConnectionLost("{device}: the connection was lost while homing ended", device=self.who)
 
     @action(deadline=LONGEST_MOVE + MARGIN)
     def move_to(self, position: float, speed: float = 0.1, *, an: str | None = None) -> None:

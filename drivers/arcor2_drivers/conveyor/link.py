@@ -108,10 +108,13 @@ class CanLink:
             bus = self._connected(timeout)
         except (TimeoutError, can.CanTimeoutError) as error:
             raise DeviceTimeout(
-                f"{self.who}: the CAN adapter cannot be reached within {timeout:.1f} s", str(error)
+                "{device}: the CAN adapter cannot be reached within {timeout:.1f} s",
+                str(error),
+                device=self.who,
+                timeout=timeout,
             ) from error
         except (can.CanError, OSError, ValueError) as error:
-            raise NotConnected(f"{self.who}: the CAN adapter cannot be reached", str(error)) from error
+            raise NotConnected("{device}: the CAN adapter cannot be reached", str(error), device=self.who) from error
         self._bus, self.loss = bus, None
         network = _Network(bus)
         self._network = network
@@ -140,7 +143,7 @@ class CanLink:
     def close(self) -> None:
         """Close; does nothing when closed."""
         self._closing.set()
-        self.loss = self.loss or NotConnected(f"{self.who} is not connected")
+        self.loss = self.loss or NotConnected("{device} is not connected", device=self.who)
         receiver, self._receiver = self._receiver, None
         bus, self._bus, network = self._bus, None, self._network
         port = getattr(bus, "serialPortOrig", None)
@@ -180,7 +183,9 @@ class CanLink:
                 continue
             except (can.CanError, OSError, TypeError) as error:
                 if not closing.is_set():
-                    self._lose(ConnectionLost(f"{self.who}: the connection to the CAN bus was lost", str(error)))
+                    self._lose(
+                        ConnectionLost("{device}: the connection to the CAN bus was lost", str(error), device=self.who)
+                    )
                 return
             if message is None or message.is_error_frame or message.is_remote_frame or message.is_extended_id:
                 continue
@@ -207,7 +212,13 @@ class CanLink:
         data = self._request(lambda sdo: sdo.upload(entry.at, entry.subindex), what)
         size = struct.calcsize(entry.form)
         if len(data) < size:
-            raise DeviceFault(f"{self.who}: {what} gave {len(data)} bytes instead of {size}")
+            raise DeviceFault(
+                "{device}: {what} gave {count} bytes instead of {size}",
+                device=self.who,
+                what=what,
+                count=len(data),
+                size=size,
+            )
         return int(struct.unpack(entry.form, data[:size])[0])
 
     def read_first(self, entry: Entry, timeout: float, enough: Callable[[], bool]) -> int:
@@ -221,7 +232,9 @@ class CanLink:
                 return self.read(entry)
             except DeviceTimeout as error:
                 if enough() or time.monotonic() + self._settings.sdo_timeout > deadline:
-                    raise DeviceTimeout(f"{self.who} does not answer within {timeout:.1f} s", str(error)) from error
+                    raise DeviceTimeout(
+                        "{device} does not answer within {timeout:.1f} s", str(error), device=self.who, timeout=timeout
+                    ) from error
                 self.loss = None
 
     def write(self, entry: Entry, value: int) -> None:
@@ -233,23 +246,34 @@ class CanLink:
     def _request(self, send: Callable[[Any], Any], what: str) -> bytes:
         limit = self._settings.sdo_timeout
         if not acquire_within(self._one_request, 4.0 * limit):
-            raise DeviceTimeout(f"{self.who}: {what} found the drive busy with other requests")
+            raise DeviceTimeout("{device}: {what} found the drive busy with other requests", device=self.who, what=what)
         try:
             sdo = self._sdo
             if self.loss is not None or sdo is None:
-                raise _again(self.loss or NotConnected(f"{self.who} is not connected"))
+                raise _again(self.loss or NotConnected("{device} is not connected", device=self.who))
             try:
                 return bytes(send(sdo) or b"")
             except SdoAbortedError as error:
                 text = SdoAbortedError.CODES.get(error.code, "unknown reason")
                 raise DeviceFault(
-                    f"{self.who} refuses {what}: {text} (abort {error.code:08X}h)", fault_code=f"{error.code:08X}h"
+                    "{device} refuses {what}: {text} (abort {code:08X}h)",
+                    fault_code=f"{error.code:08X}h",
+                    device=self.who,
+                    what=what,
+                    text=text,
+                    code=error.code,
                 ) from error
             except SdoCommunicationError as error:
-                late = DeviceTimeout(f"{self.who} did not answer {what} within {limit:g} s", str(error))
+                late = DeviceTimeout(
+                    "{device} did not answer {what} within {limit:g} s",
+                    str(error),
+                    device=self.who,
+                    what=what,
+                    limit=limit,
+                )
                 raise _again(self._lose(late)) from error
             except (can.CanError, OSError) as error:
-                lost = ConnectionLost(f"{self.who}: the connection to the CAN bus was lost", str(error))
+                lost = ConnectionLost("{device}: the connection to the CAN bus was lost", str(error), device=self.who)
                 raise _again(self._lose(lost)) from error
         finally:
             self._one_request.release()
@@ -265,11 +289,11 @@ class CanLink:
     def _send(self, identifier: int, data: bytes) -> None:
         network = self._network
         if self.loss is not None or network is None:
-            raise _again(self.loss or NotConnected(f"{self.who} is not connected"))
+            raise _again(self.loss or NotConnected("{device} is not connected", device=self.who))
         try:
             network.send_message(identifier, data)
         except (can.CanError, OSError) as error:
-            lost = ConnectionLost(f"{self.who}: the connection to the CAN bus was lost", str(error))
+            lost = ConnectionLost("{device}: the connection to the CAN bus was lost", str(error), device=self.who)
             raise _again(self._lose(lost)) from error
 
 

@@ -46,7 +46,13 @@ class Motion:
         code = now.error_code or self._observer.emergency
         fault = fault_of(code)
         return DeviceFault(
-            f"{self._who}: {what}: fault {code:04X}h, {fault.text}; {fault.remedy}", fault_code=f"{code:04X}h"
+            "{device}: {what}: fault {code:04X}h, {text}; {remedy}",
+            fault_code=f"{code:04X}h",
+            device=self._who,
+            what=what,
+            code=code,
+            text=fault.text,
+            remedy=fault.remedy,
         )
 
     def _enabled(self, now: State, what: str) -> None:
@@ -55,7 +61,13 @@ class Motion:
         if now.power is not Power.ENABLED:
             emergency = self._observer.emergency
             why = f": {fault_of(emergency).text} ({emergency:04X}h)" if emergency else ""
-            raise DeviceFault(f"{self._who}: {what} ended: the drive went to {now.power}{why}")
+            raise DeviceFault(
+                "{device}: {what} ended: the drive went to {power}{reason}",
+                device=self._who,
+                what=what,
+                power=now.power,
+                reason=why,
+            )
 
     # -------------------------------------------------------------------------------- enabling
     def enable(self, mode: Mode, what: str, go_on: GoOn) -> None:
@@ -125,7 +137,12 @@ class Motion:
 
         def homed(now: State) -> bool:
             if now.statusword & cia402.HOMING_ERROR:
-                raise DeviceFault(f"{self._who}: {what} ended with a homing error (method {s.homing_method})")
+                raise DeviceFault(
+                    "{device}: {what} ended with a homing error (method {homing_method})",
+                    device=self._who,
+                    what=what,
+                    homing_method=s.homing_method,
+                )
             wanted = cia402.HOMING_ATTAINED | cia402.TARGET_REACHED
             return now.statusword & wanted == wanted and self.stands(now)
 
@@ -153,7 +170,13 @@ class Motion:
         )
         if abs(after.position - expected) > s.rate(s.tolerance):
             told, wanted = s.metres(after.position), s.metres(expected)
-            raise DeviceFault(f"{self._who}: {what} ended at {told:.4f} m instead of {wanted:.4f} m")
+            raise DeviceFault(
+                "{device}: {what} ended at {told:.4f} m instead of {wanted:.4f} m",
+                device=self._who,
+                what=what,
+                told=told,
+                wanted=wanted,
+            )
 
     def run(self, speed: int, what: str, go_on: GoOn) -> None:
         """Run with a velocity; return when it is reached."""
@@ -212,5 +235,5 @@ class Motion:
             self._observer.wait(lambda s: s.power is not Power.FAULT, STEP, "resetting the fault")
         except DeviceTimeout as error:
             text = str(self.fault(now, "its cause stands"))
-            raise Refused(f"{self._who}: fault_reset is refused in state Fault", text) from error
+            raise Refused("{device}: fault_reset is refused in state Fault", text, device=self._who) from error
         self.control(cia402.CW_DISABLE_VOLTAGE, go_on)

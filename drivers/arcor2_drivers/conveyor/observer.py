@@ -69,7 +69,9 @@ class Observer(StateObserver[State]):
             self.put(*came)
         elif identifier == HEARTBEAT + node and data == b"\x00":
             if self._opened:
-                self.link.lose(ConnectionLost(f"{self.who} was reset or switched off and on: it has booted"))
+                self.link.lose(
+                    ConnectionLost("{device} was reset or switched off and on: it has booted", device=self.who)
+                )
         elif identifier == HEARTBEAT + node and len(data) == 1:
             self._hear_nmt(data[0] & 0x7F)
         elif HEARTBEAT < identifier <= HEARTBEAT + 127:
@@ -83,7 +85,7 @@ class Observer(StateObserver[State]):
         try:
             return self.pdos.take(identifier, data)
         except ValueError as error:
-            self.link.lose(DeviceFault(f"{self.who} sent what no drive sends: {error}"))
+            self.link.lose(DeviceFault("{device} sent what no drive sends: {reason}", device=self.who, reason=error))
             return None
 
     def _hear_nmt(self, state: int) -> None:
@@ -103,7 +105,12 @@ class Observer(StateObserver[State]):
         left = deadline - time.monotonic()
         profile = self.link.read_first(cia402.DEVICE_TYPE, left, lambda: self.ending) & 0xFFFF
         if profile != cia402.PROFILE:
-            raise DeviceFault(f"{self.who} is not a drive: its device profile is {profile}, not {cia402.PROFILE}")
+            raise DeviceFault(
+                "{device} is not a drive: its device profile is {profile}, not {expected}",
+                device=self.who,
+                profile=profile,
+                expected=cia402.PROFILE,
+            )
         self.link.read(cia402.VENDOR)  # drains what is late, see CanLink
         self.emergency = 0
         self._opened = True  # from now on a boot is a loss
@@ -145,7 +152,7 @@ class Observer(StateObserver[State]):
         try:
             return State.of(*values)
         except ValueError as error:
-            raise DeviceFault(f"{self.who} sent what no drive sends: {error}") from error
+            raise DeviceFault("{device} sent what no drive sends: {reason}", device=self.who, reason=error) from error
 
     def on_state(self, snapshot: Snapshot[State]) -> None:
         """Note when a fault appears."""

@@ -70,9 +70,9 @@ class Unit:
     def act(self, what: str) -> Iterator[None]:
         """Be the one act there is; a hold is over by it. Raises Refused beside another, and while aborted."""
         if self.aborted:
-            raise Refused(f"{self._who}: {what} is refused in state Aborted: clear it first")
+            raise Refused("{device}: {what} is refused in state Aborted: clear it first", device=self._who, what=what)
         if not self._one_act.acquire(blocking=False):
-            raise Refused(f"{self._who}: {what} is refused while another motion is under way")
+            raise Refused("{device}: {what} is refused while another motion is under way", device=self._who, what=what)
         try:
             self.held = False
             yield
@@ -93,11 +93,11 @@ class Unit:
             MachineCommand.CLEAR: (S.CLEARING, lambda: self._clear(go_on)),
         }
         if command not in acts:
-            raise Refused(f"{refused}: a belt has no such command")
+            raise Refused("{refused}: a belt has no such command", refused=refused)
         if state not in ALLOWED[command]:
-            raise Refused(f"{refused}: this state does not allow it")
+            raise Refused("{refused}: this state does not allow it", refused=refused)
         if command is MachineCommand.HOLD and now.mode != Mode.PROFILE_VELOCITY:
-            raise Refused(f"{refused}: a move cannot be held, only stopped")
+            raise Refused("{refused}: a move cannot be held, only stopped", refused=refused)
         passing, act = acts[command]
         self._passing = passing
         try:

@@ -40,7 +40,7 @@ def set_up(link: CanLink, node: int, period_ms: int) -> None:
             _set_up(link, pdo, node, period_ms)
     except DeviceFault as error:
         raise Refused(
-            f"{link.who} does not send its state by PDO; set pdo_period_ms to 0 to ask for it", str(error)
+            "{device} does not send its state by PDO; set pdo_period_ms to 0 to ask for it", str(error), device=link.who
         ) from error
 
 

@@ -78,9 +78,9 @@ class ConveyorSettings(Settings):
         super().__post_init__()
         self._check_channel()
         if self.bitrate not in (10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000, 1000000):
-            raise OutOfRange(f"bitrate must be one of CiA 301 such as 500000, not {self.bitrate!r}")
+            raise OutOfRange("bitrate must be one of CiA 301 such as 500000, not {bitrate!r}", bitrate=self.bitrate)
         if self.master_id == self.node_id:
-            raise OutOfRange(f"master_id must not be the drive's node_id {self.node_id}")
+            raise OutOfRange("master_id must not be the drive's node_id {node_id}", node_id=self.node_id)
         within("counts_per_metre", abs(self.counts_per_metre), 1.0, 1e8)
         within("quick_stop_deceleration", self.quick_stop_deceleration, self.max_speed / LONGEST_RAMP, 1000.0)
         farthest = _INT32 / abs(self.counts_per_metre) / 2.0  # a move may span the range
@@ -102,11 +102,15 @@ class ConveyorSettings(Settings):
                 check_serial_port("channel", self.channel)
             case CanInterface.SOCKETCAN:
                 if not _NETWORK_INTERFACE.fullmatch(self.channel):
-                    raise OutOfRange(f"channel must be a network interface for socketcan, not {self.channel!r}")
+                    raise OutOfRange(
+                        "channel must be a network interface for socketcan, not {channel!r}", channel=self.channel
+                    )
             case CanInterface.SOCKETCAND:
                 where = check_url("channel", self.channel, "socket")
                 if where.port is None or not self.server[2].isidentifier():
-                    raise OutOfRange(f"channel must be socket://host:port/bus for socketcand, not {self.channel!r}")
+                    raise OutOfRange(
+                        "channel must be socket://host:port/bus for socketcand, not {channel!r}", channel=self.channel
+                    )
 
     @property
     def server(self) -> tuple[str, int, str]:

@@ -48,7 +48,9 @@ class Control:
         try:  # an arm counts as moving for a moment after it has stopped
             self._observer.wait(lambda sample: not sample.moving, 3.0 * STANDSTILL_AFTER, "standstill")
         except DeviceTimeout as e:
-            raise NotInControl(f"{self.who} is being moved by another client. Wait until it stops.") from e
+            raise NotInControl(
+                "{device} is being moved by another client. Wait until it stops.", device=self.who
+            ) from e
         has = self._settings
         joint, ramp = math.degrees(has.max_joint_speed), math.degrees(has.joint_acceleration)
         tcp, tcp_ramp = has.max_tcp_speed * 1000.0, has.tcp_acceleration * 1000.0
@@ -95,14 +97,19 @@ class Control:
         """Raise NotInControl unless we have control, or why the arm is not observed."""
         self._observer.observing.check()
         if not self.ours:
-            raise NotInControl(f"{self.who}: control is not taken.")
+            raise NotInControl("{device}: control is not taken.", device=self.who)
 
     def _set(self, command: Command, layout: str, *values: float) -> None:
         """Set values and read them back. Raise Refused."""
         self._observer.set(command, layout, *values)
         actual = self._observer.get(command, layout)
         if any(abs(a - b) > 1e-3 * max(1.0, abs(b)) for a, b in zip(actual, values, strict=True)):
-            raise Refused(f"{self.who} did not accept {command.name.lower()}.", f"sent {values}, read {actual}")
+            raise Refused(
+                "{device} did not accept {name}.",
+                f"sent {values}, read {actual}",
+                device=self.who,
+                name=command.name.lower(),
+            )
 
     # -------------------------------------------------------------------------------- stopping
     def stop(self) -> None:
@@ -117,7 +124,7 @@ class Control:
         self._observer.wake()
         if not self.ours and not self._left_running:
             if self.owner() is not None:
-                raise NotInControl(f"{self.who} is being moved by another client; control is not taken.")
+                raise NotInControl("{device} is being moved by another client; control is not taken.", device=self.who)
             return
         self._observer.observing.check()
         self.send_stop()
@@ -142,9 +149,11 @@ class Control:
     def drive_belt(self, speed: float) -> None:
         """Drive the conveyor belt, m/s. Hold `commands`."""
         if self._settings.conveyor_port < 0:
-            raise Refused(f"{self.who} has no conveyor: conveyor_port is not set.")
+            raise Refused("{device} has no conveyor: conveyor_port is not set.", device=self.who)
         pulses = round(speed * self._settings.conveyor_pulses)
         if abs(pulses) >= 1 << 31:
-            raise OutOfRange(f"speed must be lower, not {speed!r}: the stepper has 32 bits of pulses per second.")
+            raise OutOfRange(
+                "speed must be lower, not {speed!r}: the stepper has 32 bits of pulses per second.", speed=speed
+            )
         self._observer.set(Command.STEPPER, "BBi", self._settings.conveyor_port, int(pulses != 0), pulses)
         self._belt_runs = pulses != 0

@@ -113,11 +113,14 @@ class DobotMagician(HoldsParts, Connected, Robot):
         """Clear an alarm. Raise Refused while its cause persists, or if others are active: all are cleared together."""
         active = {alarm.code for alarm in self.alarms()}
         if code not in active:
-            raise NotFound(f"{self.who} has no alarm {code}.")
+            raise NotFound("{device} has no alarm {code}.", device=self.who, code=code)
         if others := active - {code, alarms.title(alarms.RESET)}:
             raise Refused(
-                f"{self.who}: alarm {code} cannot be acknowledged alone; also active: {', '.join(sorted(others))}.",
+                "{device}: alarm {code} cannot be acknowledged alone; also active: {others}.",
                 "acknowledge_all",
+                device=self.who,
+                code=code,
+                others=", ".join(sorted(others)),
             )
         self.acknowledge_all()
 
@@ -126,7 +129,9 @@ class DobotMagician(HoldsParts, Connected, Robot):
         self._observer.set(Command.CLEAR_ALARMS)
         if left := alarms.codes(self._observer.raw(Command.ALARMS)):
             names = ", ".join(map(alarms.title, sorted(left)))
-            raise Refused(f"{self.who}: alarm {names} is active again. Remove its cause first.")
+            raise Refused(
+                "{device}: alarm {names} is active again. Remove its cause first.", device=self.who, names=names
+            )
 
     def take_control(self) -> None:
         """Take control of an arm at standstill, unless we have it. Raise NotInControl or Refused."""
@@ -247,7 +252,9 @@ class DobotMagician(HoldsParts, Connected, Robot):
             values(self.name, start_joints)
         found = named_joints(JOINTS, self._motion.solve(pose)[1])
         if avoid_collisions and (hit := self.safe_moves.contacts(found)):
-            raise self.KinematicsException(f"{self.name} reaches the pose only in collision: {hit[0]}")
+            raise self.KinematicsException(
+                "{name} reaches the pose only in collision: {hit}", name=self.name, hit=hit[0]
+            )
         return found
 
     def forward_kinematics(self, end_effector_id: str, joints: list[Joint]) -> Pose:
@@ -368,7 +375,7 @@ class DobotMagician(HoldsParts, Connected, Robot):
             self._observer.set(command, "2B", *wanted)
             actual = self._observer.get(command, "2B")
         if actual != wanted:
-            raise DeviceFault(f"{what} did not switch.", f"sent {wanted}, read {actual}")
+            raise DeviceFault("{what} did not switch.", f"sent {wanted}, read {actual}", what=what)
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             guard.check(what)

@@ -82,10 +82,10 @@ class Motion:
     def check_ready(self) -> None:
         """Raise what prevents the arm from moving."""
         if self._lock.locked():
-            raise Refused(f"{self._robot.name} is moving already. Wait until the motion ends, or stop it.")
+            raise Refused("{name} is moving already. Wait until the motion ends, or stop it.", name=self._robot.name)
         self._control.require()
         if faults := self.obstacles(self._observer.sample()):
-            raise Refused(f"{self._who} cannot move: {', '.join(faults)}")
+            raise Refused("{device} cannot move: {faults}", device=self._who, faults=", ".join(faults))
 
     @staticmethod
     def obstacles(sample: Sample) -> list[str]:
@@ -209,24 +209,24 @@ class Motion:
             if faults := self.obstacles(sample):
                 self._control.send_stop()
                 code = min(sample.alarms - {alarms.RESET})
-                raise DeviceFault(f"{what} failed: {faults[0]}", "", alarms.title(code))
+                raise DeviceFault("{what} failed: {fault}", "", alarms.title(code), what=what, fault=faults[0])
             if sample.index >= index and sample.unchanged > SHORT_OF_TARGET and not reached(sample):
-                raise DeviceFault(f"{what} ended before its target.")
+                raise DeviceFault("{what} ended before its target.", what=what)
             return sample.index >= index and reached(sample)
 
         def go_on() -> None:
             guard.check(what)
             if not self._control.ours:
                 self._observer.observing.check()
-                raise NotInControl(f"{what}: control was lost. The arm completes the motion.")
+                raise NotInControl("{what}: control was lost. The arm completes the motion.", what=what)
 
         try:
             self._observer.wait(done, max(deadline - time.monotonic(), 0.0), what, go_on)
         except ConnectionLost as e:
-            raise ConnectionLost(f"{e} The arm completes {what}.", e.detail) from None
+            raise ConnectionLost("{reason} The arm completes {what}.", e.detail, reason=e, what=what) from None
         except DeviceTimeout as e:
             self._control.send_stop()
-            raise DeviceTimeout(f"{what} did not end within the computed time. It was stopped.") from e
+            raise DeviceTimeout("{what} did not end within the computed time. It was stopped.", what=what) from e
 
     def _record(self, speed: float, started: float, end: MoveEnd) -> MoveResult:
         newest = self._observer.newest()

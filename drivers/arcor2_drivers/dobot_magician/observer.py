@@ -92,10 +92,10 @@ class Observer(StateObserver[Sample]):
         self.observing.check()
         limit = self._settings.answer_timeout
         if not acquire_within(self._lock, 2.0 * limit):
-            raise DeviceTimeout(f"{self.who} is busy with another command.")
+            raise DeviceTimeout("{device} is busy with another command.", device=self.who)
         try:
             if self._port is None or self._error is not None:
-                raise ConnectionLost(f"The connection to {self.who} is lost.", str(self._error or ""))
+                raise ConnectionLost("The connection to {device} is lost.", str(self._error or ""), device=self.who)
             try:
                 return self._port.ask(command, control, parameters, limit)
             except DeviceError as e:
@@ -109,7 +109,13 @@ class Observer(StateObserver[Sample]):
             return struct.unpack("<" + layout, answer)
         except struct.error:
             sizes = f"{len(answer)} bytes instead of {struct.calcsize('<' + layout)}"
-            raise DeviceFault(f"{self.who} answered {command.name.lower()} with {sizes}.", answer.hex(" ")) from None
+            raise DeviceFault(
+                "{device} answered {name} with {sizes}.",
+                answer.hex(" "),
+                device=self.who,
+                name=command.name.lower(),
+                sizes=sizes,
+            ) from None
 
     # -------------------------------------------------------------------------------- on the observing thread
     def open(self, timeout: float) -> Snapshot[Sample]:
@@ -140,7 +146,7 @@ class Observer(StateObserver[Sample]):
             if self._error is not None:
                 raise self._error
             if self._port is None:
-                raise NotConnected(f"{self.who} is closed.")
+                raise NotConnected("{device} is closed.", device=self.who)
             return self._read(self._port)
 
     def _read(self, port: Port) -> Sample:
@@ -150,7 +156,7 @@ class Observer(StateObserver[Sample]):
         pose = self._unpack(Command.POSE, port.ask(Command.POSE, 0, b"", limit), "8f")
         alarms = codes(port.ask(Command.ALARMS, 0, b"", limit))
         if not all(map(math.isfinite, pose)):
-            raise DeviceFault(f"{self.who} reports an invalid pose.", repr(pose))
+            raise DeviceFault("{device} reports an invalid pose.", repr(pose), device=self.who)
         x, y, z, r, *angles = pose
         one, two, three, four = map(math.radians, angles)
         q = one, two, three, four
@@ -158,7 +164,7 @@ class Observer(StateObserver[Sample]):
         if before is not None and max(abs(a - b) for a, b in zip(before.q, q, strict=True)) > STILL:
             self._moved_at = started
         if before is not None and RESET in alarms and RESET not in before.alarms:
-            raise ConnectionLost(f"{self.who} was switched off and on.")
+            raise ConnectionLost("{device} was switched off and on.", device=self.who)
         if before is None or before.alarms != alarms:
             stamp = now()
             self.since = {code: self.since.get(code, stamp) for code in alarms}

@@ -31,7 +31,7 @@ class Port:
             self._serial.reset_input_buffer()
         except (serial.SerialException, OSError, ValueError) as e:
             why = "is used by another program" if "exclusively" in str(e) else "cannot be opened"
-            raise NotConnected(f"{who}: the port {why}.", str(e)) from e
+            raise NotConnected("{device}: the port {reason}.", str(e), device=who, reason=why) from e
 
     @property
     def garbage(self) -> int:
@@ -63,16 +63,20 @@ class Port:
                     if (frame.command, frame.control) == (command, control):
                         return frame.parameters
                     if first:
-                        raise DeviceTimeout(f"{self.who} lags behind.", f"{frame.command} came before {command}")
+                        raise DeviceTimeout(
+                            "{device} lags behind.", f"{frame.command} came before {command}", device=self.who
+                        )
                 if clock() >= timeout:
                     raise DeviceTimeout(
-                        f"{self.who} did not answer within {timeout:g} s.",
+                        "{device} did not answer within {timeout:g} s.",
                         f"id {command}, {self.garbage} bytes of garbage so far",
+                        device=self.who,
+                        timeout=timeout,
                     )
         except serial.SerialTimeoutException as e:
-            raise DeviceTimeout(f"{self.who} accepts no bytes.", str(e)) from e
+            raise DeviceTimeout("{device} accepts no bytes.", str(e), device=self.who) from e
         except (serial.SerialException, OSError, TypeError) as e:  # TypeError: raised by pyserial on a closed port
-            raise ConnectionLost(f"{self.who}: the connection was lost. Check the cable.", str(e)) from e
+            raise ConnectionLost("{device}: the connection was lost. Check the cable.", str(e), device=self.who) from e
 
     def close(self) -> None:
         """Close the port, if it is open."""

@@ -81,7 +81,7 @@ class ErpService(Generic):
                 self.observing.start(timeout)
                 return
             if self._former is not None and not self._former.join(timeout):
-                raise DeviceTimeout(f"the last connection to {self._who} is still being closed")
+                raise DeviceTimeout("the last connection to {device} is still being closed", device=self._who)
             self._former = None
             self.observing.start(max(deadline - time.monotonic(), 0.001))
             try:
@@ -159,14 +159,14 @@ class ErpService(Generic):
         Raises NotFound for another code: those alarms end with their cause.
         """
         if code != REFUSED or not self._outbox.note_aside():
-            raise NotFound(f"{self._who} has no alarm {code!r} to be acknowledged")
+            raise NotFound("{device} has no alarm {code!r} to be acknowledged", device=self._who, code=code)
 
     # -------------------------------------------------------------------------------- the outbox
     def outbox(self) -> Reading[OutboxState]:
         """Return how many results wait, since when, what the last failure was, and how many were refused."""
         sender = self._sender
         if sender is None:
-            raise NotConnected(f"{self._who} is not connected")
+            raise NotConnected("{device} is not connected", device=self._who)
         return Reading.of(self._outbox.state(sender.last_error))
 
     def refused(self) -> list[Aside]:
@@ -195,7 +195,7 @@ class ErpService(Generic):
         self._in_range("wait", wait)
         stops, deadline = self._stops, time.monotonic() + wait
         if not self._asking.acquire(blocking=False):
-            raise Refused(f"{self._who} is busy with another call of next_order")
+            raise Refused("{device} is busy with another call of next_order", device=self._who)
         try:
             while True:
                 self._stopped.clear()
@@ -212,7 +212,7 @@ class ErpService(Generic):
                 if left > 0.0 and stops == self._stops:
                     self._stopped.wait(min(self._given.poll, left))
                 if stops != self._stops:
-                    raise Cancelled(f"{self._who}: waiting for an order was stopped")
+                    raise Cancelled("{device}: waiting for an order was stopped", device=self._who)
                 if left <= 0.0:
                     if failure is not None:
                         raise failure
@@ -267,11 +267,15 @@ class ErpService(Generic):
         stops, deadline = self._stops, time.monotonic() + timeout
         while (state := self.outbox().value).waiting:
             if stops != self._stops:
-                raise Cancelled(f"{self._who}: waiting for the outbox was stopped")
+                raise Cancelled("{device}: waiting for the outbox was stopped", device=self._who)
             left = deadline - time.monotonic()
             if left <= 0.0:
                 raise DeviceTimeout(
-                    f"{self._who}: {state.waiting} results still wait after {timeout:g} s", state.last_error
+                    "{device}: {waiting} results still wait after {timeout:g} s",
+                    state.last_error,
+                    device=self._who,
+                    waiting=state.waiting,
+                    timeout=timeout,
                 )
             if (sender := self._sender) is not None:
                 sender.wait_change(min(left, 0.2))
@@ -286,11 +290,23 @@ class ErpService(Generic):
     # -------------------------------------------------------------------------------- behind them
     def _in_range(self, name: str, value: float) -> None:
         if not 0.0 <= value <= LONGEST_WAIT:
-            raise OutOfRange(f"{self._who}: {name} must be 0 to {LONGEST_WAIT:g} s, not {value!r}")
+            raise OutOfRange(
+                "{device}: {name} must be 0 to {longest_wait:g} s, not {value!r}",
+                device=self._who,
+                name=name,
+                longest_wait=LONGEST_WAIT,
+                value=value,
+            )
 
     def _text(self, name: str, value: str, empty: bool = False) -> None:
         if not (value.strip() or empty) or len(value) > LONGEST_TEXT or not value.isprintable():
-            raise OutOfRange(f"{self._who}: {name} must be 1 to {LONGEST_TEXT} printable characters, not {value!r}")
+            raise OutOfRange(
+                "{device}: {name} must be 1 to {longest_text} printable characters, not {value!r}",
+                device=self._who,
+                name=name,
+                longest_text=LONGEST_TEXT,
+                value=value,
+            )
 
     def _store(
         self, path: str, order_id: str, what: dict[str, object], *, piece: bool = False, last: bool = False
@@ -308,7 +324,7 @@ class ErpService(Generic):
         """Return the callers' connection; the service itself may be down. Raises NotConnected."""
         service = self._caller
         if service is None:
-            raise NotConnected(f"{self._who} is not connected")
+            raise NotConnected("{device} is not connected", device=self._who)
         return service
 
     def _ask_order(self) -> Order | None:
@@ -323,11 +339,13 @@ class ErpService(Generic):
             raise
         told: ToldNext = service.read(answer, ToldNext, what)
         if told.key != key:
-            raise DeviceFault(f"{self._who} answered {what} for another question", told.key[:80], "receipt")
+            raise DeviceFault(
+                "{device} answered {what} for another question", told.key[:80], "receipt", device=self._who, what=what
+            )
         order = None if told.order is None else Order(told.order.id, told.order.product, told.order.quantity)
         if order is not None and not (order.id and order.product and 0 < order.quantity <= LARGEST_QUANTITY):
             self._outbox.answered(None)
-            raise DeviceFault(f"{self._who} gave an order that makes no sense", str(order), "order")
+            raise DeviceFault("{device} gave an order that makes no sense", str(order), "order", device=self._who)
         self._outbox.answered(order)
         self.observing.settled()
         return order

@@ -105,7 +105,9 @@ class Outbox:
                 database = sqlite3.connect(self.file, check_same_thread=False, isolation_level=None)
             except BlockingIOError:
                 self._release()
-                raise Refused(f"{self._who}: its outbox is open in another program", str(self.file)) from None
+                raise Refused(
+                    "{device}: its outbox is open in another program", str(self.file), device=self._who
+                ) from None
             except (OSError, sqlite3.Error) as e:
                 self._release()
                 raise self._broken(e) from e
@@ -150,14 +152,16 @@ class Outbox:
             self._held = None
 
     def _broken(self, error: Exception) -> StorageError:
-        return StorageError(f"{self._who}: its outbox cannot be read or written: {error}", str(self.file))
+        return StorageError(
+            "{device}: its outbox cannot be read or written: {reason}", str(self.file), device=self._who, reason=error
+        )
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
         """Have a transaction that is on disk when it ends."""
         with self._one:
             if self._database is None:
-                raise NotConnected(f"{self._who} is not connected")
+                raise NotConnected("{device} is not connected", device=self._who)
             try:
                 self._database.execute("BEGIN IMMEDIATE")
                 try:
@@ -174,7 +178,7 @@ class Outbox:
     def _reading(self) -> Iterator[sqlite3.Connection]:
         with self._one:
             if self._database is None:
-                raise NotConnected(f"{self._who} is not connected")
+                raise NotConnected("{device} is not connected", device=self._who)
             try:
                 yield self._database
             except sqlite3.Error as e:

@@ -155,7 +155,9 @@ class Sender:
     def _check_receipt(self, answer: Answer, message: Message, what: str) -> None:
         receipt: Receipt = self._service.read(answer, Receipt, what)
         if receipt.key != message.key:
-            raise DeviceFault(f"{self._who} answered {what} for another message", receipt.key[:80], "receipt")
+            raise DeviceFault(
+                "{device} answered {what} for another message", receipt.key[:80], "receipt", device=self._who, what=what
+            )
 
     def _note(self, text: str) -> None:
         if not self.last_error:

@@ -100,7 +100,7 @@ class Access(NamedTuple):
             if settings.client_certificate:
                 tls.load_cert_chain(settings.client_certificate, settings.client_key)
         except (OSError, ValueError) as e:  # ssl.SSLError is an OSError, UnicodeDecodeError a ValueError
-            raise NotConnected(f"{who}: {what} cannot be used", str(e)) from e
+            raise NotConnected("{device}: {what} cannot be used", str(e), device=who, what=what) from e
         return cls(headers, tls)
 
 
@@ -122,10 +122,10 @@ class Service:
         limit = timeout or self._settings.request_timeout
         deadline = time.monotonic() + limit
         if not self._one.acquire(timeout=limit):
-            raise DeviceTimeout(f"{self._who} is busy with another call")
+            raise DeviceTimeout("{device} is busy with another call", device=self._who)
         try:
             if self._ended:
-                raise NotConnected(f"{self._who} is not connected")
+                raise NotConnected("{device} is not connected", device=self._who)
             return self._request(method, path, key, body, deadline, limit)
         finally:
             if self._ended:
@@ -149,7 +149,12 @@ class Service:
                 for part in response.iter_bytes():
                     data += part
                     if len(data) > LONGEST_ANSWER:
-                        raise ConnectionLost(f"{self._who}: the answer to {method} {path} is too long")
+                        raise ConnectionLost(
+                            "{device}: the answer to {method} {path} is too long",
+                            device=self._who,
+                            method=method,
+                            path=path,
+                        )
                     if time.monotonic() > deadline:
                         raise DeviceTimeout(late, "the answer came too slowly")
                 return Answer(response.status_code, data, _pause(response.headers.get("Retry-After", "")))
@@ -158,13 +163,15 @@ class Service:
             raise
         except httpx.ConnectError as e:
             self._drop()
-            raise NotConnected(f"{self._who} cannot be reached", str(e)) from e
+            raise NotConnected("{device} cannot be reached", str(e), device=self._who) from e
         except httpx.TimeoutException as e:
             self._drop()
             raise DeviceTimeout(late, type(e).__name__) from e
         except (httpx.HTTPError, httpx.InvalidURL, httpx.StreamError) as e:
             self._drop()
-            raise ConnectionLost(f"{self._who}: {method} {path} broke off", str(e)) from e
+            raise ConnectionLost(
+                "{device}: {method} {path} broke off", str(e), device=self._who, method=method, path=path
+            ) from e
 
     def close(self) -> None:
         """Close for good; a request under way ends by its own deadline and closes then."""
@@ -194,10 +201,21 @@ class Service:
         if answer.done:
             return
         if answer.status in (401, 403, 407):
-            raise Refused(f"{self._who} does not let us in: token_file or client_certificate is not valid", answer.told)
+            raise Refused(
+                "{device} does not let us in: token_file or client_certificate is not valid",
+                answer.told,
+                device=self._who,
+            )
         if 400 <= answer.status < 500 and answer.status not in RETRIED:
-            raise Refused(f"{self._who} refuses {what}: {answer.told}", answer.told)
-        raise DeviceFault(f"{self._who} cannot do {what} now: {answer.told}", answer.told, answer.status)
+            raise Refused("{device} refuses {what}: {told}", answer.told, device=self._who, what=what, told=answer.told)
+        raise DeviceFault(
+            "{device} cannot do {what} now: {told}",
+            answer.told,
+            answer.status,
+            device=self._who,
+            what=what,
+            told=answer.told,
+        )
 
     def read(self, answer: Answer, form: Any, what: str) -> Any:
         """Read the answer's body. Raises DeviceFault."""
@@ -205,7 +223,11 @@ class Service:
             return msgspec.json.decode(answer.body, type=form)
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as e:
             raise DeviceFault(
-                f"{self._who} gave no sensible answer to {what}", f"{e}: {answer.body[:200]!r}", "answer"
+                "{device} gave no sensible answer to {what}",
+                f"{e}: {answer.body[:200]!r}",
+                "answer",
+                device=self._who,
+                what=what,
             ) from e
 
 

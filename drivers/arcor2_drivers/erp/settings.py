@@ -62,4 +62,6 @@ class ErpSettings(Settings):
         for name in ("outbox", "ca_file", "client_certificate", "client_key"):
             setattr(self, name, device_file(name, getattr(self, name)))
         if not _STATION.fullmatch(self.station):
-            raise OutOfRange(f"station must be 1 to 64 letters, digits, '.', '-' or '_', not {self.station!r}")
+            raise OutOfRange(
+                "station must be 1 to 64 letters, digits, '.', '-' or '_', not {station!r}", station=self.station
+            )

@@ -40,7 +40,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
     ) -> None:
         super().__init__(obj_id, name, pose, collision_model, settings)
         if settings is None:
-            raise NotFound(f"{name} has no settings. Set host to the address of the tester.")
+            raise NotFound("{name} has no settings. Set host to the address of the tester.", name=name)
         self.use_tester(settings)
 
     # -------------------------------------------------------------------------------- condition
@@ -64,7 +64,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
     def acknowledge(self, code: str) -> None:
         """Clear the fault `code`. Raises NotFound when there is no such fault, Refused while its cause is present."""
         if code == "0" or str(self.fresh().fault_code) != code:
-            raise NotFound(f"{self.who} has no alarm {code}")
+            raise NotFound("{device} has no alarm {code}", device=self.who, code=code)
         self.clear()
 
     # -------------------------------------------------------------------------------- machine
@@ -172,7 +172,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
             if inputs.state in FALLEN:
                 raise self.fault(inputs, what)
             if inputs.state in (S.STOPPING, S.STOPPED):
-                raise Cancelled(f"{self.who}: {what} was stopped at the station")
+                raise Cancelled("{device}: {what} was stopped at the station", device=self.who, what=what)
             return inputs.state in (S.COMPLETE, S.RESETTING, S.IDLE) and inputs.result_number == expected
 
         try:
@@ -183,7 +183,12 @@ class FunctionalTester(Tester, Machine, CollisionObject):
                 self.stop()  # a test that nobody waits for must not continue
             raise
         if after.result not in (1, 2):
-            raise DeviceFault(f"{self.who}: {what} ended with result {after.result}, neither pass nor fail")
+            raise DeviceFault(
+                "{device}: {what} ended with result {result}, neither pass nor fail",
+                device=self.who,
+                what=what,
+                result=after.result,
+            )
         return after.result == 1
 
     @action
@@ -204,7 +209,12 @@ class FunctionalTester(Tester, Machine, CollisionObject):
     def _measured(self, what: str) -> Inputs:
         inputs = self.fresh()
         if inputs.result == 0:
-            raise Refused(f"{self.who}: {what} is refused in state {title(inputs.state)}: nothing was tested")
+            raise Refused(
+                "{device}: {what} is refused in state {state}: nothing was tested",
+                device=self.who,
+                what=what,
+                state=title(inputs.state),
+            )
         return inputs
 
     @action

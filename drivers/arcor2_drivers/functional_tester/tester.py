@@ -61,7 +61,11 @@ class Tester(ModbusDevice[Inputs]):
         """Open the connection, unless the tester has to notice first that we were gone."""
         left = self._leave_alone_until - time.monotonic()
         if left > 0.0:
-            raise NotConnected(f"{self.who} is left alone for {left:.1f} s, so that it notices that we were gone")
+            raise NotConnected(
+                "{device} is left alone for {left:.1f} s, so that it notices that we were gone",
+                device=self.who,
+                left=left,
+            )
         self._life = (-1, 0.0)
         return super().open_link(timeout)
 
@@ -72,7 +76,9 @@ class Tester(ModbusDevice[Inputs]):
         try:
             return registers.decode(words, bits)
         except ValueError as error:
-            raise DeviceFault(f"{self.who} sent what no tester of this kind sends: {error}") from error
+            raise DeviceFault(
+                "{device} sent what no tester of this kind sends: {reason}", device=self.who, reason=error
+            ) from error
 
     def on_state(self, snapshot: Snapshot[Inputs]) -> None:
         """Note changes of the life counter and of the fault."""
@@ -94,7 +100,12 @@ class Tester(ModbusDevice[Inputs]):
         newest = super().current()
         value, since = self._life
         if (stands := time.monotonic() - since) > LIFE_STANDS:
-            raise Stale(f"{self.who} answers, but its life counter has been {value} for {stands:.1f} s")
+            raise Stale(
+                "{device} answers, but its life counter has been {value} for {stands:.1f} s",
+                device=self.who,
+                value=value,
+                stands=stands,
+            )
         return newest
 
     # -------------------------------------------------------------------------------- control
@@ -102,7 +113,12 @@ class Tester(ModbusDevice[Inputs]):
         """Set the host watchdog."""
         self.link.write_registers(Holding.HOST_WATCHDOG, self._s.watchdog_ms)
         if (stored := self._read_holding()[Holding.HOST_WATCHDOG]) != self._s.watchdog_ms:
-            raise Refused(f"{self.who}: host_watchdog is {stored} ms after {self._s.watchdog_ms} was written")
+            raise Refused(
+                "{device}: host_watchdog is {stored} ms after {watchdog_ms} was written",
+                device=self.who,
+                stored=stored,
+                watchdog_ms=self._s.watchdog_ms,
+            )
 
     def disarm(self) -> None:
         """Switch the host watchdog off."""
@@ -117,7 +133,11 @@ class Tester(ModbusDevice[Inputs]):
     def release_control(self) -> None:
         """Switch the host watchdog off. Raises Refused while a test runs."""
         if self.in_control and (state := self.fresh().state) in RUNNING:
-            raise Refused(f"{self.who}: release_control is refused in state {title(state)}: stop the test")
+            raise Refused(
+                "{device}: release_control is refused in state {state}: stop the test",
+                device=self.who,
+                state=title(state),
+            )
         super().release_control()
 
     def owner_of(self, state: Inputs) -> str | None:
@@ -143,7 +163,7 @@ class Tester(ModbusDevice[Inputs]):
         owner = self.owner_of(inputs)
         if owner != US:
             refused = f"{self.who}: {what} is refused in state {title(inputs.state)}"
-            raise NotInControl(f"{refused}: {owner or 'nobody'} has control")
+            raise NotInControl("{refused}: {owner} has control", refused=refused, owner=owner or "nobody")
         return inputs
 
     # -------------------------------------------------------------------------------- commands
@@ -152,7 +172,12 @@ class Tester(ModbusDevice[Inputs]):
         name = command.name.lower()
         if command not in registers.COMMANDS:
             state = title(self.fresh().state)
-            raise Refused(f"{self.who}: {name} is refused in state {state}: it has no such command")
+            raise Refused(
+                "{device}: {name} is refused in state {state}: it has no such command",
+                device=self.who,
+                name=name,
+                state=state,
+            )
         with self._one_command:
             before = self.fresh()
             # Read, not counted here: the tester may have restarted, or another host may have sent commands.
@@ -168,7 +193,13 @@ class Tester(ModbusDevice[Inputs]):
             why = registers.REFUSALS.get(after.command_result, f"result {after.command_result}")
             if before.emergency_stop:
                 why = "the emergency stop is pressed"
-            raise Refused(f"{self.who}: {name} is refused in state {title(before.state)}: {why}")
+            raise Refused(
+                "{device}: {name} is refused in state {state}: {reason}",
+                device=self.who,
+                name=name,
+                state=title(before.state),
+                reason=why,
+            )
 
     def reach(self, wanted: set[MachineState], timeout: float, what: str, go_on: GoOn) -> Inputs:
         """Wait for one of the states. Raises DeviceTimeout, and DeviceFault or SafetyStop when it aborts instead."""
@@ -186,7 +217,9 @@ class Tester(ModbusDevice[Inputs]):
         """Return the error for a tester that has aborted."""
         code = inputs.fault_code
         if not code:
-            return DeviceFault(f"{self.who}: {what} ended: aborted by command; clear it", fault_code=0)
+            return DeviceFault(
+                "{device}: {what} ended: aborted by command; clear it", fault_code=0, device=self.who, what=what
+            )
         fault = fault_of(code)
         text = f"{self.who}: {what} ended: fault {code}, {fault.text}; {fault.remedy}"
         if code == registers.EMERGENCY_STOP:
@@ -201,9 +234,9 @@ class Tester(ModbusDevice[Inputs]):
         def done(inputs: Inputs) -> bool:
             where = f"{self.who}: {what} is refused in state {title(inputs.state)}"
             if inputs.emergency_stop:
-                raise SafetyStop(f"{where}: the emergency stop is pressed", kind="emergency_stop")
+                raise SafetyStop("{place}: the emergency stop is pressed", kind="emergency_stop", place=where)
             if inputs.state not in registers.DOOR_MAY_MOVE | registers.PASSING:
-                raise Refused(f"{where}: the door moves only when no test runs")
+                raise Refused("{place}: the door moves only when no test runs", place=where)
             return arrived(inputs)
 
         def movable(inputs: Inputs) -> bool:
@@ -219,7 +252,7 @@ class Tester(ModbusDevice[Inputs]):
         try:
             self.wait(done, left, what, go_on)
         except DeviceTimeout as error:
-            raise DeviceTimeout(f"{error}: the door does not reach its end position") from error
+            raise DeviceTimeout("{reason}: the door does not reach its end position", reason=error) from error
 
     def _read_holding(self) -> list[int]:
         return self.link.read_holding_registers(0, registers.HOLDING_COUNT)

@@ -33,4 +33,4 @@ class ZplPrinterSettings(Settings):
         try:
             check_template(self.template)
         except BadLabel as e:
-            raise OutOfRange(f"template must be one label in ZPL: it {e}") from e
+            raise OutOfRange("template must be one label in ZPL: it {reason}", reason=e) from e

@@ -65,7 +65,7 @@ class ZplPrinter(LineDevice, Printer):
     def acknowledge(self, code: str) -> None:
         """Acknowledge a label whose fate is unknown (code unconfirmed). Raises NotFound for another code."""
         if code != UNCONFIRMED or self._unconfirmed is None:
-            raise NotFound(f"{self.who} has no alarm {code!r} that can be acknowledged")
+            raise NotFound("{device} has no alarm {code!r} that can be acknowledged", device=self.who, code=code)
         self._settle()
 
     def identify(self) -> Identity:
@@ -103,15 +103,15 @@ class ZplPrinter(LineDevice, Printer):
         try:
             data = zpl.check_label(label)
         except BadLabel as e:
-            raise OutOfRange(f"{self.who}: the label {e}") from e
+            raise OutOfRange("{device}: the label {reason}", device=self.who, reason=e) from e
         with self.held(self._print_timeout):
             if self._unconfirmed is not None:
                 text, remedy, _ = _ALARMS[UNCONFIRMED]
-                raise Refused(f"{self.who}: {text}; {remedy}", UNCONFIRMED)
+                raise Refused("{device}: {text}; {remedy}", UNCONFIRMED, device=self.who, text=text, remedy=remedy)
             found = self._ask_status()
             self._raise_if_blocked(found, "nothing was sent")
             if found.buffer_full or not found.idle:
-                raise Refused(f"{self.who} is printing labels of another client; nothing was sent")
+                raise Refused("{device} is printing labels of another client; nothing was sent", device=self.who)
             before = self._ask_counter()
             self._check_not_stopped(go_on, "nothing was sent")
             self._unconfirmed = before
@@ -131,7 +131,7 @@ class ZplPrinter(LineDevice, Printer):
         try:
             go_on()
         except Cancelled as error:
-            raise Cancelled(f"{error}; {consequence}") from None
+            raise Cancelled("{reason}; {consequence}", reason=error, consequence=consequence) from None
 
     def _confirm(self, before: int, go_on: GoOn) -> str:
         """Wait until the printer has counted the label; return the id of the job."""
@@ -144,14 +144,20 @@ class ZplPrinter(LineDevice, Printer):
                 return f"{self.name}-{before + 1}"
             if counted not in (0, 1):
                 raise DeviceFault(
-                    f"{self.who} has counted {counted} labels instead of 1: another client uses it", "", "counter"
+                    "{device} has counted {counted} labels instead of 1: another client uses it",
+                    "",
+                    "counter",
+                    device=self.who,
+                    counted=counted,
                 )
             if counted == 0:
                 self._raise_if_blocked(found, "the label was sent and may come out later; it is not sent again")
             if time.monotonic() >= deadline:
                 raise DeviceTimeout(
-                    f"{self.who} has not counted the label within {self._print_timeout:g} s; it is not sent again",
+                    "{device} has not counted the label within {print_timeout:g} s; it is not sent again",
                     f"counter {before}, formats waiting {found.formats_waiting}",
+                    device=self.who,
+                    print_timeout=self._print_timeout,
                 )
             time.sleep(CONFIRM_PERIOD)
 
@@ -165,11 +171,11 @@ class ZplPrinter(LineDevice, Printer):
         :param code: content of the bar code (ASCII)
         """
         if not code:
-            raise OutOfRange(f"{self.who}: code must not be empty")
+            raise OutOfRange("{device}: code must not be empty", device=self.who)
         try:
             label = zpl.fill(self._template, {"title": title, "text": text, "code": code})
         except BadLabel as e:
-            raise OutOfRange(f"{self.who}: {e}") from e
+            raise OutOfRange("{device}: {reason}", device=self.who, reason=e) from e
         return self.print(label)
 
     @action
@@ -181,18 +187,20 @@ class ZplPrinter(LineDevice, Printer):
         with self.held():
             before = self._unconfirmed
             if before is None:
-                raise Refused(f"{self.who}: every label was confirmed")
+                raise Refused("{device}: every label was confirmed", device=self.who)
             found = self._ask_status()
             counted = self._ask_counter() - before
             if not found.idle:
                 blocked = self._blocked_by(found)
                 why = f": {_ALARMS[blocked].text}; {_ALARMS[blocked].remedy}" if blocked else ""
-                raise Refused(f"{self.who}: the label still waits in the printer{why}")
+                raise Refused("{device}: the label still waits in the printer{reason}", device=self.who, reason=why)
             if counted not in (0, 1):
                 raise DeviceFault(
-                    f"{self.who} has counted {counted} labels since; look for the label, then acknowledge",
+                    "{device} has counted {counted} labels since; look for the label, then acknowledge",
                     "",
                     "counter",
+                    device=self.who,
+                    counted=counted,
                 )
             self._settle()
             return counted == 1
@@ -223,10 +231,11 @@ class ZplPrinter(LineDevice, Printer):
         """Return the error for a printer that does not answer."""
         self.set_alarm(NO_REPLY, True)
         return NoReply(
-            f"{self.who} does not answer: it is out of labels, its head is open, or the line is broken; "
-            f"{_ALARMS[NO_REPLY].remedy}",
+            "{device} does not answer: it is out of labels, its head is open, or the line is broken; {remedy}",
             f"{error} {error.detail}".strip(),
             NO_REPLY,
+            device=self.who,
+            remedy=_ALARMS[NO_REPLY].remedy,
         )
 
     @staticmethod
@@ -238,7 +247,15 @@ class ZplPrinter(LineDevice, Printer):
     def _raise_if_blocked(self, found: Status, consequence: str) -> None:
         if blocked := self._blocked_by(found):
             text, remedy, _ = _ALARMS[blocked]
-            raise DeviceFault(f"{self.who}: {text}; {remedy}; {consequence}", blocked, blocked)
+            raise DeviceFault(
+                "{device}: {text}; {remedy}; {consequence}",
+                blocked,
+                blocked,
+                device=self.who,
+                text=text,
+                remedy=remedy,
+                consequence=consequence,
+            )
 
     # -------------------------------------------------------------------------------- observing
     def greet(self, deadline: float) -> None:

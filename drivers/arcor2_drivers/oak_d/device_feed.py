@@ -28,16 +28,21 @@ def find(who: str, address: str, timeout: float) -> dai.DeviceInfo:
     found = dai.Device.getAllAvailableDevices()
     matching = [info for info in found if address in ("", info.getDeviceId(), info.name)]
     if len(matching) > 1:
-        raise NotConnected(f"{who}: there are {len(matching)} cameras; give the device id of one", _listed(found))
+        raise NotConnected(
+            "{device}: there are {count} cameras; give the device id of one",
+            _listed(found),
+            device=who,
+            count=len(matching),
+        )
     if matching:
         return matching[0]
     if _is_ip(address):  # beyond a router it does not answer to the search
         try:
             socket.create_connection((address, POE_PORT), timeout).close()
         except OSError as e:
-            raise NotConnected(f"{who} cannot be reached", str(e)) from e
+            raise NotConnected("{device} cannot be reached", str(e), device=who) from e
         return dai.DeviceInfo(address)
-    raise NotConnected(f"{who} is not there: is it plugged in, and free?", _listed(found))
+    raise NotConnected("{device} is not there: is it plugged in, and free?", _listed(found), device=who)
 
 
 def _listed(found: list[dai.DeviceInfo]) -> str:
@@ -69,9 +74,9 @@ def boot(who: str, info: dai.DeviceInfo, timeout: float) -> dai.Device:
     thread.join(timeout)
     if not box:
         late.set()
-        raise DeviceTimeout(f"{who} has not started within {timeout:.1f} s")
+        raise DeviceTimeout("{device} has not started within {timeout:.1f} s", device=who, timeout=timeout)
     if isinstance(box[0], BaseException):
-        raise NotConnected(f"{who} cannot be opened; another program may use it", str(box[0])) from box[0]
+        raise NotConnected("{device} cannot be opened; another program may use it", str(box[0]), device=who) from box[0]
     return box[0]
 
 
@@ -115,10 +120,10 @@ class DeviceFeed:
             self._pipeline.start()
         except BadCalibration as e:
             self.close()
-            raise DeviceFault(f"{who}: {e}", "", "calibration") from e
+            raise DeviceFault("{device}: {reason}", "", "calibration", device=who, reason=e) from e
         except RuntimeError as e:
             self.close()
-            raise DeviceFault(f"{who} cannot be set up", str(e), "pipeline") from e
+            raise DeviceFault("{device} cannot be set up", str(e), "pipeline", device=who) from e
         except BaseException:
             self.close()
             raise
@@ -127,7 +132,7 @@ class DeviceFeed:
         """Wait for the next picture; None when none came. Raises ConnectionLost."""
         shot = None if self._pipeline is None else self._pipeline.next(timeout)
         if shot is None and self._device.isClosed():
-            raise ConnectionLost(f"{self.who}: the connection was lost")
+            raise ConnectionLost("{device}: the connection was lost", device=self.who)
         return shot
 
     def temperature(self) -> float | None:
@@ -135,7 +140,7 @@ class DeviceFeed:
         try:
             return float(self._device.getChipTemperature().average)
         except RuntimeError as e:
-            raise ConnectionLost(f"{self.who}: the connection was lost", str(e)) from e
+            raise ConnectionLost("{device}: the connection was lost", str(e), device=self.who) from e
 
     def set_exposure(self, exposure: float | None, timeout: float) -> None:
         """Set the exposure, s, None for automatic; the camera does not confirm it. Raises Refused."""
@@ -147,7 +152,7 @@ class DeviceFeed:
         try:
             self._control.send(control)
         except RuntimeError as e:
-            raise Refused(f"{self.who} does not take the exposure", str(e)) from e
+            raise Refused("{device} does not take the exposure", str(e), device=self.who) from e
 
     def close(self) -> None:
         """Close; does nothing when closed."""

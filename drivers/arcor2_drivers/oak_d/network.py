@@ -69,20 +69,26 @@ class NetworkSource:
         try:
             link = socket.create_connection(self._where, left)
         except TimeoutError:
-            raise DeviceTimeout(f"{self.who} did not take the connection within {left:.1f} s") from None
+            raise DeviceTimeout(
+                "{device} did not take the connection within {left:.1f} s", device=self.who, left=left
+            ) from None
         except OSError as e:
-            raise NotConnected(f"{self.who} cannot be reached", str(e)) from e
+            raise NotConnected("{device} cannot be reached", str(e), device=self.who) from e
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket = link
         self._offsets.clear()
         head, header, payload = self._message(deadline)
         if head.kind is not Kind.HELLO:
-            raise DeviceFault(f"{self.who} does not say hello but {head.kind.name.lower()}", "", "protocol")
+            raise DeviceFault(
+                "{device} does not say hello but {name}", "", "protocol", device=self.who, name=head.kind.name.lower()
+            )
         try:
             self.hello = read(header, Hello)
             self.eeprom = msgspec.json.decode(payload, type=dict[str, Any])
         except (BadStream, msgspec.DecodeError) as e:
-            raise DeviceFault(f"{self.who}: the hello is not readable: {e}", "", "protocol") from e
+            raise DeviceFault(
+                "{device}: the hello is not readable: {reason}", "", "protocol", device=self.who, reason=e
+            ) from e
 
     def start(self, client: str) -> None:
         """Ask for frames."""
@@ -105,9 +111,11 @@ class NetworkSource:
             self._say(Kind.CONTROL, {"exposure": exposure})
             answered = self._status.wait_for(lambda: self._statuses > before or self._refusal, timeout)
             if self._refusal:
-                raise Refused(f"{self.who} refuses: {self._refusal}")
+                raise Refused("{device} refuses: {refusal}", device=self.who, refusal=self._refusal)
             if not answered:
-                raise DeviceTimeout(f"{self.who} did not answer to set_exposure within {timeout:g} s")
+                raise DeviceTimeout(
+                    "{device} did not answer to set_exposure within {timeout:g} s", device=self.who, timeout=timeout
+                )
 
     def _ask_clock(self) -> None:
         self._asked_clock = time.monotonic()
@@ -116,12 +124,12 @@ class NetworkSource:
     def _say(self, kind: Kind, header: dict[str, object]) -> None:
         link = self._socket
         if link is None:
-            raise NotConnected(f"{self.who} is not connected")
+            raise NotConnected("{device} is not connected", device=self.who)
         try:
             with self._sending:
                 link.sendall(message(kind, header))
         except OSError as e:
-            raise ConnectionLost(f"{self.who}: the connection was lost", str(e)) from e
+            raise ConnectionLost("{device}: the connection was lost", str(e), device=self.who) from e
 
     # -------------------------------------------------------------------------------- reading
     def next_frame(self, timeout: float) -> SourceFrame:
@@ -139,7 +147,7 @@ class NetworkSource:
                     continue  # before the first answer of the clock nobody knows how old it is
                 self._take(head.kind, header)
             except BadStream as e:
-                raise DeviceFault(f"{self.who}: {e}", "", "protocol") from e
+                raise DeviceFault("{device}: {reason}", "", "protocol", device=self.who, reason=e) from e
 
     def _take(self, kind: Kind, header: bytes) -> None:
         if kind is Kind.CLOCK:
@@ -188,7 +196,7 @@ class NetworkSource:
             header = bytes(view[: head.header])
             check(head, header)
         except BadStream as e:
-            raise DeviceFault(f"{self.who}: {e}", "", "protocol") from e
+            raise DeviceFault("{device}: {reason}", "", "protocol", device=self.who, reason=e) from e
         payload = view[head.header : length]
         self._read(payload, deadline)
         return head, header, payload
@@ -197,7 +205,7 @@ class NetworkSource:
         link, came = self._socket, 0
         while came < len(into):
             if link is None:
-                raise ConnectionLost(f"{self.who}: the connection was closed")
+                raise ConnectionLost("{device}: the connection was closed", device=self.who)
             left = deadline - time.monotonic()
             if left <= 0.0:
                 raise self._silent(idle and came == 0)
@@ -207,12 +215,12 @@ class NetworkSource:
             except TimeoutError:
                 raise self._silent(idle and came == 0) from None
             except OSError as e:
-                raise ConnectionLost(f"{self.who}: the connection was lost", str(e)) from e
+                raise ConnectionLost("{device}: the connection was lost", str(e), device=self.who) from e
             if got == 0:
                 why = f"it said: {self._refusal}" if self._refusal else "the source closed it"
-                raise ConnectionLost(f"{self.who}: the connection was lost: {why}")
+                raise ConnectionLost("{device}: the connection was lost: {reason}", device=self.who, reason=why)
             came += got
 
     def _silent(self, between: bool) -> DeviceError:
         what = "sends nothing" if between else "stopped in the middle of a message"
-        return DeviceTimeout(f"{self.who} {what}")
+        return DeviceTimeout("{device} {what}", device=self.who, what=what)

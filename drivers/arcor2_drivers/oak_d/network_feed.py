@@ -91,7 +91,7 @@ class NetworkFeed:
             self._pipeline.start()
         except BadCalibration as e:
             self.close()
-            raise DeviceFault(f"{who}: {e}", "", "calibration") from e
+            raise DeviceFault("{device}: {reason}", "", "calibration", device=who, reason=e) from e
         except BaseException:
             self.close()
             raise
@@ -110,7 +110,9 @@ class NetworkFeed:
             if isinstance(error, DeviceError):
                 raise error
             if error is not None:
-                raise DeviceFault(f"{self.who}: {type(error).__name__}: {error}") from error
+                raise DeviceFault(
+                    "{device}: {type}: {reason}", device=self.who, type=type(error).__name__, reason=error
+                ) from error
             if time.monotonic() >= until:
                 break
         return None

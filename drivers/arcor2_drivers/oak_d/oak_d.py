@@ -128,7 +128,11 @@ class OakD(Camera):
         """Set the exposure, s; None leaves it to the camera. Raises OutOfRange, Refused, DeviceTimeout."""
         if exposure is not None and not SHORTEST <= exposure <= LONGEST:
             raise OutOfRange(
-                f"{self._observed.who}: exposure must be {SHORTEST:g} to {LONGEST:g} s, not {exposure:g} s"
+                "{device}: exposure must be {shortest:g} to {longest:g} s, not {exposure:g} s",
+                device=self._observed.who,
+                shortest=SHORTEST,
+                longest=LONGEST,
+                exposure=exposure,
             )
         self._observed.set_exposure(exposure)
 
@@ -156,7 +160,11 @@ class OakD(Camera):
         from PIL import Image
 
         if not 1 <= averaged_frames <= MOST_AVERAGED:
-            raise OutOfRange(f"{self._observed.who}: averaged_frames must be 1 to {MOST_AVERAGED}")
+            raise OutOfRange(
+                "{device}: averaged_frames must be 1 to {most_averaged}",
+                device=self._observed.who,
+                most_averaged=MOST_AVERAGED,
+            )
         assert 1 <= averaged_frames <= 100
         shot = self._after_now()
         depth = shot.depth_mm()
@@ -219,12 +227,18 @@ class OakD(Camera):
         white = float((looked_at.min(axis=2) >= WHITE).mean())
         if white > self._given.white_limit:
             exposed = "" if shot.exposure is None else f" with an exposure of {shot.exposure * 1e3:g} ms"
-            raise Overexposed(f"{self._observed.who}: {white:.0%} of the picture are white{exposed}")
+            raise Overexposed(
+                "{device}: {white:.0%} of the picture are white{exposed}",
+                device=self._observed.who,
+                white=white,
+                exposed=exposed,
+            )
         if (mean := float(looked_at.mean())) < BLACK:
             raise DeviceFault(
-                f"{self._observed.who}: the picture is black: the lens is covered, or there is no light",
+                "{device}: the picture is black: the lens is covered, or there is no light",
                 f"mean {mean:.1f} of 255",
                 "dark",
+                device=self._observed.who,
             )
 
     def _check_depth(self, depth: "npt.NDArray[np.uint16]") -> None:
@@ -232,6 +246,10 @@ class OakD(Camera):
         if valid < LEAST_DEPTH:
             near, far = self.depth_range()
             raise NoDepth(
-                f"{self._observed.who}: {valid:.1%} of the picture have a depth: the lens is covered, stereo "
-                f"is off, or nothing is within {near:g} and {far:g} m"
+                "{device}: {valid:.1%} of the picture have a depth: the lens is covered, stereo "
+                "is off, or nothing is within {near:g} and {far:g} m",
+                device=self._observed.who,
+                valid=valid,
+                near=near,
+                far=far,
             )

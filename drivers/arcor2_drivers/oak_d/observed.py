@@ -53,7 +53,7 @@ class Observed:
         self.observing.check()
         feed = self._feed
         if feed is None:
-            raise NotConnected(f"{self.who} is not connected")
+            raise NotConnected("{device} is not connected", device=self.who)
         return feed
 
     def newest(self, max_age: float) -> "Shot":
@@ -72,7 +72,7 @@ class Observed:
             while True:
                 self.observing.check()
                 if self._stops != stops:
-                    raise Cancelled(f"{self.who}: waiting for a picture was stopped")
+                    raise Cancelled("{device}: waiting for a picture was stopped", device=self.who)
                 newest = self._newest
                 if newest is not None and newest.monotonic > moment:
                     return newest
@@ -80,7 +80,12 @@ class Observed:
                     break
                 self._news.wait(left)
         age = "never" if newest is None else f"{time.monotonic() - newest.monotonic:.2f} s ago"
-        raise Stale(f"{self.who} gave no new picture within {timeout:g} s; the last was taken {age}")
+        raise Stale(
+            "{device} gave no new picture within {timeout:g} s; the last was taken {age}",
+            device=self.who,
+            timeout=timeout,
+            age=age,
+        )
 
     def stop_waiting(self) -> None:
         """End the calls that wait for a picture, with Cancelled."""
@@ -98,7 +103,12 @@ class Observed:
     def _fresh(self, shot: "Shot | None", max_age: float) -> "Shot":
         age = float("inf") if shot is None else time.monotonic() - shot.monotonic
         if shot is None or age > max_age:
-            raise Stale(f"{self.who}: the newest picture is {age:.2f} s old, {max_age:g} s at most are asked for")
+            raise Stale(
+                "{device}: the newest picture is {age:.2f} s old, {max_age:g} s at most are asked for",
+                device=self.who,
+                age=age,
+                max_age=max_age,
+            )
         return shot
 
     def set_exposure(self, exposure: float | None) -> None:
@@ -141,7 +151,9 @@ class Observed:
         while shot is None or time.monotonic() - shot.monotonic > self._settings.max_age:
             if (left := deadline - time.monotonic()) <= 0.0:
                 old = "no" if shot is None else "only an old"
-                raise DeviceTimeout(f"{self.who} sent {old} picture within {timeout:.1f} s")
+                raise DeviceTimeout(
+                    "{device} sent {old} picture within {timeout:.1f} s", device=self.who, old=old, timeout=timeout
+                )
             shot = opened.next(min(WAIT, left)) or shot
         self._take(shot)
         if self._exposure is not None:  # it has come back
@@ -163,16 +175,19 @@ class Observed:
             return DeviceFeed(self.who, self._name, self._settings, timeout)
         except ModuleNotFoundError as e:
             raise NotConnected(
-                f"{self.who}: depthai is not installed here; it comes with the extra `depthai` (arcor2-hw[depthai])",
+                "{device}: depthai is not installed here; it comes with the extra `depthai` (arcor2-hw[depthai])",
                 str(e),
+                device=self.who,
             ) from e
         except ImportError as e:
-            raise NotConnected(f"{self.who}: depthai is installed and cannot be loaded: {e}") from e
+            raise NotConnected(
+                "{device}: depthai is installed and cannot be loaded: {reason}", device=self.who, reason=e
+            ) from e
 
     def _watch(self, stopping: threading.Event) -> None:
         feed = self._feed
         if feed is None:
-            raise NotConnected(f"{self.who} is not connected")
+            raise NotConnected("{device} is not connected", device=self.who)
         self._came = looked = time.monotonic()
         while not stopping.is_set():
             shot = feed.next(WAIT)
@@ -180,7 +195,9 @@ class Observed:
             if shot is not None:
                 self._take(shot)
             elif moment - self._came > self._settings.frame_timeout:
-                raise DeviceTimeout(f"{self.who} has sent no picture for {moment - self._came:.1f} s")
+                raise DeviceTimeout(
+                    "{device} has sent no picture for {moment:.1f} s", device=self.who, moment=moment - self._came
+                )
             if moment - looked > LOOK_PERIOD:
                 looked = moment
                 self._look(feed)

@@ -59,13 +59,17 @@ class OakDSettings(Settings):
         super().__post_init__()
         self.address = self.address.strip()
         if ":" in self.address and self.network is None:
-            raise OutOfRange(f"address must be a device id, an IP address or host:port, not {self.address!r}")
+            raise OutOfRange(
+                "address must be a device id, an IP address or host:port, not {address!r}", address=self.address
+            )
         if not (math.isfinite(self.max_age) and 1.0 / self.fps < self.max_age <= 10.0):
-            raise OutOfRange(f"max_age must be more than one image ({1.0 / self.fps:.3f} s) and at most 10 s")
+            raise OutOfRange("max_age must be more than one image ({fps:.3f} s) and at most 10 s", fps=1.0 / self.fps)
         if not (math.isfinite(self.frame_timeout) and 2.0 / self.fps < self.frame_timeout <= 10.0):
-            raise OutOfRange(f"frame_timeout must be more than two images ({2.0 / self.fps:.3f} s) and at most 10 s")
+            raise OutOfRange(
+                "frame_timeout must be more than two images ({fps:.3f} s) and at most 10 s", fps=2.0 / self.fps
+            )
         if not 0.0 < self.white_limit <= 1.0:
-            raise OutOfRange(f"white_limit must be within 0 and 1, not {self.white_limit!r}")
+            raise OutOfRange("white_limit must be within 0 and 1, not {white_limit!r}", white_limit=self.white_limit)
 
     @property
     def network(self) -> tuple[str, int] | None:

@@ -48,13 +48,24 @@ class Jobs:
         plc.require_control(f"job {number}")
         low, high = INTEGERS.get(plc.variant("number", 0).VariantType, (0, 0))
         if not low <= number <= high:
-            raise OutOfRange(f"{plc.who}: the number of a job must be {low} to {high}, not {number}")
+            raise OutOfRange(
+                "{device}: the number of a job must be {low} to {high}, not {number}",
+                device=plc.who,
+                low=low,
+                high=high,
+                number=number,
+            )
         if not self._one.acquire(blocking=False):
-            raise Refused(f"{plc.who}: job {number} is refused: another job runs")
+            raise Refused("{device}: job {number} is refused: another job runs", device=plc.who, number=number)
         try:
             found = plc.hand()
             if found.busy or found.done or found.error:
-                raise Refused(f"{plc.who}: job {number} is refused: the PLC is {_state(found)}")
+                raise Refused(
+                    "{device}: job {number} is refused: the PLC is {found}",
+                    device=plc.who,
+                    number=number,
+                    found=_state(found),
+                )
             plc.link.write({"number": plc.variant("number", number), "request": plc.variant("request", True)})
             try:
                 self._wait(
@@ -72,7 +83,14 @@ class Jobs:
         finally:
             self._one.release()
         if ended.error:
-            raise DeviceFault(f"{plc.who}: job {number} ended with error {ended.code}", "", ended.code)
+            raise DeviceFault(
+                "{device}: job {number} ended with error {code}",
+                "",
+                ended.code,
+                device=plc.who,
+                number=number,
+                code=ended.code,
+            )
 
     def _take_back(self) -> None:
         """Take the request back, so that a job that still runs stops, and see the PLC idle."""
@@ -97,22 +115,32 @@ class Jobs:
         deadline = time.monotonic() + timeout
         while True:
             if stops not in (-1, plc.stops):
-                raise Cancelled(f"{plc.who}: {what} was stopped")
+                raise Cancelled("{device}: {what} was stopped", device=plc.who, what=what)
             if losses >= 0:
                 plc.check_loss(losses)
                 plc.check_program()
                 if not plc.in_control:
-                    raise NotInControl(f"{plc.who}: {what} was given up: {plc.why_not}")
+                    raise NotInControl(
+                        "{device}: {what} was given up: {why_not}", device=plc.who, what=what, why_not=plc.why_not
+                    )
             try:
                 found = plc.hand()
             except DeviceTimeout as e:
-                raise ConnectionLost(f"{plc.who}: {what}: the connection was lost", f"{e} {e.detail}") from e
+                raise ConnectionLost(
+                    "{device}: {what}: the connection was lost", f"{e} {e.detail}", device=plc.who, what=what
+                ) from e
             if stops not in (-1, plc.stops):
-                raise Cancelled(f"{plc.who}: {what} was stopped")
+                raise Cancelled("{device}: {what} was stopped", device=plc.who, what=what)
             if holds(found):
                 return found
             if time.monotonic() >= deadline:
-                raise DeviceTimeout(f"{plc.who}: {what} took longer than {timeout:g} s; the PLC is {_state(found)}")
+                raise DeviceTimeout(
+                    "{device}: {what} took longer than {timeout:g} s; the PLC is {found}",
+                    device=plc.who,
+                    what=what,
+                    timeout=timeout,
+                    found=_state(found),
+                )
             time.sleep(LOOK)
 
 

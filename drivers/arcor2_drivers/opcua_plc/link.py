@@ -112,7 +112,7 @@ class Link:
         try:
             self._call(self._connect(), timeout, f"connecting within {timeout:.1f} s")
         except ConnectionLost as e:
-            raise NotConnected(f"{self._who} cannot be reached", e.detail) from e
+            raise NotConnected("{device} cannot be reached", e.detail, device=self._who) from e
         self._up = True
 
     async def _connect(self) -> None:
@@ -148,7 +148,15 @@ class Link:
         )
         for node, result in zip(names, made, strict=True):
             if isinstance(result, ua.StatusCode):
-                raise DeviceFault(f"{self._who}: {names[node][0]} ({node.to_string()}) {result.name}", "", result.name)
+                raise DeviceFault(
+                    "{device}: {name} ({to_string}) {result_name}",
+                    "",
+                    result.name,
+                    device=self._who,
+                    name=names[node][0],
+                    to_string=node.to_string(),
+                    result_name=result.name,
+                )
 
     async def _secure(self, client: Client) -> None:
         settings = self._settings
@@ -171,7 +179,7 @@ class Link:
             )
         except (OSError, ValueError, TypeError, x509.ExtensionNotFound) as e:
             what = "client_certificate, client_key or server_certificate cannot be used"
-            raise NotConnected(f"{self._who}: {what}", str(e)) from e
+            raise NotConnected("{device}: {what}", str(e), device=self._who, what=what) from e
 
     def close(self) -> None:
         """Close; whoever waits for an answer gets ConnectionLost."""
@@ -242,12 +250,17 @@ class Link:
         for name, status in zip(values, self._call(ask(), limit, f"writing {', '.join(values)}"), strict=True):
             if not status.is_good():
                 raise Refused(
-                    f"{self._who}: writing {name} ({self.nodes[name].to_string()}): {status.name}", status.name
+                    "{device}: writing {name} ({to_string}): {status_name}",
+                    status.name,
+                    device=self._who,
+                    name=name,
+                    to_string=self.nodes[name].to_string(),
+                    status_name=status.name,
                 )
 
     def _session(self) -> Any:
         if self._client is None:
-            raise NotConnected(f"{self._who} is not connected")
+            raise NotConnected("{device} is not connected", device=self._who)
         return self._client.uaclient
 
     def _call(self, work: Coroutine[Any, Any, T], timeout: float, what: str) -> T:
@@ -259,29 +272,33 @@ class Link:
             future = asyncio.run_coroutine_threadsafe(limited(), self._loop)
         except RuntimeError as e:  # the loop is closed
             work.close()
-            raise ConnectionLost(f"{self._who}: the connection was closed") from e
+            raise ConnectionLost("{device}: the connection was closed", device=self._who) from e
         try:
             return future.result(timeout + JOIN)
         except DeviceError:
             raise
         except TimeoutError as e:  # the future's own and asyncio's are the same class
             future.cancel()
-            raise DeviceTimeout(f"{self._who}: {what}: no answer within {timeout:g} s", str(e)) from e
+            raise DeviceTimeout(
+                "{device}: {what}: no answer within {timeout:g} s", str(e), device=self._who, what=what, timeout=timeout
+            ) from e
         except (concurrent.futures.CancelledError, OSError) as e:
-            raise ConnectionLost(f"{self._who}: {what}: the connection broke", str(e)) from e
+            raise ConnectionLost("{device}: {what}: the connection broke", str(e), device=self._who, what=what) from e
         except ua.UaStatusCodeError as e:
             raise self._typed(type(e).__name__, what, e) from e
         except ua.UaError as e:
-            raise ConnectionLost(f"{self._who}: {what}: no sensible answer", f"{type(e).__name__}: {e}") from e
+            raise ConnectionLost(
+                "{device}: {what}: no sensible answer", f"{type(e).__name__}: {e}", device=self._who, what=what
+            ) from e
 
     def _typed(self, name: str, what: str, error: Exception) -> DeviceError:
         if name == "BadTimeout" or name == "BadRequestTimeout":
-            return DeviceTimeout(f"{self._who}: {what}: no answer in time", str(error))
+            return DeviceTimeout("{device}: {what}: no answer in time", str(error), device=self._who, what=what)
         if name.startswith(_BROKEN):
-            return ConnectionLost(f"{self._who}: {what}: the connection broke", str(error))
+            return ConnectionLost("{device}: {what}: the connection broke", str(error), device=self._who, what=what)
         if name.startswith(_DOORS):
-            return Refused(f"{self._who} does not let us in: {name}", str(error))
-        return DeviceFault(f"{self._who}: {what}: {name}", str(error), name)
+            return Refused("{device} does not let us in: {name}", str(error), device=self._who, name=name)
+        return DeviceFault("{device}: {what}: {name}", str(error), name, device=self._who, what=what, name=name)
 
 
 def _properties(file: str) -> uacrypto.CertProperties:
@@ -294,4 +311,4 @@ def _password(who: str, file: str) -> str:
     try:
         return Path(file).read_text("utf-8").rstrip("\r\n")
     except (OSError, ValueError) as e:
-        raise NotConnected(f"{who}: password_file cannot be read", str(e)) from e
+        raise NotConnected("{device}: password_file cannot be read", str(e), device=who) from e

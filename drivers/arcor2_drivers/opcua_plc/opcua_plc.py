@@ -113,7 +113,7 @@ class OpcUaPlc(PointActions, Connected, IOBlock):
     def bad_reading(self, name: str) -> DeviceFault:
         """Return the error for a point whose status is bad."""
         status = status_name(self._plc.read(name))
-        return DeviceFault(f"{self.who}: {name} is bad: {status}", "", status)
+        return DeviceFault("{device}: {name} is bad: {status}", "", status, device=self.who, name=name, status=status)
 
     def await_point(self, name: str, value: bool, timeout: float) -> None:
         """Return when a digital point has the value."""

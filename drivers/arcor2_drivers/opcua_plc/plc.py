@@ -99,13 +99,13 @@ class Plc:
         self.observing.check()
         link = self._link
         if link is None:
-            raise ConnectionLost(f"{self.who}: the connection was lost", str(self._loss or ""))
+            raise ConnectionLost("{device}: the connection was lost", str(self._loss or ""), device=self.who)
         return link
 
     def check_loss(self, losses: int) -> None:
         """Raise ConnectionLost when the connection was lost since `losses`."""
         if losses != self._losses:
-            raise ConnectionLost(f"{self.who}: the connection was lost", str(self._loss or ""))
+            raise ConnectionLost("{device}: the connection was lost", str(self._loss or ""), device=self.who)
 
     @property
     def losses(self) -> int:
@@ -125,7 +125,9 @@ class Plc:
             losses = self._losses
             self.check_program()
             if owner := self.hand().owner:
-                raise NotInControl(f"{self.who}: control is refused: {self._named(owner)} has it")
+                raise NotInControl(
+                    "{device}: control is refused: {named} has it", device=self.who, named=self._named(owner)
+                )
             self._life = (self._life + 1) % 65536
             number = self.settings.host_number
             self.link.write(
@@ -136,7 +138,9 @@ class Plc:
                 }
             )
             if (owner := self.hand().owner) != number:
-                raise NotInControl(f"{self.who}: control is refused: {self._named(owner)} has it")
+                raise NotInControl(
+                    "{device}: control is refused: {named} has it", device=self.who, named=self._named(owner)
+                )
             with self._news:
                 self._owner = number
                 self.in_control = True
@@ -183,18 +187,20 @@ class Plc:
         """Return when the PLC obeys us. Raises NotConnected, ConnectionLost, NotInControl, Stale, with the reason."""
         self.observing.check()
         if self.hand_nodes and not self.in_control:
-            raise NotInControl(f"{self.who}: {what} is refused: {self.why_not}")
+            raise NotInControl(
+                "{device}: {what} is refused: {why_not}", device=self.who, what=what, why_not=self.why_not
+            )
         self.check_program()
 
     def check_program(self) -> None:
         """Raise Stale while the PLC's program does not run: what the server tells is old then."""
         if self.program_stands:
-            raise Stale(f"{self.who}: the life sign of its program stands still: its values are old")
+            raise Stale("{device}: the life sign of its program stands still: its values are old", device=self.who)
 
     def need_handshake(self) -> None:
         """Raise Refused for a PLC without a handshake."""
         if not self.hand_nodes:
-            raise Refused(f"{self.who}: the setting handshake is empty: there is no control to be taken")
+            raise Refused("{device}: the setting handshake is empty: there is no control to be taken", device=self.who)
 
     def hand(self) -> Hand:
         """Read the PLC's side of the handshake now. Raises DeviceFault for a value that is bad."""
@@ -202,7 +208,14 @@ class Plc:
         found = self.link.read(names)
         for name, value in zip(names, found, strict=True):
             if value.Value is None or value.Value.Value is None or quality(value) is Quality.BAD:
-                raise DeviceFault(f"{self.who}: {name} of the handshake is {status_name(value)}", "", "handshake")
+                raise DeviceFault(
+                    "{device}: {name} of the handshake is {value}",
+                    "",
+                    "handshake",
+                    device=self.who,
+                    name=name,
+                    value=status_name(value),
+                )
         owner, busy, done, error, code = (value.Value.Value for value in found if value.Value is not None)
         return Hand(int(owner), bool(busy), bool(done), bool(error), int(code))
 
@@ -211,7 +224,12 @@ class Plc:
         """Return the point of this name. Raises OutOfRange."""
         point = self.points.get(name)
         if point is None:
-            raise OutOfRange(f"{self.who} has no point {name!r}; there are {', '.join(self.points)}")
+            raise OutOfRange(
+                "{device} has no point {name!r}; there are {points}",
+                device=self.who,
+                name=name,
+                points=", ".join(self.points),
+            )
         return point
 
     def read(self, name: str) -> ua.DataValue:
@@ -220,14 +238,21 @@ class Plc:
         self.check_program()
         (value,) = self.link.read([name])
         if value.Value is None or value.Value.Value is None:
-            raise DeviceFault(f"{self.who}: {name} has no value: {status_name(value)}", "", status_name(value))
+            raise DeviceFault(
+                "{device}: {name} has no value: {value}",
+                "",
+                status_name(value),
+                device=self.who,
+                name=name,
+                value=status_name(value),
+            )
         return value
 
     def write(self, name: str, value: bool | float) -> None:
         """Write an output. Raises Refused for an input, OutOfRange with the range, NotInControl."""
         point = self.point(name)
         if not point.output:
-            raise Refused(f"{self.who}: {name} is an input")
+            raise Refused("{device}: {name} is an input", device=self.who, name=name)
         if point.digital:
             given: bool | float = bool(value)
         else:
@@ -235,7 +260,14 @@ class Plc:
                 given = raw(float(value), point.io.scale, self._types.get(name, ua.VariantType.Double))
             except ValueError as e:
                 unit = f" {point.io.unit}" if point.io.unit else ""
-                raise OutOfRange(f"{self.who}: {name} {e}{unit}, not {value!r}") from None
+                raise OutOfRange(
+                    "{device}: {name} {reason}{unit}, not {value!r}",
+                    device=self.who,
+                    name=name,
+                    reason=e,
+                    unit=unit,
+                    value=value,
+                ) from None
         self.require_control(f"writing {name}")
         self.link.write({name: self.variant(name, given)})
 
@@ -263,7 +295,7 @@ class Plc:
                 news = [each for told, each in list(self._told)[len(self._told) - count :] if told == name]
                 late, seen = seen == self._told_in_all, self._told_in_all
             if stops != self.stops:
-                raise Cancelled(f"{self.who}: waiting for {what} was stopped")
+                raise Cancelled("{device}: waiting for {what} was stopped", device=self.who, what=what)
             self.check_loss(losses)
             self.observing.check()
             self.check_program()
@@ -271,7 +303,9 @@ class Plc:
             if any(_is(each, value) and not _before(each.SourceTimestamp, began) for each in news):
                 return
             if late or time.monotonic() >= deadline:
-                raise DeviceTimeout(f"{self.who}: {what} took longer than {timeout:g} s")
+                raise DeviceTimeout(
+                    "{device}: {what} took longer than {timeout:g} s", device=self.who, what=what, timeout=timeout
+                )
 
     # -------------------------------------------------------------------------------- on the observing thread
     def _open(self, timeout: float) -> None:
@@ -292,17 +326,32 @@ class Plc:
         self.program_stands = False
         self._beat(link)
         if time.monotonic() > deadline:
-            raise DeviceTimeout(f"{self.who} did not answer within {timeout:.1f} s")
+            raise DeviceTimeout("{device} did not answer within {timeout:.1f} s", device=self.who, timeout=timeout)
 
     def _check_node(self, name: str, value: ua.DataValue, data_type: ua.DataValue) -> None:
         node = self.points[name].node if name in self.points else self.hand_nodes[name]
         if status_name(value) in ("BadNodeIdUnknown", "BadNodeIdInvalid", "BadAttributeIdInvalid"):
-            raise DeviceFault(f"{self.who}: {name} ({node}) is not there: {status_name(value)}", "", status_name(value))
+            raise DeviceFault(
+                "{device}: {name} ({node}) is not there: {value}",
+                "",
+                status_name(value),
+                device=self.who,
+                name=name,
+                node=node,
+                value=status_name(value),
+            )
         kind = type_of(value, data_type)
         digital = self.points[name].digital if name in self.points else name in ("request", "busy", "done", "error")
         if kind is None or not fits(kind, digital):
             found = "of an unknown type" if kind is None else kind.name
-            raise DeviceFault(f"{self.who}: {name} ({node}) is {found}, not {'Boolean' if digital else 'a number'}")
+            raise DeviceFault(
+                "{device}: {name} ({node}) is {found}, not {digital}",
+                device=self.who,
+                name=name,
+                node=node,
+                found=found,
+                digital="Boolean" if digital else "a number",
+            )
         self._types[name] = kind
 
     def _watch(self, stopping: threading.Event) -> None:
@@ -317,7 +366,7 @@ class Plc:
                     raise
                 return
             if (broken := link.broken) is not None:
-                raise ConnectionLost(f"{self.who}: {broken}")
+                raise ConnectionLost("{device}: {broken}", device=self.who, broken=broken)
 
     def _beat(self, link: Link) -> None:
         """Count our life sign, and look at the PLC's."""

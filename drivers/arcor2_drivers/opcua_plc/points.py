@@ -35,7 +35,12 @@ class Point(Data, frozen=True):
 
 def _node(text: str, name: str, parameter: str) -> str:
     if not _NODE.fullmatch(text):
-        raise OutOfRange(f"{parameter} must give {name} a node id such as ns=2;s=Cell.Lamp, not {text!r}")
+        raise OutOfRange(
+            "{parameter} must give {name} a node id such as ns=2;s=Cell.Lamp, not {text!r}",
+            parameter=parameter,
+            name=name,
+            text=text,
+        )
     return text
 
 
@@ -43,14 +48,21 @@ def parse_points(text: str, parameter: str = "points") -> dict[str, Point]:
     """Return the points by name. Raises OutOfRange naming the parameter and the entry."""
     points = {name: _point(name, words, parameter) for name, words in entries(text, "|", parameter).items()}
     if not points:
-        raise OutOfRange(f"{parameter} must name at least one point, as in part=DI ns=2;s=Cell.PartPresent")
+        raise OutOfRange(
+            "{parameter} must name at least one point, as in part=DI ns=2;s=Cell.PartPresent", parameter=parameter
+        )
     return points
 
 
 def _point(name: str, words: list[str], parameter: str) -> Point:
     kind = words[0]
     if kind not in OPTIONS or len(words) < 2:
-        raise OutOfRange(f"{parameter} must give {name} as DI, DO, AI or AO and a node id, not {' '.join(words)!r}")
+        raise OutOfRange(
+            "{parameter} must give {name} as DI, DO, AI or AO and a node id, not {words!r}",
+            parameter=parameter,
+            name=name,
+            words=" ".join(words),
+        )
     node = _node(words[1], name, parameter)
     return Point(io_point(name, kind, words[2:], parameter, debounce=False, default_on_loss=OnLoss.HOLD), node)
 
@@ -60,8 +72,13 @@ def parse_handshake(text: str, parameter: str = "handshake") -> dict[str, str]:
     found: dict[str, str] = {}
     for name, words in entries(text, "|", parameter).items():
         if name not in HANDSHAKE or len(words) != 1:
-            raise OutOfRange(f"{parameter} must give {', '.join(HANDSHAKE)}, a node id each, not {name!r}")
+            raise OutOfRange(
+                "{parameter} must give {handshake}, a node id each, not {name!r}",
+                parameter=parameter,
+                handshake=", ".join(HANDSHAKE),
+                name=name,
+            )
         found[name] = _node(words[0], name, parameter)
     if missing := [name for name in HANDSHAKE if found and name not in found]:
-        raise OutOfRange(f"{parameter} must give {', '.join(missing)} too")
+        raise OutOfRange("{parameter} must give {missing} too", parameter=parameter, missing=", ".join(missing))
     return found

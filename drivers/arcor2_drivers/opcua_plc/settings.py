@@ -75,4 +75,4 @@ class OpcUaPlcSettings(Settings):
         for name in certificates:
             setattr(self, name, device_file(name, getattr(self, name)))
             if bool(getattr(self, name)) != (self.security is not Security.NONE):
-                raise OutOfRange(f"{name} must be given with a security other than none, and only with it")
+                raise OutOfRange("{name} must be given with a security other than none, and only with it", name=name)

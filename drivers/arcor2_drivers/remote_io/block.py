@@ -74,7 +74,9 @@ class Block(ModbusDevice[Image]):
         try:
             return registers.decode(self.link.read_input_registers(0, registers.IMAGE_COUNT))
         except ValueError as error:
-            raise DeviceFault(f"{self.who} sent what no block of this kind sends: {error}") from error
+            raise DeviceFault(
+                "{device} sent what no block of this kind sends: {reason}", device=self.who, reason=error
+            ) from error
 
     def on_state(self, snapshot: Snapshot[Image]) -> None:
         """Debounce the points."""
@@ -111,7 +113,12 @@ class Block(ModbusDevice[Image]):
         self.link.write_registers(self._watchdog, *armed)
         stored = self.link.read_holding_registers(self._watchdog, len(armed))
         if stored != armed:
-            raise Refused(f"{self.who}: its watchdog stores {stored} after {armed} was written")
+            raise Refused(
+                "{device}: its watchdog stores {stored} after {armed} was written",
+                device=self.who,
+                stored=stored,
+                armed=armed,
+            )
         self._triggered = time.monotonic()
 
     def disarm(self) -> None:
@@ -140,7 +147,7 @@ class Block(ModbusDevice[Image]):
         value = self._digital[name].value
         if value is None:
             self.observing.check()
-            raise ConnectionLost(f"{self.who}: the value of {name} is not known yet")
+            raise ConnectionLost("{device}: the value of {name} is not known yet", device=self.who, name=name)
         return value
 
     def switch(self, name: str, value: bool) -> None:
@@ -164,7 +171,9 @@ class Block(ModbusDevice[Image]):
         go_on = self.begin(what)
         with self._one_pulse:
             if channel in self._pulsing:
-                raise Refused(f"{self.who}: pulsing {name} is refused while it is being pulsed")
+                raise Refused(
+                    "{device}: pulsing {name} is refused while it is being pulsed", device=self.who, name=name
+                )
             self._pulsing.add(channel)
 
         def over(image: Image) -> bool:

@@ -48,10 +48,18 @@ def parse_points(text: str, parameter: str = "points") -> dict[str, Point]:
         for other in points.values():
             if other.address == point.address:
                 names = f"{other.io.name!r} and {name!r}"
-                raise OutOfRange(f"{parameter} must use each terminal once: {point.address} is {names}")
+                raise OutOfRange(
+                    "{parameter} must use each terminal once: {address} is {names}",
+                    parameter=parameter,
+                    address=point.address,
+                    names=names,
+                )
         points[name] = point
     if not points:
-        raise OutOfRange(f"{parameter} must name at least one point, as in part_present=DI0; lamp=DO4 on_loss=off")
+        raise OutOfRange(
+            "{parameter} must name at least one point, as in part_present=DI0; lamp=DO4 on_loss=off",
+            parameter=parameter,
+        )
     return points
 
 
@@ -59,8 +67,16 @@ def parse_address(text: str, parameter: str) -> tuple[str, int]:
     """Return kind and channel of a terminal such as DO4. Raises OutOfRange naming the parameter."""
     match = _ADDRESS.fullmatch(text)
     if match is None:
-        raise OutOfRange(f"{parameter} must use a terminal such as DI0, DO4, AI1 or AO0, not {text!r}")
+        raise OutOfRange(
+            "{parameter} must use a terminal such as DI0, DO4, AI1 or AO0, not {text!r}", parameter=parameter, text=text
+        )
     kind, channel = match[1], int(match[2])
     if channel >= CHANNELS[kind]:
-        raise OutOfRange(f"{parameter} must use {kind}0 to {kind}{CHANNELS[kind] - 1}, not {text}")
+        raise OutOfRange(
+            "{parameter} must use {type}0 to {type}{channels}, not {text}",
+            parameter=parameter,
+            type=kind,
+            channels=CHANNELS[kind] - 1,
+            text=text,
+        )
     return kind, channel

@@ -25,7 +25,7 @@ class RemoteIO(PointActions, Block, IOBlock):
     def __init__(self, obj_id: str, name: str, settings: RemoteIOSettings | None = None) -> None:
         super().__init__(obj_id, name, settings)
         if settings is None:
-            raise NotFound(f"{name} has no settings. Set host or serial_port to the address of the block.")
+            raise NotFound("{name} has no settings. Set host or serial_port to the address of the block.", name=name)
         self.use_block(settings, parse_points(settings.points))
         self.io_points = {name: point.io for name, point in self.block_points.items()}
 
@@ -66,13 +66,20 @@ class RemoteIO(PointActions, Block, IOBlock):
             try:
                 raw = point.raw(float(value))
             except ValueError as error:
-                raise OutOfRange(f"{self.who}: {name} {error}, not {value!r}") from None
+                raise OutOfRange(
+                    "{device}: {name} {reason}, not {value!r}", device=self.who, name=name, reason=error, value=value
+                ) from None
             self.send(f"writing {name}", lambda: self.link.write_registers(point.channel, raw & 0xFFFF))
 
     def require_output(self, name: str) -> None:
         """Raise Refused for an input."""
         if self.require_point(name).direction is not PointDirection.OUTPUT:
-            raise Refused(f"{self.who}: {name} is {self.point_label(name)}, an input")
+            raise Refused(
+                "{device}: {name} is {point_label}, an input",
+                device=self.who,
+                name=name,
+                point_label=self.point_label(name),
+            )
 
     def await_point(self, name: str, value: bool, timeout: float) -> None:
         """Return when a digital point has the value."""

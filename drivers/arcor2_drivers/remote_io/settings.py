@@ -61,7 +61,11 @@ class BlockSettings(Settings):
         else:
             check_host(self.host, self.port)
         if self.baudrate not in BAUDRATES:
-            raise OutOfRange(f"baudrate must be one of {', '.join(map(str, BAUDRATES))}, not {self.baudrate!r}")
+            raise OutOfRange(
+                "baudrate must be one of {baudrates}, not {baudrate!r}",
+                baudrates=", ".join(map(str, BAUDRATES)),
+                baudrate=self.baudrate,
+            )
         within("unit_id", self.unit_id, 1 if self.serial_port else 0, 247 if self.serial_port else 255)
         # A repeated reading must not trip the watchdog: two time-outs, one to drain a serial line, and one to spare.
         within("request_timeout", self.request_timeout, 0.05, min(LONGEST_REQUEST, self.watchdog_ms / 4000.0), "s")
@@ -112,9 +116,13 @@ class TowerLightSettings(BlockSettings):
         super().__post_init__()
         fitted = self.lamps()
         if not fitted:
-            raise OutOfRange(f"one of {', '.join(COLORS)} must be the output of a lamp")
+            raise OutOfRange("one of {colors} must be the output of a lamp", colors=", ".join(COLORS))
         if self.on_loss and self.on_loss not in fitted:
-            raise OutOfRange(f"on_loss must be one of {', '.join(fitted)} or empty, not {self.on_loss!r}")
+            raise OutOfRange(
+                "on_loss must be one of {fitted} or empty, not {on_loss!r}",
+                fitted=", ".join(fitted),
+                on_loss=self.on_loss,
+            )
         parse_patterns(self.patterns, fitted)
         self.points()
 
@@ -130,9 +138,15 @@ class TowerLightSettings(BlockSettings):
             if not terminal:
                 continue
             if parse_address(terminal, name)[0] != "DO":
-                raise OutOfRange(f"{name} must be a digital output such as DO0, not {terminal}")
+                raise OutOfRange(
+                    "{name} must be a digital output such as DO0, not {terminal}", name=name, terminal=terminal
+                )
             if terminal in used.values():
-                raise OutOfRange(f"{name} must be an output of its own: {terminal} is used by another lamp")
+                raise OutOfRange(
+                    "{name} must be an output of its own: {terminal} is used by another lamp",
+                    name=name,
+                    terminal=terminal,
+                )
             used[name] = terminal
         safe = {name: "on" if name == self.on_loss else "off" for name in used}
         return parse_points("; ".join(f"{name}={terminal} on_loss={safe[name]}" for name, terminal in used.items()))
@@ -147,15 +161,24 @@ def parse_patterns(text: str, fitted: Collection[str]) -> dict[str, Pattern]:
         head, *words = entry.split()
         state, sign, lamps = head.partition("=")
         if not sign or not lamps or words not in ([], ["blinking"]):
-            raise OutOfRange(f"patterns must be a list of state=colour or state=colour blinking, not {entry!r}")
+            raise OutOfRange(
+                "patterns must be a list of state=colour or state=colour blinking, not {entry!r}", entry=entry
+            )
         if state not in states:
-            raise OutOfRange(f"patterns must name a state of {', '.join(states)}, not {state!r}")
+            raise OutOfRange(
+                "patterns must name a state of {states}, not {state!r}", states=", ".join(states), state=state
+            )
         if state in patterns:
-            raise OutOfRange(f"patterns must name each state once: {state!r} is in it twice")
+            raise OutOfRange("patterns must name each state once: {state!r} is in it twice", state=state)
         colors = [] if lamps == "off" else lamps.split("+")
         unknown = [color for color in colors if color not in fitted]
         if unknown and given:
-            raise OutOfRange(f"patterns must show {state} by {', '.join(fitted)} or off, not {unknown[0]!r}")
+            raise OutOfRange(
+                "patterns must show {state} by {fitted} or off, not {unknown!r}",
+                state=state,
+                fitted=", ".join(fitted),
+                unknown=unknown[0],
+            )
         if not unknown:
             patterns[state] = dict.fromkeys(colors, bool(words))
     return patterns

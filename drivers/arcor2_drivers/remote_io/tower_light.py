@@ -61,7 +61,7 @@ class TowerLight(Block, Generic):
     def __init__(self, obj_id: str, name: str, settings: TowerLightSettings | None = None) -> None:
         super().__init__(obj_id, name, settings)
         if settings is None:
-            raise NotFound(f"{name} has no settings. Set host or serial_port to the address of the block.")
+            raise NotFound("{name} has no settings. Set host or serial_port to the address of the block.", name=name)
         self._lamps = settings.lamps()
         self._patterns = parse_patterns(settings.patterns, self._lamps)
         self._half_period = settings.blink_period / 2.0
@@ -91,7 +91,12 @@ class TowerLight(Block, Generic):
         :param blinking: let it blink
         """
         if color not in self._lamps:
-            raise OutOfRange(f"{self.who} has no {color} lamp; there are {', '.join(self._lamps)}")
+            raise OutOfRange(
+                "{device} has no {color} lamp; there are {lamps}",
+                device=self.who,
+                color=color,
+                lamps=", ".join(self._lamps),
+            )
         self._show({str(color): blinking}, f"showing {color}")
 
     @action
@@ -101,7 +106,7 @@ class TowerLight(Block, Generic):
         :param state: which state
         """
         if state not in self._patterns:
-            raise OutOfRange(f"{self.who} has no pattern for the state {state}")
+            raise OutOfRange("{device} has no pattern for the state {state}", device=self.who, state=state)
         self._show(self._patterns[state], f"showing {state}")
 
     @action
@@ -118,7 +123,7 @@ class TowerLight(Block, Generic):
         assert 0.01 <= duration <= 60.0
 
         if "buzzer" not in self.block_points:
-            raise OutOfRange(f"{self.who} has no buzzer. Set buzzer to its output.")
+            raise OutOfRange("{device} has no buzzer. Set buzzer to its output.", device=self.who)
         self.pulse_output("buzzer", duration)
 
     # -------------------------------------------------------------------------------- lamps

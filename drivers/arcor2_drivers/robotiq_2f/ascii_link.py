@@ -36,7 +36,9 @@ class AsciiLink(Line):
                 position=values["POS"],
             )
         except ValueError as error:
-            raise DeviceFault(f"{self.who} sent what no gripper of this kind sends: {error}") from error
+            raise DeviceFault(
+                "{device} sent what no gripper of this kind sends: {reason}", device=self.who, reason=error
+            ) from error
 
     def write(self, command: Command) -> None:
         """Set variables in one line. Raises Refused naming the line, DeviceTimeout, ConnectionLost."""
@@ -49,16 +51,24 @@ class AsciiLink(Line):
         }
         line = " ".join(["SET", *(f"{name} {value}" for name, value in values.items() if value is not None)])
         if not self._exchange(line, _ACKNOWLEDGED):
-            raise Refused(f"{self.who} refuses {line}")
+            raise Refused("{device} refuses {line}", device=self.who, line=line)
 
     def _get(self, name: str) -> int:
         found = self._exchange(f"GET {name}", _VALUE)
         if not found:
-            raise DeviceFault(f"{self.who} does not know the variable {name}")
+            raise DeviceFault("{device} does not know the variable {name}", device=self.who, name=name)
         answered, value = found[1].decode(), found[2].decode()
         number = int(value, 16 if any(c in "ABCDEF" for c in value) else 10)  # FLT may come as two hex digits
         if answered != name or number > 255:
-            raise self.broken(DeviceFault(f"{self.who} answers {answered} {value} when asked for {name}"))
+            raise self.broken(
+                DeviceFault(
+                    "{device} answers {answered} {value} when asked for {name}",
+                    device=self.who,
+                    answered=answered,
+                    value=value,
+                    name=name,
+                )
+            )
         return number
 
     def _exchange(self, line: str, expected: re.Pattern[bytes]) -> re.Match[bytes] | None:

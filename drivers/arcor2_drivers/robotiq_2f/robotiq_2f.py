@@ -110,10 +110,16 @@ class Robotiq2F(PolledControl[Status], Gripper):
         """
         status = self.fresh()
         if not status.fault or str(status.fault) != code:
-            raise NotFound(f"{self.who} has no alarm {code}")
+            raise NotFound("{device} has no alarm {code}", device=self.who, code=code)
         if status.fault < FIRST_MAJOR:
             fault = fault_of(status.fault)
-            raise Refused(f"{self.who}: fault {code} ends with its cause: {fault.text}; {fault.remedy}")
+            raise Refused(
+                "{device}: fault {code} ends with its cause: {text}; {remedy}",
+                device=self.who,
+                code=code,
+                text=fault.text,
+                remedy=fault.remedy,
+            )
         with self.act("acknowledge") as go_on:
             self._reset(go_on)
 
@@ -143,7 +149,11 @@ class Robotiq2F(PolledControl[Status], Gripper):
     def release_control(self) -> None:
         """Release control. Raises Refused while the gripper moves."""
         if self.in_control and self.fresh().moving:
-            raise Refused(f"{self.who}: release_control is refused in state {self.state()}: stop it first")
+            raise Refused(
+                "{device}: release_control is refused in state {state}: stop it first",
+                device=self.who,
+                state=self.state(),
+            )
         super().release_control()
 
     def control_owner(self) -> str | None:
@@ -161,7 +171,12 @@ class Robotiq2F(PolledControl[Status], Gripper):
         if status.fault >= FIRST_MAJOR:
             raise self._fault(status, what)
         if not status.active:
-            raise Refused(f"{self.who}: {what} is refused in state {GripperState.INACTIVE}: activate it first")
+            raise Refused(
+                "{device}: {what} is refused in state {inactive}: activate it first",
+                device=self.who,
+                what=what,
+                inactive=GripperState.INACTIVE,
+            )
         return status
 
     def _fault(self, status: Status, what: str) -> DeviceFault:
@@ -233,7 +248,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
                 speed=scaling.speed(self._s, speed),
             )
         except OutOfRange as e:
-            raise OutOfRange(f"{self.who}: {e}") from e
+            raise OutOfRange("{device}: {reason}", device=self.who, reason=e) from e
         with self.act(what) as go_on:
             self._require_ready(what)
             self._write(command, what, go_on)
@@ -243,7 +258,9 @@ class Robotiq2F(PolledControl[Status], Gripper):
                 if status.fault >= FIRST_MAJOR:
                     raise self._fault(status, what)
                 if not status.active:
-                    raise DeviceFault(f"{self.who}: {what} was ended: the gripper was reset or switched off")
+                    raise DeviceFault(
+                        "{device}: {what} was ended: the gripper was reset or switched off", device=self.who, what=what
+                    )
                 taken = status.go_to and status.echo == command.position
                 return taken and status.object is not Object.MOVING
 
@@ -311,7 +328,9 @@ class Robotiq2F(PolledControl[Status], Gripper):
                 self.detach_part()
         if status.object is not Object.ARRIVED:
             opened = scaling.width(self._s, status.position)
-            raise DeviceFault(f"{self.who}: release ended at {opened:.4f} m: the fingers are blocked")
+            raise DeviceFault(
+                "{device}: release ended at {opened:.4f} m: the fingers are blocked", device=self.who, opened=opened
+            )
 
     @action
     def part_held(self, *, an: str | None = None) -> bool:

@@ -50,7 +50,9 @@ class RtuLink(ModbusLink):
         try:
             return decode(registers)
         except ValueError as error:
-            raise DeviceFault(f"{self.who} sent what no gripper of this kind sends: {error}") from error
+            raise DeviceFault(
+                "{device} sent what no gripper of this kind sends: {reason}", device=self.who, reason=error
+            ) from error
 
     def write(self, command: Command) -> None:
         """Write all requests at once; never sent a second time."""

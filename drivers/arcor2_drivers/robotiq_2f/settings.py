@@ -103,7 +103,7 @@ class Robotiq2FSettings(Settings):
             if getattr(self, field.name) == 0.0:
                 setattr(self, field.name, getattr(data, field.name))
         if self.tcp_z == 0.0:
-            raise OutOfRange(f"tcp_z must be set to 0.05 to 0.5 m: that of a {self.model} is unknown")
+            raise OutOfRange("tcp_z must be set to 0.05 to 0.5 m: that of a {model} is unknown", model=self.model)
         within("tcp_z", self.tcp_z, 0.05, 0.5, "m")
         within("mass", self.mass, 0.1, 5.0, "kg")
         if self.wire is Wire.URCAP:

@@ -85,7 +85,7 @@ class MtSicsScale(LineDevice, Scale):
     def acknowledge(self, code: str) -> None:
         """Accept the present tare of the scale (code tare_lost). Raises NotFound for another code."""
         if code != TARE_LOST or not self._tare_is_lost:
-            raise NotFound(f"{self.who} has no alarm {code!r} that can be acknowledged")
+            raise NotFound("{device} has no alarm {code!r} that can be acknowledged", device=self.who, code=code)
         self._tare = None
         self.set_alarm(TARE_LOST, False)
 
@@ -110,7 +110,7 @@ class MtSicsScale(LineDevice, Scale):
             if answer.mark in ("+", "-"):
                 raise self._complaint(answer)
             if answer.value is None:
-                raise Refused(f"{self.who} is busy and gives no weight now", f"S {answer.mark}")
+                raise Refused("{device} is busy and gives no weight now", f"S {answer.mark}", device=self.who)
             return self._reading(answer, began)
 
     def _at_rest(self) -> Reading[float]:
@@ -128,7 +128,11 @@ class MtSicsScale(LineDevice, Scale):
                 return self._reading(answer, began)
             go_on()
             if time.monotonic() >= deadline:
-                raise DeviceTimeout(f"{self.who}: the load has not come to rest within {self._stable_timeout:g} s")
+                raise DeviceTimeout(
+                    "{device}: the load has not come to rest within {stable_timeout:g} s",
+                    device=self.who,
+                    stable_timeout=self._stable_timeout,
+                )
             time.sleep(LOOK_AGAIN)
 
     def _value(self) -> tuple[Answer, float]:
@@ -137,13 +141,19 @@ class MtSicsScale(LineDevice, Scale):
         answer = self._ask("SI")
         self._watch_range(answer)
         if answer.mark in ("S", "D") and answer.value is None:
-            raise DeviceFault(f"{self.who} weighs in {answer.unit}; set it to kg, g or mg", answer.unit, "unit")
+            raise DeviceFault(
+                "{device} weighs in {unit}; set it to kg, g or mg",
+                answer.unit,
+                "unit",
+                device=self.who,
+                unit=answer.unit,
+            )
         return answer, began
 
     def _reading(self, answer: Answer, began: float) -> Reading[float]:
         assert answer.value is not None
         if not self.observing.online:  # closed or lost while the answer was on its way
-            raise Stale(f"{self.who}: the connection was closed while weighing")
+            raise Stale("{device}: the connection was closed while weighing", device=self.who)
         self.observing.settled()
         # It counts as measured when it was asked for: the scale does not report when it measured.
         reading = Reading(answer.value, now(), began)
@@ -155,7 +165,12 @@ class MtSicsScale(LineDevice, Scale):
         reading = self._newest
         age = math.inf if reading is None else reading.age
         if reading is None or not age <= max_age:
-            raise Stale(f"{self.who}: the newest weight is older than {max_age:g} s", f"age {age:.3f} s")
+            raise Stale(
+                "{device}: the newest weight is older than {max_age:g} s",
+                f"age {age:.3f} s",
+                device=self.who,
+                max_age=max_age,
+            )
         return reading
 
     # -------------------------------------------------------------------------------- actions
@@ -175,7 +190,12 @@ class MtSicsScale(LineDevice, Scale):
         :param highest: kg
         """
         if not lowest <= highest:
-            raise OutOfRange(f"{self.who}: lowest must not be above highest: {lowest!r}, {highest!r}")
+            raise OutOfRange(
+                "{device}: lowest must not be above highest: {lowest!r}, {highest!r}",
+                device=self.who,
+                lowest=lowest,
+                highest=highest,
+            )
         return lowest <= self.weigh().value <= highest
 
     @action(deadline=DEADLINE)
@@ -198,7 +218,9 @@ class MtSicsScale(LineDevice, Scale):
             go_on = self.begin(name)
             before = self._ask("SI")
             if before.mark == "D":
-                raise Refused(f"{self.who}: {name} is refused while the load is in motion", "S D")
+                raise Refused(
+                    "{device}: {name} is refused while the load is in motion", "S D", device=self.who, name=name
+                )
             go_on()
             limit = self.line.answer_timeout + self._stable_timeout
             try:
@@ -211,7 +233,13 @@ class MtSicsScale(LineDevice, Scale):
                 raise
             if answer.mark != done:
                 why = {"I": "the load is in motion, or the scale is busy", "+": "too much load", "-": "too little load"}
-                raise Refused(f"{self.who}: {name} is refused: {why.get(answer.mark, answer.mark)}", answer.mark)
+                raise Refused(
+                    "{device}: {name} is refused: {mark}",
+                    answer.mark,
+                    device=self.who,
+                    name=name,
+                    mark=why.get(answer.mark, answer.mark),
+                )
             self._newest = None  # it refers to another zero
             self._tare = self._ask("TA").value
             self.set_alarm(TARE_LOST, False)
@@ -227,7 +255,14 @@ class MtSicsScale(LineDevice, Scale):
             if answer.command == wanted:
                 return answer
             if answer.command in sics.ERRORS:
-                raise DeviceFault(f"{self.who} {sics.ERRORS[answer.command]} {command}", answer.command, answer.command)
+                raise DeviceFault(
+                    "{device} {errors} {command}",
+                    answer.command,
+                    answer.command,
+                    device=self.who,
+                    errors=sics.ERRORS[answer.command],
+                    command=command,
+                )
             self._hello(answer)
         return None
 
@@ -248,7 +283,7 @@ class MtSicsScale(LineDevice, Scale):
     def _needs_tare(self) -> None:
         if self._tare_is_lost:
             text, remedy, _ = self.ALARMS[TARE_LOST]
-            raise Refused(f"{self.who}: {text}; {remedy}", TARE_LOST)
+            raise Refused("{device}: {text}; {remedy}", TARE_LOST, device=self.who, text=text, remedy=remedy)
 
     # -------------------------------------------------------------------------------- observing
     def greet(self, deadline: float) -> None:
@@ -285,4 +320,4 @@ class MtSicsScale(LineDevice, Scale):
     def _complaint(self, answer: Answer) -> DeviceFault:
         code = OVERLOAD if answer.mark == "+" else UNDERLOAD
         text, remedy, _ = self.ALARMS[code]
-        return DeviceFault(f"{self.who}: {text}; {remedy}", code, code)
+        return DeviceFault("{device}: {text}; {remedy}", code, code, device=self.who, text=text, remedy=remedy)

@@ -112,8 +112,10 @@ class Bus:
                 with contextlib.suppress(OSError, termios.error):
                     port.ser.close()
             raise NotConnected(
-                f"{self._name}: port {self._path} cannot be opened. Check the cable, and close other programs.",
+                "{name}: port {path} cannot be opened. Check the cable, and close other programs.",
                 str(e),
+                name=self._name,
+                path=self._path,
             ) from e
         self._port = port
         self.drain()
@@ -129,14 +131,16 @@ class Bus:
     def _exchange(self) -> Iterator[_Port]:
         port = self._port
         if port is None:
-            raise NotConnected(f"{self.who} is not connected")
+            raise NotConnected("{device} is not connected", device=self.who)
         port.begin()
         try:
             yield port
         except (OSError, termios.error) as e:
-            raise ConnectionLost(f"The port of {self.who} has disappeared. Check the cable.", str(e)) from e
+            raise ConnectionLost(
+                "The port of {device} has disappeared. Check the cable.", str(e), device=self.who
+            ) from e
         except (_Endless, IndexError) as e:
-            raise DeviceTimeout(f"{self.who}: the bytes received are not an answer.", "garbage") from e
+            raise DeviceTimeout("{device}: the bytes received are not an answer.", "garbage", device=self.who) from e
         finally:
             port.is_using = False
 
@@ -150,14 +154,24 @@ class Bus:
 
     def _check(self, number: int, result: int, error: int, what: str) -> None:
         if result == COMM_RX_TIMEOUT:
-            raise DeviceTimeout(f"{self.servo(number)} did not answer {what}. Check power and cable.")
+            raise DeviceTimeout(
+                "{servo} did not answer {what}. Check power and cable.", servo=self.servo(number), what=what
+            )
         if result == COMM_RX_CORRUPT:
-            raise DeviceTimeout(f"The answer of {self.servo(number)} to {what} was damaged.")
+            raise DeviceTimeout("The answer of {servo} to {what} was damaged.", servo=self.servo(number), what=what)
         if result != COMM_SUCCESS:
-            raise ConnectionLost(f"{what} could not be sent to {self.servo(number)}", f"result {result}")
+            raise ConnectionLost(
+                "{what} could not be sent to {servo}", f"result {result}", what=what, servo=self.servo(number)
+            )
         if error & ~ALERT:
             reason = STATUS_ERRORS.get(error & ~ALERT, f"error {error:#04x}")
-            raise Refused(f"{self.servo(number)} refuses {what}: {reason}", f"status error {error:#04x}")
+            raise Refused(
+                "{servo} refuses {what}: {reason}",
+                f"status error {error:#04x}",
+                servo=self.servo(number),
+                what=what,
+                reason=reason,
+            )
 
     def ping(self, number: int) -> int:
         """Return the model number of a servo. Raise DeviceTimeout, Refused, ConnectionLost."""
@@ -176,7 +190,10 @@ class Bus:
         found = (packet[PKT_LENGTH_L] | packet[PKT_LENGTH_H] << 8) - EMPTY
         if found != size:
             raise DeviceTimeout(
-                f"The answer of {self.servo(number)} to {what} belongs to another instruction.", f"{found} bytes"
+                "The answer of {servo} to {what} belongs to another instruction.",
+                f"{found} bytes",
+                servo=self.servo(number),
+                what=what,
             )
         return bytes(packet[PKT_DATA : PKT_DATA + size])
 

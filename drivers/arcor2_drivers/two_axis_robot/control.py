@@ -56,21 +56,25 @@ class Control:
         state = self._observer.fresh().value
         self.check_faults(state)
         if not state.standing:
-            raise NotInControl(f"{self.name} is being moved by hand or by another client. Wait until it stops.")
+            raise NotInControl(
+                "{name} is being moved by hand or by another client. Wait until it stops.", name=self.name
+            )
         for number, setup in zip(self._ids, self._observer.setups, strict=True):
             if setup.operating_mode != reg.POSITION_CONTROL:
                 raise Refused(
-                    f"{self._observer.bus.servo(number)} is in operating mode {setup.operating_mode}. "
-                    f"Set it to position control ({reg.POSITION_CONTROL})."
+                    "{servo} is in operating mode {operating_mode}. Set it to position control ({position_control}).",
+                    servo=self._observer.bus.servo(number),
+                    operating_mode=setup.operating_mode,
+                    position_control=reg.POSITION_CONTROL,
                 )
         losses = self._observer.losses
         self._observer.do(self._set_up)
         self._observer.do(self._enable)
         for number, servo in zip(self._ids, self._observer.fresh().value.servos, strict=True):
             if not servo.torque or servo.watchdog != self._watchdog():
-                raise Refused(f"{self._observer.bus.servo(number)} did not keep its watchdog and torque.")
+                raise Refused("{servo} did not keep its watchdog and torque.", servo=self._observer.bus.servo(number))
         if self._observer.losses != losses:
-            raise NotInControl(f"Control of {self.name} was lost while it was taken.")
+            raise NotInControl("Control of {name} was lost while it was taken.", name=self.name)
         self.ours = True
         self._observer.observing.settled()
 
@@ -135,13 +139,13 @@ class Control:
                 elif servo.watchdog != self._watchdog() or servo.torque == self.teaching:
                     self.drop(f"servo {number} was switched by another client, or lost its supply.")
         if not self.ours:
-            raise NotInControl(f"Control of {self.name} is not taken: {self._why_not}")
+            raise NotInControl("Control of {name} is not taken: {why_not}", name=self.name, why_not=self._why_not)
 
     def require_motion(self) -> None:
         """Raise what prevents motions: no control, or hand teaching."""
         self.require()
         if self.teaching:
-            raise Refused(f"{self.name} is in hand teaching mode.")
+            raise Refused("{name} is in hand teaching mode.", name=self.name)
 
     # -------------------------------------------------------------------------------- stopping
     def stop(self) -> None:
@@ -173,7 +177,11 @@ class Control:
         until = time.monotonic() + timeout
         while self.ours and not self._observer.fresh().value.standing:
             if time.monotonic() > until:
-                raise DeviceTimeout(f"{self.name} did not come to a standstill within {timeout:g} s of a stop.")
+                raise DeviceTimeout(
+                    "{name} did not come to a standstill within {timeout:g} s of a stop.",
+                    name=self.name,
+                    timeout=timeout,
+                )
             time.sleep(POLL)
 
     # -------------------------------------------------------------------------------- hand teaching
@@ -208,10 +216,12 @@ class Control:
     def acknowledge(self, code: str) -> None:
         """Raise Refused: only a named person can acknowledge a hardware error. Raise NotFound for an inactive alarm."""
         if code not in {alarm.code for alarm in self.alarms()}:
-            raise NotFound(f"{self.name} has no alarm {code}.")
+            raise NotFound("{name} has no alarm {code}.", name=self.name, code=code)
         raise Refused(
-            f"Alarm {code} of {self.name} must be acknowledged by the person who inspected the robot: "
-            "restart_safety(confirmed_by)."
+            "Alarm {code} of {name} must be acknowledged by the person who inspected the robot: "
+            "restart_safety(confirmed_by).",
+            code=code,
+            name=self.name,
         )
 
     def check_faults(self, state: State) -> None:
@@ -220,7 +230,12 @@ class Control:
             self.drop("a servo has a hardware error.")
             alarms = self.alarms()
             texts = "; ".join(f"{alarm.text} ({alarm.remedy})" for alarm in alarms)
-            raise DeviceFault(f"{self._observer.who}: {texts}", fault_code=",".join(alarm.code for alarm in alarms))
+            raise DeviceFault(
+                "{device}: {texts}",
+                fault_code=",".join(alarm.code for alarm in alarms),
+                device=self._observer.who,
+                texts=texts,
+            )
 
     def reboot(self, confirmed_by: str) -> None:
         """Reboot the servos with a hardware error."""
@@ -228,7 +243,7 @@ class Control:
         servos = self._observer.fresh().value.servos
         failed = [number for number, servo in zip(self._ids, servos, strict=True) if servo.hardware_error]
         if not failed:
-            raise Refused(f"{self.name} has no hardware error.")
+            raise Refused("{name} has no hardware error.", name=self.name)
         self.stops.request()
         self.drop("a servo was rebooted.")
 

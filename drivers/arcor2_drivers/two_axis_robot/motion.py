@@ -82,16 +82,20 @@ class Motion:
         x, y, z = local.position
         where = f"in its base: {x:.4f}, {y:.4f}, {z:.4f}"
         if not all(map(math.isfinite, (x, y, z))):
-            raise OutOfRange(f"{self._name}: the numbers of a pose must be finite.")
+            raise OutOfRange("{name}: the numbers of a pose must be finite.", name=self._name)
         upright = Position(0.0, 0.0, 1.0).rotated(local.orientation)
         if abs(z) > OUT_OF_PLANE or math.hypot(upright.x, upright.y) > math.sin(TILTED) or upright.z < 0.0:
-            raise Robot.KinematicsException(f"{self._name} moves in a plane; the pose is outside of it.", where)
+            raise Robot.KinematicsException(
+                "{name} moves in a plane; the pose is outside of it.", where, name=self._name
+            )
         solutions = kinematics.inverse(self._links, x, y)
         if not solutions:
-            raise Robot.KinematicsException(f"{self._name} cannot reach the pose.", where)
+            raise Robot.KinematicsException("{name} cannot reach the pose.", where, name=self._name)
         q = kinematics.nearest(solutions, seed, tuple(self.limits.values()))
         if q is None:
-            raise Robot.KinematicsException(f"{self._name} reaches the pose only beyond its joint limits.", where)
+            raise Robot.KinematicsException(
+                "{name} reaches the pose only beyond its joint limits.", where, name=self._name
+            )
         return q
 
     def solve_free(self, pose: Pose, seed: Angles) -> Angles:
@@ -167,14 +171,17 @@ class Motion:
     def _check_valid(self, what: str, guard: StopGuard) -> None:
         guard.check(f"{what} of {self._name}")
         if not self._control.ours:
-            raise Cancelled(f"{what} of {self._name} was stopped: control was lost.")
+            raise Cancelled("{what} of {name} was stopped: control was lost.", what=what, name=self._name)
 
     def _check_servo_limits(self, goals: tuple[int, int]) -> None:
         for number, goal, setup in zip(self._settings.ids, goals, self._observer.setups, strict=True):
             if not setup.min_position <= goal <= setup.max_position:
                 raise OutOfRange(
-                    f"{self._observer.bus.servo(number)} allows positions {setup.min_position} to "
-                    f"{setup.max_position}, not {goal}."
+                    "{servo} allows positions {min_position} to {max_position}, not {goal}.",
+                    servo=self._observer.bus.servo(number),
+                    min_position=setup.min_position,
+                    max_position=setup.max_position,
+                    goal=goal,
                 )
 
     def _check_accepted(self, goals: tuple[int, int], guard: StopGuard) -> None:
@@ -206,10 +213,14 @@ class Motion:
                 since, positions = now, (servos[0].position, servos[1].position)
             elif now - since > STANDING:
                 problem = f"{' and '.join(short)} of {self._name} stopped short of the goal."
-                raise DeviceFault(f"{problem} Remove what blocks the arm.", fault_code="short_of_goal")
+                raise DeviceFault("{problem} Remove what blocks the arm.", fault_code="short_of_goal", problem=problem)
             if now > budget:
                 self._control.stop()
-                raise DeviceTimeout(f"A move of {self._name} did not end within {budget:.1f} s. It was stopped.")
+                raise DeviceTimeout(
+                    "A move of {name} did not end within {budget:.1f} s. It was stopped.",
+                    name=self._name,
+                    budget=budget,
+                )
             time.sleep(POLL)
 
     def _record(self, speed: float, started: float, end: MoveEnd) -> MoveResult:
@@ -225,14 +236,16 @@ class Motion:
         """Move with a velocity that expires: the goals are where the servos stop afterwards."""
         within(f"{self._name}: valid_for", valid_for, 0.01, 1.0)
         if (twist is None) == (velocities is None):
-            raise OutOfRange(f"{self._name}: jog needs either twist or joint_velocities.")
+            raise OutOfRange("{name}: jog needs either twist or joint_velocities.", name=self._name)
         guard, until = self._control.stops.guard(), time.monotonic() + valid_for
         with self.exclusive():
             self._control.require_motion()
             state = self._observer.current().value
             rates = self._rates(twist, frame, self._angles(state)) if twist is not None else list(velocities or ())
             if len(rates) != len(JOINTS):
-                raise OutOfRange(f"{self._name}: joint_velocities must have {len(JOINTS)} numbers.")
+                raise OutOfRange(
+                    "{name}: joint_velocities must have {count} numbers.", name=self._name, count=len(JOINTS)
+                )
             top, blocks = self._settings.max_joint_speed, {}
             for joint, rate in enumerate(rates):
                 within(f"{self._name}: velocity of {JOINTS[joint]}", rate, -top, top)
@@ -241,7 +254,11 @@ class Motion:
             def command(bus: Bus) -> None:
                 self._check_valid("A jog", guard)
                 if time.monotonic() >= until:
-                    raise Cancelled(f"A jog of {self._name} was sent too late; it was valid for {valid_for:g} s.")
+                    raise Cancelled(
+                        "A jog of {name} was sent too late; it was valid for {valid_for:g} s.",
+                        name=self._name,
+                        valid_for=valid_for,
+                    )
                 bus.sync_write(GOALS, blocks)
 
             self._observer.do(command)
@@ -267,11 +284,13 @@ class Motion:
             "tool": Orientation.from_rotation_vector(0.0, 0.0, heading),
         }.get(frame)
         if axes is None:
-            raise Refused(f"{self._name} has no frame {frame!r} for jogging; use world, base or tool.")
+            raise Refused(
+                "{name} has no frame {frame!r} for jogging; use world, base or tool.", name=self._name, frame=frame
+            )
         x, y, z = Position(*twist[:3]).rotated(axes)
         if abs(z) > STILL or any(abs(part) > STILL for part in twist[3:]):
-            raise Refused(f"{self._name} moves in a plane, and cannot rotate its tool separately.")
+            raise Refused("{name} moves in a plane, and cannot rotate its tool separately.", name=self._name)
         rates = kinematics.rates(self._links, q, x, y)
         if rates is None:
-            raise Refused(f"{self._name} is stretched or folded. Jog its joints instead.")
+            raise Refused("{name} is stretched or folded. Jog its joints instead.", name=self._name)
         return list(rates)

@@ -65,7 +65,9 @@ class Observer(StateObserver[State]):
             return future.result(timeout)
         except TimeoutError:
             future.cancel()
-            raise DeviceTimeout(f"{self.who} did not execute a command within {timeout:g} s.") from None
+            raise DeviceTimeout(
+                "{device} did not execute a command within {timeout:g} s.", device=self.who, timeout=timeout
+            ) from None
 
     def end_keep_alive(self) -> None:
         """End the child process, so that only reading keeps the watchdog from tripping."""
@@ -88,7 +90,9 @@ class Observer(StateObserver[State]):
             self.bus.again(partial(self.bus.ping, number))
             setups.append(decode_setup(self.bus.again(partial(self.bus.read, number, EEPROM))))
             if time.monotonic() > deadline:
-                raise DeviceTimeout(f"{self.who} could not be opened within {timeout:g} s.")
+                raise DeviceTimeout(
+                    "{device} could not be opened within {timeout:g} s.", device=self.who, timeout=timeout
+                )
         self.setups = tuple(setups)
         return Snapshot.by(lambda: self._read()[0])
 
@@ -112,7 +116,9 @@ class Observer(StateObserver[State]):
         while self._jobs:
             future, _ = self._jobs.popleft()
             if future.set_running_or_notify_cancel():
-                future.set_exception(ConnectionLost(f"The connection to {self.who} was lost. Nothing was sent."))
+                future.set_exception(
+                    ConnectionLost("The connection to {device} was lost. Nothing was sent.", device=self.who)
+                )
 
     def _execute(self, future: Future[Any], job: Callable[[Bus], Any]) -> None:
         if not future.set_running_or_notify_cancel():

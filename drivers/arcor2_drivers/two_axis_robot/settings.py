@@ -63,14 +63,22 @@ class TwoAxisRobotSettings(Settings):
         super().__post_init__()
         check_serial_port("port", self.port, sockets=False)
         if self.baud_rate not in BAUD_RATES:
-            raise OutOfRange(f"baud_rate must be one of {', '.join(map(str, BAUD_RATES))}, not {self.baud_rate!r}")
+            raise OutOfRange(
+                "baud_rate must be one of {baud_rates}, not {baud_rate!r}",
+                baud_rates=", ".join(map(str, BAUD_RATES)),
+                baud_rate=self.baud_rate,
+            )
         for joint in (1, 2):
             if getattr(self, f"direction_{joint}") not in (1, -1):
-                raise OutOfRange(f"direction_{joint} must be 1 or -1, not {getattr(self, f'direction_{joint}')!r}")
+                raise OutOfRange(
+                    "direction_{joint} must be 1 or -1, not {value!r}",
+                    joint=joint,
+                    value=getattr(self, f"direction_{joint}"),
+                )
             if getattr(self, f"lower_{joint}") >= getattr(self, f"upper_{joint}"):
-                raise OutOfRange(f"lower_{joint} must be below upper_{joint}")
+                raise OutOfRange("lower_{joint} must be below upper_{joint}", joint=joint)
         if self.id_1 == self.id_2:
-            raise OutOfRange(f"id_2 must differ from id_1, which is {self.id_1}")
+            raise OutOfRange("id_2 must differ from id_1, which is {id_1}", id_1=self.id_1)
 
     @property
     def ids(self) -> tuple[int, int]:

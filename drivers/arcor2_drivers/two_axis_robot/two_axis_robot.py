@@ -194,7 +194,7 @@ class TwoAxisRobot(Connected, Robot):
         guard = self._control.stops.guard()
         check_end_effector(self.name, end_effector_id)
         if linear:
-            raise Refused(f"{self.name} cannot move in a straight line. Use a joint move (linear=false).")
+            raise Refused("{name} cannot move in a straight line. Use a joint move (linear=false).", name=self.name)
         present = self._motion.present()
         if safe:
             self._motion.go_around(self._motion.solve_free(target_pose, present), speed, guard)

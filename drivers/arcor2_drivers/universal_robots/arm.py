@@ -41,7 +41,7 @@ class Arm:
         """Return a pose in the world as the controller expects it. Raise OutOfRange unless it is finite."""
         vector = to_vector(self.base.inverted() * pose)
         if not all(map(math.isfinite, vector)):
-            raise OutOfRange(f"{self.name}: the numbers of a pose must be finite.")
+            raise OutOfRange("{name}: the numbers of a pose must be finite.", name=self.name)
         return vector
 
     def joint_values(self, joints: list[Joint]) -> list[float]:

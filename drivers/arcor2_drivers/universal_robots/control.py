@@ -72,21 +72,34 @@ class Control:
         control, _ = self._pendant.state(max_age=0.0)
         safety = safety_of(sample.safety_mode)
         if safety not in MAY_MOVE:
-            raise SafetyStop(f"{name} cannot be controlled: {label(safety)}", REMEDIES.get(safety, ""), safety.value)
+            raise SafetyStop(
+                "{name} cannot be controlled: {safety}",
+                REMEDIES.get(safety, ""),
+                safety.value,
+                name=name,
+                safety=label(safety),
+            )
         if control is ControlMode.LOCAL:
-            raise NotInControl(f"{name} is in local control. Select remote control at the pendant.", observer.address)
+            raise NotInControl(
+                "{name} is in local control. Select remote control at the pendant.", observer.address, name=name
+            )
         if program_plays(sample.runtime):
             program = self._pendant.program()
-            raise NotInControl(f"{program} plays on {name}. Stop it before taking control.", observer.address)
+            raise NotInControl(
+                "{program} plays on {name}. Stop it before taking control.",
+                observer.address,
+                program=program,
+                name=name,
+            )
         if missing := self.obstacles(sample, control):
-            raise Refused(f"{name} cannot be controlled: {', '.join(missing)}")
+            raise Refused("{name} cannot be controlled: {missing}", name=name, missing=", ".join(missing))
         session = ControlSession(observer, self.uses_upper_registers(), self._arm.settings.watchdog_frequency)
         session.open(TAKE_TIMEOUT, self._pendant.available)
         try:
             self.send_tool(session, tool)
             self._await_samples()
         except BaseException:
-            session.end(NotInControl(f"Control of {name} was not taken."))
+            session.end(NotInControl("Control of {name} was not taken.", name=name))
             raise
         self.teaching = self._retake = False
         self.session = session
@@ -102,12 +115,12 @@ class Control:
             self.stops.request()
             with contextlib.suppress(DeviceError):
                 session.stop_motion(self._arm.settings.stop_deceleration)
-        session.release(NotInControl(f"Control of {self._arm.name} was released."), 0.4)
+        session.release(NotInControl("Control of {name} was released.", name=self._arm.name), 0.4)
 
     def revoke(self, why: str) -> None:
         """End the session and stop the program, so that an old motion cannot continue."""
         if self.session is not None:
-            self.session.end(NotInControl(f"Control of {self._arm.name} ended: {why}."))
+            self.session.end(NotInControl("Control of {name} ended: {reason}.", name=self._arm.name, reason=why))
         self._retake = False
         self._pendant.do("stop", "Stopped")
 
@@ -135,7 +148,7 @@ class Control:
             return self.session
         self._observer.observing.check()
         why = f": {session.ended}" if session is not None else ". Take control first."
-        raise NotInControl(f"Control of {self._arm.name} is not taken{why}")
+        raise NotInControl("Control of {name} is not taken{reason}", name=self._arm.name, reason=why)
 
     def obstacles(self, sample: Sample, control: ControlMode) -> list[str]:
         """Return what prevents the arm from accepting commands."""
@@ -168,7 +181,7 @@ class Control:
     def tool(self) -> Tool:
         """Return the tool. Raise Refused if its mass is not set."""
         if self.stated_tool.mass < 0.0:
-            raise Refused(f"{self._arm.name}: payload_mass is not set. Enter the mass at the flange first.")
+            raise Refused("{name}: payload_mass is not set. Enter the mass at the flange first.", name=self._arm.name)
         return self.stated_tool
 
     def set_tool(
@@ -181,11 +194,11 @@ class Control:
             arm.within(f"cog {axis}", value, -1.0, 1.0)
         if inertia is not None:
             if len(inertia) != 6:
-                raise OutOfRange(f"{arm.name}: inertia must be six numbers: Ixx, Iyy, Izz, Ixy, Ixz, Iyz.")
+                raise OutOfRange("{name}: inertia must be six numbers: Ixx, Iyy, Izz, Ixy, Ixz, Iyz.", name=arm.name)
             for value in inertia:
                 arm.within("inertia", value, -MAX_INERTIA, MAX_INERTIA)
             if self._observer.version[:2] < INERTIA_FROM:
-                raise Refused(f"{arm.name}: the controller accepts an inertia only from version 5.10 on.")
+                raise Refused("{name}: the controller accepts an inertia only from version 5.10 on.", name=arm.name)
         tool = Tool(tcp, mass, cog, inertia)
         self.send_tool(self.current(), tool)
         self.stated_tool = tool

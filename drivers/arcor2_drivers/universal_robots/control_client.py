@@ -94,6 +94,8 @@ class ControlClient:
         if future is None:
             return
         if "error" in answer:
-            future.set_exception(DeviceFault(f"The control interface of {self._who} failed.", answer["error"]))
+            future.set_exception(
+                DeviceFault("The control interface of {device} failed.", answer["error"], device=self._who)
+            )
         else:
             future.set_result(answer["data"])

@@ -78,16 +78,28 @@ class Dashboard:
                 return self._line(deadline)
             except TimeoutError:
                 self._shut()
-                raise DeviceTimeout(f"Dashboard {self.address} did not answer {command!r} in {timeout:g} s.") from None
+                raise DeviceTimeout(
+                    "Dashboard {address} did not answer {command!r} in {timeout:g} s.",
+                    address=self.address,
+                    command=command,
+                    timeout=timeout,
+                ) from None
             except OSError as e:
                 self._shut()
-                raise ConnectionLost(f"Dashboard {self.address} closed the connection.", f"{command!r}: {e}") from e
+                raise ConnectionLost(
+                    "Dashboard {address} closed the connection.", f"{command!r}: {e}", address=self.address
+                ) from e
 
     def do(self, command: str, expected: str, timeout: float = 1.0) -> None:
         """Send a command. Raise Refused, with the controller's text, for an answer other than `expected`."""
         answer = self.ask(command, timeout)
         if not answer.startswith(expected):
-            raise Refused(f"The controller refuses {command!r}: {answer}", f"dashboard {self.address}")
+            raise Refused(
+                "The controller refuses {command!r}: {answer}",
+                f"dashboard {self.address}",
+                command=command,
+                answer=answer,
+            )
 
     def close(self) -> None:
         """Close the connection; a command in progress on another thread fails."""
@@ -101,7 +113,7 @@ class Dashboard:
     @contextlib.contextmanager
     def _locked(self, deadline: float) -> Iterator[None]:
         if not self._lock.acquire(timeout=max(deadline - time.monotonic(), 0.0)):
-            raise DeviceTimeout(f"Dashboard {self.address} is busy with another command.")
+            raise DeviceTimeout("Dashboard {address} is busy with another command.", address=self.address)
         try:
             yield
         finally:
@@ -116,10 +128,10 @@ class Dashboard:
             self._line(deadline)  # the greeting
         except TimeoutError:
             self._shut()
-            raise DeviceTimeout(f"Dashboard {self.address} does not answer.") from None
+            raise DeviceTimeout("Dashboard {address} does not answer.", address=self.address) from None
         except OSError as e:
             self._shut()
-            raise NotConnected(f"No dashboard server at {self.address}.", str(e)) from e
+            raise NotConnected("No dashboard server at {address}.", str(e), address=self.address) from e
         return self._socket
 
     def _is_idle(self, opened: socket.socket) -> bool:

@@ -86,7 +86,13 @@ class DigitalIO:
             return self.get_digital_input(number) is value
 
         if not once_within(timeout, seen):
-            raise DeviceTimeout(f"Input {number} of {self.name} was not {'on' if value else 'off'} in {timeout:g} s.")
+            raise DeviceTimeout(
+                "Input {number} of {name} was not {value} in {timeout:g} s.",
+                number=number,
+                name=self.name,
+                value="on" if value else "off",
+                timeout=timeout,
+            )
 
     def points(self) -> list[IOPoint]:
         """Return the digital inputs and outputs by their names at the pendant; outputs hold on connection loss."""
@@ -101,22 +107,37 @@ class DigitalIO:
     def write(self, name: str, value: bool | float) -> None:
         """Switch an output, from any thread, also during a motion. Raise OutOfRange, Refused or NotInControl."""
         if self._point(name).direction is PointDirection.INPUT:
-            raise Refused(f"{name} of {self.name} is an input.")
+            raise Refused("{name} of {owner} is an input.", name=name, owner=self.name)
         self._switch(NUMBERS[name], bool(value))
 
     def _point(self, name: str) -> IOPoint:
         if name not in POINTS:
-            raise OutOfRange(f"{self.name} has no point {name!r}. Its points are {', '.join(POINTS)}.")
+            raise OutOfRange(
+                "{name} has no point {other_name!r}. Its points are {points}.",
+                name=self.name,
+                other_name=name,
+                points=", ".join(POINTS),
+            )
         return POINTS[name]
 
     def _switch(self, output: int, value: bool) -> None:
         """Switch an output and wait until the controller reports it."""
         if not 0 <= output < OUTPUTS:
-            raise OutOfRange(f"{self.name}: output must be 0 to {OUTPUTS - 1}, not {output}")
+            raise OutOfRange(
+                "{name}: output must be 0 to {outputs}, not {output}",
+                name=self.name,
+                outputs=OUTPUTS - 1,
+                output=output,
+            )
         self._control.current().set_output(output, value)
         self._on_switched(output, value)
         if not once_within(OUTPUT_WITHIN, lambda: bool(self._observer.sample().outputs >> output & 1) is value):
-            raise DeviceFault(f"Output {output} of {self.name} did not switch {'on' if value else 'off'}.")
+            raise DeviceFault(
+                "Output {output} of {name} did not switch {value}.",
+                output=output,
+                name=self.name,
+                value="on" if value else "off",
+            )
 
     def _on_switched(self, output: int, value: bool) -> None:
         """Handle a switched output."""

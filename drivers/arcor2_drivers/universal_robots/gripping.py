@@ -47,7 +47,9 @@ class DigitalGripper(HoldsParts, DigitalIO):
         self._motion.to_pose(above, True, slow_speed, 0.5, guard)
         if not held:
             self._switch(output, False)
-            raise DeviceFault(f"{self.name} picked nothing.", f"input {self._ur.part_sensor_input}", NOTHING_HELD)
+            raise DeviceFault(
+                "{name} picked nothing.", f"input {self._ur.part_sensor_input}", NOTHING_HELD, name=self.name
+            )
         self._check_part_held("on the way up")
 
     @action
@@ -72,11 +74,11 @@ class DigitalGripper(HoldsParts, DigitalIO):
         released = self._await_part(False, guard)
         self._motion.to_pose(above, True, slow_speed, 0.5, guard)
         if not released:
-            raise DeviceFault(f"The part sticks to the gripper of {self.name}.", fault_code=PART_STICKS)
+            raise DeviceFault("The part sticks to the gripper of {name}.", fault_code=PART_STICKS, name=self.name)
 
     def _gripper_output(self) -> int:
         if self._ur.gripper_output < 0:
-            raise Refused(f"{self.name} has no gripper: gripper_output is not set.")
+            raise Refused("{name} has no gripper: gripper_output is not set.", name=self.name)
         return self._ur.gripper_output
 
     def _part_sensed(self) -> bool | None:
@@ -96,7 +98,7 @@ class DigitalGripper(HoldsParts, DigitalIO):
     def _check_part_held(self, when: str) -> None:
         if self._part_sensed() is False:
             self.detach_part()
-            raise DeviceFault(f"{self.name} lost the part {when}.", fault_code=PART_LOST)
+            raise DeviceFault("{name} lost the part {when}.", fault_code=PART_LOST, name=self.name, when=when)
 
     def _on_switched(self, output: int, value: bool) -> None:
         if output == self._ur.gripper_output and not value:

@@ -26,7 +26,7 @@ class Jog:
         arm, settings, guard = self._arm, self._arm.settings, self._control.stops.guard()
         arm.within("valid_for", valid_for, 0.01, 1.0)
         if (twist is None) == (velocities is None):
-            raise OutOfRange(f"{arm.name}: jog needs either twist or joint_velocities.")
+            raise OutOfRange("{name}: jog needs either twist or joint_velocities.", name=arm.name)
         with self._motion.exclusive():
             session = self._control.current()
             if twist is not None:
@@ -37,7 +37,9 @@ class Jog:
             else:
                 command, values, ramp = "speedJ", list(velocities or ()), settings.joint_acceleration
                 if len(values) != len(JOINTS):
-                    raise OutOfRange(f"{arm.name}: joint_velocities must have {len(JOINTS)} numbers.")
+                    raise OutOfRange(
+                        "{name}: joint_velocities must have {count} numbers.", name=arm.name, count=len(JOINTS)
+                    )
                 limit = self._motion.joint_speed(1.0)
                 for name, value in zip(JOINTS, values, strict=True):
                     arm.within(f"velocity of {name}", value, -limit, limit)
@@ -52,6 +54,8 @@ class Jog:
             "tool": Orientation.from_rotation_vector(*self._observer.sample().tcp[3:]),
         }.get(frame)
         if orientation is None:
-            raise Refused(f"{self._arm.name} cannot be jogged in frame {frame!r}; use world, base or tool.")
+            raise Refused(
+                "{name} cannot be jogged in frame {frame!r}; use world, base or tool.", name=self._arm.name, frame=frame
+            )
         x, y, z, rx, ry, rz = twist
         return rotated((x, y, z), orientation), rotated((rx, ry, rz), orientation)

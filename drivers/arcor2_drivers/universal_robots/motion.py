@@ -75,7 +75,7 @@ class Motion:
     def check_not_teaching(self) -> None:
         """Raise Refused in hand teaching mode."""
         if self._control.teaching:
-            raise Refused(f"{self._arm.name} is in hand teaching mode.")
+            raise Refused("{name} is in hand teaching mode.", name=self._arm.name)
 
     # -------------------------------------------------------------------------------- moving
     def to_pose(self, target: Pose, linear: bool, speed: float, acceleration: float, guard: StopGuard) -> MoveResult:
@@ -169,11 +169,11 @@ class Motion:
             if sample.moving or running or standing is None:
                 standing = sample.timestamp
             elif sample.timestamp - standing > STANDING:
-                raise DeviceFault(f"{what} ended before its target.")
+                raise DeviceFault("{what} ended before its target.", what=what)
             if clock.exceeded(sample):
                 self._control.stops.request()
                 session.stop_motion(self._arm.settings.stop_deceleration)
-                raise DeviceTimeout(f"{what} did not end within the computed time. It was stopped.")
+                raise DeviceTimeout("{what} did not end within the computed time. It was stopped.", what=what)
             time.sleep(POLL)
 
     # -------------------------------------------------------------------------------- stopping
@@ -184,7 +184,11 @@ class Motion:
         if session is None or session.ended is not None:
             newest = self._observer.newest()
             if newest is not None and newest.moving and program_plays(newest.runtime):
-                raise NotInControl(f"{self._arm.name} is being moved by {self._pendant.program()}. Stop it there.")
+                raise NotInControl(
+                    "{name} is being moved by {program}. Stop it there.",
+                    name=self._arm.name,
+                    program=self._pendant.program(),
+                )
             return
         session.stop_motion(self._arm.settings.stop_deceleration)
         if self._control.teaching and session.ended is None:
@@ -207,7 +211,7 @@ class Motion:
             now = time.monotonic()
             if now > until:
                 problem = f"{self._arm.name} did not come to a standstill within {REST_WITHIN:g} s of a stop."
-                raise DeviceTimeout(f"{problem} Press the emergency stop.")
+                raise DeviceTimeout("{problem} Press the emergency stop.", problem=problem)
             if now > dashboard_at and session.ended is None:
                 session.stop_by_dashboard()
             time.sleep(POLL)
@@ -222,7 +226,7 @@ class Motion:
         if len(q) != len(JOINTS) or not all(map(math.isfinite, q)):
             position = ", ".join(f"{value:.3f}" for value in vector[:3])
             raise Robot.KinematicsException(
-                f"{self._arm.name} cannot reach the pose.", f"in the controller's base: {position}"
+                "{name} cannot reach the pose.", f"in the controller's base: {position}", name=self._arm.name
             )
         return q
 

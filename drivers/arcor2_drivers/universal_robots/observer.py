@@ -127,13 +127,18 @@ class Observer:
             self.observing.check()
             newest = self.newest()  # it may have arrived, and the connection come back, since the first check
             if newest is None:
-                raise NotConnected(f"{self.who} has sent no sample yet.")
+                raise NotConnected("{device} has sent no sample yet.", device=self.who)
             if newest.age <= max_age:
                 return newest
             if clock() > FRESH_WITHIN:
                 break
             time.sleep(self.period)
-        raise Stale(f"The latest sample of {self.who} is {newest.age:.2f} s old; at most {max_age:g} s is allowed.")
+        raise Stale(
+            "The latest sample of {device} is {age:.2f} s old; at most {max_age:g} s is allowed.",
+            device=self.who,
+            age=newest.age,
+            max_age=max_age,
+        )
 
     # -------------------------------------------------------------------------------- on the observing thread
     def _open(self, timeout: float) -> None:
@@ -148,7 +153,7 @@ class Observer:
         while not self.ring:
             left = deadline - time.monotonic()
             if left <= 0.0:
-                raise DeviceTimeout(f"{self.who} sends no samples.")
+                raise DeviceTimeout("{device} sends no samples.", device=self.who)
             self._receive(stream, left)
 
     def _close(self) -> None:
@@ -163,7 +168,7 @@ class Observer:
         while not stopping.is_set():
             empty = 0 if self._receive(stream, READ_WAIT) else empty + 1
             if empty * READ_WAIT >= STALLED:
-                raise ConnectionLost(f"{self.who} has sent nothing for {STALLED:g} s.")
+                raise ConnectionLost("{device} has sent nothing for {stalled:g} s.", device=self.who, stalled=STALLED)
 
     def _receive(self, stream: RtdeStream, wait: float) -> bool:
         """Store the samples that have arrived; return False if there are none."""

@@ -50,7 +50,7 @@ class Paths:
         """Move along a direction of the world until the force against it is reached. Raise DeviceFault if it is not."""
         arm, length = self._arm, math.hypot(*direction)
         if len(direction) != 3 or not math.isfinite(length) or length < 1e-9:
-            raise OutOfRange(f"{arm.name}: direction must be three numbers, not all zero.")
+            raise OutOfRange("{name}: direction must be three numbers, not all zero.", name=arm.name)
         arm.within("force", force, *FORCE_LIMITS)
         arm.within("max_distance", max_distance, 0.001, MAX_CONTACT_DISTANCE)
         here = arm.tcp(self._observer.sample())
@@ -68,7 +68,13 @@ class Paths:
         self._arm.within("force", force, *FORCE_LIMITS)
         result, state = self._guarded_line(target, speed, Limit(force))
         if state is RunState.PUSHED:
-            raise DeviceFault(f"A force of {force:g} N stopped {self._arm.name}.", "before its target", FORCE_LIMIT)
+            raise DeviceFault(
+                "A force of {force:g} N stopped {name}.",
+                "before its target",
+                FORCE_LIMIT,
+                force=force,
+                name=self._arm.name,
+            )
         return result
 
     def _guarded_line(self, target: Pose, speed: float, limit: Limit) -> tuple[MoveResult, RunState]:
@@ -96,7 +102,12 @@ class Paths:
         arm.check_speed(speed)
         arm.within("blend", blend, 0.0, MAX_BLEND)
         if not 1 <= len(waypoints) <= MAX_WAYPOINTS:
-            raise OutOfRange(f"{arm.name}: a path has 1 to {MAX_WAYPOINTS} waypoints, not {len(waypoints)}.")
+            raise OutOfRange(
+                "{name}: a path has 1 to {max_waypoints} waypoints, not {count}.",
+                name=arm.name,
+                max_waypoints=MAX_WAYPOINTS,
+                count=len(waypoints),
+            )
         vectors = [arm.vector(pose) for pose in waypoints]
         with motion.exclusive():
             session, start = self._control.current(), self._observer.sample()
@@ -126,8 +137,10 @@ class Paths:
             distance = math.dist(a[:3], b[:3])
             if len(points) > 2 and blend > 0.0 and blend >= distance / 2.0:
                 raise OutOfRange(
-                    f"{self._arm.name}: blend must be less than half the distance of {distance:.3f} m "
-                    f"to waypoint {number}."
+                    "{name}: blend must be less than half the distance of {distance:.3f} m to waypoint {number}.",
+                    name=self._arm.name,
+                    distance=distance,
+                    number=number,
                 )
 
     # -------------------------------------------------------------------------------- the run of a motion program
@@ -152,9 +165,9 @@ class Paths:
         session.resume()
         self._control.send_tool(session, tool)
         if state is RunState.STOPPED:
-            raise Cancelled(f"{what} was stopped.")
+            raise Cancelled("{what} was stopped.", what=what)
         if state is RunState.ARRIVED and not arrived:
-            raise DeviceFault(f"{what} ended before its target.")
+            raise DeviceFault("{what} ended before its target.", what=what)
         assert self._motion.last is not None
         return self._motion.last, state
 
@@ -179,10 +192,12 @@ class Paths:
             if ours and state in ENDED and not plays and not sample.moving:
                 if timed_out:
                     session.resume()
-                    raise DeviceTimeout(f"{what} did not end within the computed time. It was stopped.")
+                    raise DeviceTimeout("{what} did not end within the computed time. It was stopped.", what=what)
                 return RunState(state)
             if not ours and now - started > STARTS_WITHIN:
-                error = DeviceFault(f"The controller of {self._arm.name} did not start the program of {what}.")
+                error = DeviceFault(
+                    "The controller of {name} did not start the program of {what}.", name=self._arm.name, what=what
+                )
                 session.end(error)
                 raise error
             if plays or not ours or gone_since is None:

@@ -84,7 +84,11 @@ class Pendant:
     def do(self, command: str, expected: str) -> None:
         """Give a command. Raise Refused without a dashboard server, NotInControl in local control."""
         if not self.available:
-            raise Refused(f"{self.name} has no dashboard server. Use the pendant for {command!r}.")
+            raise Refused(
+                "{name} has no dashboard server. Use the pendant for {command!r}.", name=self.name, command=command
+            )
         if self.state(max_age=0.0)[0] is Control.LOCAL:
-            raise NotInControl(f"{self.name} is in local control. Use the pendant for {command!r}.")
+            raise NotInControl(
+                "{name} is in local control. Use the pendant for {command!r}.", name=self.name, command=command
+            )
         self.dashboard.do(command, expected)

@@ -78,12 +78,14 @@ def read_calibration(host: str, timeout: float = TIMEOUT, port: int = PORT) -> K
                 if kind == _STATE and (found := calibration_in(content)) is not None:
                     return found
     except TimeoutError:
-        raise DeviceTimeout(f"UR controller {address} sent no kinematics within {timeout:g} s.") from None
+        raise DeviceTimeout(
+            "UR controller {address} sent no kinematics within {timeout:g} s.", address=address, timeout=timeout
+        ) from None
     except ConnectionRefusedError as e:
-        raise NotConnected(f"No UR controller at {address}.", str(e)) from e
+        raise NotConnected("No UR controller at {address}.", str(e), address=address) from e
     except (OSError, ValueError) as e:
-        raise ConnectionLost(f"UR controller {address} broke the exchange off.", str(e)) from e
-    raise ConnectionLost(f"UR controller {address} closed the connection.")
+        raise ConnectionLost("UR controller {address} broke the exchange off.", str(e), address=address) from e
+    raise ConnectionLost("UR controller {address} closed the connection.", address=address)
 
 
 def _messages(opened: socket.socket, deadline: float) -> Iterator[tuple[int, bytes]]:

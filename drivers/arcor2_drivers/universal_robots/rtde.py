@@ -64,7 +64,7 @@ def recipe(names: list[str], payload: bytes) -> tuple[int, struct.Struct]:
     types = payload[1:].decode("ascii", "replace").rstrip(",").split(",")
     missing = [name for name, kind in zip(names, types, strict=False) if kind == "NOT_FOUND"]
     if missing:
-        raise DeviceFault(f"The controller does not have {', '.join(missing)}.", ", ".join(types))
+        raise DeviceFault("The controller does not have {missing}.", ", ".join(types), missing=", ".join(missing))
     if len(types) != len(names) or not set(types) <= _FORMATS.keys():
         raise ValueError(f"a recipe of {', '.join(types)}")
     return payload[0], struct.Struct(">" + "".join(_FORMATS[kind] for kind in types))
@@ -96,11 +96,15 @@ class RtdeStream:
         try:
             opened = socket.create_connection((host, port), timeout)
         except TimeoutError:
-            raise DeviceTimeout(f"UR controller {address} cannot be reached within {timeout:g} s.") from None
+            raise DeviceTimeout(
+                "UR controller {address} cannot be reached within {timeout:g} s.", address=address, timeout=timeout
+            ) from None
         except ConnectionResetError as e:  # the port is open: a reset may overtake the acceptance
-            raise ConnectionLost(f"UR controller {address} broke the exchange off.", str(e)) from e
+            raise ConnectionLost("UR controller {address} broke the exchange off.", str(e), address=address) from e
         except OSError as e:
-            raise NotConnected(f"No UR controller at {address}: {e.strerror or e}.", str(e)) from e
+            raise NotConnected(
+                "No UR controller at {address}: {reason}.", str(e), address=address, reason=e.strerror or e
+            ) from e
         stream = cls(host, port, opened)
         try:
             opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -108,9 +112,11 @@ class RtdeStream:
         except BaseException as e:
             stream.close()
             if isinstance(e, TimeoutError):
-                raise DeviceTimeout(f"UR controller {address} did not answer within {timeout:g} s.") from None
+                raise DeviceTimeout(
+                    "UR controller {address} did not answer within {timeout:g} s.", address=address, timeout=timeout
+                ) from None
             if isinstance(e, (OSError, ValueError, struct.error)):
-                raise ConnectionLost(f"UR controller {address} broke the exchange off.", str(e)) from e
+                raise ConnectionLost("UR controller {address} broke the exchange off.", str(e), address=address) from e
             raise
         return stream
 
@@ -127,14 +133,18 @@ class RtdeStream:
         except TimeoutError:
             return []
         except OSError as e:
-            raise ConnectionLost(f"The connection to UR controller {self.address} broke.", str(e)) from e
+            raise ConnectionLost(
+                "The connection to UR controller {address} broke.", str(e), address=self.address
+            ) from e
         if not data:
-            raise ConnectionLost(f"UR controller {self.address} closed the connection.")
+            raise ConnectionLost("UR controller {address} closed the connection.", address=self.address)
         try:
             found, self._buffer = frames(self._buffer + data if self._buffer else data)
             return [self._layout.unpack(f[1:]) for kind, f in found if kind == _DATA and f[0] == self._number]
         except (ValueError, IndexError, struct.error) as e:
-            raise ConnectionLost(f"UR controller {self.address} sends data that is not RTDE.", str(e)) from e
+            raise ConnectionLost(
+                "UR controller {address} sends data that is not RTDE.", str(e), address=self.address
+            ) from e
 
     def close(self) -> None:
         """Close the connection, if it is open."""

@@ -78,7 +78,9 @@ class SafeMotion:
         near = [joint.value for joint in self.moves.inverse(TCP, pose, joints)]
         found = named_joints(JOINTS, self._motion.solve(self._control.current(), self._arm.vector(pose), near))
         if hit := self.moves.contacts(found):
-            raise Robot.KinematicsException(f"{self._arm.name} reaches the pose only in collision: {hit[0]}")
+            raise Robot.KinematicsException(
+                "{name} reaches the pose only in collision: {hit}", name=self._arm.name, hit=hit[0]
+            )
         return found
 
     def _rod(self) -> Tool | None:

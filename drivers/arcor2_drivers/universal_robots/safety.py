@@ -49,10 +49,12 @@ class SafetySystem:
     def acknowledge(self, code: str) -> None:
         """Raise Refused: only a named person can acknowledge a safety stop. Raise NotFound for an inactive alarm."""
         if code not in {alarm.code for alarm in self.alarms()}:
-            raise NotFound(f"{self._name} has no alarm {code}.")
+            raise NotFound("{name} has no alarm {code}.", name=self._name, code=code)
         raise Refused(
-            f"{code} of {self._name} must be acknowledged by the person who inspected the robot: "
-            "acknowledge_protective_stop(confirmed_by)."
+            "{code} of {name} must be acknowledged by the person who inspected the robot: "
+            "acknowledge_protective_stop(confirmed_by).",
+            code=code,
+            name=self._name,
         )
 
     def power_on(self) -> None:
@@ -68,7 +70,7 @@ class SafetySystem:
         if mode == MODE_RUNNING:
             return
         if mode < MODE_IDLE:
-            raise Refused(f"{self._name} has no power. Switch it on before releasing the brakes.")
+            raise Refused("{name} has no power. Switch it on before releasing the brakes.", name=self._name)
         self._pendant.do("brake release", "Brake releasing")
         self._await("release its brakes", lambda sample: sample.robot_mode == MODE_RUNNING, BRAKES_WITHIN)
 
@@ -76,7 +78,7 @@ class SafetySystem:
         """Unlock a protective stop, after stopping the old program."""
         check_confirmed(confirmed_by)
         if self._safety() is not Safety.PROTECTIVE_STOP:
-            raise Refused(f"{self._name} has no protective stop.")
+            raise Refused("{name} has no protective stop.", name=self._name)
         self._control.revoke("a protective stop was acknowledged")
         self._pendant.do("unlock protective stop", "Protective stop releasing")
         log.warning("%s: protective stop acknowledged by %s", self._name, confirmed_by)
@@ -86,7 +88,7 @@ class SafetySystem:
         """Restart the safety system after a fault or violation; drive power is off afterwards."""
         check_confirmed(confirmed_by)
         if self._safety() not in _BROKEN:
-            raise Refused(f"{self._name} has neither a fault nor a violation of its safety system.")
+            raise Refused("{name} has neither a fault nor a violation of its safety system.", name=self._name)
         self._control.revoke("the safety system was restarted")
         self._pendant.do("restart safety", "Restarting safety")
         log.warning("%s: safety system restarted by %s", self._name, confirmed_by)
@@ -99,7 +101,12 @@ class SafetySystem:
         until = time.monotonic() + within
         while not holds(self._observer.sample(max_age=0.5)):
             if time.monotonic() > until:
-                raise DeviceTimeout(f"{self._name} did not {what} within {within:g} s. Check the pendant.")
+                raise DeviceTimeout(
+                    "{name} did not {what} within {within:g} s. Check the pendant.",
+                    name=self._name,
+                    what=what,
+                    within=within,
+                )
             time.sleep(POLL)
 
 

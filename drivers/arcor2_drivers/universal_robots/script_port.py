@@ -25,9 +25,9 @@ class ScriptPort:
         try:
             return cls(address, socket.create_connection((host, port), timeout))
         except TimeoutError:
-            raise DeviceTimeout(f"The script port {address} does not answer.") from None
+            raise DeviceTimeout("The script port {address} does not answer.", address=address) from None
         except OSError as e:
-            raise NotConnected(f"No script port at {address}.", str(e)) from e
+            raise NotConnected("No script port at {address}.", str(e), address=address) from e
 
     def send(self, program: str, timeout: float) -> None:
         """Send a program. Raise DeviceTimeout or ConnectionLost."""
@@ -38,9 +38,15 @@ class ScriptPort:
                 self._socket.settimeout(max(deadline - time.monotonic(), 0.001))
                 rest = rest[self._socket.send(rest) :]
         except TimeoutError:
-            raise DeviceTimeout(f"The script port {self.address} did not take a program in {timeout:g} s.") from None
+            raise DeviceTimeout(
+                "The script port {address} did not take a program in {timeout:g} s.",
+                address=self.address,
+                timeout=timeout,
+            ) from None
         except OSError as e:
-            raise ConnectionLost(f"The script port {self.address} closed the connection.", str(e)) from e
+            raise ConnectionLost(
+                "The script port {address} closed the connection.", str(e), address=self.address
+            ) from e
 
     def drain(self) -> None:
         """Discard the stream of the controller, so that its buffer does not fill."""

@@ -101,7 +101,9 @@ class ControlSession:
             if isinstance(e, DeviceFault):
                 error = self._refusal(e.detail)
             else:
-                error = DeviceTimeout(f"{self.who} did not start the control program within {timeout:g} s.")
+                error = DeviceTimeout(
+                    "{device} did not start the control program within {timeout:g} s.", device=self.who, timeout=timeout
+                )
             self.end(error)
             if self._dashboard is not None:
                 self._dashboard.close()
@@ -117,8 +119,8 @@ class ControlSession:
             problem = f"Input registers {block} of {self.who} are used by a fieldbus or another client."
             return NotInControl(problem, text)
         if "remote control" in lower:
-            return NotInControl(f"{self.who} is in local control.", text)
-        return DeviceFault(f"{self.who} does not start the control program.", text)
+            return NotInControl("{device} is in local control.", text, device=self.who)
+        return DeviceFault("{device} does not start the control program.", text, device=self.who)
 
     def end(self, reason: DeviceError) -> None:
         """End the session now and kill the process, so that it neither signals the watchdog nor reconnects."""
@@ -172,7 +174,9 @@ class ControlSession:
         try:
             return result_within(future, timeout)
         except TimeoutError:
-            error = DeviceTimeout(f"{self.who} did not execute {what} within {timeout:g} s.")
+            error = DeviceTimeout(
+                "{device} did not execute {what} within {timeout:g} s.", device=self.who, what=what, timeout=timeout
+            )
             self.end(error)
             raise error from None
 
@@ -193,7 +197,7 @@ class ControlSession:
         once_within(self._ending.is_set, 2.0 * timing.PROGRAM_GONE, timing.GUARD_PERIOD)
         if self.ended is not None:
             raise self.ended  # the guard was about to find the cause
-        raise DeviceFault(f"{self.who} did not accept {what}.")
+        raise DeviceFault("{device} did not accept {what}.", device=self.who, what=what)
 
     def speed(
         self, command: str, velocities: list[float], acceleration: float, valid_for: float, stopped: Callable[[], bool]
@@ -206,7 +210,11 @@ class ControlSession:
 
         if not self.call("a jog", command, velocities, acceleration, until, stopped=late):
             if time.monotonic() >= until:
-                raise Cancelled(f"A jog of {self.who} was sent too late; it was valid for {valid_for:g} s.")
+                raise Cancelled(
+                    "A jog of {device} was sent too late; it was valid for {valid_for:g} s.",
+                    device=self.who,
+                    valid_for=valid_for,
+                )
             self._not_accepted("a jog")
 
     def set_output(self, number: int, on: bool) -> None:
@@ -265,13 +273,13 @@ class ControlSession:
         if self.own is None or self.ended is not None:
             return
         if (newest := self._observer.newest()) is None or program_plays(newest.runtime):
-            self.end(NotInControl(f"Another program plays on {self.who}."))
+            self.end(NotInControl("Another program plays on {device}.", device=self.who))
         self.do("the control program", "resume", timeout=timing.RESUME_TIMEOUT)
         self.own = None
 
     def stop_by_dashboard(self) -> None:
         """Stop the program, and thereby the session, over the dashboard connection."""
-        reason = Cancelled(f"The control program of {self.who} was stopped by the dashboard.")
+        reason = Cancelled("The control program of {device} was stopped by the dashboard.", device=self.who)
         try:
             if self._dashboard is not None:
                 self._dashboard.do("stop", "Stopped")
@@ -287,7 +295,7 @@ class ControlSession:
             if self.ended is not None:
                 raise self.ended
             if stopped():
-                raise Cancelled(f"{what} was stopped before it started.")
+                raise Cancelled("{what} was stopped before it started.", what=what)
             assert self._process is not None
             return self._process.request(command, arguments)
 
@@ -296,14 +304,19 @@ class ControlSession:
         detail = f"The control process of {self.who} ended with status {status}."
         error = ConnectionLost(detail)
         if status in _TOO_SLOW:
-            error = ConnectionLost(f"{self.who}: {TOO_SLOW.format('robot')}", f"{_TOO_SLOW[status]}. {detail}")
+            error = ConnectionLost(
+                "{device}: {too_slow}",
+                f"{_TOO_SLOW[status]}. {detail}",
+                device=self.who,
+                too_slow=TOO_SLOW.format("robot"),
+            )
         self.end(error)
         return self.ended or error
 
     def _on_output(self, line: bytes) -> None:
         text = line.decode("utf-8", "replace").strip()
         if any(words in line.lower() for words in _BROKEN):
-            self.end(ConnectionLost(f"The control connection to {self.who} broke.", text))
+            self.end(ConnectionLost("The control connection to {device} broke.", text, device=self.who))
         elif text:
             log.info("%s: %s", self.who, text)
 
@@ -315,7 +328,7 @@ class ControlSession:
         while not self._ending.is_set():
             newest = observer.newest()
             if newest is None or not observer.observing.online:
-                self.end(ConnectionLost(f"{self.who} sends no state."))
+                self.end(ConnectionLost("{device} sends no state.", device=self.who))
             elif (unsafe := observer.unsafe) is not None and unsafe is not self._unsafe:
                 self._end_by_safety(unsafe.safety_mode)
             elif program_plays(newest.runtime) or self.own is not None:
@@ -338,7 +351,9 @@ class ControlSession:
     def _end_by_safety(self, safety_mode: int) -> None:
         """Stop the program, then end: after a safeguard stop it would continue as soon as the guard closes."""
         safety = safety_of(safety_mode)
-        reason = SafetyStop(f"{label(safety)} of {self.who}", REMEDIES.get(safety, ""), safety.value)
+        reason = SafetyStop(
+            "{safety} of {device}", REMEDIES.get(safety, ""), safety.value, safety=label(safety), device=self.who
+        )
         self._last_stop()
         self.end(reason)
 

@@ -58,7 +58,12 @@ class UniversalRobot(MoveActions, DigitalGripper, Robot):
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: UrSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
         if settings.payload_mass > (most := self.model.max_payload):
-            raise OutOfRange(f"{name}: payload_mass must be at most {most:g} kg, not {settings.payload_mass!r}")
+            raise OutOfRange(
+                "{name}: payload_mass must be at most {most:g} kg, not {payload_mass!r}",
+                name=name,
+                most=most,
+                payload_mass=settings.payload_mass,
+            )
         self._ur = settings
         self._arm = Arm(self, self.model, settings)
         self._observer = Observer(name, settings.host)
@@ -346,7 +351,7 @@ class UniversalRobot(MoveActions, DigitalGripper, Robot):
     def set_hand_teaching_mode(self, enabled: bool) -> None:
         """Enable or disable moving the arm by hand. Raise Refused while moving, or if the payload is not set."""
         if enabled and self.move_in_progress:
-            raise Refused(f"{self.name} is moving already. Wait until the motion ends, or stop it.")
+            raise Refused("{name} is moving already. Wait until the motion ends, or stop it.", name=self.name)
         self._control.set_teaching(enabled)
 
     # -------------------------------------------------------------------------------- power and safety

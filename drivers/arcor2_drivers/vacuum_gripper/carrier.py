@@ -58,17 +58,24 @@ class Carrier:
             except NotConnected as e:
                 left = until - time.monotonic()
                 if left <= 0.0:
-                    raise NotConnected(f"{self.name}: {self.carrier} is not connected", str(e)) from None
+                    raise NotConnected(
+                        "{name}: {carrier} is not connected", str(e), name=self.name, carrier=self.carrier
+                    ) from None
             time.sleep(min(POLL, left))
 
     def _look(self) -> Generic:
         if self._find is None:
-            raise InvalidData(f"{self.name} stands alone: there is no {self.carrier}")
+            raise InvalidData("{name} stands alone: there is no {carrier}", name=self.name, carrier=self.carrier)
         found = self._find(self.carrier)
         if not isinstance(found, HasPoints):
-            raise InvalidData(f"{self.name}: {self.carrier} ({type(found).__name__}) has no points to use")
+            raise InvalidData(
+                "{name}: {carrier} ({type}) has no points to use",
+                name=self.name,
+                carrier=self.carrier,
+                type=type(found).__name__,
+            )
         if found.connection not in UP:
-            raise NotConnected(f"{self.carrier} is {found.connection.value}")
+            raise NotConnected("{carrier} is {value}", carrier=self.carrier, value=found.connection.value)
         return found
 
     def disconnect(self) -> None:
@@ -79,7 +86,7 @@ class Carrier:
     def object(self) -> Generic:
         """Return the carrier; NotConnected before `connect`."""
         if self._found is None:
-            raise NotConnected(f"{self.name} is not connected to {self.carrier}")
+            raise NotConnected("{name} is not connected to {carrier}", name=self.name, carrier=self.carrier)
         return self._found
 
     @property
@@ -90,7 +97,13 @@ class Carrier:
     def require_up(self) -> None:
         """Return while the carrier is connected. Raises NotConnected, ConnectionLost."""
         if self.object.connection not in UP:
-            raise ConnectionLost(f"{self.name}: {self.carrier} is {self.connection.value}", self.reason())
+            raise ConnectionLost(
+                "{name}: {carrier} is {value}",
+                self.reason(),
+                name=self.name,
+                carrier=self.carrier,
+                value=self.connection.value,
+            )
 
     @property
     def _points(self) -> HasPoints:
@@ -104,15 +117,26 @@ class Carrier:
                 return point
         wanted = f"{kind.value} {direction.value}"
         there = ", ".join(p.name for p in self._points.points() if p.direction is direction and p.kind is kind)
-        raise InvalidData(f"{self.name}: {self.carrier} has no {wanted} {name!r}; it has {there or 'none'}")
+        raise InvalidData(
+            "{name}: {carrier} has no {wanted} {other_name!r}; it has {there}",
+            name=self.name,
+            carrier=self.carrier,
+            wanted=wanted,
+            other_name=name,
+            there=there or "none",
+        )
 
     def require_holding(self, name: str) -> None:
         """InvalidData unless an output keeps its state when the carrier loses us: a part would fall."""
         point = self.require(name, PointDirection.OUTPUT, PointKind.DIGITAL)
         if point.on_loss is not OnLoss.HOLD:
             raise InvalidData(
-                f"{self.name}: {name} of {self.carrier} goes {point.on_loss} on a loss; it must hold",
+                "{name}: {other_name} of {carrier} goes {on_loss} on a loss; it must hold",
                 "a part that is held would fall when the hub is gone",
+                name=self.name,
+                other_name=name,
+                carrier=self.carrier,
+                on_loss=point.on_loss,
             )
 
     def read(self, name: str) -> Reading[bool | float]:

@@ -48,8 +48,8 @@ class VacuumGripperSettings(Settings):
         super().__post_init__()
         for name in ("carrier", "vacuum_output"):
             if not getattr(self, name).strip():
-                raise OutOfRange(f"{name} must not be empty")
+                raise OutOfRange("{name} must not be empty", name=name)
         points = [p for p in (self.vacuum_output, self.blow_output, self.part_input, self.vacuum_input) if p]
         if len(set(points)) != len(points):
-            raise OutOfRange(f"each point may be used once: {', '.join(points)}")
+            raise OutOfRange("each point may be used once: {points}", points=", ".join(points))
         check_part_size(self, within)

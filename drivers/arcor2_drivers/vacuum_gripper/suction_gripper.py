@@ -128,7 +128,7 @@ class SuctionGripper(Suction):
     def acknowledge(self, code: str) -> None:
         """Acknowledge that a part was lost; NotFound when no such alarm stands."""
         if code != PART_LOST or self._lost_since is None:
-            raise NotFound(f"{self.name} has no alarm {code}")
+            raise NotFound("{name} has no alarm {code}", name=self.name, code=code)
         self._lost_since = None
 
     def _carrying_robot(self) -> Robot | None:
@@ -162,7 +162,7 @@ class SuctionGripper(Suction):
     def vacuum(self) -> Reading[float]:
         """Return the vacuum below the surrounding pressure, Pa. Refused without vacuum_input."""
         if not self._set.vacuum_input:
-            raise Refused(f"{self.name} has no vacuum_input")
+            raise Refused("{name} has no vacuum_input", name=self.name)
         found = self._carrier.read(self._set.vacuum_input)
         return Reading[float](float(found.value), found.stamp, found.monotonic, found.quality)
 
@@ -190,7 +190,9 @@ class SuctionGripper(Suction):
             if not self._sensed(True, self._set.grip_time, stops):
                 self._carrier.write(self._set.vacuum_output, False)
                 self.detach_part()
-                raise DeviceFault(f"{self.name} holds nothing", f"within {self._set.grip_time:g} s", NOTHING_HELD)
+                raise DeviceFault(
+                    "{name} holds nothing", f"within {self._set.grip_time:g} s", NOTHING_HELD, name=self.name
+                )
             self.attach_part(hanging=True)
             if self.senses:
                 self._begin_watch()
@@ -205,16 +207,16 @@ class SuctionGripper(Suction):
             if self._set.blow_output:
                 self._blow(stops)
             if lost:
-                raise DeviceFault(f"{self.name} had lost its part before it was let go", fault_code=PART_LOST)
+                raise DeviceFault("{name} had lost its part before it was let go", fault_code=PART_LOST, name=self.name)
             if not self._sensed(False, self._set.release_time, stops):
-                raise DeviceFault(f"the part sticks to {self.name}", fault_code=PART_STICKS)
+                raise DeviceFault("the part sticks to {name}", fault_code=PART_STICKS, name=self.name)
             self.detach_part()
 
     @action(deadline=30.0)
     def blow_off(self, *, an: str | None = None) -> None:
         """Push the part off with a blast of air; the vacuum is switched off before."""
         if not self._set.blow_output:
-            raise Refused(f"{self.name} has no blow_output")
+            raise Refused("{name} has no blow_output", name=self.name)
         with _Turn(self) as stops:
             self._end_watch()
             self._carrier.write(self._set.vacuum_output, False)
@@ -230,7 +232,7 @@ class SuctionGripper(Suction):
     def check_part(self, *, an: str | None = None) -> None:
         """Go on only when the part is held, and was all the time since it was gripped."""
         if self._lost_since is not None or not self.part_held():
-            raise DeviceFault(f"{self.name} has lost its part", fault_code=PART_LOST)
+            raise DeviceFault("{name} has lost its part", fault_code=PART_LOST, name=self.name)
 
     @action
     def measure_vacuum(self, *, an: str | None = None) -> float:
@@ -240,7 +242,7 @@ class SuctionGripper(Suction):
     # -------------------------------------------------------------------------------- inside
     def _check(self, stops: int) -> None:
         if self._stops != stops:
-            raise Cancelled(f"the work of {self.name} was stopped")
+            raise Cancelled("the work of {name} was stopped", name=self.name)
         self._carrier.require_up()
 
     def _sensed(self, held: bool, seconds: float, stops: int) -> bool:
@@ -305,7 +307,7 @@ class _Turn:
 
     def __enter__(self) -> int:
         if not self._gripper._work.acquire(blocking=False):
-            raise Refused(f"{self._gripper.name} is gripping or releasing already")
+            raise Refused("{name} is gripping or releasing already", name=self._gripper.name)
         return self._gripper._stops
 
     def __exit__(self, *_: object) -> None:

@@ -84,10 +84,12 @@ class Access:
         """Admit a client by a token. Raise AccessRefused, or TooManyAttempts before the token is checked."""
         attempts = self._attempts(address)
         if len(attempts) >= WRONG_TOKENS:
-            raise TooManyAttempts(f"Too many wrong tokens came from {address}: wait a minute.")
+            raise TooManyAttempts("Too many wrong tokens came from {address}: wait a minute.", address=address)
         token = self._tokens.find(secret)
         if token is None and self._tokens.unusable:
-            raise AccessRefused(f"No token can be checked: the server's file {FILE} is damaged. {REMEDY}")
+            raise AccessRefused(
+                "No token can be checked: the server's file {file} is damaged. {remedy}", file=FILE, remedy=REMEDY
+            )
         if token is None:
             attempts.append(time.monotonic())
             self._wrong[address] = attempts

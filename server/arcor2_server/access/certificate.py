@@ -38,7 +38,10 @@ def fingerprint(files: tuple[Path, Path]) -> str:
     except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
         reason = getattr(error, "strerror", None) or str(error)
         raise CertificateProblem(
-            f"the certificate {certificate} with the key {key} cannot be used: {reason}"
+            "the certificate {certificate} with the key {key} cannot be used: {reason}",
+            certificate=certificate,
+            key=key,
+            reason=reason,
         ) from error
     return found.fingerprint(hashes.SHA256()).hex(":").upper()
 
@@ -50,7 +53,9 @@ def self_signed(data_dir: Path, host: str) -> tuple[Path, Path]:
         try:
             _make(files, host)
         except OSError as error:
-            raise CertificateProblem(f"no certificate can be written to {data_dir}: {error.strerror}") from error
+            raise CertificateProblem(
+                "no certificate can be written to {data_dir}: {reason}", data_dir=data_dir, reason=error.strerror
+            ) from error
     return files
 
 

@@ -71,7 +71,9 @@ class TokenFile:
         except FileNotFoundError:
             self._tokens, self._seen, self.damage, self.unusable = [], None, "", False
         except OSError as error:
-            raise StorageError(f"the file of tokens {self._path} cannot be used: {error}") from error
+            raise StorageError(
+                "the file of tokens {path} cannot be used: {reason}", path=self._path, reason=error
+            ) from error
         return self._tokens
 
     def _read(self) -> list[Token]:
@@ -122,7 +124,10 @@ class TokenFile:
         Raise InvalidData or Conflict if that is impossible.
         """
         if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
-            raise InvalidData(f"A token needs the name of a person or a device, of {LONGEST_NAME} characters at most.")
+            raise InvalidData(
+                "A token needs the name of a person or a device, of {longest_name} characters at most.",
+                longest_name=LONGEST_NAME,
+            )
         secret = secrets.token_urlsafe(32)
         expires = None
         if days is not None:
@@ -131,7 +136,7 @@ class TokenFile:
         token = Token(secrets.token_hex(4), name, role, digest, now(), expires)
         with self._changing() as tokens:
             if any(each.name == name and not each.expired for each in tokens):
-                raise Conflict(f"There is a token for {name!r} already: revoke it first.")
+                raise Conflict("There is a token for {name!r} already: revoke it first.", name=name)
             tokens.append(token)
         return token, secret
 
@@ -140,7 +145,7 @@ class TokenFile:
         with self._changing() as tokens:
             gone = [token for token in tokens if which in (token.id, token.name)]
             if not gone:
-                raise NotFound(f"There is no token {which!r}.")
+                raise NotFound("There is no token {which!r}.", which=which)
             tokens[:] = [token for token in tokens if token not in gone]
         return gone
 
@@ -159,4 +164,6 @@ class TokenFile:
                 write_private(self._copy, content)
                 write_private(self._path, content)
         except OSError as error:
-            raise StorageError(f"the file of tokens {self._path} cannot be written: {error.strerror}") from error
+            raise StorageError(
+                "the file of tokens {path} cannot be written: {reason}", path=self._path, reason=error.strerror
+            ) from error

@@ -27,19 +27,19 @@ class Candidates:
             try:
                 self._library.add(SourceFile(name, module_name(name), one.source))
             except InvalidData as error:
-                raise InvalidPackage(f"object type {name}: {error}") from error
+                raise InvalidPackage("object type {name}: {reason}", name=name, reason=error) from error
 
     def analysis(self, name: str) -> TypeAnalysis:
         """Return the analysis of the source of a type, helper or mixin."""
         if name not in self._library:
-            raise NotFound(f"The object type {name} is neither in the package nor here.")
+            raise NotFound("The object type {name} is neither in the package nor here.", name=name)
         return self._library.analyse(name)
 
     def meta(self, name: str) -> ObjectTypeMeta:
         """Return one type."""
         found = self.analysis(name)
         if not found.is_object_type:
-            raise NotFound(f"{name} is no object type.")
+            raise NotFound("{name} is no object type.", name=name)
         given = self._given.get(name)
         return found.meta if given is None else msgspec.structs.replace(found.meta, object_model=given.model)
 
@@ -47,12 +47,12 @@ class Candidates:
         """Return one action, by its name or a former one."""
         if (action := find_action(self.analysis(type_name).actions, name)) is not None:
             return action
-        raise NotFound(f"The object type {type_name} has no action {name!r}.")
+        raise NotFound("The object type {type_name} has no action {name!r}.", type_name=type_name, name=name)
 
     def robot_meta(self, name: str) -> RobotMeta:
         """Return the features of a robot type; raise NotFound when it is none."""
         if (robot := self.analysis(name).robot) is None:
-            raise NotFound(f"The object type {name} is no robot.")
+            raise NotFound("The object type {name} is no robot.", name=name)
         return robot
 
     def enumerations(self, name: str) -> dict[tuple[str, str], Enumeration]:

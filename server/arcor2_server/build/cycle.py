@@ -26,7 +26,9 @@ class Cycle:
         names: set[str] = set()
         for action in flow.actions:
             if action.name in names:
-                raise InvalidProject(f"two actions are named {action.name!r}: a program could not tell them apart")
+                raise InvalidProject(
+                    "two actions are named {name!r}: a program could not tell them apart", name=action.name
+                )
             names.add(action.name)
         self.declared = [frame.declared(action) for action in flow.actions]
         self.results = [self._name_results(number) for number in range(len(flow.actions))]
@@ -37,7 +39,11 @@ class Cycle:
         if outputs and len(outputs) != len(returns):
             method = self.declared[number][2]
             raise InvalidProject(
-                f"action {action.name!r} names {len(outputs)} results, but {method} gives {len(returns)}"
+                "action {name!r} names {count} results, but {method} gives {other_count}",
+                name=action.name,
+                count=len(outputs),
+                method=method,
+                other_count=len(returns),
             )
         return [self.frame.names.claim(output) for output in outputs]
 
@@ -119,11 +125,18 @@ class Cycle:
         user, giver = self.flow.actions[node], self.flow.actions[source]
         names, returns = self.results[source], self.declared[source][3].returns
         if output >= len(names):
-            raise InvalidProject(f"action {user.name!r} uses a result that {giver.name!r} does not name")
+            raise InvalidProject(
+                "action {name!r} uses a result that {giver_name!r} does not name", name=user.name, giver_name=giver.name
+            )
         if returns[output] != kind:
             name = giver.outputs()[output]
             raise InvalidProject(
-                f"action {user.name!r} needs {kind}, but {name} of {giver.name!r} is {returns[output]}"
+                "action {name!r} needs {type}, but {other_name} of {giver_name!r} is {return_value}",
+                name=user.name,
+                type=kind,
+                other_name=name,
+                giver_name=giver.name,
+                return_value=returns[output],
             )
         return names[output]
 
@@ -136,26 +149,41 @@ class Cycle:
         kind = returns[condition.output] if condition.output < len(returns) else ""
         if kind not in BRANCHABLE:
             name = self.flow.actions[source].outputs()[condition.output]
-            raise InvalidProject(f"action {user!r}: {name} is {kind or 'nothing'}, which cannot be branched on")
+            raise InvalidProject(
+                "action {user!r}: {name} is {type}, which cannot be branched on",
+                user=user,
+                name=name,
+                type=kind or "nothing",
+            )
         variable = self._result(node, source, condition.output, kind)
         if type(condition.value) is not BRANCHABLE[kind]:
             allowed = "true and false" if kind == "boolean" else "texts" if kind == "string_enum" else "integers"
             raise InvalidProject(
-                f"action {user!r}: on {variable}, which is {kind}, only {allowed} can be branched on,"
-                f" not {condition.value!r}"
+                "action {user!r}: on {variable}, which is {type}, only {allowed} can be branched on, not {value!r}",
+                user=user,
+                variable=variable,
+                type=kind,
+                allowed=allowed,
+                value=condition.value,
             )
         return (expressions.differs if negated else expressions.equals)(variable, condition.value)
 
     def _too_early(self, node: int, source: int) -> InvalidProject:
         user, giver = self.flow.actions[node].name, self.flow.actions[source].name
-        return InvalidProject(f"action {user!r} uses a result of {giver!r}, which has not always run before it")
+        return InvalidProject(
+            "action {user!r} uses a result of {giver!r}, which has not always run before it", user=user, giver=giver
+        )
 
     def _linked(self, node: int, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
         action_id, flow, output = parse_link(read_reference(parameter))
         source = self.numbers.get(action_id)
         if source is None or flow != "default":
             _, giver = self.frame.index.action(action_id)
-            raise InvalidData(f"parameter {parameter.name}: {giver.name!r} never runs, so it has no result")
+            raise InvalidData(
+                "parameter {name}: {giver_name!r} never runs, so it has no result",
+                name=parameter.name,
+                giver_name=giver.name,
+            )
         if source == node or not self.natural.always_before(source, node):
             raise self._too_early(node, source)
         return expressions.name(self._result(node, source, output, meta.type))
@@ -163,14 +191,25 @@ class Cycle:
     def _constant(self, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
         constant = self.frame.index.parameter(read_reference(parameter))
         if constant.type != meta.type:
-            raise InvalidData(f"parameter {parameter.name} must be {meta.type}, but {constant.name} is {constant.type}")
+            raise InvalidData(
+                "parameter {name} must be {type}, but {constant_name} is {constant_type}",
+                name=parameter.name,
+                type=meta.type,
+                constant_name=constant.name,
+                constant_type=constant.type,
+            )
         return expressions.name(self.frame.parameters[constant.id])
 
     def _literal(self, node: int, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
         object_id, type_name, method, _ = self.declared[node]
         kind = PARAMETER_TYPES.get(meta.type)
         if kind is None or parameter.type != meta.type:
-            raise InvalidData(f"parameter {parameter.name} must be of type {meta.type}, not {parameter.type}")
+            raise InvalidData(
+                "parameter {name} must be of type {type}, not {parameter_type}",
+                name=parameter.name,
+                type=meta.type,
+                parameter_type=parameter.type,
+            )
         if meta.type not in REFERENCES:  # those are looked up by name below
             kind.check(parameter, meta)
         enumerations = self.frame.types[type_name].enumerations
@@ -188,7 +227,9 @@ class Cycle:
             parameter = given.pop(meta.name, None)
             if parameter is None:
                 if isinstance(meta.default_value, Unset):
-                    raise InvalidProject(f"action {action.name!r}: parameter {meta.name} is missing")
+                    raise InvalidProject(
+                        "action {name!r}: parameter {meta_name} is missing", name=action.name, meta_name=meta.name
+                    )
                 gap = True
                 continue
             match parameter.type:
@@ -203,7 +244,12 @@ class Cycle:
             else:
                 positional.append(value)
         if given:
-            raise InvalidProject(f"action {action.name!r}: {declared.name} has no parameter {', '.join(given)}")
+            raise InvalidProject(
+                "action {name!r}: {declared_name} has no parameter {given}",
+                name=action.name,
+                declared_name=declared.name,
+                given=", ".join(given),
+            )
         return positional, keywords
 
     def _call(self, node: int) -> ast.stmt:
@@ -215,7 +261,7 @@ class Cycle:
         except InvalidProject:
             raise
         except (Arcor2Error, ValueError) as error:
-            raise InvalidProject(f"action {action.name!r}: {error}") from error
+            raise InvalidProject("action {name!r}: {reason}", name=action.name, reason=error) from error
         keywords.append(ast.keyword("an", ast.Constant(action.name)))
         call = ast.Call(expressions.dotted(self.frame.objects[object_id], (method,)), positional, keywords)
         match self.results[node]:

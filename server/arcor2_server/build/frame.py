@@ -59,7 +59,7 @@ class Frame:
         try:
             return self.types[type_name]
         except KeyError:
-            raise NotFound(f"object type {type_name} is not known") from None
+            raise NotFound("object type {type_name} is not known", type_name=type_name) from None
 
     def imported(self, module: str, name: str) -> str:
         """Return the name under which the script knows a class, imported where it is used first."""
@@ -131,11 +131,13 @@ class Frame:
     def _constant(self, parameter: Parameter) -> ast.expr:
         kind = PARAMETER_TYPES.get(parameter.type)
         if kind is None or parameter.type in REFERENCES:
-            raise InvalidProject(f"project parameter {parameter.name!r} cannot be of type {parameter.type!r}")
+            raise InvalidProject(
+                "project parameter {name!r} cannot be of type {type!r}", name=parameter.name, type=parameter.type
+            )
         try:
             return kind.expression(parameter, References(self, "", {}, ""))
         except InvalidData as error:
-            raise InvalidProject(f"project {error}") from error
+            raise InvalidProject("project {reason}", reason=error) from error
 
     # ------------------------------------------------------------------------------------------------ actions
     def declared(self, action: Action) -> tuple[str, str, str, ObjectAction]:
@@ -147,13 +149,21 @@ class Frame:
             object_id, method = action.parse_type()
             obj = self.index.scene_object(object_id)
         except (ValueError, NotFound) as error:
-            raise InvalidProject(f"action {action.name!r}: {error}") from error
+            raise InvalidProject("action {name!r}: {reason}", name=action.name, reason=error) from error
         found = self._facts(obj.type).actions.get(method)
         if found is None:
-            raise InvalidProject(f"action {action.name!r}: {obj.type} has no action {method}")
+            raise InvalidProject(
+                "action {name!r}: {type} has no action {method}", name=action.name, type=obj.type, method=method
+            )
         if found.disabled:
             why = "" if isinstance(found.problem, Unset) else f": {found.problem}"
-            raise InvalidProject(f"action {action.name!r}: {obj.type}.{method} cannot be used{why}")
+            raise InvalidProject(
+                "action {name!r}: {type}.{method} cannot be used{reason}",
+                name=action.name,
+                type=obj.type,
+                method=method,
+                reason=why,
+            )
         return object_id, obj.type, method, found
 
 
@@ -171,7 +181,7 @@ class References:
     @staticmethod
     def _below(what: str, known: Mapping[str, tuple[str, ...]], wanted: str) -> ast.expr:
         if wanted not in known:
-            raise NotFound(f"the project has no {what} {wanted}")
+            raise NotFound("the project has no {what} {wanted}", what=what, wanted=wanted)
         return expressions.dotted("aps", known[wanted])
 
     def pose(self, orientation_id: str) -> ast.expr:
@@ -186,13 +196,15 @@ class References:
         """Return the expression for joints of an action point."""
         _, joints = self._frame.index.joints(joints_id)
         if joints.robot_id != self._object_id:
-            raise InvalidData(f"joints {joints.name} belong to another robot")
+            raise InvalidData("joints {name} belong to another robot", name=joints.name)
         return self._below("joints", self._frame.points.joints, joints_id)
 
     def enum_member(self, parameter: Parameter, value: str | int) -> ast.expr:
         """Return the expression for the member with `value` of the enumeration that `parameter` takes."""
         kind = self._enumerations.get((self._method, parameter.name))
         if kind is None or value not in kind.members:
-            raise InvalidData(f"parameter {parameter.name}: {value!r} is no member of its enumeration")
+            raise InvalidData(
+                "parameter {name}: {value!r} is no member of its enumeration", name=parameter.name, value=value
+            )
         first, *inner = kind.name.split(".")
         return expressions.dotted(self._frame.imported(kind.module, first), (*inner, kind.members[value]))

@@ -60,18 +60,18 @@ def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
     try:
         raw = files[path]
     except KeyError:
-        raise InvalidPackage(f"The package has no {path}.") from None
+        raise InvalidPackage("The package has no {path}.", path=path) from None
     try:
         found = msgspec.json.decode(raw, type=kind)
     except (msgspec.MsgspecError, RecursionError) as error:
         try:
             found = msgspec.convert(humps.decamelize(msgspec.json.decode(raw)), kind)
         except (msgspec.MsgspecError, ValueError, RecursionError):
-            raise InvalidPackage(f"{path} of the package is damaged: {error}") from error
+            raise InvalidPackage("{path} of the package is damaged: {reason}", path=path, reason=error) from error
     try:
         check_texts(found)
     except TextTooLong as error:
-        raise InvalidPackage(f"{path} of the package: {error}") from error
+        raise InvalidPackage("{path} of the package: {reason}", path=path, reason=error) from error
     return found
 
 
@@ -79,9 +79,9 @@ def _text(files: Mapping[str, bytes], path: str) -> str:
     try:
         return files[path].decode("utf-8-sig")  # some editors put a mark in front
     except KeyError:
-        raise InvalidPackage(f"The package has no {path}.") from None
+        raise InvalidPackage("The package has no {path}.", path=path) from None
     except UnicodeDecodeError as error:
-        raise InvalidPackage(f"{path} of the package is no text: {error}") from error
+        raise InvalidPackage("{path} of the package is no text: {reason}", path=path, reason=error) from error
 
 
 def _class_in(path: str, source: str) -> tuple[str, _Kind]:
@@ -93,7 +93,7 @@ def _class_in(path: str, source: str) -> tuple[str, _Kind]:
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise InvalidPackage(f"{path} of the package is no Python: {error}") from error
+        raise InvalidPackage("{path} of the package is no Python: {reason}", path=path, reason=error) from error
     for node in tree.body:
         if isinstance(node, ast.ClassDef) and module_name(node.name) == stem:
             return node.name, "type"
@@ -104,7 +104,7 @@ def _class_in(path: str, source: str) -> tuple[str, _Kind]:
                     return alias.asname or alias.name, "installed"
     if is_valid_name(stem) and module_name(stem) == stem:
         return stem, "helper"
-    raise InvalidPackage(f"{path} of the package has no class that the file is named after.")
+    raise InvalidPackage("{path} of the package has no class that the file is named after.", path=path)
 
 
 def read(data: Path | bytes) -> Imported:
@@ -114,7 +114,7 @@ def read(data: Path | bytes) -> Imported:
     project = _document(files, "data/project.json", Project)
     for what, key in (("scene", scene.id), ("project", project.id)):
         if not key or len(key) > MAX_ID or not key.isprintable():
-            raise InvalidPackage(f"The {what} of the package has no usable id: {key[:80]!r}.")
+            raise InvalidPackage("The {what} of the package has no usable id: {key!r}.", what=what, key=key[:80])
     source = _text(files, "script.py")
     types: dict[str, ObjectTypeSource] = {}
     installed: list[str] = []
@@ -133,7 +133,7 @@ def read(data: Path | bytes) -> Imported:
     modules = {module_name(name) for name in (*types, *installed)}
     for path in files:
         if path.startswith("data/models/") and PurePosixPath(path).stem not in modules:
-            raise InvalidPackage(f"{path} of the package belongs to none of its object types.")
+            raise InvalidPackage("{path} of the package belongs to none of its object types.", path=path)
     given = Imported(scene, project, source, types, installed, helpers)
     extra = project.project_objects_ids
     return given if isinstance(extra, Unset) else with_helpers_named(given, extra)
@@ -147,7 +147,9 @@ def _model(files: Mapping[str, bytes], name: str) -> ObjectModel | Unset:
     if model.type is Model3dType.NONE:
         return UNSET
     if model.model().id != name:
-        raise InvalidPackage(f"{path} of the package is the model of {model.model().id}, not of {name}.")
+        raise InvalidPackage(
+            "{path} of the package is the model of {id}, not of {name}.", path=path, id=model.model().id, name=name
+        )
     return model
 
 

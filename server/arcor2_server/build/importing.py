@@ -53,11 +53,17 @@ def _check(given: Imported, types: Candidates) -> None:
     """Refuse documents that could not be opened or run after they are saved."""
     for name in given.types:
         if (problem := types.analysis(name).problem) is not None:
-            raise InvalidPackage(f"The object type {name} of the package cannot be used: {problem}.")
+            raise InvalidPackage(
+                "The object type {name} of the package cannot be used: {problem}.", name=name, problem=problem
+            )
     for name in dict.fromkeys([*given.installed, *(obj.type for obj in given.scene.objects)]):
         types.analysis(name)  # NotFound
     if problems := project_problems(given.scene, given.project, types):
-        raise InvalidPackage(f"The project {given.project.name} of the package is not sound. {' '.join(problems)}")
+        raise InvalidPackage(
+            "The project {name} of the package is not sound. {problems}",
+            name=given.project.name,
+            problems=" ".join(problems),
+        )
     if given.needs_source:
         script.check_syntax(given.script)
     _check_logic(given.project)
@@ -70,7 +76,7 @@ def _check_logic(project: Project) -> None:
         for place in {item.start.partition("/")[0], item.end.partition("/")[0]} - {START, END}:
             if place not in known:
                 raise InvalidPackage(
-                    f"The logic of the package leads from or to an action {place}, which is not there."
+                    "The logic of the package leads from or to an action {place}, which is not there.", place=place
                 )
 
 
@@ -88,7 +94,9 @@ def _from_script(given: Imported, types: Candidates) -> Project:
     from arcor2_server.build.reading import from_script  # a start of the server does without the seven modules
 
     if given.needs_source:
-        raise InvalidProject(f"The project {given.project.name} has no logic that its script could be read back into.")
+        raise InvalidProject(
+            "The project {name} has no logic that its script could be read back into.", name=given.project.name
+        )
     facts = types.facts(given.scene)
     project = from_script(given.script, given.scene, with_present_names(given.scene, given.project, types), facts)
     type_of = {obj.id: obj.type for obj in given.scene.objects}
@@ -226,7 +234,11 @@ class PackageImport:
         for one in given.types.values():
             mesh = UNSET if isinstance(one.model, Unset) else one.model.model()
             if isinstance(mesh, Mesh) and not self._assets.exists(mesh.asset_id):
-                raise NotFound(f"The mesh of {one.id} needs the asset {mesh.asset_id!r}, which is not here.")
+                raise NotFound(
+                    "The mesh of {id} needs the asset {asset_id!r}, which is not here.",
+                    id=one.id,
+                    asset_id=mesh.asset_id,
+                )
 
     async def import_package(self, data: Path | bytes, options: ImportOptions) -> ImportedIds:
         """Save the documents of a package in one transaction, after all of them are checked.

@@ -29,7 +29,7 @@ _MODE: Final = (stat.S_IFREG | 0o644) << 16
 def _checked(path: str) -> str:
     parts = PurePosixPath(path).parts
     if not parts or path.startswith("/") or ".." in parts or "\\" in path or "\0" in path:
-        raise InvalidPackage(f"a package cannot have a file {path!r}")
+        raise InvalidPackage("a package cannot have a file {path!r}", path=path)
     return path
 
 
@@ -57,12 +57,12 @@ def from_zip(data: Path | bytes, wanted: Callable[[PurePosixPath], bool], larges
         with zipfile.ZipFile(io.BytesIO(data) if isinstance(data, bytes) else data) as archive:
             entries = archive.infolist()
             if len(entries) > MAX_FILES:
-                raise InvalidPackage(f"The package has more than {MAX_FILES} files.")
+                raise InvalidPackage("The package has more than {max_files} files.", max_files=MAX_FILES)
             seen: set[PurePosixPath] = set()
             for entry in entries:
                 path = inside(entry)
                 if path in seen:
-                    raise InvalidPackage(f"The package has the file {entry.filename[:80]!r} twice.")
+                    raise InvalidPackage("The package has the file {filename!r} twice.", filename=entry.filename[:80])
                 seen.add(path)
                 if entry.is_dir() or not wanted(path):
                     continue
@@ -71,13 +71,15 @@ def from_zip(data: Path | bytes, wanted: Callable[[PurePosixPath], bool], larges
                     while chunk := source.read(min(_CHUNK, left + 1)):
                         left -= len(chunk)
                         if left < 0:
-                            raise InvalidPackage(f"What the package tells is larger than {largest} bytes.")
+                            raise InvalidPackage(
+                                "What the package tells is larger than {largest} bytes.", largest=largest
+                            )
                         content += chunk
                 found[path.as_posix()] = bytes(content)
     except OSError as error:
-        raise StorageError(f"the package cannot be read: {error.strerror or error}") from error
+        raise StorageError("the package cannot be read: {reason}", reason=error.strerror or error) from error
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
-        raise InvalidPackage(f"The package is no usable zip: {error}.") from error
+        raise InvalidPackage("The package is no usable zip: {reason}.", reason=error) from error
     return found
 
 
@@ -91,7 +93,9 @@ def write(files: Files, directory: Path) -> None:
         # On the same file system, for the rename, and with a leading dot, which no package id has.
         temporary = Path(tempfile.mkdtemp(prefix=f".{directory.name}-", dir=directory.parent))
     except OSError as error:
-        raise StorageError(f"packages cannot be written into {directory.parent}: {error.strerror}") from error
+        raise StorageError(
+            "packages cannot be written into {parent}: {reason}", parent=directory.parent, reason=error.strerror
+        ) from error
     try:
         # script.py last: a directory is a package by it, even one that a crash left behind.
         for path, content in sorted(files.items(), key=lambda entry: entry[0] == "script.py"):
@@ -102,7 +106,9 @@ def write(files: Files, directory: Path) -> None:
         temporary.rename(directory)
         sync_directory(directory.parent)
     except OSError as error:
-        raise StorageError(f"package {directory.name} cannot be written: {error.strerror}", str(directory)) from error
+        raise StorageError(
+            "package {name} cannot be written: {reason}", str(directory), name=directory.name, reason=error.strerror
+        ) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 

@@ -31,6 +31,8 @@ def check_syntax(source: str) -> None:
     try:
         compile(source, "script.py", "exec", dont_inherit=True)
     except SyntaxError as error:
-        raise InvalidProject(f"script.py, line {error.lineno}: {error.msg}", error.text or "") from error
+        raise InvalidProject(
+            "script.py, line {lineno}: {msg}", error.text or "", lineno=error.lineno, msg=error.msg
+        ) from error
     except (ValueError, RecursionError, MemoryError) as error:
-        raise InvalidProject(f"script.py is no Python: {error}") from error
+        raise InvalidProject("script.py is no Python: {reason}", reason=error) from error

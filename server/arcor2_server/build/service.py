@@ -135,7 +135,7 @@ class BuildService:
         for name in used:
             if (meta := types.meta(name)).disabled:
                 problem = "" if isinstance(meta.problem, Unset) else f": {meta.problem}"
-                raise InvalidProject(f"object type {name} cannot be used{problem}")
+                raise InvalidProject("object type {name} cannot be used{problem}", name=name, problem=problem)
         extra = [] if isinstance(project.project_objects_ids, Unset) else project.project_objects_ids
         # Bases too: an uploaded type may derive from an installed one.
         code = types.sources_for([*(each for name in used for each in (*reversed(types.bases(name)), name)), *extra])

@@ -73,7 +73,10 @@ def _inside(one: PackageType, folder: Path) -> tuple[str, str]:
         if module[end - 1] == folder.name and any(file.is_file() for file in files):
             return ".".join(module[:end]), ".".join(module[end:])
     raise InvalidProject(
-        f"object type {one.name}: its entry point {one.entry_point} is not in its folder {folder.name}"
+        "object type {name}: its entry point {entry_point} is not in its folder {folder_name}",
+        name=one.name,
+        entry_point=one.entry_point,
+        folder_name=folder.name,
     )
 
 
@@ -87,13 +90,19 @@ def _check_own(one: PackageType, path: Path, content: bytes, own: str) -> None:
     imports = _imports(content)
     if imports.level > len(path.relative_to(one.folder).parts):
         raise InvalidProject(
-            f"object type {one.name}: {path.name} imports from outside of the folder {one.folder.name}"
+            "object type {name}: {path_name} imports from outside of the folder {folder_name}",
+            name=one.name,
+            path_name=path.name,
+            folder_name=one.folder.name,
         )
     vendor = own.partition(".")[0]
     for name in imports.absolute:
         if name == own or name.startswith(f"{own}.") or (vendor != "arcor2_hw" and name.partition(".")[0] == vendor):
             raise InvalidProject(
-                f"object type {one.name}: {path.name} imports {name}; a driver must import its own folder relatively"
+                "object type {name}: {path_name} imports {other_name}; a driver must import its own folder relatively",
+                name=one.name,
+                path_name=path.name,
+                other_name=name,
             )
 
 
@@ -108,7 +117,9 @@ def _given(one: PackageType, own: str, copied: str, inner: str, kinds: Iterable[
         if "." in kind.name and given.get(name) == place:
             continue  # nested in the type itself
         if given.setdefault(name, source) != source:
-            raise InvalidProject(f"object type {one.name}: its actions take two things called {name}")
+            raise InvalidProject(
+                "object type {name}: its actions take two things called {other_name}", name=one.name, other_name=name
+            )
     about = docstring(f"{one.name} of {one.distribution} {one.version}, as it was when this package was built.")
     lines = [f"from {source} import {name} as {name}" for name, source in given.items()]
     return "\n".join([about, "", *lines, ""]).encode()
@@ -123,7 +134,9 @@ def files_of(types: "Iterable[PackageType]", enumerations: Mapping[str, Iterable
     files: dict[str, bytes] = {f"{FOLDER}/__init__.py": b""}
     for one in types:
         if not _MODULE.fullmatch(one.module):
-            raise InvalidProject(f"object type {one.name}: {one.module!r} is no name of a module")
+            raise InvalidProject(
+                "object type {name}: {module!r} is no name of a module", name=one.name, module=one.module
+            )
         if one.source:
             files[f"{FOLDER}/{one.module}.py"] = one.source.encode()
     names = Names(one.module for one in types)
@@ -132,7 +145,7 @@ def files_of(types: "Iterable[PackageType]", enumerations: Mapping[str, Iterable
         if one.source:
             continue
         if one.folder is None or not one.folder.is_dir():
-            raise InvalidProject(f"object type {one.name} is not in a folder of its own and cannot be copied")
+            raise InvalidProject("object type {name} is not in a folder of its own and cannot be copied", name=one.name)
         own, inner = _inside(one, one.folder)
         if one.folder not in folders:
             folders[one.folder] = copied = names.claim(one.folder.name, f"{one.folder.name}_driver")

@@ -339,8 +339,9 @@ def _touch_task(given: Touched, path: Path) -> Any:
         case Touched(origin=Position() as origin, on_x=Position() as x):
             return t.FrameByAxes(origin, x, given.in_plane)
     raise InvalidData(
-        f"{path} names no method: it needs known and touched, or origin, on_x and in_plane, or flanges, or "
-        "orientations, or flange, tip, along_z and on_x."
+        "{path} names no method: it needs known and touched, or origin, on_x and in_plane, or flanges, or "
+        "orientations, or flange, tip, along_z and on_x.",
+        path=path,
     )
 
 

@@ -142,7 +142,12 @@ async def _record(client: Client, name: str, key: str) -> CalibrationRecord:
         path = f"/api/calibrations/{quote(key, safe='')}"
         found: CalibrationRecord = await client.rest.request("GET", path, CalibrationRecord)
         if found.object_name != name:
-            raise InvalidData(f"The calibration {key} is one of {found.object_name}, not of {name}.")
+            raise InvalidData(
+                "The calibration {key} is one of {object_name}, not of {name}.",
+                key=key,
+                object_name=found.object_name,
+                name=name,
+            )
         return found
     listed: list[CalibrationRecord] = await client.rest.request(
         "GET", "/api/calibrations", list[CalibrationRecord], params={"limit": 1000}
@@ -150,7 +155,7 @@ async def _record(client: Client, name: str, key: str) -> CalibrationRecord:
     for one in listed:
         if one.object_name == name and not isinstance(one.after, Unset):
             return one
-    raise NotFound(f"There is no calibration of {name!r} that found a pose.")
+    raise NotFound("There is no calibration of {name!r} that found a pose.", name=name)
 
 
 async def _present(client: Client, record: CalibrationRecord) -> Pose:
@@ -159,11 +164,20 @@ async def _present(client: Client, record: CalibrationRecord) -> Pose:
     Raise Conflict, NotFound or InvalidData if that is impossible.
     """
     if record.parent != "world":
-        raise InvalidData(f"The calibration {record.id} is stated in {record.parent}: give a pose in that with --pose.")
+        raise InvalidData(
+            "The calibration {id} is stated in {parent}: give a pose in that with --pose.",
+            id=record.id,
+            parent=record.parent,
+        )
     scene = await _open_scene(client)
     found = next((each for each in scene.objects if each.id == record.object_id), None)
     if found is None or isinstance(found.pose, Unset):
-        raise NotFound(f"{record.object_name} of the calibration {record.id} is not in the scene {scene.name}.")
+        raise NotFound(
+            "{object_name} of the calibration {id} is not in the scene {name}.",
+            object_name=record.object_name,
+            id=record.id,
+            name=scene.name,
+        )
     return found.pose
 
 
@@ -202,7 +216,12 @@ def _named(scene: Scene, name: str) -> SceneObject:
     for each in scene.objects:
         if each.name == name:
             return each
-    raise NotFound(f"The scene {scene.name} has no object {name!r}; it has {', '.join(o.name for o in scene.objects)}.")
+    raise NotFound(
+        "The scene {name} has no object {other_name!r}; it has {objects}.",
+        name=scene.name,
+        other_name=name,
+        objects=", ".join(o.name for o in scene.objects),
+    )
 
 
 async def _calibrate(client: Client, found: SceneObject, process: str, begin: Callable[[], Awaitable[None]]) -> None:
@@ -241,5 +260,5 @@ async def _followed(client: Client, found: SceneObject, process: str) -> tuple[s
                         if event.data.state == "finished":
                             return message, pose
     except TimeoutError:
-        raise DeviceTimeout(f"The calibration did not end within {ENDS_WITHIN:g} s.") from None
-    raise ConnectionLost(f"The connection to {client.url} broke.")
+        raise DeviceTimeout("The calibration did not end within {ends_within:g} s.", ends_within=ENDS_WITHIN) from None
+    raise ConnectionLost("The connection to {url} broke.", url=client.url)

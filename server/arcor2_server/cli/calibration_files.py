@@ -34,12 +34,12 @@ def content_of(path: Path, largest: int) -> bytes:
     """Return a file's bytes. NotFound, InvalidData naming the file."""
     try:
         if path.stat().st_size > largest:
-            raise InvalidData(f"{path} is larger than {largest} bytes.")
+            raise InvalidData("{path} is larger than {largest} bytes.", path=path, largest=largest)
         return path.read_bytes()
     except FileNotFoundError:
-        raise NotFound(f"There is no file {path}.") from None
+        raise NotFound("There is no file {path}.", path=path) from None
     except OSError as error:
-        raise InvalidData(f"{path} cannot be read: {error.strerror}.") from None
+        raise InvalidData("{path} cannot be read: {reason}.", path=path, reason=error.strerror) from None
 
 
 def picture_of(path: Path) -> bytes:
@@ -53,7 +53,7 @@ def read_as(path: Path, kind: type[T]) -> T:
     try:
         return msgspec.convert(content, kind)
     except (msgspec.ValidationError, ValueError) as error:
-        raise InvalidData(f"{path}: {error}.") from None
+        raise InvalidData("{path}: {reason}.", path=path, reason=error) from None
 
 
 def write(path: Path, content: bytes) -> None:
@@ -62,7 +62,7 @@ def write(path: Path, content: bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
     except OSError as error:
-        raise InvalidData(f"{path} cannot be written: {error.strerror}.") from None
+        raise InvalidData("{path} cannot be written: {reason}.", path=path, reason=error.strerror) from None
     Console(stderr=True, highlight=False).print(f"written: {path}")
 
 

@@ -40,12 +40,14 @@ async def _exported(server: Server, wanted: str | None) -> Cell:
     async with server.client() as client:
         scenes = await client.list_scenes()
         named = [scene for scene in scenes if wanted is None or wanted in (scene.id, scene.name)]
+        if not scenes:
+            raise NotFound("{url} has no scenes", url=client.url)
         if not named:
-            raise NotFound(
-                f"the server at {client.url} has no scene {wanted}" if scenes else f"{client.url} has no scenes"
-            )
+            raise NotFound("the server at {url} has no scene {wanted}", url=client.url, wanted=wanted)
         if len(named) > 1:
-            raise NotFound(f"say which scene with --scene: {', '.join(sorted(scene.name for scene in named))}")
+            raise NotFound(
+                "say which scene with --scene: {named}", named=", ".join(sorted(scene.name for scene in named))
+            )
         scene = await client.get_scene(named[0].id)
         types = await client.get_object_types()
         return exported(scene, {one.type for one in types if VIRTUAL in (one.type, one.base)})

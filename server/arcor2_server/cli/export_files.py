@@ -79,7 +79,7 @@ def read(path: Path, kind: Kind | None = None) -> Archive:
     try:
         archive = archives.read(path)
     except InvalidPackage as error:
-        raise InvalidPackage(f"{path}: {error}") from error
+        raise InvalidPackage("{path}: {reason}", path=path, reason=error) from error
     if kind is None or archive.kind == kind:
         return archive
     if kind == "scene" and archive.kind == "project":
@@ -124,7 +124,7 @@ async def bring_in(
         try:
             steps = await target.plan(await asyncio.to_thread(installed))
         except InvalidPackage as error:
-            raise InvalidPackage(f"{path}: {error}") from error
+            raise InvalidPackage("{path}: {reason}", path=path, reason=error) from error
         if not dry_run:
             await target.carry_out()
     words = {"new": "would be new", "replaced": "would be replaced", "same": "is the same"} if dry_run else {}

@@ -109,7 +109,7 @@ async def _run(server: Server, wanted: str, paused: bool) -> ExitStatus:
             key=lambda summary: summary.package_meta.built,
         )
         if not named:
-            raise NotFound(f"The server at {client.url} has no package {wanted}.")
+            raise NotFound("The server at {url} has no package {wanted}.", url=client.url, wanted=wanted)
         chosen = named[-1].id
         try:
             await client.run_package(chosen, start_paused=paused)
@@ -132,7 +132,7 @@ async def _run(server: Server, wanted: str, paused: bool) -> ExitStatus:
                     if event.data.state is PackageStateEnum.STOPPED:
                         break
         else:
-            raise ConnectionLost(f"The connection to {client.url} broke: the program may go on.")
+            raise ConnectionLost("The connection to {url} broke: the program may go on.", url=client.url)
         if problem:
             sys.stderr.write(f"arcor2-hw package run: {problem}\n")
             return ExitStatus.PROGRAM_FAILED

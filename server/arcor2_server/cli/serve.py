@@ -187,7 +187,7 @@ def check_access(settings: ServerSettings) -> None:
 def _legacy(address: str, role: LegacyRole) -> LegacyListener:
     host, _, port = address.rpartition(":")
     if not host or not port.isdigit() or int(port) > 0xFFFF:
-        raise InvalidData(f"--legacy-listen {address!r} is not HOST:PORT")
+        raise InvalidData("--legacy-listen {address!r} is not HOST:PORT", address=address)
     return LegacyListener(host.strip("[]"), int(port), Role[role.upper()])
 
 

@@ -38,7 +38,7 @@ class _Nothing:
     """The tree while no document is open."""
 
     def root_of(self, item: str) -> str:
-        raise NotFound(f"{item!r} is not known.")
+        raise NotFound("{item!r} is not known.", item=item)
 
     def tree_of(self, root: str) -> Iterable[str]:  # noqa: ARG002
         return ()
@@ -93,7 +93,7 @@ class LockTable:
         """Refuse unless the user holds the write lock of an id (`held(x)`); with `tree`, of its tree."""
         if not self.holds(user, item, tree=tree):
             what = "tree of " if tree else ""
-            raise Locked(f"{user} does not hold the write lock of the {what}{item!r}.")
+            raise Locked("{user} does not hold the write lock of the {what}{item!r}.", user=user, what=what, item=item)
 
     def holds_read(self, user: str, item: str) -> bool:
         """Return whether the user holds a read lock of an id."""
@@ -247,9 +247,13 @@ class LockTable:
         if root is None:
             return
         if root.tree or item in root.writers or root.readers.get(item):
-            raise Locked(f"{item!r} is locked by {self._blockers(root, item)}.")
+            raise Locked("{item!r} is locked by {blockers}.", item=item, blockers=self._blockers(root, item))
         if tree and not root.free:
-            raise Locked(f"Something in the tree of {item!r} is locked by {self._blockers(root, '')}.")
+            raise Locked(
+                "Something in the tree of {item!r} is locked by {blockers}.",
+                item=item,
+                blockers=self._blockers(root, ""),
+            )
 
     @staticmethod
     def _blockers(root: _Root, item: str) -> str:
@@ -273,7 +277,7 @@ class LockTable:
     def _take_read(self, user: str, root_id: str, item: str) -> None:
         root = self._roots.setdefault(root_id, _Root())
         if root.tree or item in root.writers:
-            raise Locked(f"{item!r} is locked by {self._blockers(root, item)}.")
+            raise Locked("{item!r} is locked by {blockers}.", item=item, blockers=self._blockers(root, item))
         readers = root.readers.setdefault(item, {})
         readers[user] = readers.get(user, 0) + 1
         self._where[item] = root_id
@@ -281,7 +285,7 @@ class LockTable:
     def _read_all(self, user: str, root_ids: dict[str, str]) -> None:
         for item, root_id in root_ids.items():
             if (root := self._roots.get(root_id)) is not None and (root.tree or item in root.writers):
-                raise Locked(f"{item!r} is locked by {self._blockers(root, item)}.")
+                raise Locked("{item!r} is locked by {blockers}.", item=item, blockers=self._blockers(root, item))
         for item, root_id in root_ids.items():
             self._take_read(user, root_id, item)
 

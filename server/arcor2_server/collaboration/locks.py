@@ -58,7 +58,7 @@ class Locks(LockTable):
         """Unlock an item for a client. Return the ids to announce. Raise Locked if the user does not hold this lock."""
         await self._pass()
         if not self._is_writer(user, item):
-            raise Locked(f"{user} does not hold a write lock of {item!r}.")
+            raise Locked("{user} does not hold a write lock of {item!r}.", user=user, item=item)
         return sorted(self._free_write(user, item))
 
     async def read_lock(self, user: str, item: str) -> None:
@@ -71,7 +71,7 @@ class Locks(LockTable):
         """Release a read lock of a client. Raise Locked if there is none."""
         await self._pass()
         if item not in self._reads.get(user, ()):
-            raise Locked(f"{user} does not hold a read lock of {item!r}.")
+            raise Locked("{user} does not hold a read lock of {item!r}.", user=user, item=item)
         self._forget_read(user, item)
         self._free_read(user, item)
 
@@ -79,17 +79,17 @@ class Locks(LockTable):
         """Widen a lock to its tree, or narrow it. Gives the ids to announce: as locked (widened) or as free."""
         await self._pass()
         if not self._is_writer(user, item):
-            raise Locked(f"{user} does not hold a write lock of {item!r}.")
+            raise Locked("{user} does not hold a write lock of {item!r}.", user=user, item=item)
         root_id = self._where[item]
         root = self._roots[root_id]
         if root.tree is tree:
-            raise Locked(f"The lock of {item!r} is of that type already.")
+            raise Locked("The lock of {item!r} is of that type already.", item=item)
         whole = {root_id, *self.tree.tree_of(root_id)} - {item}
         announced = self._announced.setdefault(user, {})
         self._since.setdefault((user, item), now())
         if tree:
             if len(root.writers) > 1:
-                raise Locked(f"Other locks are held in the tree of {item!r}.")
+                raise Locked("Other locks are held in the tree of {item!r}.", item=item)
             root.tree = True
             announced[item] = whole | {item}
         else:
@@ -175,7 +175,7 @@ class Locks(LockTable):
 
     def _refuse_announced(self) -> None:
         if found := self.announced():
-            raise Locked(f"Something is locked by {', '.join(sorted(found))}.")
+            raise Locked("Something is locked by {found}.", found=", ".join(sorted(found)))
 
     async def _eventually(self, take: Callable[[dict[str, str]], None], items: Iterable[str]) -> None:
         deadline = asyncio.get_running_loop().time() + self._patience

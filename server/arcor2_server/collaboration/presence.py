@@ -57,7 +57,7 @@ class PresenceBoard:
             del self._presence[user]
             if before is not None:
                 self._presence[user] = before
-            raise RequestRefused(f"This cannot be sent to others: {error}.") from None
+            raise RequestRefused("This cannot be sent to others: {reason}.", reason=error) from None
 
     def close(self) -> None:
         """Stop when the server ends."""

@@ -55,7 +55,7 @@ class Users:
     def require_left(self, user: str) -> None:
         """Raise RequestRefused while a user is connected."""
         if user in self._clients:
-            raise RequestRefused(f"{user} is connected. Ask {user} to unlock it.")
+            raise RequestRefused("{user} is connected. Ask {user} to unlock it.", user=user)
 
     def release(self, user: str, notice: str) -> list[str]:
         """Release all locks of a user who left and return their ids. The user receives the notice on returning."""
@@ -75,9 +75,9 @@ class Users:
         holder = self._clients.get(name)
         if holder is not None and holder is not client:
             if await holder.ping(PONG_WITHIN):
-                raise RequestRefused(f"The user name {name!r} is already in use.")
+                raise RequestRefused("The user name {name!r} is already in use.", name=name)
             if self._clients.get(name) not in (holder, None):
-                raise RequestRefused(f"The user name {name!r} is already in use.")
+                raise RequestRefused("The user name {name!r} is already in use.", name=name)
             holder.user = None
         if client.user is not None and client.user != name:
             self._leave(client.user)

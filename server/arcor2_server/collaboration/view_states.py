@@ -55,9 +55,11 @@ class ViewStates:
             before = await self._view(owner, document)
             after = {key: value for key, value in (before | encoded).items() if value is not None}
             if len(after) > max(MOST_KEYS, len(before)):
-                raise RequestRefused(f"More than {MOST_KEYS} keys are not kept for one document.")
+                raise RequestRefused("More than {most_keys} keys are not kept for one document.", most_keys=MOST_KEYS)
             if sum(map(len, after.values())) > max(LARGEST_VIEW, sum(map(len, before.values()))):
-                raise RequestRefused(f"More than {LARGEST_VIEW} bytes are not kept for one document.")
+                raise RequestRefused(
+                    "More than {largest_view} bytes are not kept for one document.", largest_view=LARGEST_VIEW
+                )
             revision = max(await self._now() + 1, time.time_ns() // 1_000_000)
             await self._data.put_view(owner, document, encoded, revision)
             self._revision = revision
@@ -116,7 +118,9 @@ def _encoded(key: str, value: Any) -> bytes | None:
     try:
         encoded = msgspec.json.encode(value)
     except (RecursionError, UnicodeEncodeError, OverflowError) as error:
-        raise RequestRefused(f"The value of {key!r} cannot be kept: {error}.") from None
+        raise RequestRefused("The value of {key!r} cannot be kept: {reason}.", key=key, reason=error) from None
     if len(encoded) > LARGEST_VALUE:
-        raise RequestRefused(f"The value of {key!r} has more than {LARGEST_VALUE} bytes.")
+        raise RequestRefused(
+            "The value of {key!r} has more than {largest_value} bytes.", key=key, largest_value=LARGEST_VALUE
+        )
     return encoded

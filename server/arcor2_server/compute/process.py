@@ -135,7 +135,9 @@ class ComputeProcess:
         log.error("compute worker ended", pid=self.process.pid, task=type(task).__name__, status=code, detail=detail)
         if code == -signal.SIGALRM:
             return ComputeTimeout(_too_long(task, within), detail)
-        return ComputeStopped(f"The compute worker {describe_exit(code)} while it worked on {task.label}.", detail)
+        return ComputeStopped(
+            "The compute worker {code} while it worked on {label}.", detail, code=describe_exit(code), label=task.label
+        )
 
     # -------------------------------------------------------------------------------- ending
     async def close(self) -> None:

@@ -45,7 +45,9 @@ class _Worker:
         """Let a question wait; ComputeBusy."""
         queue = self._waiting[background]
         if len(queue) >= MOST_WAITING:
-            raise ComputeBusy(f"{len(queue)} computations wait already: {question.task.label} is not begun.")
+            raise ComputeBusy(
+                "{count} computations wait already: {label} is not begun.", count=len(queue), label=question.task.label
+            )
         queue.append(question)
         self._wake.set()
         if self._serving is None:

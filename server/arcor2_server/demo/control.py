@@ -28,7 +28,13 @@ async def ask(address: str, do: str, /, *, within: float = 5.0, **arguments: Any
     except (OSError, OverflowError, ValueError, msgspec.DecodeError) as e:
         reason = "no answer in time" if isinstance(e, TimeoutError) else "it is no control channel of a fake"
         reason = "nobody listens there" if isinstance(e, ConnectionRefusedError) else reason
-        raise ConnectionLost(f"the fake at {address} does not answer: {reason}", str(e)) from e
+        raise ConnectionLost(
+            "the fake at {address} does not answer: {reason}", str(e), address=address, reason=reason
+        ) from e
     if not isinstance(answer, dict) or not answer.get("ok"):
-        raise Refused(f"the fake at {address} refuses: {answer.get('error') if isinstance(answer, dict) else answer}")
+        raise Refused(
+            "the fake at {address} refuses: {answer}",
+            address=address,
+            answer=answer.get("error") if isinstance(answer, dict) else answer,
+        )
     return answer.get("data")

@@ -58,12 +58,19 @@ class Child:
                         return text.removeprefix("ready").strip()
         except TimeoutError:
             await self.stop()
-            raise ChildFailed(f"{self.name} was not ready within {READY_TIMEOUT:g} s.", self._last_words()) from None
+            raise ChildFailed(
+                "{name} was not ready within {ready_timeout:g} s.",
+                self._last_words(),
+                name=self.name,
+                ready_timeout=READY_TIMEOUT,
+            ) from None
         except asyncio.CancelledError:
             await self.stop()
             raise
         await self._process.wait()
-        raise ChildFailed(f"{self.name} did not start: {self._last_words() or 'it said nothing'}")
+        raise ChildFailed(
+            "{name} did not start: {last_words}", name=self.name, last_words=self._last_words() or "it said nothing"
+        )
 
     async def start_json(self) -> dict[str, Any]:
         """Start it and give the addresses of its ready line."""

@@ -202,7 +202,9 @@ class Demo:
                 return
             begun = begun or event.data.state is SceneStateEnum.STARTING
             if event.data.state is SceneStateEnum.STOPPED and begun:
-                raise ProgramFailed(f"The workplace did not come online: {event.data.message or 'no reason given'}")
+                raise ProgramFailed(
+                    "The workplace did not come online: {text}", text=event.data.message or "no reason given"
+                )
 
     async def _follow(self, client: Client, project: Project, outcome: Outcome) -> None:
         actions = {action.id: action for point in project.action_points for action in point.actions}
@@ -211,7 +213,9 @@ class Demo:
             try:
                 event: Event = await client.next_event(timeout=BOARD_TIMEOUT)
             except DeviceTimeout:
-                raise ProgramFailed(f"The program stands still: nothing happened for {BOARD_TIMEOUT:g} s.") from None
+                raise ProgramFailed(
+                    "The program stands still: nothing happened for {board_timeout:g} s.", board_timeout=BOARD_TIMEOUT
+                ) from None
             match event.event:
                 case "ActionStateBefore" if event.data.action_id in actions:
                     self._display.action(actions[event.data.action_id].name)
@@ -229,7 +233,9 @@ class Demo:
                     if problem:
                         # What began it may be the fault of another device, which no action was waiting for.
                         alarms = "".join(f"; {alarm}" for alarm in self._display.alarms())
-                        raise ProgramFailed(f"The program ended with an error: {problem}{alarms}")
+                        raise ProgramFailed(
+                            "The program ended with an error: {problem}{alarms}", problem=problem, alarms=alarms
+                        )
                     outcome.finished = True
                     return
 

@@ -282,7 +282,12 @@ class Creation:
     ) -> ActionParameter:
         meta = next((meta for meta in action.parameters if meta.name == name), None)
         if meta is None:
-            raise InvalidData(f"Step {step.name}: {step.action} has no parameter {name}.")
+            raise InvalidData(
+                "Step {name}: {action} has no parameter {other_name}.",
+                name=step.name,
+                action=step.action,
+                other_name=name,
+            )
         if isinstance(value, str) and value.startswith("@"):
             return ActionParameter(name, meta.type, _json(orientations[value[1:]]))
         if isinstance(value, str) and value.startswith("$"):

@@ -50,9 +50,9 @@ def check_name(name: str, what: str) -> None:
     """Refuse what cannot become a name in a program; `what` says what it names ("action point")."""
     if not is_valid_name(name):
         raise InvalidData(
-            f"{name!r} cannot name an {what}: use letters, digits and _, no digit first, no Python word."
-            if what[0] in "aeiou"
-            else f"{name!r} cannot name a {what}: use letters, digits and _, no digit first, no Python word."
+            "{name!r} cannot name {item}: use letters, digits and _, no digit first, no Python word.",
+            name=name,
+            item=f"an {what}" if what[0] in "aeiou" else f"a {what}",
         )
 
 
@@ -103,7 +103,12 @@ def check_setting(parameter: Parameter, meta: ParameterMeta) -> None:
     if (kind := PARAMETER_TYPES.get(meta.type)) is not None:
         kind.check(parameter, meta)
     elif parameter.type != meta.type:
-        raise InvalidData(f"setting {parameter.name} must be of type {meta.type}, not {parameter.type}")
+        raise InvalidData(
+            "setting {name} must be of type {type}, not {parameter_type}",
+            name=parameter.name,
+            type=meta.type,
+            parameter_type=parameter.type,
+        )
 
 
 def scene_problems(scene: Scene, types: Types) -> list[str]:
@@ -157,12 +162,12 @@ def action_meta(action: Action, lookup: ProjectLookup, types: Types) -> ObjectAc
     try:
         object_id, method = action.parse_type()
     except ValueError as error:
-        raise InvalidData(f"{error}.") from None
+        raise InvalidData("{reason}.", reason=error) from None
     obj = lookup.scene_object(object_id)
     meta = types.action(obj.type, method)
     if meta.disabled:
         why = "" if isinstance(meta.problem, Unset) else f" ({meta.problem})"
-        raise InvalidData(f"{obj.type}.{method} cannot be used{why}.")
+        raise InvalidData("{type}.{method} cannot be used{reason}.", type=obj.type, method=method, reason=why)
     return meta
 
 
@@ -170,13 +175,17 @@ def check_flows(action: Action, meta: ObjectAction) -> None:
     """Refuse flows that do not fit what the action returns."""
     flows: list[Flow] = action.flows
     if [flow.type for flow in flows] != [FlowTypes.DEFAULT]:
-        raise InvalidData(f"{action.name}: exactly one flow is needed, of type default.")
+        raise InvalidData("{name}: exactly one flow is needed, of type default.", name=action.name)
     outputs = flows[0].outputs
     for output in outputs:
         check_name(output, "result")
     if outputs and len(outputs) != len(meta.returns):
         raise InvalidData(
-            f"{action.name}: {meta.name} returns {len(meta.returns)} values, {len(outputs)} names are given."
+            "{name}: {meta_name} returns {count} values, {other_count} names are given.",
+            name=action.name,
+            meta_name=meta.name,
+            count=len(meta.returns),
+            other_count=len(outputs),
         )
 
 
@@ -185,7 +194,11 @@ def check_outputs_unique(document: Document, action: Action) -> None:
     for output in action.outputs():
         other = document.named("output", output)
         if other is not None and other != action.id:
-            raise InvalidData(f"{document.action(other)[1].name} names a result {output} already: choose another name.")
+            raise InvalidData(
+                "{name} names a result {output} already: choose another name.",
+                name=document.action(other)[1].name,
+                output=output,
+            )
 
 
 def complete_parameters(action: Action, meta: ObjectAction) -> Action:
@@ -193,15 +206,22 @@ def complete_parameters(action: Action, meta: ObjectAction) -> Action:
     action = with_present_name(action, meta)
     given = {parameter.name: parameter for parameter in action.parameters}
     if len(given) != len(action.parameters):
-        raise InvalidData(f"{action.name}: a parameter is given twice.")
+        raise InvalidData("{name}: a parameter is given twice.", name=action.name)
     if unknown := given.keys() - {parameter.name for parameter in meta.parameters}:
-        raise InvalidData(f"{action.name}: {meta.name} has no parameter {', '.join(sorted(unknown))}.")
+        raise InvalidData(
+            "{name}: {meta_name} has no parameter {unknown}.",
+            name=action.name,
+            meta_name=meta.name,
+            unknown=", ".join(sorted(unknown)),
+        )
     filled = list(action.parameters)
     for parameter in meta.parameters:
         if parameter.name in given:
             continue
         if isinstance(parameter.default_value, Unset):
-            raise InvalidData(f"{action.name}: the parameter {parameter.name} is missing.")
+            raise InvalidData(
+                "{name}: the parameter {parameter_name} is missing.", name=action.name, parameter_name=parameter.name
+            )
         filled.append(ActionParameter(parameter.name, parameter.type, parameter.default_value))
     return action if len(filled) == len(action.parameters) else replace(action, parameters=filled)
 
@@ -222,23 +242,31 @@ def check_parameters(action: Action, meta: ObjectAction, lookup: ProjectLookup, 
                 case _ if wanted.type in PARAMETER_TYPES:
                     PARAMETER_TYPES[wanted.type].check(parameter, wanted, unparented, robot_id)
                 case _:
-                    raise InvalidData(f"parameter {wanted.name} is of the unknown type {wanted.type}")
+                    raise InvalidData(
+                        "parameter {name} is of the unknown type {type}", name=wanted.name, type=wanted.type
+                    )
         except Arcor2Error as error:
-            raise InvalidData(f"{action.name}: {error}") from error
+            raise InvalidData("{name}: {reason}", name=action.name, reason=error) from error
 
 
 def _text(parameter: Parameter) -> str:
     try:
         return msgspec.json.decode(parameter.value, type=str)
     except msgspec.DecodeError:
-        raise InvalidData(f"parameter {parameter.name}: {parameter.value[:80]} is not a JSON string.") from None
+        raise InvalidData(
+            "parameter {name}: {value} is not a JSON string.", name=parameter.name, value=parameter.value[:80]
+        ) from None
 
 
 def _check_project_parameter(parameter: Parameter, wanted: ParameterMeta, lookup: ProjectLookup) -> None:
     source = lookup.parameter(_text(parameter))
     if source.type != wanted.type:
         raise InvalidData(
-            f"parameter {wanted.name} is {wanted.type}, the project parameter {source.name} is {source.type}."
+            "parameter {name} is {type}, the project parameter {source_name} is {source_type}.",
+            name=wanted.name,
+            type=wanted.type,
+            source_name=source.name,
+            source_type=source.type,
         )
 
 
@@ -248,15 +276,26 @@ def _check_link(
     try:
         source_id, flow, index = parse_link(_text(parameter))
     except ValueError as error:
-        raise InvalidData(f"parameter {wanted.name}: {error}.") from None
+        raise InvalidData("parameter {name}: {reason}.", name=wanted.name, reason=error) from None
     if source_id == action.id:
-        raise InvalidData(f"parameter {wanted.name} cannot be linked to a result of the same action.")
+        raise InvalidData("parameter {name} cannot be linked to a result of the same action.", name=wanted.name)
     _, source = lookup.action(source_id)
     returns, outputs = action_meta(source, lookup, types).returns, source.outputs()
     if flow != FlowTypes.DEFAULT or len(outputs) != len(returns) or index >= len(returns):
-        raise InvalidData(f"parameter {wanted.name}: {source.name} keeps no result number {index}; name its results.")
+        raise InvalidData(
+            "parameter {name}: {source_name} keeps no result number {index}; name its results.",
+            name=wanted.name,
+            source_name=source.name,
+            index=index,
+        )
     if returns[index] != wanted.type:
-        raise InvalidData(f"parameter {wanted.name} is {wanted.type}, the result {outputs[index]} is {returns[index]}.")
+        raise InvalidData(
+            "parameter {name} is {type}, the result {output} is {return_value}.",
+            name=wanted.name,
+            type=wanted.type,
+            output=outputs[index],
+            return_value=returns[index],
+        )
 
 
 # ---------------------------------------------------------------------------------------------- project
@@ -268,10 +307,17 @@ def check_project_parameter(parameter: ProjectParameter) -> None:
         value = msgspec.json.decode(parameter.value, type=bool | int | float | str)
     except msgspec.DecodeError:
         raise InvalidData(
-            f"{parameter.name}: the value {parameter.value[:80]} is not JSON of a truth value, number or text."
+            "{name}: the value {value} is not JSON of a truth value, number or text.",
+            name=parameter.name,
+            value=parameter.value[:80],
         ) from None
     if expected is not None and type(value) is not expected:
-        raise InvalidData(f"{parameter.name}: {parameter.value[:80]} is not of type {parameter.type}.")
+        raise InvalidData(
+            "{name}: {value} is not of type {type}.",
+            name=parameter.name,
+            value=parameter.value[:80],
+            type=parameter.type,
+        )
 
 
 def project_problems(scene: Scene, project: Project, types: Types) -> list[str]:
@@ -333,7 +379,9 @@ def _check_joints(point: str, joints: ProjectRobotJoints, lookup: ProjectLookup,
     try:
         types.robot_meta(lookup.scene_object(joints.robot_id).type)
     except NotFound:
-        raise InvalidData(f"{point}: the joints {joints.name} belong to no robot of the scene.") from None
+        raise InvalidData(
+            "{point}: the joints {name} belong to no robot of the scene.", point=point, name=joints.name
+        ) from None
 
 
 def _parent_problems(document: Document, project: Project) -> Iterator[tuple[str, str]]:

@@ -259,7 +259,7 @@ class Document:
         try:
             return self._items[kind][item_id]
         except KeyError:
-            raise NotFound(f"There is no {what} with the id {item_id!r}.") from None
+            raise NotFound("There is no {what} with the id {item_id!r}.", what=what, item_id=item_id) from None
 
     def scene_object(self, object_id: str) -> SceneObject:
         """Return an object of the scene."""
@@ -384,7 +384,7 @@ class Document:
             item = point.value.parent
         if item in points or any(item in self._items[kind] for kind in ROOTS):
             return item
-        raise NotFound(f"{item!r} is not part of what is open.")
+        raise NotFound("{item!r} is not part of what is open.", item=item)
 
     def tree_of(self, root: str) -> list[str]:
         """Return the ids below a root: its action points with their items; empty if it is not a root."""

@@ -96,7 +96,7 @@ class Journal:
             try:
                 recovered, self.loss = file.open()
             except (sqlite3.Error, OSError, StorageError) as error:
-                failure = StorageError(f"The journal {self._path} cannot be used: {error}.")
+                failure = StorageError("The journal {path} cannot be used: {reason}.", path=self._path, reason=error)
                 self._loop.call_soon_threadsafe(_resolve, started, None, failure)
                 return
             self._loop.call_soon_threadsafe(_resolve, started, recovered, None)
@@ -122,7 +122,9 @@ class Journal:
             file.commit([job for job, _, _ in live])
         except (sqlite3.Error, OSError) as error:
             self._failed_epoch = live[-1][1]
-            self._failure = StorageError(f"The change could not be stored, {self._path} cannot be written: {error}.")
+            self._failure = StorageError(
+                "The change could not be stored, {path} cannot be written: {reason}.", path=self._path, reason=error
+            )
             log.error("journal cannot be written", path=str(self._path), error=str(error))
             self._loop.call_soon_threadsafe(self._finish, futures, self._failure, self._failed_epoch)
         else:

@@ -25,23 +25,29 @@ def check_logic_item(
     if start == START and end == END:
         raise InvalidData("START cannot lead straight to END: put an action between them.")
     if start == end:
-        raise InvalidData(f"{_name(document, start)} cannot lead to itself.")
+        raise InvalidData("{name} cannot lead to itself.", name=_name(document, start))
     for place in {start, end} - {START, END}:
         document.action(place)
     siblings = [other for other in document.outgoing(start) if other.id != item.id]
     if start == START and siblings:
-        raise InvalidData(f"START leads to {_name(document, action_of(siblings[0].end))} already.")
+        raise InvalidData("START leads to {name} already.", name=_name(document, action_of(siblings[0].end)))
     if any(action_of(other.end) == end for other in siblings):
-        raise InvalidData(f"{_name(document, start)} leads to {_name(document, end)} already.")
+        raise InvalidData(
+            "{name} leads to {other_name} already.", name=_name(document, start), other_name=_name(document, end)
+        )
     _check_otherwise(document, start, [item, *siblings])
     if not isinstance(item.condition, Unset):
         if start == START:
             raise InvalidData("The step from START cannot have a condition: there is no result yet.")
         _check_condition(document, meta_of, item.condition)
         if any(_same(item.condition, other.condition) for other in siblings):
-            raise InvalidData(f"Another step from {_name(document, start)} has the same condition.")
+            raise InvalidData("Another step from {name} has the same condition.", name=_name(document, start))
     if loops and start != START and end != END and document.leads_to(end, start, item.id):
-        raise InvalidData(f"The step from {_name(document, start)} to {_name(document, end)} would close a loop.")
+        raise InvalidData(
+            "The step from {name} to {other_name} would close a loop.",
+            name=_name(document, start),
+            other_name=_name(document, end),
+        )
 
 
 def _check_otherwise(document: Document, start: str, items: list[LogicItem]) -> None:
@@ -51,9 +57,9 @@ def _check_otherwise(document: Document, start: str, items: list[LogicItem]) -> 
     if len(items) == 1 or not without:
         return
     if any(isinstance(msgspec.json.decode(condition.value), bool) for condition in conditions if _is_json(condition)):
-        raise InvalidData(f"Each of several steps from {_name(document, start)} needs a condition.")
+        raise InvalidData("Each of several steps from {name} needs a condition.", name=_name(document, start))
     if without > 1:
-        raise InvalidData(f"Each of several steps from {_name(document, start)} but one needs a condition.")
+        raise InvalidData("Each of several steps from {name} but one needs a condition.", name=_name(document, start))
 
 
 def _is_json(condition: ProjectLogicIf) -> bool:
@@ -84,7 +90,7 @@ def check_no_loops(document: Document, items: Iterable[LogicItem]) -> None:
                 continue
             following = action_of(waiting[-1].pop().end)
             if following in on_path:
-                raise InvalidData(f"The steps through {_name(document, following)} would close a loop.")
+                raise InvalidData("The steps through {name} would close a loop.", name=_name(document, following))
             if following not in done:
                 path.append(following)
                 on_path.add(following)
@@ -95,9 +101,9 @@ def _place(text: str, border: str) -> str:
     """Return the action id, or START or END, of one side of an item."""
     action_id, slash, flow = text.partition("/")
     if not action_id or (slash and (flow != "default" or action_id == border)):
-        raise InvalidData(f"{text!r} names no action: write its id, or {border}.")
+        raise InvalidData("{text!r} names no action: write its id, or {border}.", text=text, border=border)
     if action_id == (END if border == START else START):
-        raise InvalidData(f"A step cannot {'start at END' if border == START else 'end at START'}.")
+        raise InvalidData("A step cannot start at END." if border == START else "A step cannot end at START.")
     return action_id
 
 
@@ -115,16 +121,20 @@ def _check_condition(document: Document, meta_of: Callable[[Action], ObjectActio
     try:
         action_id, flow, index = condition.parse_what()
     except ValueError as error:
-        raise InvalidData(f"The condition is not understood: {error}.") from None
+        raise InvalidData("The condition is not understood: {reason}.", reason=error) from None
     _, action = document.action(action_id)
     outputs, returns = action.outputs(), meta_of(action).returns
     if flow != "default" or index >= len(outputs) or index >= len(returns):
-        raise InvalidData(f"Action {action.name} keeps no result number {index}: name its results first.")
+        raise InvalidData(
+            "Action {name} keeps no result number {index}: name its results first.", name=action.name, index=index
+        )
     kind = BRANCHABLE.get(returns[index])
     if kind is None:
         raise InvalidData(
-            f"The result {outputs[index]} of {action.name} is {returns[index]};"
-            " only boolean, integer and enumerations can branch."
+            "The result {output} of {name} is {return_value}; only boolean, integer and enumerations can branch.",
+            output=outputs[index],
+            name=action.name,
+            return_value=returns[index],
         )
     try:
         value = msgspec.json.decode(condition.value)
@@ -132,4 +142,9 @@ def _check_condition(document: Document, meta_of: Callable[[Action], ObjectActio
         value = None
     if type(value) is not kind:
         wanted = {bool: "true or false", int: "an integer", str: "a text in quotes"}[kind]
-        raise InvalidData(f"A condition on {outputs[index]} compares with {wanted}, not with {condition.value[:40]}.")
+        raise InvalidData(
+            "A condition on {output} compares with {wanted}, not with {value}.",
+            output=outputs[index],
+            wanted=wanted,
+            value=condition.value[:40],
+        )

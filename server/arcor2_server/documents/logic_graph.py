@@ -47,11 +47,13 @@ class Flow:
 def _node(reference: str, item: LogicItem, known: dict[str, int]) -> int:
     action_id, slash, kind = reference.partition("/")
     if slash and kind != "default":
-        raise InvalidProject(f"logic item {item.id}: an action has no flow {kind!r}")
+        raise InvalidProject("logic item {id}: an action has no flow {type!r}", id=item.id, type=kind)
     try:
         return known[action_id]
     except KeyError:
-        raise InvalidProject(f"logic item {item.id} leads to or from an unknown action {action_id}") from None
+        raise InvalidProject(
+            "logic item {id} leads to or from an unknown action {action_id}", id=item.id, action_id=action_id
+        ) from None
 
 
 def _condition(
@@ -61,16 +63,28 @@ def _condition(
         action_id, flow, output = parse_link(condition.what)
         value = json.loads(condition.value)
     except ValueError as error:
-        raise InvalidProject(f"action {source.name!r}: a condition cannot be read: {error}") from None
+        raise InvalidProject(
+            "action {name!r}: a condition cannot be read: {reason}", name=source.name, reason=error
+        ) from None
     if action_id not in known or flow != "default":
-        raise InvalidProject(f"action {source.name!r}: a condition asks for {condition.what!r}, which does not exist")
+        raise InvalidProject(
+            "action {name!r}: a condition asks for {what!r}, which does not exist",
+            name=source.name,
+            what=condition.what,
+        )
     if not isinstance(value, bool | int | str):
         raise InvalidProject(
-            f"action {source.name!r}: only true, false, integers and texts can be branched on, not {condition.value}"
+            "action {name!r}: only true, false, integers and texts can be branched on, not {value}",
+            name=source.name,
+            value=condition.value,
         )
     asked = actions[known[action_id]]
     if output >= len(asked.outputs()):
-        raise InvalidProject(f"action {source.name!r}: a condition asks for a result that {asked.name!r} does not name")
+        raise InvalidProject(
+            "action {name!r}: a condition asks for a result that {asked_name!r} does not name",
+            name=source.name,
+            asked_name=asked.name,
+        )
     return Condition(known[action_id], output, value)
 
 
@@ -80,20 +94,22 @@ def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tu
     Puts true before false where two are opposite, and the one without a condition last.
     """
     if not edges:
-        raise InvalidProject(f"action {source.name!r}: nothing follows it")
+        raise InvalidProject("action {name!r}: nothing follows it", name=source.name)
     plain = [edge for edge in edges if edge.condition is None]
     if plain and len(edges) == 1:
         return tuple(edges)
     asked = [edge for edge in edges if edge.condition is not None]
     if len(plain) > 1 or (plain and any(_is_boolean(edge.condition) for edge in asked)):
-        raise InvalidProject(f"action {source.name!r}: one of the ways on has no condition")
+        raise InvalidProject("action {name!r}: one of the ways on has no condition", name=source.name)
     tried: set[Condition] = set()
     settled = False
     for edge in asked:
         assert edge.condition is not None
         if settled or edge.condition in tried:
             where = "the end" if edge.target == END_NODE else repr(actions[edge.target].name)
-            raise InvalidProject(f"action {source.name!r}: the way on to {where} can never be taken")
+            raise InvalidProject(
+                "action {name!r}: the way on to {place} can never be taken", name=source.name, place=where
+            )
         tried.add(edge.condition)
         settled = _is_boolean(edge.condition) and edge.condition._replace(value=not edge.condition.value) in tried
     if not settled and not plain:
@@ -102,7 +118,7 @@ def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tu
         when = "no condition holds" if more else f"{result} is not {_shown(one.value)}"
         if not more and isinstance(one.value, bool):
             when = f"{result} is {_shown(not one.value)}"
-        raise InvalidProject(f"action {source.name!r}: nothing follows it when {when}")
+        raise InvalidProject("action {name!r}: nothing follows it when {when}", name=source.name, when=when)
     if len(asked) == 2 and not plain:
         asked.sort(key=lambda edge: _is_boolean(edge.condition) and edge.condition.value is False)
     return (*asked, *plain)
@@ -129,7 +145,7 @@ def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> li
             if target == END_NODE or state[target] == closed:
                 continue
             if state[target] == open_:
-                raise InvalidProject(f"action {actions[target].name!r}: the logic leads back to it")
+                raise InvalidProject("action {name!r}: the logic leads back to it", name=actions[target].name)
             state[target] = open_
             stack.append((target, iter(reversed(edges[target]))))
             break
@@ -159,7 +175,7 @@ def read(project: Project) -> Flow:
         raise InvalidProject("the logic has no START: no action is the first one")
     if len(starts) > 1:
         names = ", ".join(repr(actions[start].name) for start in starts)
-        raise InvalidProject(f"the logic has more than one first action: {names}")
+        raise InvalidProject("the logic has more than one first action: {names}", names=names)
 
     order = _number(starts[0], [[target for target, _ in ways] for ways in items], actions)
     place = {action: number for number, action in enumerate(order)}

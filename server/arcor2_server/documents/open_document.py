@@ -81,9 +81,9 @@ class OpenDocument:
     def require_nothing_open(self) -> None:
         """Raise RequestRefused when a scene or project is open."""
         if self.document.count(Kind.PROJECT):
-            raise RequestRefused(f"The project {self._name(Kind.PROJECT)} is open: close it first.")
+            raise RequestRefused("The project {name} is open: close it first.", name=self._name(Kind.PROJECT))
         if self.document.count(Kind.SCENE):
-            raise RequestRefused(f"The scene {self._name(Kind.SCENE)} is open: close it first.")
+            raise RequestRefused("The scene {name} is open: close it first.", name=self._name(Kind.SCENE))
 
     def bare_scene(self) -> BareScene:
         """Give the open scene without its objects."""

@@ -30,9 +30,15 @@ def check_parent(lookup: ProjectLookup, parent_id: str, name: str) -> None:
     try:
         obj = lookup.scene_object(parent_id)
     except NotFound:
-        raise NotFound(f"The parent of {name} is neither an object nor an action point: {parent_id!r}.") from None
+        raise NotFound(
+            "The parent of {name} is neither an object nor an action point: {parent_id!r}.",
+            name=name,
+            parent_id=parent_id,
+        ) from None
     if isinstance(obj.pose, Unset):
-        raise InvalidData(f"{obj.name} has no pose and cannot be the parent of {name}.")
+        raise InvalidData(
+            "{name} has no pose and cannot be the parent of {other_name}.", name=obj.name, other_name=name
+        )
 
 
 def changes_for_parent(document: Document, point_id: str, new_parent: str) -> tuple[list[Change], list[str]]:
@@ -77,6 +83,6 @@ def check_no_loop(document: Document, point: BareActionPoint, new_parent: str) -
     at: str | Unset = new_parent
     while not isinstance(at, Unset):
         if at == point.id:
-            raise InvalidData(f"{point.name} cannot hang on itself: choose a parent that is not below it.")
+            raise InvalidData("{name} cannot hang on itself: choose a parent that is not below it.", name=point.name)
         item = document.find(Kind.POINT, at)
         at = UNSET if item is None else item.value.parent

@@ -27,11 +27,18 @@ def require_possible(
         item = document.find(change.kind, change.id)
         if (None if item is None else item.value) != change.before:
             what = "removed" if item is None else "changed"
-            raise RequestRefused(f"{title(change)} was {what} since{_by(history, {change.id}, after, user)}.")
+            raise RequestRefused(
+                "{change} was {what} since{by}.",
+                change=title(change),
+                what=what,
+                by=_by(history, {change.id}, after, user),
+            )
     try:
         check_sound(document, changes, types)
     except Unsound as error:
-        raise RequestRefused(f"{error}{_by(history, error.ids, after, user, ' That was made')}") from None
+        raise RequestRefused(
+            "{reason}{by}", reason=error, by=_by(history, error.ids, after, user, " That was made")
+        ) from None
 
 
 def _by(history: History, ids: set[str], after: int, user: str, opening: str = "") -> str:

@@ -123,7 +123,7 @@ def write(archive: Archive, path: Path) -> None:
     try:
         replace_file(path, package.to_zip(files_of(archive)), mode=0o666, durable=False)
     except OSError as error:
-        raise StorageError(f"{path} cannot be written: {error.strerror or error}") from error
+        raise StorageError("{path} cannot be written: {reason}", path=path, reason=error.strerror or error) from error
 
 
 # ------------------------------------------------------------------------------------------------ reading
@@ -150,35 +150,37 @@ def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
             msgspec.json.encode(found)  # half a surrogate pair can be read, but neither be written nor shown
         return found
     except TextTooLong as error:
-        raise InvalidPackage(f"{path}: {error}") from error
+        raise InvalidPackage("{path}: {reason}", path=path, reason=error) from error
     except UnicodeError as error:
-        raise InvalidPackage(f"{path}: it has a character that is none: {error}") from error
+        raise InvalidPackage("{path}: it has a character that is none: {reason}", path=path, reason=error) from error
     except KeyError:
-        raise InvalidPackage(f"{path}: it is missing.") from None
+        raise InvalidPackage("{path}: it is missing.", path=path) from None
     except (msgspec.MsgspecError, RecursionError) as error:
         # msgspec says where: `$.objects[2].pose.position`.
-        raise InvalidPackage(f"{path}: {error}") from error
+        raise InvalidPackage("{path}: {reason}", path=path, reason=error) from error
 
 
 def _text(files: Mapping[str, bytes], path: str) -> str:
     try:
         return files[path].decode("utf-8-sig")
     except KeyError:
-        raise InvalidPackage(f"{path}: it is missing.") from None
+        raise InvalidPackage("{path}: it is missing.", path=path) from None
     except UnicodeDecodeError as error:
-        raise InvalidPackage(f"{path}: it is no text: {error}") from error
+        raise InvalidPackage("{path}: it is no text: {reason}", path=path, reason=error) from error
 
 
 def _types(files: Mapping[str, bytes], head: _Head) -> dict[str, ObjectTypeSource]:
     types: dict[str, ObjectTypeSource] = {}
     for path, name in head.types.items():
         if not is_valid_name(name) or path != f"object_types/{module_name(name)}.py":
-            raise InvalidPackage(f"{HEAD}: {path[:80]!r} cannot hold an object type {name[:80]!r}.")
+            raise InvalidPackage(
+                "{head}: {path!r} cannot hold an object type {name!r}.", head=HEAD, path=path[:80], name=name[:80]
+            )
         types[name] = ObjectTypeSource(name, _text(files, path), model=_model(files, name))
     stray = {path for path in files if path.startswith("object_types/")} - head.types.keys()
     stray |= {path for path in files if path.startswith("data/models/")} - {_model_path(name) for name in types}
     if stray:
-        raise InvalidPackage(f"{min(stray)}: it belongs to no object type that {HEAD} names.")
+        raise InvalidPackage("{stray}: it belongs to no object type that {head} names.", stray=min(stray), head=HEAD)
     return types
 
 
@@ -194,14 +196,16 @@ def _model(files: Mapping[str, bytes], name: str) -> ObjectModel | Unset:
     if model.type is Model3dType.NONE:
         return UNSET
     if model.model().id != name:
-        raise InvalidPackage(f"{path}: it is the model of {model.model().id[:80]!r}, not of {name}.")
+        raise InvalidPackage(
+            "{path}: it is the model of {id!r}, not of {name}.", path=path, id=model.model().id[:80], name=name
+        )
     return model
 
 
 def _checked_id(document: Scene | Project, path: str) -> None:
     key = document.id
     if not key or len(key) > imported.MAX_ID or not key.isprintable() or "/" in key or key in (".", ".."):
-        raise InvalidPackage(f"{path}: {key[:80]!r} is no usable id.")
+        raise InvalidPackage("{path}: {key!r} is no usable id.", path=path, key=key[:80])
 
 
 def read(path: Path) -> Archive:
@@ -210,15 +214,20 @@ def read(path: Path) -> Archive:
     Raise NotFound if the file does not exist, InvalidPackage naming a damaged entry, or StorageError.
     """
     if not path.is_file():
-        raise NotFound(f"There is no file {path}.")
+        raise NotFound("There is no file {path}.", path=path)
     files = package.from_zip(path, _wanted, LARGEST)
     if HEAD not in files:
         if {SCRIPT, PROJECT} <= files.keys():
             return _from_package(path)
-        raise InvalidPackage(f"It is no export of arcor2-hw: {HEAD} is missing.")
+        raise InvalidPackage("It is no export of arcor2-hw: {head} is missing.", head=HEAD)
     head = _document(files, HEAD, _Head)
     if head.format != FORMAT:
-        raise InvalidPackage(f"{HEAD}: format {head.format} is of another version; this one reads {FORMAT}.")
+        raise InvalidPackage(
+            "{head}: format {format} is of another version; this one reads {other_format}.",
+            head=HEAD,
+            format=head.format,
+            other_format=FORMAT,
+        )
     scene = _document(files, SCENE, Scene) if head.kind != "object-type" else None
     project = _document(files, PROJECT, Project) if head.kind == "project" else None
     for document, place in ((scene, SCENE), (project, PROJECT)):
@@ -226,7 +235,7 @@ def read(path: Path) -> Archive:
             _checked_id(document, place)
     types = _types(files, head)
     if head.kind == "object-type" and not types:
-        raise InvalidPackage(f"{HEAD}: it names no object type.")
+        raise InvalidPackage("{head}: it names no object type.", head=HEAD)
     return Archive(
         head.kind,
         scene,
@@ -244,9 +253,14 @@ def _assets(files: Mapping[str, bytes], named: Iterable[_Asset]) -> dict[str, As
     assets: dict[str, AssetFile] = {}
     for one in named:
         if one.file not in files or not one.file.startswith("assets/"):
-            raise InvalidPackage(f"{HEAD}: the asset {one.id[:80]!r} should be in {one.file[:80]!r}, which is missing.")
+            raise InvalidPackage(
+                "{head}: the asset {id!r} should be in {file!r}, which is missing.",
+                head=HEAD,
+                id=one.id[:80],
+                file=one.file[:80],
+            )
         if one.id in assets:
-            raise InvalidPackage(f"{HEAD}: the asset {one.id[:80]!r} is named twice.")
+            raise InvalidPackage("{head}: the asset {id!r} is named twice.", head=HEAD, id=one.id[:80])
         assets[one.id] = AssetFile(files[one.file], one.file_name)
     return assets
 

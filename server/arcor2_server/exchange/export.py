@@ -21,9 +21,15 @@ def chosen(listed: Iterable[Listed], wanted: str, what: str, url: str) -> str:
     """Return the id of a document by id or name. Raise NotFound, or Conflict if a name is not unique."""
     found = [one.id for one in listed if one.id == wanted] or [one.id for one in listed if one.name == wanted]
     if not found:
-        raise NotFound(f"the server at {url} has no {what} {wanted}")
+        raise NotFound("the server at {url} has no {what} {wanted}", url=url, what=what, wanted=wanted)
     if len(found) > 1:
-        raise Conflict(f"{len(found)} {what}s are named {wanted}: give an id: {', '.join(sorted(found))}")
+        raise Conflict(
+            "{count} {what}s are named {wanted}: give an id: {found}",
+            count=len(found),
+            what=what,
+            wanted=wanted,
+            found=", ".join(sorted(found)),
+        )
     return found[0]
 
 
@@ -50,7 +56,9 @@ class Source:
             scene = await rest.scene(project.scene_id)
         except NothingThere:
             raise NotFound(
-                f"the scene {project.scene_id} of the project {project.name} is not there any more"
+                "the scene {scene_id} of the project {name} is not there any more",
+                scene_id=project.scene_id,
+                name=project.name,
             ) from None
         script = None
         if not project.has_logic:
@@ -73,7 +81,9 @@ class Source:
         uploaded = await self.uploaded()
         for name in wanted:
             if name not in uploaded:
-                raise NotFound(f"no object type {name} was brought into the server at {self._client.url}")
+                raise NotFound(
+                    "no object type {name} was brought into the server at {url}", name=name, url=self._client.url
+                )
         types = with_needed(wanted, uploaded)
         return Archive("object-type", types=types, assets=await self._assets(types, ()))
 

@@ -100,7 +100,7 @@ class Target:
         known = Known(archive, [*local, *there], metas, actions, robots)
         for finding in find(archive, known, [asset.id for asset in await self._rest.assets()]):
             if finding.level == "error":
-                raise InvalidPackage(f"{finding.entry}: {finding.text}")
+                raise InvalidPackage("{entry}: {text}", entry=finding.entry, text=finding.text)
 
     def _may(self, part: Part, what: str) -> None:
         if not {part, "all"} & set(self._overwrite):

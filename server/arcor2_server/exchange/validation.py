@@ -62,7 +62,7 @@ class Known:
             return self.candidates.action(type_name, name)
         if (action := find_action(self._actions.get(type_name, {}).values(), name)) is not None:
             return action
-        raise NotFound(f"The object type {type_name} has no action {name!r}.")
+        raise NotFound("The object type {type_name} has no action {name!r}.", type_name=type_name, name=name)
 
     def robot_meta(self, name: str) -> RobotMeta:
         """Return the features of a robot type; raise NotFound when it is none."""
@@ -71,7 +71,7 @@ class Known:
         try:
             return self._robots[name]
         except KeyError:
-            raise NotFound(f"The object type {name} is no robot.") from None
+            raise NotFound("The object type {name} is no robot.", name=name) from None
 
 
 def find(archive: Archive, types: Known, assets: Iterable[str] | None = None) -> Iterator[Finding]:

@@ -53,11 +53,11 @@ class SharedBreakpoints:
             items = await self._items(project_id)
             if unknown := add - items:
                 names = ", ".join(sorted(unknown)[:5])
-                raise RequestRefused(f"The project has no action point or action {names}.")
+                raise RequestRefused("The project has no action point or action {names}.", names=names)
             # Those that are not there wait for an undo, but not beyond what is kept.
             after = (before | add) - remove
             if len(after & items) > MOST:
-                raise RequestRefused(f"A project has at most {MOST} breakpoints.")
+                raise RequestRefused("A project has at most {most} breakpoints.", most=MOST)
             if len(after) > MOST:
                 after &= items
             if after == before:

@@ -109,4 +109,4 @@ class PackageRuns:
         if cell.online:
             await cell.begin_stop()
         if await cell.settled() is not SceneStateEnum.STOPPED:
-            raise RequestRefused(f"The scene is {cell.state.value}. Wait until it is offline.")
+            raise RequestRefused("The scene is {value}. Wait until it is offline.", value=cell.state.value)

@@ -127,7 +127,7 @@ class Execution(PackageLibrary):
         found = self.board.object(robot_id)
         with contextlib.suppress(NotFound):  # a package may bring a type that is not known here
             if not self._types.derives_from(found.type, "Robot"):
-                raise RequestRefused(f"{found.name} is not a robot.")
+                raise RequestRefused("{name} is not a robot.", name=found.name)
         return self.streams
 
     @property
@@ -202,7 +202,7 @@ class Execution(PackageLibrary):
 
     def _require_idle(self) -> None:
         if self.state not in _IDLE:
-            raise RequestRefused(f"A package is {self.state.value}: stop it first.")
+            raise RequestRefused("A package is {value}: stop it first.", value=self.state.value)
         if self._online.state.value != "stopped":
             raise RequestRefused("The scene is online: stop it first, its devices are in use.")
 
@@ -281,7 +281,7 @@ class Execution(PackageLibrary):
     def _require(self, states: "set[PackageStateEnum] | frozenset[PackageStateEnum]", what: str) -> CellHost:
         host = self._host.host
         if self.state not in states or host is None:
-            raise RequestRefused(f"The package is {self.state.value} and cannot be {what}.")
+            raise RequestRefused("The package is {value} and cannot be {what}.", value=self.state.value, what=what)
         return host
 
     def _kill(self, host: CellHost) -> None:

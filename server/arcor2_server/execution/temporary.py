@@ -107,13 +107,13 @@ class _Run:
     async def _build(self) -> Project:
         project = self._session.require_project()
         if self._session.has_changes:
-            raise RequestRefused(f"{project.name} has changes that are not saved: save it first.")
+            raise RequestRefused("{name} has changes that are not saved: save it first.", name=project.name)
         if self._execution.busy:
             raise RequestRefused("A program is running: stop it first.")
         if self._scene.running_action is not None:
             raise RequestRefused("An action is running: wait for it, or stop it.")
         if self._scene.state not in (SceneStateEnum.STOPPED, SceneStateEnum.STARTED):
-            raise RequestRefused(f"The scene is {self._scene.state.value}: wait until that is over.")
+            raise RequestRefused("The scene is {value}: wait until that is over.", value=self._scene.state.value)
         name = f"Temporary package for project '{project.name}'."
         self._package = new_id("pkg")
         await asyncio.to_thread(self._execution.packages.note_temporary, self._package, project.id)

@@ -119,7 +119,7 @@ class DeviceBoard:
     def object(self, object_id: str) -> SceneObject:
         """Return an object of the scene. Raise NotFound if there is none."""
         if (found := self._objects.get(object_id)) is None:
-            raise NotFound(f"There is no object {object_id!r} in operation.")
+            raise NotFound("There is no object {object_id!r} in operation.", object_id=object_id)
         return found
 
     def changed(self, message: DeviceChanged) -> None:
@@ -145,7 +145,9 @@ class DeviceBoard:
         """Raise RequestRefused when an object has failed, with its name and why."""
         report, known = self._reports.get(object_id), self._objects.get(object_id)
         if report is not None and known is not None and report.connection is Connection.FAILED:
-            raise RequestRefused(f"{known.name} is not there: {report.reason or 'it could not be connected'}.")
+            raise RequestRefused(
+                "{name} is not there: {reason}.", name=known.name, reason=report.reason or "it could not be connected"
+            )
 
     def states(self) -> list[ObjectStateData]:
         """Return the connection of every object, in the order of the scene."""

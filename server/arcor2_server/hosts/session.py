@@ -147,7 +147,7 @@ class HostSession:
         try:
             return msgspec.json.decode(raw, type=kind)
         except msgspec.MsgspecError as error:
-            raise Arcor2Error(f"{method} gave something else than it should.", str(error)) from error
+            raise Arcor2Error("{method} gave something else than it should.", str(error), method=method) from error
 
     async def cancel(self, object_id: str, action: str) -> None:
         """Cancel an action of a device while it runs."""

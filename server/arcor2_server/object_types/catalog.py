@@ -77,7 +77,7 @@ class TypeCatalog:
         try:
             return self._known.metas[name]
         except KeyError:
-            raise NotFound(f"There is no object type {name!r}.") from None
+            raise NotFound("There is no object type {name!r}.", name=name) from None
 
     def _analysis(self, name: str) -> TypeAnalysis:
         self.meta(name)
@@ -99,7 +99,7 @@ class TypeCatalog:
         """Return one action, by its name or a former one."""
         if (action := find_action(self._analysis(type_name).actions, name)) is not None:
             return action
-        raise NotFound(f"The object type {type_name} has no action {name!r}.")
+        raise NotFound("The object type {type_name} has no action {name!r}.", type_name=type_name, name=name)
 
     def enumerations(self, name: str) -> dict[tuple[str, str], Enumeration]:
         """Return the enumerations that the actions of a type take, by action and parameter."""
@@ -117,7 +117,7 @@ class TypeCatalog:
         """Return the features of a robot type. Raise NotFound if it is not a robot."""
         self.meta(name)
         if (robot := self._known.robots.get(name)) is None:
-            raise NotFound(f"The object type {name} is no robot.")
+            raise NotFound("The object type {name} is no robot.", name=name)
         return robot
 
     def implements(self, name: str, method: str) -> bool:

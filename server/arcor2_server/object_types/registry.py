@@ -283,12 +283,16 @@ class ObjectTypes(TypeCatalog):
     def require_replaceable(name: str) -> None:
         """Refuse to replace a base class. Raise InvalidData if that is impossible."""
         if name in BUILT_IN:
-            raise InvalidData(f"The object type {name} is built in and cannot be replaced.")
+            raise InvalidData("The object type {name} is built in and cannot be replaced.", name=name)
 
     def require_deletable(self, name: str) -> None:
         """Refuse to delete a base class or an installed type. Raise InvalidData if that is impossible."""
         if name in BUILT_IN:
-            raise InvalidData(f"The object type {name} is built in and cannot be deleted.")
+            raise InvalidData("The object type {name} is built in and cannot be deleted.", name=name)
         if name in self._installed and name not in self._uploaded:
             origin = self._origin(name) or "an installed distribution"
-            raise InvalidData(f"The object type {name} belongs to {origin} and cannot be deleted: uninstall that.")
+            raise InvalidData(
+                "The object type {name} belongs to {origin} and cannot be deleted: uninstall that.",
+                name=name,
+                origin=origin,
+            )

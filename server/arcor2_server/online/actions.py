@@ -67,11 +67,15 @@ def argument(parameter: ActionParameter, lookup: ProjectLookup, results: dict[st
         try:
             action_id, _, index = parse_link(read_reference(parameter))
         except ValueError as error:
-            raise InvalidData(f"parameter {parameter.name}: {error}") from error
+            raise InvalidData("parameter {name}: {reason}", name=parameter.name, reason=error) from error
         stored = results.get(action_id)
         if stored is None or index >= len(stored):
             name = lookup.action(action_id)[1].name
-            raise RequestRefused(f"Parameter {parameter.name} needs a result of the action {name}: execute that first.")
+            raise RequestRefused(
+                "Parameter {name} needs a result of the action {other_name}: execute that first.",
+                name=parameter.name,
+                other_name=name,
+            )
         return msgspec.Raw(stored[index].encode())
     if parameter.type == ActionParameterType.PROJECT_PARAMETER:
         return msgspec.Raw(lookup.parameter(read_reference(parameter)).value.encode())

@@ -24,15 +24,15 @@ class Cameras:
         """Return a camera of the open scene. Raise NotFound or RequestRefused if there is none."""
         found = self._session.scene_object(object_id)
         if not self._types.derives_from(found.type, "Camera"):
-            raise RequestRefused(f"{found.name} is not a camera.")
+            raise RequestRefused("{name} is not a camera.", name=found.name)
         return found
 
     async def camera_parameters(self, camera: SceneObject) -> CameraParameters:
         """Return the intrinsics that a live camera has; raise RequestRefused when it has none."""
         raw = await self._online.call(camera.id, "color_camera_params", deadline=OBSERVE_WITHIN)
         if not raw:
-            raise RequestRefused(f"{camera.name} does not know its parameters.")
+            raise RequestRefused("{name} does not know its parameters.", name=camera.name)
         try:
             return msgspec.json.decode(raw, type=CameraParameters)
         except msgspec.MsgspecError as error:
-            raise Arcor2Error(f"{camera.name} gave no parameters of a camera.", str(error)) from error
+            raise Arcor2Error("{name} gave no parameters of a camera.", str(error), name=camera.name) from error

@@ -134,14 +134,18 @@ class HoldToRun:
         """
         arrived = asyncio.get_running_loop().time()
         if not 0 <= args.valid_ms <= LONGEST_LEASE_MS:
-            raise RequestRefused(f"valid_ms must be 0 to {LONGEST_LEASE_MS}, not {args.valid_ms}.")
+            raise RequestRefused(
+                "valid_ms must be 0 to {longest_lease_ms}, not {valid_ms}.",
+                longest_lease_ms=LONGEST_LEASE_MS,
+                valid_ms=args.valid_ms,
+            )
         if args.valid_ms == 0:
             await self._let_go(client, args)
             return 0.0
         delay = self._delays.setdefault(client, Delay()).of(args.sent_ms, arrived)
         until = arrived + args.valid_ms / 1e3 - delay
         if until <= arrived:
-            raise RequestRefused(f"The request came {delay * 1e3:.0f} ms late: it was thrown away.")
+            raise RequestRefused("The request came {delay:.0f} ms late: it was thrown away.", delay=delay * 1000.0)
         press = self._held.get(args.robot_id)
         if press is None or press.client is not client or press.press != args.hold or press.kind is not kind:
             press = await self._begin(client, user, args, kind, until, allow)
@@ -154,7 +158,7 @@ class HoldToRun:
 
     async def _send_lease(self, press: _Press, until: float, motion: Mapping[str, Any]) -> float:
         if press.over:
-            raise RequestRefused(f"The hold was ended: {press.reason or 'it was let go'}.")
+            raise RequestRefused("The hold was ended: {reason}.", reason=press.reason or "it was let go")
         try:
             raw = await self._host.require_online().lease(
                 press.robot_id,
@@ -191,16 +195,16 @@ class HoldToRun:
             self._end(former, "" if former.press < args.hold else "another button was pressed")
             await asyncio.wait({former.ended}, timeout=until - loop.time())
             if loop.time() >= until:
-                raise RequestRefused(f"{name} is still coming to rest.")
+                raise RequestRefused("{name} is still coming to rest.", name=name)
             self._require_unspent(client, args.hold)
         if (former := self._held.get(robot_id)) is not None:
-            raise RequestRefused(f"{name} is held by {former.user}.")
+            raise RequestRefused("{name} is held by {user}.", name=name, user=former.user)
         self._require_lock(user, robot_id)
         press = self._held[robot_id] = _Press(client, user, kind, args, next(self._numbers))
         try:
             await allow()
             if press.over:
-                raise RequestRefused(f"The hold was ended: {press.reason}.")
+                raise RequestRefused("The hold was ended: {reason}.", reason=press.reason)
         except BaseException as error:
             self._finish(press, "")
             refusal = error if isinstance(error, Arcor2Error) else RequestRefused("The hold could not begin.")
@@ -219,7 +223,9 @@ class HoldToRun:
         locks = self._locks
         if not locks.holds(user, robot_id):
             name, writer = self._robots.robot(robot_id).name, locks.writer_of(robot_id)
-            raise RequestRefused(f"{name} is locked by {writer}." if writer else f"Lock {name} before you move it.")
+            if writer:
+                raise RequestRefused("{name} is locked by {user}.", name=name, user=writer)
+            raise RequestRefused("Lock {name} before you move it.", name=name)
 
     # -------------------------------------------------------------------------------- ends
     async def _let_go(self, client: Connection, args: Held) -> None:

@@ -40,7 +40,7 @@ MoveEventData = Callable[[MoveEventType, str | Unset], Any]
 def require_speed(speed: float) -> None:
     """Raise RequestRefused unless the speed is a fraction of the maximum."""
     if not 0.0 < speed <= 1.0:
-        raise RequestRefused(f"The speed must be more than 0 and at most 1, not {speed:g}.")
+        raise RequestRefused("The speed must be more than 0 and at most 1, not {speed:g}.", speed=speed)
 
 
 class RobotMotion:
@@ -66,7 +66,7 @@ class RobotMotion:
         """Raise RequestRefused when the robot's type does not have the feature."""
         robot = self._online.robot(robot_id)
         if not getattr(self._types.robot_meta(robot.type).features, feature):
-            raise RequestRefused(f"{robot.name} cannot {FEATURES[feature]}.")
+            raise RequestRefused("{name} cannot {features}.", name=robot.name, features=FEATURES[feature])
 
     def require_not_moving(self, robot_id: str, *, held: bool = False) -> None:
         """Raise RequestRefused if the robot moves, is held, executes an action, or has failed.
@@ -77,11 +77,11 @@ class RobotMotion:
         name = cell.robot(robot_id).name
         cell.board.require_not_failed(robot_id)
         if not held and (holder := cell.held.holder(robot_id)) is not None:
-            raise RequestRefused(f"{name} is held by {holder}.")
+            raise RequestRefused("{name} is held by {holder}.", name=name, holder=holder)
         if robot_id in cell.moving:
-            raise RequestRefused(f"{name} is moving.")
+            raise RequestRefused("{name} is moving.", name=name)
         if cell.running_action is not None and cell.running_action.object_id == robot_id:
-            raise RequestRefused(f"{name} is executing an action.")
+            raise RequestRefused("{name} is executing an action.", name=name)
 
     async def require_ready(self, robot_id: str, feature: str, arm_id: str | None) -> None:
         """Raise RequestRefused unless the robot may begin a motion now."""
@@ -93,7 +93,7 @@ class RobotMotion:
         if self._types.robot_meta(robot.type).features.hand_teaching and await cell.ask(
             bool, robot_id, "get_hand_teaching_mode", arm
         ):
-            raise RequestRefused(f"{robot.name} is being moved by hand.")
+            raise RequestRefused("{name} is being moved by hand.", name=robot.name)
 
     async def take_control(self, robot_id: str, arm_id: str | None) -> None:
         """Take control before a goal is computed from where the robot is: with control comes the tool of its settings.

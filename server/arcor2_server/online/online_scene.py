@@ -139,7 +139,7 @@ class OnlineScene:
         for check in self.before_start:
             check()
         if self._session.project is None and (locked := self._locks.write_locked_roots()):
-            raise RequestRefused(f"Something is being edited: {', '.join(locked)}.")
+            raise RequestRefused("Something is being edited: {locked}.", locked=", ".join(locked))
         await self._locks.acquire(SERVER, SCENE, PROJECT)
         try:
             self.require_offline()

@@ -36,7 +36,7 @@ class CameraQuery(Data, frozen=True, rename="camel"):
     def parameters(self) -> CameraParameters:
         """Return them as the rest of the server has them. Raise InvalidData if that is impossible."""
         if len(self.dist_coefs) not in COEFFICIENTS:
-            raise InvalidData(f"distCoefs needs 4, 5, 8 or 12 numbers, not {len(self.dist_coefs)}.")
+            raise InvalidData("distCoefs needs 4, 5, 8 or 12 numbers, not {count}.", count=len(self.dist_coefs))
         return CameraParameters(self.fx, self.fy, self.cx, self.cy, list(self.dist_coefs))
 
 
@@ -64,7 +64,7 @@ def read_args(text: str, kind: type[T]) -> T:
     try:
         args = msgspec.convert(snaked(msgspec.json.decode(text)), kind)
     except (msgspec.DecodeError, RecursionError) as error:
-        raise InvalidData(f"The part args is wrong: {camelized_names(str(error))}.") from None
+        raise InvalidData("The part args is wrong: {reason}.", reason=camelized_names(str(error))) from None
     check_texts(args)
     return args
 

@@ -237,7 +237,11 @@ class MeasurementCalibrationOperations:
         args = read_args(uploads.fields["args"], HandEyeArgs)
         pictures = await _pictures(uploads)
         if len(pictures) != len(args.flanges):
-            raise InvalidData(f"There are {len(pictures)} pictures, but {len(args.flanges)} poses of the flange.")
+            raise InvalidData(
+                "There are {count} pictures, but {other_count} poses of the flange.",
+                count=len(pictures),
+                other_count=len(args.flanges),
+            )
         samples = [HandEyeSample(flange, picture) for flange, picture in zip(args.flanges, pictures, strict=True)]
         task = t.FindHandEye(samples, args.camera_parameters, args.target, args.mounting, args.options)
         found = await self._compute.run(task)

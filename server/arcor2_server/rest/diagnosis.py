@@ -33,7 +33,7 @@ class DiagnosisOperations:
     async def diagnosis_with_notes(self, body: ClientNotes) -> Binary:
         """Return the diagnosis bundle with notes of the client, at most 256 KiB of JSON."""
         if len(msgspec.json.encode(body.client)) > LARGEST_NOTES:
-            raise InvalidData(f"A client may add {LARGEST_NOTES} bytes of JSON, not more.")
+            raise InvalidData("A client may add {largest_notes} bytes of JSON, not more.", largest_notes=LARGEST_NOTES)
         return Binary(
             await asyncio.to_thread(packed, self._diagnosis.parts(), body.client, self._secrets.store.values), ZIP, FILE
         )

@@ -27,7 +27,7 @@ class DisplayModelOperations:
                 return await asyncio.to_thread(file.read_bytes)
             except FileNotFoundError:
                 raise NotFound(
-                    f"What was prepared of the asset {asset_id!r} was dropped just now: ask again."
+                    "What was prepared of the asset {asset_id!r} was dropped just now: ask again.", asset_id=asset_id
                 ) from None
 
         return CacheableContent(read, MEDIA_TYPE, shown.etag, gzipped=shown.packed is not None)

@@ -226,7 +226,9 @@ class ExecutionOperations:
     async def create_token(self, query: NameQuery) -> ExecutionToken:
         """Add an entry to the token table of the protocol. It grants no access: `arcor2-hw token add` makes tokens."""
         if not query.name or len(query.name) > LONGEST_NAME or not query.name.isprintable():
-            raise InvalidData(f"A token needs a name of 1 to {LONGEST_NAME} printable characters.")
+            raise InvalidData(
+                "A token needs a name of 1 to {longest_name} printable characters.", longest_name=LONGEST_NAME
+            )
         token = ExecutionToken(new_id("tkn"), query.name)
         await ProjectTables(self._storage).put_token(token)
         return token

@@ -68,7 +68,12 @@ class ModelOperations:
     async def _of_kind(self, key: str, kind: Model3dType) -> Models:
         model = await self._storage.model(key)
         if model.type() is not kind:
-            raise NotFound(f"The model {key} is a {model.type().value.lower()}, not a {kind.value.lower()}.")
+            raise NotFound(
+                "The model {key} is a {value}, not a {other_value}.",
+                key=key,
+                value=model.type().value.lower(),
+                other_value=kind.value.lower(),
+            )
         return model
 
     @operation("GET", "/models/{model_id}/{model_type}", STORAGE, Role.OPERATOR)
@@ -77,7 +82,7 @@ class ModelOperations:
         try:
             kind = Model3dType(model_type.capitalize())
         except ValueError:
-            raise InvalidData(f"There is no kind of model {model_type[:40]!r}.") from None
+            raise InvalidData("There is no kind of model {model_type!r}.", model_type=model_type[:40]) from None
         return await self._of_kind(model_id, kind)
 
     @operation("GET", "/models/{model_id}/box", STORAGE, Role.OPERATOR)

@@ -66,17 +66,26 @@ class ObjectTypeOperations:
         opened.
         """
         if body.id != body.name or not is_valid_name(body.id):
-            raise InvalidData(f"{body.id[:80]!r} cannot name an object type: id and name are the name of its class.")
+            raise InvalidData(
+                "{id!r} cannot name an object type: id and name are the name of its class.", id=body.id[:80]
+            )
         if len(body.source.encode()) > MAX_SOURCE:
-            raise TooLarge(f"The source of {body.id} has more than {MAX_SOURCE} bytes.")
+            raise TooLarge("The source of {id} has more than {max_source} bytes.", id=body.id, max_source=MAX_SOURCE)
         self._types.require_replaceable(body.id)
         source = ObjectTypeSource(body.id, body.source, body.description)
         if not isinstance(body.model, Unset) and body.model.type is not Model3dType.NONE:
             if body.model.id != body.id:
-                raise InvalidData(f"The model of {body.id} has to have its id, not {body.model.id[:80]!r}.")
+                raise InvalidData(
+                    "The model of {id} has to have its id, not {other_id!r}.", id=body.id, other_id=body.model.id[:80]
+                )
             model = await self._storage.model(body.id)
             if model.type() is not body.model.type:
-                raise InvalidData(f"The model {body.id} is a {model.type().value}, not a {body.model.type.value}.")
+                raise InvalidData(
+                    "The model {id} is a {value}, not a {type_value}.",
+                    id=body.id,
+                    value=model.type().value,
+                    type_value=body.model.type.value,
+                )
             source = replace(source, model=ObjectModel.of(model))
         saved = await self._storage.put_object_type(source)
         await self._type_notifications.uploaded()

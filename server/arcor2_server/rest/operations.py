@@ -169,7 +169,9 @@ def route(declared: Operation, tasks: Tasks) -> HTTPRouteHandler:
         except Exception:
             reference = secrets.token_hex(4)
             log.exception("request failed", method=declared.method, path=declared.path, reference=reference)
-            trouble = InternalError(f"An error inside the server: see its log, reference {reference}.")
+            trouble = InternalError(
+                "An error inside the server: see its log, reference {reference}.", reference=reference
+            )
             return refusal(declared.service, trouble)
         finally:
             for upload in uploads:
@@ -236,13 +238,13 @@ def _query(kind: Any, request: Request[Any, Any, Any]) -> Any:
     try:
         read = msgspec.convert(values, kind, strict=False)
     except msgspec.ValidationError as error:
-        raise InvalidData(f"The query is wrong: {error}.") from None
+        raise InvalidData("The query is wrong: {reason}.", reason=error) from None
     check_texts(read)
     for name in fields:
         value = getattr(read, name)
         for each in value if isinstance(value, list) else (value,):
             if isinstance(each, float) and not math.isfinite(each):
-                raise InvalidData(f"The query is wrong: {name} is no finite number.")
+                raise InvalidData("The query is wrong: {name} is no finite number.", name=name)
     return read
 
 
@@ -254,7 +256,7 @@ async def _body(kind: Any, request: Request[Any, Any, Any]) -> Any:
     media_type = request.content_type[0]
     # Without a type it is taken for what it has to be.
     if media_type and media_type != "application/json" and not media_type.endswith("+json"):
-        raise Unsupported(f"The body has to be application/json, not {media_type[:80]}.")
+        raise Unsupported("The body has to be application/json, not {media_type}.", media_type=media_type[:80])
     content = await request.body()
     if len(content) > BESIDE:
         return await asyncio.to_thread(_decoded, content, kind)
@@ -269,7 +271,7 @@ def _decoded(content: bytes, kind: Any) -> Any:
         body = msgspec.convert(value, kind)
         check_texts(body)
     except (msgspec.DecodeError, RecursionError, UnicodeError) as error:
-        raise InvalidData(f"The body is wrong: {camelized_names(str(error))}.") from None
+        raise InvalidData("The body is wrong: {reason}.", reason=camelized_names(str(error))) from None
     return body
 
 
@@ -277,7 +279,7 @@ async def _upload(declared: Operation, request: Request[Any, Any, Any], uploads:
     parts, texts = await _multipart(declared, request, uploads)
     file = _as_file(dict(parts).get(declared.file), uploads)
     if file is None:
-        raise InvalidData(f"The body has no file {declared.file}.")
+        raise InvalidData("The body has no file {file}.", file=declared.file)
     return Upload(typing.cast("IO[bytes]", file.file), file.filename, texts)
 
 
@@ -285,10 +287,15 @@ async def _uploads(declared: Operation, request: Request[Any, Any, Any], uploads
     parts, texts = await _multipart(declared, request, uploads)
     named = [part for name, part in parts if name == declared.file]
     if len(named) > MOST_FILES:
-        raise InvalidData(f"The body has {len(named)} files {declared.file}; {MOST_FILES} are the most.")
+        raise InvalidData(
+            "The body has {count} files {file}; {most_files} are the most.",
+            count=len(named),
+            file=declared.file,
+            most_files=MOST_FILES,
+        )
     files = [file for part in named if (file := _as_file(part, uploads)) is not None]
     if not files:
-        raise InvalidData(f"The body has no file {declared.file}.")
+        raise InvalidData("The body has no file {file}.", file=declared.file)
     return Uploads([typing.cast("IO[bytes]", file.file) for file in files], texts)
 
 
@@ -297,7 +304,7 @@ async def _multipart(
 ) -> tuple[list[tuple[str, Any]], dict[str, str]]:
     """Return all parts of a body in order, and the text parts."""
     if request.content_type[0] != "multipart/form-data":
-        raise Unsupported(f"The body has to be multipart/form-data with the file {declared.file}.")
+        raise Unsupported("The body has to be multipart/form-data with the file {file}.", file=declared.file)
     try:
         form = await request.form()
     except UnicodeDecodeError:
@@ -307,7 +314,7 @@ async def _multipart(
     last = dict(parts)
     for name in declared.parts:
         if name not in last:
-            raise InvalidData(f"The body has no part {name}.")
+            raise InvalidData("The body has no part {name}.", name=name)
     texts: dict[str, str] = {}
     for name, part in last.items():
         if isinstance(part, str):

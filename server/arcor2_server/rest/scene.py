@@ -103,7 +103,7 @@ class SceneServiceOperations:
         try:
             model = kind(key, *sizes)  # type: ignore[arg-type]
         except ValueError as error:
-            raise InvalidData(f"{error}.") from None
+            raise InvalidData("{reason}.", reason=error) from None
         self._collisions.put(Obstacle.of(model, pose))
         return "ok"
 

@@ -26,7 +26,10 @@ def check_id(key: str, what: str) -> None:
     """Refuse an id under which nothing could be asked for later. Raise InvalidData if that is impossible."""
     if not key or len(key) > LONGEST_ID or not key.isprintable() or "/" in key or key in (".", ".."):
         raise InvalidData(
-            f"{key[:80]!r} cannot be the id of a {what}: 1 to {LONGEST_ID} printable characters, no slash."
+            "{key!r} cannot be the id of a {what}: 1 to {longest_id} printable characters, no slash.",
+            key=key[:80],
+            what=what,
+            longest_id=LONGEST_ID,
         )
 
 
@@ -56,7 +59,9 @@ class SceneOperations:
         check_id(body.id, "scene")
         for placed in body.objects:
             if not self._types.known(placed.type):
-                raise NotFound(f"The object {placed.name} is of a type {placed.type!r}, which there is not.")
+                raise NotFound(
+                    "The object {name} is of a type {type!r}, which there is not.", name=placed.name, type=placed.type
+                )
         return str((await self._storage.put_scene(body)).modified)
 
     @operation("DELETE", "/scenes/{scene_id}", STORAGE, Role.TECHNICIAN)

@@ -35,17 +35,27 @@ def _without_actions(document: Document, point_id: str) -> ActionPoint:
 
 def _check_unneeded(document: Document, point: BareActionPoint) -> None:
     if below := document.points_of(point.id):
-        raise RequestRefused(f"{below[0].name} hangs on {point.name}: remove it, or hang it elsewhere, first.")
+        raise RequestRefused(
+            "{name} hangs on {point_name}: remove it, or hang it elsewhere, first.",
+            name=below[0].name,
+            point_name=point.name,
+        )
     own = {item.id for item in document.owned(point.id, Kind.ACTION)}
     for action_id in own:
         if document.outgoing(action_id) or document.incoming(action_id):
-            raise RequestRefused(f"{document.action(action_id)[1].name} on {point.name} is in the logic.")
+            raise RequestRefused(
+                "{name} on {point_name} is in the logic.",
+                name=document.action(action_id)[1].name,
+                point_name=point.name,
+            )
     for needed in (point.id, *(item.id for kind in OWNED for item in document.owned(point.id, kind))):
         for user in document.users_of(needed):
             if not isinstance(user, Action):
-                raise RequestRefused(f"A condition of the logic uses a result of an action on {point.name}.")
+                raise RequestRefused("A condition of the logic uses a result of an action on {name}.", name=point.name)
             if user.id not in own:
-                raise RequestRefused(f"The action {user.name} uses {point.name} or what belongs to it.")
+                raise RequestRefused(
+                    "The action {name} uses {point_name} or what belongs to it.", name=user.name, point_name=point.name
+                )
 
 
 class ActionPointRequests:
@@ -108,7 +118,7 @@ class ActionPointRequests:
         document = self._session.require_project_open()
         point = document.action_point(args.action_point_id)
         if point.name == args.new_name:
-            raise RequestRefused(f"The action point is called {point.name} already.")
+            raise RequestRefused("The action point is called {name} already.", name=point.name)
         self.check_point_name(context, args.new_name)
         self._editing.require_held(context, point.id)
         changes = [document.update(Kind.POINT, point.id, replace(point, name=args.new_name))]
@@ -124,7 +134,7 @@ class ActionPointRequests:
         if not context.dry_run:
             self._editing.require_held(context, point.id, tree=True)
         elif not self._locks.could_lock_tree(context.user, point.id):
-            raise RequestRefused(f"{point.name}, or something that hangs on it, is locked by somebody else.")
+            raise RequestRefused("{name}, or something that hangs on it, is locked by somebody else.", name=point.name)
         await self._move(context, document, point, args.new_position)
 
     async def _move(self, context: Context, document: Document, point: BareActionPoint, position: Position) -> None:
@@ -167,7 +177,7 @@ class ActionPointRequests:
         if args.new_parent_id == old:
             return
         if args.new_parent_id == point.id:
-            raise RequestRefused(f"{point.name} cannot hang on itself.")
+            raise RequestRefused("{name} cannot hang on itself.", name=point.name)
         user, locks = context.user, self._locks
         skip_held = locks.auto_skip_held(user, *([old] if old else []))
         async with skip_held, locks.auto(user, *([args.new_parent_id] if args.new_parent_id else [])):
@@ -191,7 +201,11 @@ class ActionPointRequests:
             _check_unneeded(document, point)
             for item in owned:
                 if self._locks.writer_of(item.id) not in (None, context.user):
-                    raise RequestRefused(f"{item.value.name} on {point.name} is locked by somebody else.")
+                    raise RequestRefused(
+                        "{name} on {point_name} is locked by somebody else.",
+                        name=item.value.name,
+                        point_name=point.name,
+                    )
             changes: list[Change] = [document.remove(item.kind, item.id) for item in owned]
             changes.append(document.remove(Kind.POINT, point.id))
             if await self._editing.commit(context, changes):

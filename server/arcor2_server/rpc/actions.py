@@ -30,7 +30,9 @@ def _check_results_unneeded(document: Document, before: Action, after: Action) -
     if before.outputs() and not after.outputs() and (users := document.users_of(before.id)):
         user = users[0]
         who = f"The action {user.name}" if isinstance(user, Action) else "A condition of the logic"
-        raise RequestRefused(f"{who} uses a result of {before.name}: its results have to keep names.")
+        raise RequestRefused(
+            "{device} uses a result of {name}: its results have to keep names.", device=who, name=before.name
+        )
 
 
 def _neighbours(document: Document, action_id: str) -> set[str]:
@@ -111,14 +113,16 @@ class ActionRequests:
         async with self._locks.auto_skip_held(context.user, args.id, *places):
             _, action = document.action(args.id)
             if not args.with_steps and (document.outgoing(action.id) or document.incoming(action.id)):
-                raise RequestRefused(f"{action.name} is part of the logic: remove its steps first.")
+                raise RequestRefused("{name} is part of the logic: remove its steps first.", name=action.name)
             steps = [] if not args.with_steps else self._taken_out(context, document, action)
             gone = {step.id for step in steps if step.after is None}
             for user in document.users_of(action.id):
                 if isinstance(user, LogicItem) and user.id in gone:
                     continue
                 who = f"the action {user.name}" if isinstance(user, Action) else "a condition of the logic"
-                raise RequestRefused(f"A result of {action.name} is used by {who}: change that first.")
+                raise RequestRefused(
+                    "A result of {name} is used by {device}: change that first.", name=action.name, device=who
+                )
             # The action first: what is undone is told by what it began with.
             if await self._editing.commit(context, [document.remove(Kind.ACTION, action.id), *steps]):
                 for step in steps:

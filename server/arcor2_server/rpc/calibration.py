@@ -230,7 +230,7 @@ class CalibrationRequests:
         depth = await self._picture(camera, "depth_image", averaged_frames=DEPTH_FRAMES)
         after = await self._online.robot_joints(robot.id)
         if any(abs(one.value - other.value) > STILL for one, other in zip(view.robot_joints, after, strict=False)):
-            raise RequestRefused(f"{robot.name} moved while the picture was taken.")
+            raise RequestRefused("{name} moved while the picture was taken.", name=robot.name)
         found = await self._calibration.robot(
             model, view, [depth], on_progress=lambda share, text: on_progress(0.3 + 0.7 * share, text)
         )
@@ -256,7 +256,9 @@ class CalibrationRequests:
 
     async def _view(self, robot: SceneObject, camera: SceneObject, parameters: CameraParameters) -> RobotView:
         if isinstance(robot.pose, Unset) or isinstance(camera.pose, Unset):
-            raise RequestRefused(f"{robot.name} and {camera.name} need a pose from which to search.")
+            raise RequestRefused(
+                "{name} and {camera_name} need a pose from which to search.", name=robot.name, camera_name=camera.name
+            )
         joints = await self._online.robot_joints(robot.id)
         return RobotView(joints, robot.pose, camera.pose, parameters)
 
@@ -266,7 +268,7 @@ class CalibrationRequests:
         try:
             return _file(msgspec.json.decode(raw, type=str))
         except msgspec.MsgspecError:
-            raise Arcor2Error(f"{camera.name} gave no picture.") from None
+            raise Arcor2Error("{name} gave no picture.", name=camera.name) from None
 
     def _begin(
         self, context: Context, obj: SceneObject, process: str, find: Find, end: Callable[[], None] = lambda: None

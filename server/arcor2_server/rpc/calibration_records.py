@@ -39,9 +39,11 @@ class CalibrationRecordRequests:
         Raise RequestRefused or NotFound if that is impossible.
         """
         if record.parent != "world":
-            raise RequestRefused(f"The calibration is stated in the frame of {record.parent}: give a pose in that.")
+            raise RequestRefused(
+                "The calibration is stated in the frame of {parent}: give a pose in that.", parent=record.parent
+            )
         self._session.require_scene_open()
         found = self._session.scene_object(record.object_id)
         if isinstance(found.pose, Unset):
-            raise RequestRefused(f"{found.name} has no pose.")
+            raise RequestRefused("{name} has no pose.", name=found.name)
         return found.pose

@@ -114,16 +114,16 @@ class Editing:
     async def require_name_free(self, context: Context, name: str, what: str) -> None:
         """Raise RequestRefused unless the name is given and no scene or project has it, saved or open."""
         if not name:
-            raise RequestRefused(f"The {what} needs a name.")
+            raise RequestRefused("The {what} needs a name.", what=what)
         session = self._session
         opened = [item.value.name for kind in (Kind.SCENE, Kind.PROJECT) for item in session.document.of_kind(kind)]
         if name in opened or await self._storage.name_taken(name):
-            raise RequestRefused(f"There is a scene or project called {name} already: choose another name.")
+            raise RequestRefused("There is a scene or project called {name} already: choose another name.", name=name)
 
     def require_free(self, context: Context, kind: Kind, name: str, what: str, parent: str = "") -> None:
         """Raise RequestRefused when something of that kind (within its action point) has the name."""
         if self._session.document.named(kind, name, parent) is not None:
-            raise RequestRefused(f"There is {what} called {name} already: choose another name.")
+            raise RequestRefused("There is {what} called {name} already: choose another name.", what=what, name=name)
 
     async def eef_pose(self, context: Context, robot_id: str, end_effector: str, arm_id: str | Unset) -> Pose:
         """Return the pose of an end effector in the world, as the robot has it now."""

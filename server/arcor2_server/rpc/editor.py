@@ -78,7 +78,7 @@ class SharedStateRequests:
     async def set_breakpoints(self, context: Context, args: SetBreakpointsArgs) -> ProjectBreakpoints:
         """Set and remove shared breakpoints of a project; BreakpointsChanged announces them."""
         if both := args.add & args.remove:
-            raise RequestRefused(f"{min(both)} is to be set and taken away at once.")
+            raise RequestRefused("{both} is to be set and taken away at once.", both=min(both))
         project = self._project(context, args.project_id)
         return await self._breakpoints.change(project, args.add, args.remove, context.user)
 
@@ -98,13 +98,13 @@ class SharedStateRequests:
             if (item := document.find(kind, args.id)) is not None:
                 break
         else:
-            raise NotFound(f"There is no object, action point, orientation or joints {args.id!r}.")
+            raise NotFound("There is no object, action point, orientation or joints {id!r}.", id=args.id)
         if item.kind in OF_SCENE and context.client.role < Role.TECHNICIAN:
             raise RequestRefused("Moving an object needs the role technician or a higher one.")
         if item.kind is Kind.JOINTS and not (isinstance(args.position, Unset) and isinstance(args.orientation, Unset)):
             raise RequestRefused("Joints have neither a position nor an orientation.")
         if item.kind is not Kind.JOINTS and not isinstance(args.joints, Unset):
-            raise RequestRefused(f"{args.id!r} has no joints.")
+            raise RequestRefused("{id!r} has no joints.", id=args.id)
         locked = args.id if self._locks.holds(user, args.id) else item.parent or args.id
         self._locks.require_held(user, locked)
         self._previews.show(context.client, user, args, locked)

@@ -85,12 +85,12 @@ class ExecutionRequests:
             cell.require_online()
             if cell.running_action is not None:
                 name = session.action(cell.running_action.action_id)[1].name
-                raise RequestRefused(f"The action {name} is running.")
+                raise RequestRefused("The action {name} is running.", name=name)
             object_id, _, method = action.type.partition("/")
             obj = session.scene_object(object_id)
             cell.board.require_not_failed(object_id)
             if object_id in cell.moving:
-                raise RequestRefused(f"{obj.name} is moving.")
+                raise RequestRefused("{name} is moving.", name=obj.name)
             prepared = prepare(action, self._types.action(obj.type, method), session, cell.results)
             if context.dry_run:
                 return
@@ -107,7 +107,9 @@ class ExecutionRequests:
             raise RequestRefused("No action is running.")
         obj = self._session.scene_object(running.object_id)
         if not self._types.action(obj.type, running.method).meta.cancellable:
-            raise RequestRefused(f"{obj.name}.{running.method} cannot be cancelled. StopAll stops its device.")
+            raise RequestRefused(
+                "{name}.{method} cannot be cancelled. StopAll stops its device.", name=obj.name, method=running.method
+            )
         running.cancelled = True
         try:
             await self._online.cancel(running.object_id, running.method)

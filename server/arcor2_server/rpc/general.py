@@ -127,7 +127,9 @@ class GeneralRequests:
         offered = {event.name for event in EVENTS.values() if event.additional}
         if unknown := args.events - offered:
             raise RequestRefused(
-                f"No additional event is called {', '.join(sorted(unknown))}; there is {', '.join(sorted(offered))}."
+                "No additional event is called {unknown}; there is {offered}.",
+                unknown=", ".join(sorted(unknown)),
+                offered=", ".join(sorted(offered)),
             )
         client = context.client
         self._hub.subscribe(client, args.events, args.send)

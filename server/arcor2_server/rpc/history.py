@@ -109,10 +109,14 @@ class HistoryRequests:
             session.require_scene_open()
             document, at = session.document, session.revision
             if not session.oldest_revision <= args.revision <= at:
-                raise RequestRefused(f"Only the revisions {session.oldest_revision} to {at} can be restored.")
+                raise RequestRefused(
+                    "Only the revisions {oldest_revision} to {at} can be restored.",
+                    oldest_revision=session.oldest_revision,
+                    at=at,
+                )
             changes = changes_back(session.history.since(args.revision))
             if not changes:
-                raise RequestRefused(f"The document is as it was in revision {args.revision}.")
+                raise RequestRefused("The document is as it was in revision {revision}.", revision=args.revision)
             async with self._locked(context, changes):
                 if session.document is document and session.revision == at:
                     revision = await self._make(context, changes, args.revision, context.request, How.RESTORE)
@@ -135,15 +139,15 @@ class HistoryRequests:
         if isinstance(number, Unset):
             latest = history.undoable(user) if how is How.UNDO else history.redoable(user)
             if latest is None:
-                raise RequestRefused(f"There is nothing that you could {how.value}.")
+                raise RequestRefused("There is nothing that you could {value}.", value=how.value)
             return latest
         edit = history.find(number)
         if edit is None:
-            raise RequestRefused(f"There is no edit {number}, or it is not kept any more.")
+            raise RequestRefused("There is no edit {number}, or it is not kept any more.", number=number)
         if edit.user != user:
-            raise RequestRefused(f"Edit {number} was made by {edit.user}.")
+            raise RequestRefused("Edit {number} was made by {user}.", number=number, user=edit.user)
         if not (history.can_undo(user, number) if how is How.UNDO else history.can_redo(user, number)):
-            raise RequestRefused(f"Edit {number} is nothing that you could {how.value}.")
+            raise RequestRefused("Edit {number} is nothing that you could {value}.", number=number, value=how.value)
         return edit
 
     # ---------------------------------------------------------------------------------------------- checks
@@ -154,7 +158,11 @@ class HistoryRequests:
         async with self._locks.auto_skip_held(user, *ids_to_lock(self._session.document, changes)):
             for item in ids_that_move(self._session.document, changes):
                 if others := self._locks.holders_of(item) - {user}:
-                    raise Locked(f"{item!r}, which would move along, is locked by {', '.join(sorted(others))}.")
+                    raise Locked(
+                        "{item!r}, which would move along, is locked by {others}.",
+                        item=item,
+                        others=", ".join(sorted(others)),
+                    )
             yield
 
     async def _make(self, context: Context, changes: Sequence[Change], after: int, request: str, how: How) -> int:
@@ -163,7 +171,7 @@ class HistoryRequests:
         document = session.document
         needed = role_for(changes)
         if context.client.role < needed:
-            raise RequestRefused(f"What would change needs the role {needed.name.lower()} or a higher one.")
+            raise RequestRefused("What would change needs the role {name} or a higher one.", name=needed.name.lower())
         self._require_state(context, changes)
         require_possible(document, changes, self._types, session.history, after, user)
         await self._require_outside(context, changes)
@@ -192,7 +200,7 @@ class HistoryRequests:
                 cell.require_offline()
             elif cell.online and self._types.derives_from(change.after.type, "Robot") and _moves(change):
                 raise RequestRefused(
-                    f"{change.after.name} is a robot: it cannot be moved in the scene while it is online."
+                    "{name} is a robot: it cannot be moved in the scene while it is online.", name=change.after.name
                 )
 
     async def _require_outside(self, context: Context, changes: Sequence[Change]) -> None:
@@ -208,9 +216,9 @@ class HistoryRequests:
                     if i.value.name == name
                 }
                 if (found | opened) - {None, change.id}:
-                    raise RequestRefused(f"There is a scene or project called {name} by now.")
+                    raise RequestRefused("There is a scene or project called {name} by now.", name=name)
             if change.kind is Kind.OBJECT and change.after is None and await self._dependents.uses_object(change.id):
-                raise RequestRefused(f"{change.before.name} is used in projects by now.")
+                raise RequestRefused("{name} is used in projects by now.", name=change.before.name)
 
     async def _move_live(self, context: Context, changes: Sequence[Change]) -> None:
         cell = self._online

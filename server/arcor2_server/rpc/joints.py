@@ -67,7 +67,7 @@ class JointsRequests:
         point, value = self._session.require_project_open().joints(args.joints_id)
         given, known = [joint.name for joint in args.joints], {joint.name for joint in value.joints}
         if len(given) != len(set(given)) or set(given) != known:
-            raise InvalidData(f"{value.name} has exactly the joints {', '.join(sorted(known))}.")
+            raise InvalidData("{name} has exactly the joints {known}.", name=value.name, known=", ".join(sorted(known)))
         self._editing.require_held(context, point.id)
         await self._update(context, replace(value, joints=list(args.joints), is_valid=True), ChangeType.UPDATE)
 
@@ -98,7 +98,11 @@ class JointsRequests:
         document = self._session.require_project_open()
         point, value = document.joints(args.joints_id)
         if users := document.users_of(value.id):
-            raise RequestRefused(f"The action {getattr(users[0], 'name', '')} uses the joints {value.name}.")
+            raise RequestRefused(
+                "The action {name} uses the joints {value_name}.",
+                name=getattr(users[0], "name", ""),
+                value_name=value.name,
+            )
         self._editing.require_held(context, point.id)
         changes = [document.remove(Kind.JOINTS, value.id)]
         if await self._editing.commit(context, changes):

@@ -78,7 +78,7 @@ class LockRequests:
         self._users.require_left(args.user)
         held = self._lock_takeover.held(args.user)
         if not held:
-            raise RequestRefused(f"{args.user} holds no locks.")
+            raise RequestRefused("{user} holds no locks.", user=args.user)
         if not context.dry_run:
             context.events_after += self._lock_takeover.release(args.user, by)
         return TakeOverLocksData(held)

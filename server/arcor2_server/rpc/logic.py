@@ -35,7 +35,7 @@ class LogicRequests:
         document = session.require_project_open()
         if not session.bare_project().has_logic:
             raise RequestRefused(
-                f"The project {session.bare_project().name} has no logic: it is programmed by a script."
+                "The project {name} has no logic: it is programmed by a script.", name=session.bare_project().name
             )
         return document
 

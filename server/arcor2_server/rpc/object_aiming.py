@@ -47,11 +47,11 @@ class ObjectAimingRequests:
     def _focus_points(self, context: Context, obj: SceneObject) -> list[Pose]:
         """Return the focus points of an object's mesh; RequestRefused, InvalidData when it cannot be aimed at."""
         if isinstance(obj.pose, Unset):
-            raise RequestRefused(f"{obj.name} has no pose.")
+            raise RequestRefused("{name} has no pose.", name=obj.name)
         wrapped = self._types.meta(obj.type).object_model
         model = None if isinstance(wrapped, Unset) else wrapped.model()
         if not isinstance(model, Mesh) or isinstance(model.focus_points, Unset) or not model.focus_points:
-            raise RequestRefused(f"{obj.name} has no mesh with focus points.")
+            raise RequestRefused("{name} has no mesh with focus points.", name=obj.name)
         check_points([point.position for point in model.focus_points], f"Focus points of {obj.type}")
         return model.focus_points
 
@@ -85,7 +85,11 @@ class ObjectAimingRequests:
         self._editing.require_held(context, aiming.object_id)
         self._editing.require_held(context, aiming.robot.robot_id)
         if not 0 <= args.point_idx < len(aiming.points):
-            raise RequestRefused(f"Focus point {args.point_idx} does not exist. Use 0 to {len(aiming.points) - 1}.")
+            raise RequestRefused(
+                "Focus point {point_idx} does not exist. Use 0 to {count}.",
+                point_idx=args.point_idx,
+                count=len(aiming.points) - 1,
+            )
         pose = await self._editing.eef_pose(
             context, aiming.robot.robot_id, aiming.robot.end_effector, aiming.robot.arm_id
         )
@@ -101,14 +105,16 @@ class ObjectAimingRequests:
         user = context.user
         aiming = self._object_aiming.require(user, document)
         if missing := [index for index in range(len(aiming.points)) if index not in aiming.poses]:
-            raise RequestRefused(f"Focus points are missing: {', '.join(map(str, missing))}.")
+            raise RequestRefused("Focus points are missing: {missing}.", missing=", ".join(map(str, missing)))
         obj = document.scene_object(aiming.object_id)
         touched = [aiming.poses[index].position for index in range(len(aiming.points))]
         found = fit([point.position for point in aiming.points], touched)
         log.info("aimed", object=obj.name, worst=found.worst)
         if found.worst > WORST_MISS:
             raise RequestRefused(
-                f"The points do not fit {obj.name}: one misses by {found.worst * 1000:.0f} mm. Was another one touched?"
+                "The points do not fit {name}: one misses by {worst:.0f} mm. Was another one touched?",
+                name=obj.name,
+                worst=found.worst * 1000,
             )
         await self._scene_object_requests.move_object(context, obj, found.pose)
         if not context.dry_run:

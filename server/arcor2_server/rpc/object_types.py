@@ -26,7 +26,9 @@ from arcor2_server.storage import AssetStore, Storage
 def require_mesh(assets: AssetStore, model: Models) -> None:
     """Refuse a collision model whose mesh is not an asset."""
     if isinstance(model, Mesh) and not assets.exists(model.asset_id):
-        raise RequestRefused(f"There is no asset {model.asset_id!r} that could be the mesh of {model.id}.")
+        raise RequestRefused(
+            "There is no asset {asset_id!r} that could be the mesh of {id}.", asset_id=model.asset_id, id=model.id
+        )
 
 
 def _because(meta: ObjectTypeMeta) -> str:
@@ -49,7 +51,9 @@ def _parent_value(parent: IdValue, kind: str) -> Raw:
         value = msgspec.json.decode(parent.value)
     except msgspec.DecodeError as error:
         if kind not in ("string", "string_enum"):
-            raise InvalidData(f"The parameter {parent.id}: {parent.value[:80]} is no {kind}.") from error
+            raise InvalidData(
+                "The parameter {id}: {value} is no {type}.", id=parent.id, value=parent.value[:80], type=kind
+            ) from error
         value = parent.value
     if kind in ("string", "string_enum") and not isinstance(value, str):
         value = parent.value
@@ -136,28 +140,28 @@ class ObjectTypeRequests:
     def _check_new(self, context: Context, new: ObjectTypeMeta) -> None:
         types = self._types
         if types.known(new.type):
-            raise RequestRefused(f"There is an object type called {new.type} already: choose another name.")
+            raise RequestRefused("There is an object type called {type} already: choose another name.", type=new.type)
         if not is_valid_name(new.type):
             raise RequestRefused(
-                f"{new.type!r} is no valid name: letters, digits and _, no keyword, no name of Python's."
+                "{type!r} is no valid name: letters, digits and _, no keyword, no name of Python's.", type=new.type
             )
         base = types.meta(new.base)
         if base.disabled:
-            raise RequestRefused(f"The object type {base.type} cannot be used{_because(base)}.")
+            raise RequestRefused("The object type {type} cannot be used{base}.", type=base.type, base=_because(base))
         if types.derives_from(base.type, "Robot"):
             raise RequestRefused("A robot's object type has to be written, not only derived.")
         if isinstance(new.object_model, Unset):
             if types.derives_from(base.type, "CollisionObject"):
-                raise RequestRefused(f"An object type derived from {base.type} needs a collision model.")
+                raise RequestRefused("An object type derived from {type} needs a collision model.", type=base.type)
             return
         if not types.derives_from(base.type, "CollisionObject"):
-            raise RequestRefused(f"An object type derived from {base.type} takes no collision model.")
+            raise RequestRefused("An object type derived from {type} takes no collision model.", type=base.type)
         try:
             model = new.object_model.model()
         except ValueError as error:
-            raise RequestRefused(f"A collision model is needed: {error}.") from None
+            raise RequestRefused("A collision model is needed: {reason}.", reason=error) from None
         if model.id != new.type:
-            raise RequestRefused(f"The model of {new.type} needs the id {new.type}, not {model.id}.")
+            raise RequestRefused("The model of {type} needs the id {type}, not {id}.", type=new.type, id=model.id)
         require_mesh(self._assets, model)
 
     # ------------------------------------------------------------------------------------------------ deleted ones
@@ -181,7 +185,9 @@ class ObjectTypeRequests:
                 except Arcor2Error as error:
                     failed.append(DeleteObjectTypesData(name, str(error)))
         if failed:
-            raise RequestRefused(f"These object types were not deleted: {', '.join(one.id for one in failed)}.", failed)
+            raise RequestRefused(
+                "These object types were not deleted: {failed}.", failed, failed=", ".join(one.id for one in failed)
+            )
         return None
 
     def _given(self, context: Context, name: str) -> bool:
@@ -196,11 +202,17 @@ class ObjectTypeRequests:
         types.meta(name)
         types.require_deletable(name)
         if derived := [other for other in types.names() if other != name and name in types.bases(other)]:
-            raise RequestRefused(f"The object type {name} is the base of {', '.join(derived)}.")
+            raise RequestRefused(
+                "The object type {name} is the base of {derived}.", name=name, derived=", ".join(derived)
+            )
         if (opened := session.scene) is not None and any(placed.type == name for placed in opened.objects):
-            raise RequestRefused(f"The object type {name} is used in the open scene {opened.name}.")
+            raise RequestRefused(
+                "The object type {name} is used in the open scene {opened_name}.", name=name, opened_name=opened.name
+            )
         if scenes := await self._scenes_with(context, name):
-            raise RequestRefused(f"The object type {name} is used in the scenes {', '.join(sorted(scenes))}.")
+            raise RequestRefused(
+                "The object type {name} is used in the scenes {scenes}.", name=name, scenes=", ".join(sorted(scenes))
+            )
 
     # ------------------------------------------------------------------------------------------------ dynamic values
     @rpc("ActionParamValues")
@@ -214,12 +226,18 @@ class ObjectTypeRequests:
                 dict[str, tuple[str, set[str]]], obj.id, "DYNAMIC_PARAMS"
             )
             if args.param_id not in dynamic:
-                raise RequestRefused(f"{obj.name} offers no values for a parameter {args.param_id}.")
+                raise RequestRefused(
+                    "{name} offers no values for a parameter {param_id}.", name=obj.name, param_id=args.param_id
+                )
             method, parents = dynamic[args.param_id]
             given = [parent.id for parent in args.parent_params]
             if sorted(given) != sorted(parents):
                 needed = ", ".join(sorted(parents)) or "no other one"
-                raise RequestRefused(f"The values of {args.param_id} depend on {needed}: give exactly that.")
+                raise RequestRefused(
+                    "The values of {param_id} depend on {needed}: give exactly that.",
+                    param_id=args.param_id,
+                    needed=needed,
+                )
             kinds = {
                 parameter.name: parameter.type
                 for action in self._types.actions(obj.type)

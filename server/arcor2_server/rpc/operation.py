@@ -49,13 +49,15 @@ _AT_ITS_PLACE: Final = {
 def _remedy(name: str, safety: Safety, role: Role) -> str:
     """Name the method that leads out of a state; raise RequestRefused when none does, or the role is too low."""
     if (where := _AT_ITS_PLACE.get(safety)) is not None:
-        raise RequestRefused(f"{name} cannot be acknowledged: {where}.")
+        raise RequestRefused("{name} cannot be acknowledged: {place}.", name=name, place=where)
     if safety is Safety.PROTECTIVE_STOP:
         return "acknowledge_protective_stop"
     if safety not in (Safety.FAULT, Safety.VIOLATION):
-        raise RequestRefused(f"{name} has no stop that could be acknowledged.")
+        raise RequestRefused("{name} has no stop that could be acknowledged.", name=name)
     if role < Role.TECHNICIAN:
-        raise RequestRefused(f"Restarting the safety system of {name} needs the role technician or a higher one.")
+        raise RequestRefused(
+            "Restarting the safety system of {name} needs the role technician or a higher one.", name=name
+        )
     return "restart_safety"
 
 
@@ -118,7 +120,7 @@ class OperationRequests:
             return
         arm = cell.arm(args.robot_id, optional(args.arm_id))
         if await cell.ask(bool, args.robot_id, "get_hand_teaching_mode", arm):
-            raise RequestRefused(f"{robot.name} is being moved by hand.")
+            raise RequestRefused("{name} is being moved by hand.", name=robot.name)
 
     def _velocity(self, context: Context, args: JogRobotArgs) -> dict[str, Any]:
         """Return the motion for the lease of the host; raise RequestRefused if it is missing or ambiguous."""
@@ -148,7 +150,7 @@ class OperationRequests:
         assert not isinstance(args.object_id, Unset)
         found = self._session.scene_object(args.object_id)
         if isinstance(found.pose, Unset):
-            raise RequestRefused(f"{found.name} has no pose.")
+            raise RequestRefused("{name} has no pose.", name=found.name)
         return found.pose.orientation
 
     # ------------------------------------------------------------------------------------------------ stop
@@ -173,7 +175,11 @@ class OperationRequests:
         else:
             streams = self._motion.require_robot_online(args.robot_id).streams
         if args.send and not 1.0 <= args.rate <= FASTEST_STREAM:
-            raise RequestRefused(f"The rate must be 1 to {FASTEST_STREAM} Hz, not {args.rate:g}.")
+            raise RequestRefused(
+                "The rate must be 1 to {fastest_stream} Hz, not {rate:g}.",
+                fastest_stream=FASTEST_STREAM,
+                rate=args.rate,
+            )
         streams.at_rate(context.client, args.robot_id, args.what, args.rate, args.send)
 
     # ------------------------------------------------------------------------------------------------ devices

@@ -116,7 +116,11 @@ class OrientationRequests:
         async with self._locks.auto_skip_held(context.user, args.orientation_id):
             _, value = document.orientation(args.orientation_id)
             if users := document.users_of(value.id):
-                raise RequestRefused(f"The action {getattr(users[0], 'name', '')} uses the orientation {value.name}.")
+                raise RequestRefused(
+                    "The action {name} uses the orientation {value_name}.",
+                    name=getattr(users[0], "name", ""),
+                    value_name=value.name,
+                )
             changes = [document.remove(Kind.ORIENTATION, value.id)]
             if await self._editing.commit(context, changes):
                 emit_changes(context, changes, "OrientationChanged", ChangeType.REMOVE)

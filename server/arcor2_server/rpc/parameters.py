@@ -34,7 +34,7 @@ def _index(overrides: list[Parameter], name: str) -> int:
     for index, override in enumerate(overrides):
         if override.name == name:
             return index
-    raise NotFound(f"The setting {name} is not overridden.")
+    raise NotFound("The setting {name} is not overridden.", name=name)
 
 
 class ParameterRequests:
@@ -84,7 +84,11 @@ class ParameterRequests:
             parameter = document.parameter(args.id)
             for user in document.users_of(args.id):
                 name = user.name if isinstance(user, Action) else ""
-                raise RequestRefused(f"The action {name} uses the project parameter {parameter.name}.")
+                raise RequestRefused(
+                    "The action {name} uses the project parameter {parameter_name}.",
+                    name=name,
+                    parameter_name=parameter.name,
+                )
             changes = [document.remove(Kind.PARAMETER, args.id)]
             if await self._editing.commit(context, changes):
                 emit_changes(context, changes, "ProjectParameterChanged", ChangeType.REMOVE)
@@ -97,7 +101,7 @@ class ParameterRequests:
         obj = document.scene_object(object_id)
         settings = {setting.name: setting for setting in self._types.meta(obj.type).settings}
         if given.name not in settings:
-            raise NotFound(f"{obj.type} has no setting {given.name}.")
+            raise NotFound("{type} has no setting {name}.", type=obj.type, name=given.name)
         check_setting(given, settings[given.name])
         item = document.find(Kind.OVERRIDE, object_id)
         return document, [] if item is None else list(item.value.parameters)
@@ -131,7 +135,7 @@ class ParameterRequests:
         obj = document.scene_object(object_id)
         hidden = await self._editing.hide_secrets(context, obj, [*others, given], overrides, of_project=True)
         if not hidden or hidden[-1].name != given.name:
-            raise InvalidData(f"Enter a value for the secret setting {given.name}: none is stored.")
+            raise InvalidData("Enter a value for the secret setting {name}: none is stored.", name=given.name)
         return hidden[-1]
 
     @rpc("AddOverride")
@@ -140,7 +144,7 @@ class ParameterRequests:
         given = await self._without_secret(context, args.id, args.override)
         document, overrides = self._overrides(context, args.id, given)
         if any(override.name == args.override.name for override in overrides):
-            raise InvalidData(f"The setting {args.override.name} is overridden already: update the override.")
+            raise InvalidData("The setting {name} is overridden already: update the override.", name=args.override.name)
         await self._set_overrides(context, document, args.id, [*overrides, given], given, ChangeType.ADD)
 
     @rpc("UpdateOverride")

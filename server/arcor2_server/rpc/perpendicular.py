@@ -117,5 +117,5 @@ class PerpendicularRequests:
                 log.warning("search for an angle ended early", robot=args.robot_id, within=SEARCH_WITHIN)
                 break
         if best is None:
-            raise RequestRefused(f"The tool cannot point straight down here: {refusal}")
+            raise RequestRefused("The tool cannot point straight down here: {refusal}", refusal=refusal)
         return best[1]

@@ -78,7 +78,7 @@ class ProjectRequests:
 
     def _require_no_project(self, context: Context) -> None:
         if (project := self._session.project) is not None:
-            raise RequestRefused(f"The project {project.name} is open: close it first.")
+            raise RequestRefused("The project {name} is open: close it first.", name=project.name)
 
     async def _scene_for(self, context: Context, scene_id: str) -> Scene:
         """Return the open scene, which has to be that one, or the saved one when none is open."""
@@ -86,7 +86,7 @@ class ProjectRequests:
             return await self._storage.scene(scene_id)
         if opened.id != scene_id:
             raise RequestRefused(
-                f"The project belongs to another scene than {opened.name}, which is open: close it first."
+                "The project belongs to another scene than {name}, which is open: close it first.", name=opened.name
             )
         return opened
 
@@ -107,7 +107,9 @@ class ProjectRequests:
                 raise RequestRefused("Something is locked: all locks have to be given back first.")
             scene = await self._scene_for(context, args.scene_id)
             if problems := session.scene_problems(scene):
-                raise RequestRefused(f"{scene.name} cannot be opened. {' '.join(problems)}")
+                raise RequestRefused(
+                    "{name} cannot be opened. {problems}", name=scene.name, problems=" ".join(problems)
+                )
             # Another request may have opened something meanwhile.
             self._require_no_project(context)
             if context.dry_run:
@@ -136,7 +138,9 @@ class ProjectRequests:
             scene = await self._scene_for(context, project.scene_id)
             await self._type_notifications.publish()
             if problems := project_problems(scene, project, self._types):
-                raise RequestRefused(f"{project.name} cannot be opened. {' '.join(problems)}")
+                raise RequestRefused(
+                    "{name} cannot be opened. {problems}", name=project.name, problems=" ".join(problems)
+                )
             await self._save_scene_changes(context)
             await session.show(session.scene or scene, with_present_names(scene, project, self._types))
             self._emit_opened(context)
@@ -148,7 +152,7 @@ class ProjectRequests:
         async with self._locks.exclusive():
             project = session.require_project()
             if not session.has_changes:
-                raise RequestRefused(f"{project.name} has no changes to save.")
+                raise RequestRefused("{name} has no changes to save.", name=project.name)
             if context.dry_run:
                 return
             await session.save()
@@ -162,7 +166,9 @@ class ProjectRequests:
             project = session.require_project()
             self._online.require_offline()
             if session.has_changes and not args.force:
-                raise RequestRefused(f"{project.name} has changes that are not saved: save it, or close it by force.")
+                raise RequestRefused(
+                    "{name} has changes that are not saved: save it, or close it by force.", name=project.name
+                )
             if context.dry_run:
                 return
             ids = [item.id for item in session.document.items()]

@@ -107,7 +107,7 @@ class RobotRequests:
         async with self._reading(context, args.robot_id) as cell:
             robot = cell.robot(args.robot_id)
             if not self._types.robot_meta(robot.type).multi_arm:
-                raise RequestRefused(f"{robot.name} has one arm.")
+                raise RequestRefused("{name} has one arm.", name=robot.name)
             return sorted(await cell.ask(set[str], args.robot_id, "get_arm_ids"))
 
     @rpc("RegisterForRobotEvent")
@@ -154,7 +154,7 @@ class RobotRequests:
         self._motion.require_feature(args.robot_id, "stop")
         acting = cell.running_action is not None and cell.running_action.object_id == args.robot_id
         if args.robot_id not in cell.moving and not acting:
-            raise RequestRefused(f"{cell.robot(args.robot_id).name} is not moving.")
+            raise RequestRefused("{name} is not moving.", name=cell.robot(args.robot_id).name)
         await cell.stop_motion(args.robot_id)
 
     @rpc("HandTeachingMode")

@@ -197,7 +197,7 @@ class RobotMotionRequests:
         arm_id = optional(args.arm_id)
         joints = self._session.joints(joints_id)[1]
         if joints.robot_id != args.robot_id:
-            raise RequestRefused(f"The joints {joints.name} belong to another robot.")
+            raise RequestRefused("The joints {name} belong to another robot.", name=joints.name)
         await self._motion.require_ready(args.robot_id, "move_to_joints", arm_id)
         arguments: dict[str, Any] = {"target_joints": joints.joints, "speed": args.speed, "safe": args.safe}
         arguments |= self._online.arm(args.robot_id, arm_id)

@@ -80,7 +80,9 @@ class SceneRequests:
             scene = await self._storage.scene(args.id)
             await self._type_notifications.publish()
             if problems := session.scene_problems(scene):
-                raise RequestRefused(f"{scene.name} cannot be opened. {' '.join(problems)}")
+                raise RequestRefused(
+                    "{name} cannot be opened. {problems}", name=scene.name, problems=" ".join(problems)
+                )
             await session.show(scene)
             self._emit_opened(context, session.require_scene())
 
@@ -92,7 +94,9 @@ class SceneRequests:
             self._session.require_scene_alone()
             scene = self._session.require_scene()
             if self._session.scene_changed and not args.force:
-                raise RequestRefused(f"{scene.name} has changes that are not saved: save it, or close it by force.")
+                raise RequestRefused(
+                    "{name} has changes that are not saved: save it, or close it by force.", name=scene.name
+                )
             self._online.require_offline()
             if self._locks.locked_roots(besides=(SCENE,)):
                 raise RequestRefused("Something in the scene is locked: all locks have to be given back first.")
@@ -163,7 +167,12 @@ class SceneRequests:
         async with self._locks.auto(context.user, args.id):
             scene = await self._storage.scene(args.id)
             if projects := await self._storage.projects_with_scene(args.id):
-                raise RequestRefused(f"{scene.name} is used by {len(projects)} projects: delete them first.", projects)
+                raise RequestRefused(
+                    "{name} is used by {count} projects: delete them first.",
+                    projects,
+                    name=scene.name,
+                    count=len(projects),
+                )
             if context.dry_run:
                 return
             await self._storage.delete_scene(args.id)

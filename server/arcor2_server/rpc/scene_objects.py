@@ -50,7 +50,7 @@ def _model_of(model: ObjectModel) -> Models:
     try:
         return model.model()
     except ValueError as error:
-        raise InvalidData(f"A collision model is needed: {error}.") from None
+        raise InvalidData("A collision model is needed: {reason}.", reason=error) from None
 
 
 FLIPPED = Orientation(1, 0, 0, 0)
@@ -123,11 +123,13 @@ class SceneObjectRequests:
             self._session.require_scene_alone()
             self._online.require_offline()
             if self._types.known(args.name):
-                raise RequestRefused(f"There is an object type called {args.name} already: choose another name.")
+                raise RequestRefused(
+                    "There is an object type called {name} already: choose another name.", name=args.name
+                )
             self._editing.require_free(context, Kind.OBJECT, args.name, "an object")
             check_name(args.name, "object")
             if _model_of(args.model).id != args.name:
-                raise InvalidData(f"The model of {args.name} needs the id {args.name}.")
+                raise InvalidData("The model of {name} needs the id {name}.", name=args.name)
             if context.dry_run:
                 return
             source = ObjectTypeSource(args.name, virtual_source(args.name), model=args.model)
@@ -151,7 +153,11 @@ class SceneObjectRequests:
                 names = ", ".join(
                     sorted([project.name for project in await self._storage.projects() if project.id in users])
                 )
-                raise RequestRefused(f"{obj.name} is used in {names}: change these projects, or remove it by force.")
+                raise RequestRefused(
+                    "{name} is used in {names}: change these projects, or remove it by force.",
+                    name=obj.name,
+                    names=names,
+                )
             changes = [document.remove(Kind.OBJECT, args.id)]
             if await self._editing.commit(context, changes):
                 session.removed_types.add(obj.type)
@@ -181,9 +187,11 @@ class SceneObjectRequests:
         """Move an object; while online the live one moves too."""
         obj = self._session.require_scene_alone().scene_object(args.object_id)
         if self._online.online and self._types.derives_from(obj.type, "Robot"):
-            raise RequestRefused(f"{obj.name} is a robot: it cannot be moved in the scene while it is online.")
+            raise RequestRefused(
+                "{name} is a robot: it cannot be moved in the scene while it is online.", name=obj.name
+            )
         if isinstance(obj.pose, Unset):
-            raise RequestRefused(f"{obj.name} has no pose.")
+            raise RequestRefused("{name} has no pose.", name=obj.name)
         self._editing.require_held(context, args.object_id)
         await self.move_object(context, obj, args.pose)
 
@@ -206,7 +214,7 @@ class SceneObjectRequests:
             self._online.require_online()
             obj = document.scene_object(args.id)
             if isinstance(obj.pose, Unset):
-                raise RequestRefused(f"{obj.name} has no pose.")
+                raise RequestRefused("{name} has no pose.", name=obj.name)
             model = self._types.meta(obj.type).object_model
             offset = pivot_offset(model, args.pivot)
             pose = await self._editing.eef_pose(context, robot.robot_id, robot.end_effector, robot.arm_id)
@@ -220,7 +228,7 @@ class SceneObjectRequests:
         document = self._session.require_scene_alone()
         obj = document.scene_object(args.id)
         if args.new_name == obj.name:
-            raise RequestRefused(f"The object is called {obj.name} already.")
+            raise RequestRefused("The object is called {name} already.", name=obj.name)
         self._editing.require_free(context, Kind.OBJECT, args.new_name, "an object")
         check_name(args.new_name, "object")
         self._editing.require_held(context, args.id)
@@ -235,17 +243,19 @@ class SceneObjectRequests:
         self._session.require_scene_alone()
         meta = self._types.meta(args.object_type_id)
         if meta.disabled or not self._types.derives_from(meta.type, "CollisionObject"):
-            raise RequestRefused(f"{meta.type} takes no collision model.")
+            raise RequestRefused("{type} takes no collision model.", type=meta.type)
         if meta.object_model == args.object_model:
-            raise RequestRefused(f"{meta.type} has this model already.")
+            raise RequestRefused("{type} has this model already.", type=meta.type)
         if _model_of(args.object_model).id != meta.type:
-            raise InvalidData(f"The model of {meta.type} needs the id {meta.type}.")
+            raise InvalidData("The model of {type} needs the id {type}.", type=meta.type)
         require_mesh(self._assets, _model_of(args.object_model))
         self._editing.require_held(context, args.object_type_id)
         try:
             stored = await self._storage.object_type(meta.type)
         except NotFound:
-            raise RequestRefused(f"{meta.type} comes with an installed driver: its model cannot be changed.") from None
+            raise RequestRefused(
+                "{type} comes with an installed driver: its model cannot be changed.", type=meta.type
+            ) from None
         if not context.dry_run:
             updated = await self._types.add(replace(stored, model=args.object_model))
             context.emit("ChangedObjectTypes", [updated], ChangeType.UPDATE)

@@ -105,7 +105,7 @@ class AssetStore:
         """Return the record of an asset. Raise NotFound if there is none."""
         found = self._assets.get(key) or self._offered.get(key)
         if found is None:
-            raise NotFound(f"There is no asset {key!r}.")
+            raise NotFound("There is no asset {key!r}.", key=key)
         return found
 
     def file(self, key: str) -> Path:
@@ -185,7 +185,7 @@ class AssetStore:
         async with self._changing:
             asset = self.info(key)
             if key not in self._assets:
-                raise Conflict(f"The asset {key!r} belongs to an installed driver and cannot be deleted.")
+                raise Conflict("The asset {key!r} belongs to an installed driver and cannot be deleted.", key=key)
             with self._storage_errors("write"):
                 await asyncio.to_thread(self._record(key).unlink, missing_ok=True)
                 await asyncio.to_thread(sync_directory, self._records)
@@ -196,7 +196,7 @@ class AssetStore:
     # ------------------------------------------------------------------------------------------------ inside
     def _refuse_known(self, key: str, upsert: bool) -> None:
         if self.exists(key) and not upsert:
-            raise Conflict(f"There is an asset {key!r} already.")
+            raise Conflict("There is an asset {key!r} already.", key=key)
 
     async def _receive(self, content: AsyncIterable[bytes], descriptor: int) -> tuple[int, str]:
         size = 0
@@ -204,7 +204,7 @@ class AssetStore:
         async for chunk in content:
             size += len(chunk)
             if size > self.limit:
-                raise TooLarge(f"An asset has at most {self.limit} bytes.")
+                raise TooLarge("An asset has at most {limit} bytes.", limit=self.limit)
             with self._storage_errors("write"):
                 await asyncio.to_thread(_append, descriptor, chunk, hashed)
         with self._storage_errors("write"):
@@ -249,7 +249,7 @@ class AssetStore:
 
 def _checked(key: str) -> str:
     if not key or len(key) > MAX_ID or not key.isprintable():
-        raise InvalidData(f"The id of an asset has 1 to {MAX_ID} printable characters.")
+        raise InvalidData("The id of an asset has 1 to {max_id} printable characters.", max_id=MAX_ID)
     return key
 
 

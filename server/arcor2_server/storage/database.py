@@ -115,13 +115,15 @@ class Database:
 
     def _failed(self, what: str, error: SQLAlchemyError) -> StorageError:
         cause = getattr(error, "orig", None) or error
-        return StorageError(f"cannot {what} the database {self._place}: {cause}", detail=str(error))
+        return StorageError(
+            "cannot {what} the database {place}: {cause}", detail=str(error), what=what, place=self._place, cause=cause
+        )
 
     @staticmethod
     async def one(session: AsyncSession, table: type[Any], key: str, what: str) -> Any:
         """Return the row with a key. Raise NotFound naming `what` if there is none."""
         if (row := await session.get(table, key)) is None:
-            raise NotFound(f"There is no {what} {key!r}.")
+            raise NotFound("There is no {what} {key!r}.", what=what, key=key)
         return row
 
     async def with_ids(self, table: type[Any], keys: Sequence[str], decode: Any) -> list[Any]:
@@ -142,4 +144,9 @@ class Database:
         try:
             return decode(row.document)
         except msgspec.DecodeError as error:
-            raise StorageError(f"the document {row.id!r} in the database {self._place} is damaged: {error}") from error
+            raise StorageError(
+                "the document {id!r} in the database {place} is damaged: {reason}",
+                id=row.id,
+                place=self._place,
+                reason=error,
+            ) from error

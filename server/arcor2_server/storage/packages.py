@@ -49,14 +49,14 @@ class Packages:
     def checked(self, package_id: str) -> Path:
         """Return the path for a package id. Raise InvalidPackage for an invalid id."""
         if not _ID.fullmatch(package_id):
-            raise InvalidPackage(f"{package_id[:80]!r} is no id of a package.")
+            raise InvalidPackage("{package_id!r} is no id of a package.", package_id=package_id[:80])
         return self._root / package_id
 
     def directory(self, package_id: str) -> Path:
         """Return the directory of a package; raise NotFound when there is none."""
         path = self.checked(package_id)
         if not (path / "script.py").is_file():
-            raise NotFound(f"There is no package {package_id}.")
+            raise NotFound("There is no package {package_id}.", package_id=package_id)
         return path
 
     def all(self) -> list[PackageSummary]:
@@ -110,7 +110,9 @@ class Packages:
         try:
             replace_file(path, msgspec.json.format(msgspec.json.encode(known | values), indent=2), mode=0o666)
         except OSError as error:
-            raise StorageError(f"The package {package_id} cannot be written: {error.strerror}.") from error
+            raise StorageError(
+                "The package {package_id} cannot be written: {reason}.", package_id=package_id, reason=error.strerror
+            ) from error
 
     def delete(self, package_id: str) -> PackageSummary:
         """Delete a package; return its summary. Raise NotFound or StorageError if that is impossible."""
@@ -119,7 +121,9 @@ class Packages:
             self._discard(self.directory(package_id))
             self._mark(package_id).unlink(missing_ok=True)
         except OSError as error:
-            raise StorageError(f"The package {package_id} cannot be deleted: {error.strerror}.") from error
+            raise StorageError(
+                "The package {package_id} cannot be deleted: {reason}.", package_id=package_id, reason=error.strerror
+            ) from error
         return summary
 
     def note_temporary(self, package_id: str, project_id: str) -> None:
@@ -131,7 +135,7 @@ class Packages:
             self._root.mkdir(parents=True, exist_ok=True)
             replace_file(self._mark(package_id), project_id.encode(), mode=0o666)
         except OSError as error:
-            raise StorageError(f"Packages cannot be written: {error.strerror}.") from error
+            raise StorageError("Packages cannot be written: {reason}.", reason=error.strerror) from error
 
     def forget_temporary(self, package_id: str) -> None:
         """Take back `note_temporary`; the package, if there is one, is deleted.
@@ -143,7 +147,9 @@ class Packages:
                 self._discard(path)
             self._mark(package_id).unlink(missing_ok=True)
         except OSError as error:
-            raise StorageError(f"The package {package_id} cannot be deleted: {error.strerror}.") from error
+            raise StorageError(
+                "The package {package_id} cannot be deleted: {reason}.", package_id=package_id, reason=error.strerror
+            ) from error
 
     def sweep(self) -> list[str]:
         """Delete the remains of a crash at the start; return the projects that were running.
@@ -159,7 +165,7 @@ class Packages:
                 if path.is_dir() and path.name.startswith(_UNFINISHED):
                     shutil.rmtree(path, ignore_errors=True)
         except OSError as error:
-            raise StorageError(f"Packages cannot be read: {error.strerror}.") from error
+            raise StorageError("Packages cannot be read: {reason}.", reason=error.strerror) from error
         return projects
 
     def hide_secrets(self) -> int:
@@ -170,7 +176,7 @@ class Packages:
         try:
             return sum(self._hide_secrets(self.directory(summary.id)) for summary in self.all())
         except OSError as error:
-            raise StorageError(f"Packages cannot be written: {error.strerror}.") from error
+            raise StorageError("Packages cannot be written: {reason}.", reason=error.strerror) from error
 
     def _mark(self, package_id: str) -> Path:
         return self._root / f"{_TEMPORARY}{package_id}"
@@ -190,7 +196,9 @@ class Packages:
             file.seek(0)
         except OSError as error:
             file.close()
-            raise StorageError(f"The package {package_id} cannot be read: {error.strerror}.") from error
+            raise StorageError(
+                "The package {package_id} cannot be read: {reason}.", package_id=package_id, reason=error.strerror
+            ) from error
         return file
 
     def _discard(self, path: Path) -> None:
@@ -208,7 +216,7 @@ class Packages:
         try:
             content = base64.b64decode(data, validate=True)
         except (binascii.Error, ValueError) as error:
-            raise InvalidPackage(f"The package is not base64: {error}.") from error
+            raise InvalidPackage("The package is not base64: {reason}.", reason=error) from error
         return self.take(package_id, BytesIO(content))
 
     def take(self, package_id: str, content: IO[bytes]) -> PackageSummary:
@@ -218,7 +226,7 @@ class Packages:
             self._root.mkdir(parents=True, exist_ok=True)
             temporary = Path(tempfile.mkdtemp(prefix=".new-", dir=self._root))
         except OSError as error:
-            raise StorageError(f"Packages cannot be written: {error.strerror}.") from error
+            raise StorageError("Packages cannot be written: {reason}.", reason=error.strerror) from error
         try:
             unpack(content, temporary)
             if not (temporary / "script.py").is_file():
@@ -228,7 +236,7 @@ class Packages:
                 self._discard(target)
             temporary.rename(target)
         except OSError as error:
-            raise StorageError(f"The package cannot be written: {error.strerror}.") from error
+            raise StorageError("The package cannot be written: {reason}.", reason=error.strerror) from error
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
         return self.summary(package_id)
@@ -241,7 +249,7 @@ def unpack(content: IO[bytes], directory: Path) -> None:
         with zipfile.ZipFile(content) as archive:
             entries = archive.infolist()
             if len(entries) > MAX_FILES:
-                raise InvalidPackage(f"The package has more than {MAX_FILES} files.")
+                raise InvalidPackage("The package has more than {max_files} files.", max_files=MAX_FILES)
             for entry in entries:
                 target = directory / inside(entry)
                 if entry.is_dir():
@@ -252,14 +260,16 @@ def unpack(content: IO[bytes], directory: Path) -> None:
                     while chunk := source.read(_CHUNK):
                         left -= len(chunk)
                         if left < 0:
-                            raise InvalidPackage(f"The package is larger than {MAX_SIZE} bytes when unpacked.")
+                            raise InvalidPackage(
+                                "The package is larger than {max_size} bytes when unpacked.", max_size=MAX_SIZE
+                            )
                         file.write(chunk)
     except FileExistsError as error:
         raise InvalidPackage("The package has one file twice.") from error
     except NotADirectoryError as error:
         raise InvalidPackage("The package has a file inside of a file.") from error
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
-        raise InvalidPackage(f"The package is no usable zip: {error}.") from error
+        raise InvalidPackage("The package is no usable zip: {reason}.", reason=error) from error
 
 
 def inside(entry: zipfile.ZipInfo) -> PurePosixPath:
@@ -268,9 +278,9 @@ def inside(entry: zipfile.ZipInfo) -> PurePosixPath:
     path = PurePosixPath(name)
     kind = stat.S_IFMT(entry.external_attr >> 16)
     if not path.parts or path.is_absolute() or ".." in path.parts or "\\" in name or ":" in path.parts[0]:
-        raise InvalidPackage(f"The package has a file outside of itself: {name[:80]!r}.")
+        raise InvalidPackage("The package has a file outside of itself: {name!r}.", name=name[:80])
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
-        raise InvalidPackage(f"The package has something that is no file: {name[:80]!r}.")
+        raise InvalidPackage("The package has something that is no file: {name!r}.", name=name[:80])
     return path
 
 

@@ -31,13 +31,19 @@ async def bring_up_to_date(engine: AsyncEngine, place: str) -> None:
         if found == REVISION:
             return
         if found not in KNOWN:
-            raise StorageError(f"the database {place} has the schema {found!r}, which this version does not know")
+            raise StorageError(
+                "the database {place} has the schema {found!r}, which this version does not know",
+                place=place,
+                found=found,
+            )
         async with engine.begin() as connection:
             await connection.run_sync(migrate)
     except SQLAlchemyError as error:
-        raise StorageError(f"cannot use the database {place}: {_reason(error)}", detail=str(error)) from error
+        raise StorageError(
+            "cannot use the database {place}: {reason}", detail=str(error), place=place, reason=_reason(error)
+        ) from error
     except OSError as error:
-        raise StorageError(f"cannot use the database {place}: {error}") from error
+        raise StorageError("cannot use the database {place}: {reason}", place=place, reason=error) from error
 
 
 def _reason(error: SQLAlchemyError) -> str:

@@ -52,7 +52,9 @@ class SecretStore:
         except msgspec.DecodeError as error:
             damage.set_aside(self._path, "The passwords of devices are lost: enter them again.", error)
         except OSError as error:
-            raise StorageError(f"The secrets in {self._path} cannot be read: {error}") from error
+            raise StorageError(
+                "The secrets in {path} cannot be read: {reason}", path=self._path, reason=error
+            ) from error
 
     @property
     def scanned(self) -> set[tuple[str, str]] | None:
@@ -99,7 +101,9 @@ class SecretStore:
             try:
                 write_private(self._path, msgspec.json.format(msgspec.json.encode(self._content)))
             except OSError as error:
-                raise StorageError(f"Secrets cannot be stored in {self._path}: {error.strerror}") from error
+                raise StorageError(
+                    "Secrets cannot be stored in {path}: {reason}", path=self._path, reason=error.strerror
+                ) from error
             self._changed = False
 
     async def flush(self) -> None:

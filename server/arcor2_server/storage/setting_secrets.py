@@ -140,7 +140,9 @@ class SettingSecrets:
             if is_reference(value):
                 secret = self.store.bind(value, address)
                 if secret is not None and (secret.type, secret.setting) != (type_name, parameter.name):
-                    raise InvalidData(f"The setting {parameter.name} refers to a secret of another setting. Enter it.")
+                    raise InvalidData(
+                        "The setting {name} refers to a secret of another setting. Enter it.", name=parameter.name
+                    )
                 if check and secret is not None and secret.address != address:
                     raise AddressChanged(_enter_again(name or type_name, secret, address))
                 found.append(_with(parameter, value))

@@ -22,7 +22,9 @@ def check_opens(path: Path) -> None:
         with contextlib.closing(sqlite3.connect(path)):
             return
     except (sqlite3.Error, OSError) as error:
-        raise StorageError(f"cannot use the database {path}: {error}", detail=str(error)) from error
+        raise StorageError(
+            "cannot use the database {path}: {reason}", detail=str(error), path=path, reason=error
+        ) from error
 
 
 def prepare(connection: Any, _record: Any) -> None:

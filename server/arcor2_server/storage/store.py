@@ -277,7 +277,12 @@ class Storage(Database):
 
     def _model(self, row: ModelRow) -> Models:
         if row.kind not in _MODEL_DECODERS:
-            raise StorageError(f"the model {row.id!r} in the database {self._place} has the unknown kind {row.kind!r}")
+            raise StorageError(
+                "the model {id!r} in the database {place} has the unknown kind {type!r}",
+                id=row.id,
+                place=self._place,
+                type=row.kind,
+            )
         model: Models = self.decoded(_MODEL_DECODERS[row.kind], row)
         return model
 

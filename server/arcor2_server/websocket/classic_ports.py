@@ -27,14 +27,14 @@ def ports_from_environment(environment: Mapping[str, str] = os.environ) -> dict[
     }
     fixed = [port for port in ports.values() if port]
     if twice := sorted(name for name, port in ports.items() if fixed.count(port) > 1):
-        raise InvalidData(f"{' and '.join(twice)} cannot have the same port.")
+        raise InvalidData("{twice} cannot have the same port.", twice=" and ".join(twice))
     return ports
 
 
 def _number(environment: Mapping[str, str], variable: str, default: int) -> int:
     text = environment.get(variable) or str(default)
     if not text.isdecimal() or int(text) > 0xFFFF:
-        raise InvalidData(f"{variable}={text!r} is no port.")
+        raise InvalidData("{variable}={text!r} is no port.", variable=variable, text=text)
     return int(text)
 
 
@@ -47,5 +47,5 @@ def _of_address(environment: Mapping[str, str], variable: str, default: int) -> 
     except ValueError:
         port = None
     if port is None:
-        raise InvalidData(f"{variable}={text!r} has no port.")
+        raise InvalidData("{variable}={text!r} has no port.", variable=variable, text=text)
     return port

@@ -117,7 +117,7 @@ class RunningCalibrations:
     def begin(self, object_id: str, name: str) -> None:
         """Count an object as being calibrated; raise RequestRefused while it is already."""
         if object_id in self._objects:
-            raise RequestRefused(f"{name} is being calibrated already.")
+            raise RequestRefused("{name} is being calibrated already.", name=name)
         self._objects.add(object_id)
 
     def end(self, object_id: str) -> None:

@@ -37,7 +37,9 @@ class Markers:
         except msgspec.DecodeError as error:
             damage.set_aside(self._path, "The positions of the markers are lost: set them again.", error)
         except OSError as error:
-            raise StorageError(f"The markers in {self._path} cannot be read: {error}") from error
+            raise StorageError(
+                "The markers in {path} cannot be read: {reason}", path=self._path, reason=error
+            ) from error
 
     async def set(self, configuration: CalibrationConfiguration) -> None:
         """Keep another configuration. Conflict when the server was given a file.
@@ -52,6 +54,8 @@ class Markers:
                     write_private, self._path, msgspec.json.format(msgspec.json.encode(configuration))
                 )
             except OSError as error:
-                raise StorageError(f"The markers cannot be kept in {self._path}: {error.strerror}") from error
+                raise StorageError(
+                    "The markers cannot be kept in {path}: {reason}", path=self._path, reason=error.strerror
+                ) from error
             self._stored = configuration
         log.info("markers set", markers=len(configuration.markers), boards=len(configuration.boards))

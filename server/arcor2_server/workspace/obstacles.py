@@ -39,13 +39,13 @@ class ObstacleRegistry:
     def get(self, key: str) -> Obstacle:
         """Return an obstacle. Raise NotFound if there is none."""
         if (obstacle := self._put.get(key)) is None:
-            raise NotFound(f"There is no collision model {key!r}.")
+            raise NotFound("There is no collision model {key!r}.", key=key)
         return obstacle
 
     def remove(self, key: str) -> None:
         """Remove an obstacle. Raise NotFound if there is none."""
         if self._put.pop(key, None) is None:
-            raise NotFound(f"There is no collision model {key!r}.")
+            raise NotFound("There is no collision model {key!r}.", key=key)
         self._removed([key])
 
     def stop(self) -> None:

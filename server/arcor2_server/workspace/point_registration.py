@@ -27,13 +27,17 @@ def check_points(points: Sequence[Position], what: str) -> None:
     import numpy as np  # 0.1 s that the server's start does without
 
     if len(points) < FEWEST:
-        raise InvalidData(f"{what}: at least {FEWEST} points are needed, not {len(points)}.")
+        raise InvalidData(
+            "{what}: at least {fewest} points are needed, not {count}.", what=what, fewest=FEWEST, count=len(points)
+        )
     array = np.array([tuple(point) for point in points])
     if not np.isfinite(array).all():
-        raise InvalidData(f"{what}: a point is nowhere, and does not determine a pose.")
+        raise InvalidData("{what}: a point is nowhere, and does not determine a pose.", what=what)
     extent = np.linalg.svd(array - array.mean(axis=0), compute_uv=False)
     if extent[0] < NEAREST or extent[1] < max(NEAREST, THINNEST * extent[0]):
-        raise InvalidData(f"{what}: the points lie in one line, or in one place, and do not determine a pose.")
+        raise InvalidData(
+            "{what}: the points lie in one line, or in one place, and do not determine a pose.", what=what
+        )
 
 
 def fit(on_object: Sequence[Position], touched: Sequence[Position]) -> Fit:
@@ -46,7 +50,11 @@ def fit(on_object: Sequence[Position], touched: Sequence[Position]) -> Fit:
     import numpy as np
 
     if len(on_object) != len(touched):
-        raise InvalidData(f"There are {len(on_object)} points on the object, but {len(touched)} were touched.")
+        raise InvalidData(
+            "There are {count} points on the object, but {other_count} were touched.",
+            count=len(on_object),
+            other_count=len(touched),
+        )
     check_points(on_object, "Points on the object")
     check_points(touched, "Touched points")
     a, b = (np.array([tuple(point) for point in points]) for points in (on_object, touched))

@@ -109,7 +109,7 @@ class ReachabilityBoard:
         known = {key for point in project.action_points for key in _items(point)}
         wanted = known if isinstance(args.ids, Unset) else args.ids
         if strange := sorted(wanted - known):
-            raise NotFound(f"The project has no orientation or joints {strange[0]!r}.")
+            raise NotFound("The project has no orientation or joints {strange!r}.", strange=strange[0])
         self._asked = True
         self.schedule()
         for event, within in ((self._described, DESCRIBED_WITHIN), (self._idle, ANSWER_WITHIN)):

@@ -111,7 +111,9 @@ class RobotCalibrations:
             self._damage.set_aside(self._path, what, error)
             return
         except OSError as error:
-            raise StorageError(f"The calibrations in {self._path} cannot be read: {error}") from error
+            raise StorageError(
+                "The calibrations in {path} cannot be read: {reason}", path=self._path, reason=error
+            ) from error
         self._stored = {each.object_id: each for each in stored}
 
     def stored(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> RobotCalibration | None:

@@ -29,5 +29,5 @@ class RobotModels:
         """Return the model of a robot; RequestRefused with the purpose if it has none."""
         model = self.find(robot, robot.name)
         if model is None:
-            raise RequestRefused(f"{robot.name} has no model (URDF) {purpose}.")
+            raise RequestRefused("{name} has no model (URDF) {purpose}.", name=robot.name, purpose=purpose)
         return model

@@ -43,7 +43,7 @@ class SceneRobots:
         """Return the scene object of a robot; NotFound, RequestRefused when it is none."""
         found = self._session.scene_object(robot_id)
         if not self._types.derives_from(found.type, "Robot"):
-            raise RequestRefused(f"{found.name} is not a robot.")
+            raise RequestRefused("{name} is not a robot.", name=found.name)
         return found
 
     def arm(self, robot_id: str, arm_id: str | None) -> dict[str, Any]:
@@ -51,9 +51,9 @@ class SceneRobots:
         robot = self.robot(robot_id)
         multi_arm = self._types.robot_meta(robot.type).multi_arm
         if multi_arm and arm_id is None:
-            raise RequestRefused(f"{robot.name} has several arms: name one.")
+            raise RequestRefused("{name} has several arms: name one.", name=robot.name)
         if not multi_arm and arm_id is not None:
-            raise RequestRefused(f"{robot.name} has one arm: do not name it.")
+            raise RequestRefused("{name} has one arm: do not name it.", name=robot.name)
         return {} if arm_id is None else {"arm_id": arm_id}
 
     # -------------------------------------------------------------------------------- online
@@ -87,7 +87,11 @@ class SceneRobots:
     async def require_end_effector(self, robot_id: str, end_effector: str, arm_id: str | None = None) -> None:
         """Raise RequestRefused if a robot does not have an end effector."""
         if end_effector not in await self.end_effectors(robot_id, arm_id):
-            raise RequestRefused(f"{self.robot(robot_id).name} has no end effector {end_effector!r}.")
+            raise RequestRefused(
+                "{name} has no end effector {end_effector!r}.",
+                name=self.robot(robot_id).name,
+                end_effector=end_effector,
+            )
 
     async def end_effector_pose(self, robot_id: str, end_effector: str, arm_id: str | None = None) -> Pose:
         """Return the present pose of an end effector in the world."""
@@ -147,4 +151,4 @@ class SceneRobots:
         for name in (uri, unquote(found[1]) if found else unquote(path.rsplit("/", 1)[-1])):
             if self._assets.exists(name):
                 return RobotSource(StoredFile(str(self._assets.file(name)), name))
-        raise NotFound(f"There is no asset {uri!r}, which the robot's model should be.")
+        raise NotFound("There is no asset {uri!r}, which the robot's model should be.", uri=uri)

@@ -202,7 +202,7 @@ class SceneCollisions:
         """
         obstacle = self._collisions.get(key)
         if obstacle.attachment is not None:
-            raise Conflict(f"{key} is held already.")
+            raise Conflict("{key} is held already.", key=key)
         in_link = await self._in_link(robot, link, obstacle.pose)
         self._collisions.put(Obstacle.of(obstacle.model, in_link, obstacle.scale, Attachment(robot.id, link)))
 
@@ -215,7 +215,7 @@ class SceneCollisions:
         """
         obstacle = self._collisions.get(key)
         if obstacle.attachment is None:
-            raise Conflict(f"{key} is not held.")
+            raise Conflict("{key} is not held.", key=key)
         robot = self._robots.robot(obstacle.attachment.robot)
         link_from_world = await self._in_link(robot, obstacle.attachment.link, Pose())
         pose = link_from_world.inverted() * obstacle.pose
@@ -225,8 +225,8 @@ class SceneCollisions:
     async def _in_link(self, robot: SceneObject, link: str, pose: Pose) -> Pose:
         model = self._robot_models.find(robot)
         if model is None:
-            raise Conflict(f"{robot.name} has no model (URDF) that could hold anything.")
+            raise Conflict("{name} has no model (URDF) that could hold anything.", name=robot.name)
         joints = await self._robots.present_joints(robot)
         if not joints:
-            raise Conflict(f"The joints of {robot.name} are not known: start the scene first.")
+            raise Conflict("The joints of {name} are not known: start the scene first.", name=robot.name)
         return await self._compute.run(PlaceInLink(model, joints, link, pose))

@@ -31,7 +31,9 @@ class Script:
     def claim(self, name: str, line: int) -> None:
         """Note where a name is given its one meaning; NotUnderstood when it has another one already."""
         if name in self.lines:
-            raise NotUnderstood(line, f"{name} means something else already, since line {self.lines[name]}")
+            raise NotUnderstood(
+                line, "{name} means something else already, since line {row}", name=name, row=self.lines[name]
+            )
         self.lines[name] = line
 
 
@@ -42,7 +44,7 @@ def read(source: str) -> Script:
     except SyntaxError as error:
         raise NotUnderstood(error.lineno or 1, error.msg, error.text or "") from error
     except (ValueError, RecursionError, MemoryError) as error:
-        raise NotUnderstood(1, f"this is no Python: {error}") from error
+        raise NotUnderstood(1, "this is no Python: {reason}", reason=error) from error
     script = Script()
     main: ast.FunctionDef | None = None
     for node in module.body:
@@ -58,7 +60,8 @@ def read(source: str) -> Script:
             case _:
                 raise NotUnderstood(
                     node.lineno,
-                    f"beside its imports, main and its entry a script has nothing, but here is {shown(node)}",
+                    "beside its imports, main and its entry a script has nothing, but here is {node}",
+                    node=shown(node),
                 )
     if main is None:
         raise NotUnderstood(1, "there is no function main")
@@ -70,7 +73,7 @@ def _import(script: Script, node: ast.ImportFrom) -> None:
     module = node.module or ""
     if node.level or (module != "action_points" and module.partition(".")[0] not in _LIBRARIES):
         raise NotUnderstood(
-            node.lineno, f"a script imports object types and our library only, not from {module or '.'}"
+            node.lineno, "a script imports object types and our library only, not from {module}", module=module or "."
         )
     for alias in node.names:
         name = alias.asname or alias.name
@@ -83,7 +86,9 @@ def _import(script: Script, node: ast.ImportFrom) -> None:
 def _check_entry(entry: ast.If) -> None:
     for node in ast.walk(entry):
         if isinstance(node, ast.Call) and not (isinstance(node.func, ast.Name) and node.func.id in _ENTRY):
-            raise NotUnderstood(node.lineno, f"the entry of a script only calls main, but here is {shown(node)}")
+            raise NotUnderstood(
+                node.lineno, "the entry of a script only calls main, but here is {node}", node=shown(node)
+            )
         if isinstance(node, ast.While | ast.For):
             raise NotUnderstood(node.lineno, "the entry of a script calls main once")
 
@@ -97,7 +102,7 @@ def _main(script: Script, main: ast.FunctionDef) -> None:
     found = False
     for node in main.body:
         if found:
-            raise NotUnderstood(node.lineno, f"nothing stands behind the loop, but here is {shown(node)}")
+            raise NotUnderstood(node.lineno, "nothing stands behind the loop, but here is {node}", node=shown(node))
         match node:
             case ast.Expr(ast.Constant(str())) | ast.Pass():
                 continue
@@ -110,7 +115,8 @@ def _main(script: Script, main: ast.FunctionDef) -> None:
             case _:
                 raise NotUnderstood(
                     node.lineno,
-                    f"before the loop stand action points, objects and project parameters, but here is {shown(node)}",
+                    "before the loop stand action points, objects and project parameters, but here is {node}",
+                    node=shown(node),
                 )
     if not found:
         raise NotUnderstood(main.lineno, "main has no loop (`while True:`)")
@@ -129,6 +135,8 @@ def _set_up(script: Script, name: str, value: ast.expr) -> None:
         case _:
             raise NotUnderstood(
                 value.lineno,
-                f"{name} is to be an object ({script.resources}.objects[...]), the action points or a plain value,"
-                f" not {shown(value)}",
+                "{name} is to be an object ({resources}.objects[...]), the action points or a plain value, not {value}",
+                name=name,
+                resources=script.resources,
+                value=shown(value),
             )

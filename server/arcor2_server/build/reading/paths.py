@@ -80,7 +80,7 @@ class Ways:
     def _block(self, body: Sequence[ast.stmt], going: list[_Going]) -> list[_Going]:
         for node in body:
             if not going:
-                raise NotUnderstood(node.lineno, f"{shown(node)} is never reached")
+                raise NotUnderstood(node.lineno, "{node} is never reached", node=shown(node))
             match node:
                 case ast.Assign([ast.Name(name)], ast.Constant(str(note))) if name == NOTE:
                     going = [way._replace(note=note) for way in going]
@@ -98,7 +98,8 @@ class Ways:
                 case _:
                     raise NotUnderstood(
                         node.lineno,
-                        f"the loop has calls of actions, conditions and `continue`, but here is {shown(node)}",
+                        "the loop has calls of actions, conditions and `continue`, but here is {node}",
+                        node=shown(node),
                     )
         return going
 
@@ -118,23 +119,35 @@ class Ways:
                 return [name]
             case ast.Tuple(parts) if parts and all(isinstance(part, ast.Name) for part in parts):
                 return [part.id for part in parts if isinstance(part, ast.Name)]
-        raise NotUnderstood(target.lineno, f"results go into variables, not into {shown(target)}")
+        raise NotUnderstood(target.lineno, "results go into variables, not into {target}", target=shown(target))
 
     def _call(self, node: ast.stmt, call: ast.Call, outputs: list[str], going: list[_Going]) -> list[_Going]:
         match call.func:
             case ast.Attribute(ast.Name(variable), method) if variable in self._script.objects:
                 object_id = self._script.objects[variable]
             case _:
-                raise NotUnderstood(call.lineno, f"{shown(call.func)} is no action of an object of the scene")
+                raise NotUnderstood(call.lineno, "{func} is no action of an object of the scene", func=shown(call.func))
         obj = self._frame.index.scene_object(object_id)
         declared = find_action(self._frame.types[obj.type].actions.values(), method)
         if declared is None:
-            raise NotUnderstood(call.lineno, f"{obj.type} has no action {method}")
+            raise NotUnderstood(call.lineno, "{type} has no action {method}", type=obj.type, method=method)
         if declared.disabled:
-            raise NotUnderstood(call.lineno, f"{obj.type}.{method} cannot be used: {declared.problem}")
+            raise NotUnderstood(
+                call.lineno,
+                "{type}.{method} cannot be used: {problem}",
+                type=obj.type,
+                method=method,
+                problem=declared.problem,
+            )
         name = self._name(call)
         if outputs and len(outputs) != len(declared.returns):
-            raise NotUnderstood(node.lineno, f"{method} gives {len(declared.returns)} results, not {len(outputs)}")
+            raise NotUnderstood(
+                node.lineno,
+                "{method} gives {count} results, not {other_count}",
+                method=method,
+                count=len(declared.returns),
+                other_count=len(outputs),
+            )
         arguments = self._values.arguments(call, declared, obj.type)
         number = len(self.calls)
         links = self._links(number, arguments, declared)
@@ -153,11 +166,15 @@ class Ways:
                 match keyword.value:
                     case ast.Constant(str(name)) if name:
                         break
-                raise NotUnderstood(call.lineno, f"the name of an action is a text, not {shown(keyword.value)}")
+                raise NotUnderstood(
+                    call.lineno, "the name of an action is a text, not {value}", value=shown(keyword.value)
+                )
         else:
-            raise NotUnderstood(call.lineno, f'{shown(call)} has no name: add an="..."')
+            raise NotUnderstood(call.lineno, '{call} has no name: add an="..."', call=shown(call))
         if name in self._lines:
-            raise NotUnderstood(call.lineno, f"the action {name!r} is there already, in line {self._lines[name]}")
+            raise NotUnderstood(
+                call.lineno, "the action {name!r} is there already, in line {row}", name=name, row=self._lines[name]
+            )
         self._lines[name] = call.lineno
         return name
 
@@ -170,7 +187,14 @@ class Ways:
             source, output = links[meta.name] = self._results[node.id]
             kind = self.calls[source].declared.returns[output]
             if kind != meta.type:
-                raise NotUnderstood(node.lineno, f"{meta.name} is {meta.type}, but {node.id} is {kind}")
+                raise NotUnderstood(
+                    node.lineno,
+                    "{name} is {type}, but {id} is {other_type}",
+                    name=meta.name,
+                    type=meta.type,
+                    id=node.id,
+                    other_type=kind,
+                )
             self.uses.append(Use(number, source, node.lineno, node.id))
         return links
 
@@ -180,12 +204,12 @@ class Ways:
         while True:
             holds, going = self._split(node.test, going)
             if not holds:
-                raise NotUnderstood(node.lineno, f"{shown(node.test)} never holds here")
+                raise NotUnderstood(node.lineno, "{test} never holds here", test=shown(node.test))
             behind += self._block(node.body, holds)
             if not node.orelse:
                 return behind + going
             if not going:
-                raise NotUnderstood(node.orelse[0].lineno, f"{shown(node.orelse[0])} is never reached")
+                raise NotUnderstood(node.orelse[0].lineno, "{orelse} is never reached", orelse=shown(node.orelse[0]))
             if len(node.orelse) > 1 or not isinstance(node.orelse[0], ast.If):
                 return behind + self._block(node.orelse, going)
             node = node.orelse[0]
@@ -195,7 +219,7 @@ class Ways:
         match test:
             case ast.Compare(ast.Name(name), [ast.Eq()], [ast.Constant(str(note))]) if name == NOTE:
                 if any(way.note is None for way in going):
-                    raise NotUnderstood(test.lineno, f"{NOTE} is not set on every way that leads here")
+                    raise NotUnderstood(test.lineno, "{note} is not set on every way that leads here", note=NOTE)
                 return [way for way in going if way.note == note], [way for way in going if way.note != note]
         condition, variable, negated = self._condition(test)
         opposite = condition._replace(value=not condition.value) if isinstance(condition.value, bool) else None
@@ -233,13 +257,22 @@ class Ways:
             case ast.Compare(ast.Name(variable), [ast.NotEq() | ast.IsNot()], [right]):
                 value, negated = self._values.compared(right), True
             case _:
-                raise NotUnderstood(test.lineno, f"a condition is written `result == value`, not {shown(test)}")
+                raise NotUnderstood(
+                    test.lineno, "a condition is written `result == value`, not {test}", test=shown(test)
+                )
         if variable not in self._results:
-            raise NotUnderstood(test.lineno, f"{variable} is no result of an action above")
+            raise NotUnderstood(test.lineno, "{variable} is no result of an action above", variable=variable)
         source, output = self._results[variable]
         kind = self.calls[source].declared.returns[output]
         if kind not in BRANCHABLE:
-            raise NotUnderstood(test.lineno, f"{variable} is {kind}, which cannot be asked for in a condition")
+            raise NotUnderstood(
+                test.lineno,
+                "{variable} is {type}, which cannot be asked for in a condition",
+                variable=variable,
+                type=kind,
+            )
         if type(value) is not BRANCHABLE[kind]:
-            raise NotUnderstood(test.lineno, f"{variable} is {kind} and cannot be {value!r}")
+            raise NotUnderstood(
+                test.lineno, "{variable} is {type} and cannot be {value!r}", variable=variable, type=kind, value=value
+            )
         return Condition(source, output, value), variable, negated

@@ -56,7 +56,9 @@ class _Reading:
         known = {obj.id for obj in scene.objects}
         for name, object_id in self._script.objects.items():
             if object_id not in known:
-                raise NotUnderstood(self._script.lines[name], f"the scene has no object {object_id}")
+                raise NotUnderstood(
+                    self._script.lines[name], "the scene has no object {object_id}", object_id=object_id
+                )
         self._values = Values(frame, self._script)
         self._parameters = self._read_parameters(frame)
         ways = Ways(frame, self._script, self._values)
@@ -80,7 +82,12 @@ class _Reading:
         for use in ways.uses:
             if not natural.always_before(use.source, use.node):
                 giver = self._calls[use.source].name
-                raise NotUnderstood(use.line, f"{use.name} is not always there: {giver!r} has not run on every way")
+                raise NotUnderstood(
+                    use.line,
+                    "{name} is not always there: {giver!r} has not run on every way",
+                    name=use.name,
+                    giver=giver,
+                )
 
     # ------------------------------------------------------------------------------------------------ parameters
     def _read_parameters(self, frame: Frame) -> list[ProjectParameter]:
@@ -91,14 +98,20 @@ class _Reading:
             key = by_name.get(name)
             if key is None:
                 if not is_valid_name(name):
-                    raise NotUnderstood(node.lineno, f"{name} cannot name a project parameter")
+                    raise NotUnderstood(node.lineno, "{name} cannot name a project parameter", name=name)
                 key = new_id("pco")
                 found[key] = ProjectParameter(name, PLAIN[type(value)], json_of(value), id=key)
             else:
                 old = found[key]
                 value = of_type(value, old.type)
                 if PLAIN[type(value)] != old.type:
-                    raise NotUnderstood(node.lineno, f"the project parameter {old.name} is {old.type}, not {value!r}")
+                    raise NotUnderstood(
+                        node.lineno,
+                        "the project parameter {name} is {type}, not {value!r}",
+                        name=old.name,
+                        type=old.type,
+                        value=value,
+                    )
                 found[key] = replace(old, value=kept(old.type, value, old))
             self._values.parameters[name] = (key, found[key].type)
         return list(found.values())
@@ -131,7 +144,9 @@ class _Reading:
             for output in action.outputs():
                 if output in named:
                     line = self._calls[number_of[action.name]].line
-                    raise NotUnderstood(line, f"{output} is a result of the action {named[output]!r} already")
+                    raise NotUnderstood(
+                        line, "{output} is a result of the action {named!r} already", output=output, named=named[output]
+                    )
                 named[output] = action.name
         return replace(
             self._old,
@@ -148,7 +163,9 @@ class _Reading:
         if before is not None:
             return before
         if not self._old.action_points:
-            raise NotUnderstood(call.line, f"the project has no action point on which {call.name!r} could lie")
+            raise NotUnderstood(
+                call.line, "the project has no action point on which {name!r} could lie", name=call.name
+            )
         return self._old.action_points[0].id
 
     def _action(self, number: int, old: Action | None) -> Action:
@@ -183,7 +200,7 @@ class _Reading:
                 outputs.append(old.outputs()[place])
                 continue
             if not is_valid_name(variable):
-                raise NotUnderstood(call.line, f"{variable} cannot name a result")
+                raise NotUnderstood(call.line, "{variable} cannot name a result", variable=variable)
             outputs.append(variable)
         if old is not None and old.outputs() == outputs:
             return old.flows

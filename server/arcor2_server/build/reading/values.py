@@ -33,7 +33,7 @@ def plain(node: ast.expr) -> Any:
             return value
         case ast.UnaryOp(ast.USub(), ast.Constant(int() | float() as value)) if not isinstance(value, bool):
             return -value
-    raise NotUnderstood(node.lineno, f"{shown(node)} is no truth value, number or text")
+    raise NotUnderstood(node.lineno, "{node} is no truth value, number or text", node=shown(node))
 
 
 def of_type(value: Any, kind: str) -> Any:
@@ -90,7 +90,11 @@ class Values:
         if len(call.args) > len(by_place):
             node, count = call.args[len(by_place)], len(by_place)
             raise NotUnderstood(
-                node.lineno, f"{declared.name} takes {count} arguments without a name; {shown(node)} is too much"
+                node.lineno,
+                "{name} takes {count} arguments without a name; {node} is too much",
+                name=declared.name,
+                count=count,
+                node=shown(node),
             )
         for keyword in call.keywords:
             if keyword.arg is None:
@@ -99,13 +103,20 @@ class Values:
                 continue
             name = declared.present_name(keyword.arg)
             if name not in names:
-                raise NotUnderstood(keyword.value.lineno, f"{declared.name} has no parameter {name}")
+                raise NotUnderstood(
+                    keyword.value.lineno, "{name} has no parameter {other_name}", name=declared.name, other_name=name
+                )
             if name in given:
-                raise NotUnderstood(keyword.value.lineno, f"the parameter {name} is given twice")
+                raise NotUnderstood(keyword.value.lineno, "the parameter {name} is given twice", name=name)
             given[name] = keyword.value
         for meta in declared.parameters:
             if meta.name not in given and isinstance(meta.default_value, Unset):
-                raise NotUnderstood(call.lineno, f"the parameter {meta.name} of {declared.name} is missing")
+                raise NotUnderstood(
+                    call.lineno,
+                    "the parameter {name} of {declared_name} is missing",
+                    name=meta.name,
+                    declared_name=declared.name,
+                )
         return given
 
     def points_in(self, node: ast.expr) -> list[str]:
@@ -125,7 +136,9 @@ class Values:
         if meta.type in ENUMERATIONS:
             value = self._member(node, meta, type_name, method)
         elif meta.type in REFERENCES or meta.type == "image":
-            raise NotUnderstood(node.lineno, f"{meta.name} is {meta.type}, not {shown(node)}")
+            raise NotUnderstood(
+                node.lineno, "{name} is {type}, not {node}", name=meta.name, type=meta.type, node=shown(node)
+            )
         else:
             value = of_type(plain(node), meta.type)
         text = kept(meta.type, value, old)
@@ -138,10 +151,17 @@ class Values:
 
     def _project_parameter(self, node: ast.Name, meta: ParameterMeta) -> ActionParameter:
         if node.id not in self.parameters:
-            raise NotUnderstood(node.lineno, f"{node.id} is not known here")
+            raise NotUnderstood(node.lineno, "{id} is not known here", id=node.id)
         key, kind = self.parameters[node.id]
         if kind != meta.type:
-            raise NotUnderstood(node.lineno, f"{meta.name} is {meta.type}, but {node.id} is {kind}")
+            raise NotUnderstood(
+                node.lineno,
+                "{name} is {type}, but {id} is {other_type}",
+                name=meta.name,
+                type=meta.type,
+                id=node.id,
+                other_type=kind,
+            )
         return ActionParameter(meta.name, ActionParameterType.PROJECT_PARAMETER, json_of(key))
 
     # ------------------------------------------------------------------------------------------------ references
@@ -163,12 +183,19 @@ class Values:
         }
         kind = next((kind for kind, table in tables.items() if path in table), None)
         if kind is None:
-            raise NotUnderstood(node.lineno, f"the project has no {shown(node)}")
+            raise NotUnderstood(node.lineno, "the project has no {node}", node=shown(node))
         if kind != meta.type:
-            raise NotUnderstood(node.lineno, f"{meta.name} is {meta.type}, but {shown(node)} is {kind}")
+            raise NotUnderstood(
+                node.lineno,
+                "{name} is {type}, but {node} is {other_type}",
+                name=meta.name,
+                type=meta.type,
+                node=shown(node),
+                other_type=kind,
+            )
         key = tables[kind][path]
         if kind == "joints" and self._frame.index.joints(key)[1].robot_id != object_id:
-            raise NotUnderstood(node.lineno, f"{shown(node)} belong to another robot")
+            raise NotUnderstood(node.lineno, "{node} belong to another robot", node=shown(node))
         return ActionParameter(meta.name, kind, json_of(key))
 
     # ------------------------------------------------------------------------------------------------ enumerations
@@ -187,21 +214,25 @@ class Values:
         named = self._named_member(node)
         if kind is None or named is None or named[0] != kind.name:
             wanted = "an enumeration" if kind is None else f"one of {kind.name}"
-            raise NotUnderstood(node.lineno, f"{meta.name} takes {wanted}, not {shown(node)}")
+            raise NotUnderstood(
+                node.lineno, "{name} takes {wanted}, not {node}", name=meta.name, wanted=wanted, node=shown(node)
+            )
         for value, member in kind.members.items():
             if member == named[1]:
                 return value
-        raise NotUnderstood(node.lineno, f"{kind.name} has no member {named[1]}")
+        raise NotUnderstood(node.lineno, "{name} has no member {named}", name=kind.name, named=named[1])
 
     def compared(self, node: ast.expr) -> bool | int | str:
         """Return the value that a condition compares a result with: a literal, or a member of an enumeration."""
         named = self._named_member(node)
         if named is not None:
             if named not in self._members:
-                raise NotUnderstood(node.lineno, f"{shown(node)} is not known")
+                raise NotUnderstood(node.lineno, "{node} is not known", node=shown(node))
             return self._members[named]
         value = plain(node)
         if isinstance(value, float):
-            raise NotUnderstood(node.lineno, f"a condition compares with a truth value, integer or text, not {value}")
+            raise NotUnderstood(
+                node.lineno, "a condition compares with a truth value, integer or text, not {value}", value=value
+            )
         assert isinstance(value, bool | int | str)
         return value
