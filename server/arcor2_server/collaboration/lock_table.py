@@ -1,6 +1,7 @@
 """The table of locks on items, which form trees with a root (protocol, section 6)."""
 
 import asyncio
+import contextlib
 from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Final, Protocol
@@ -13,9 +14,10 @@ PROJECT: Final = "PROJECT"
 ACTION: Final = "ACTION"
 ADDING_OBJECT: Final = "ADDING_OBJECT"
 SERVER: Final = "SERVER"
-"""The pseudo user under whose locks a scene is started and stopped."""
+"""The pseudo user that holds locks while a scene is started or stopped."""
 
 OWN_ROOTS: Final = frozenset({SCENE, PROJECT, ACTION, ADDING_OBJECT, "START", "END"})
+"""Ids of which each is the root of its own tree."""
 
 
 class Locked(RequestRefused):
@@ -25,17 +27,17 @@ class Locked(RequestRefused):
 
 
 class LockTree(Protocol):
-    """Returns the trees of items. The open document implements it."""
+    """The trees of items, as the open document provides them."""
 
     def root_of(self, item: str) -> str:
-        """Return the root of the tree that an id belongs to; raise NotFound for an id it does not know."""
+        """Return the root of the tree that an id belongs to. Raise NotFound if the id is unknown."""
 
     def tree_of(self, root: str) -> Iterable[str]:
         """Return the ids below a root; empty if it is not a root."""
 
 
-class _Nothing:
-    """The tree while no document is open."""
+class _EmptyTree:
+    """The trees of an empty document."""
 
     def root_of(self, item: str) -> str:
         raise NotFound("{item!r} is not known.", item=item)
@@ -44,13 +46,13 @@ class _Nothing:
         return ()
 
 
-async def _nothing_stored(item: str) -> bool:  # noqa: ARG001
+async def _none_stored(item: str) -> bool:  # noqa: ARG001
     return False
 
 
 @dataclass(slots=True)
 class _Root:
-    """The locks of one tree. `readers` counts per id how often each user reads it."""
+    """The locks of one tree. `readers` has per id the number of read locks of each user."""
 
     readers: dict[str, dict[str, int]] = field(default_factory=dict)
     writers: dict[str, str] = field(default_factory=dict)
@@ -62,27 +64,27 @@ class _Root:
 
 
 class LockTable:
-    """The locks of all users. Its methods do not wait, so that each change is atomic.
+    """The locks of all users. Its methods do not wait, so each change is atomic.
 
-    `tree` and `stored` are set by the composition root: the open document, and a function that tells whether an id
-    names a stored scene or project, or an object type.
+    The composition root sets `tree`, the open document, and `stored`, a function that returns whether an id belongs
+    to a stored scene, a stored project or an object type.
     """
 
     def __init__(self) -> None:
-        self.tree: LockTree = _Nothing()
-        self.stored: Callable[[str], Awaitable[bool]] = _nothing_stored
+        self.tree: LockTree = _EmptyTree()
+        self.stored: Callable[[str], Awaitable[bool]] = _none_stored
         self._roots: dict[str, _Root] = {}
-        self._where: dict[str, str] = {}
+        self._root_ids: dict[str, str] = {}
         self._announced: dict[str, dict[str, set[str]]] = {}
         self._reads: dict[str, list[str]] = {}
         self._since: dict[tuple[str, str], str] = {}
-        """When a client locked an id, by user and id."""
+        """The time at which a client locked an id, by user and id."""
         self._changed: asyncio.Event = asyncio.Event()
 
-    # ------------------------------------------------------------------------------------------------ what is held
+    # ------------------------------------------------------------------------------------------------ queries
     def holds(self, user: str, item: str, *, tree: bool = False) -> bool:
         """Return whether the user holds the write lock of an id; with `tree`, of its tree."""
-        root = self._roots.get(self._where.get(item) or self._known_root(item))
+        root = self._locked_root(item)
         if root is None:
             return False
         if root.writers.get(item) == user:
@@ -90,29 +92,29 @@ class LockTable:
         return root.tree and bool(root.writers) and all(writer == user for writer in root.writers.values())
 
     def require_held(self, user: str, item: str, *, tree: bool = False) -> None:
-        """Refuse unless the user holds the write lock of an id (`held(x)`); with `tree`, of its tree."""
+        """Raise Locked unless the user holds the write lock of an id (`held(x)`); with `tree`, of its tree."""
         if not self.holds(user, item, tree=tree):
             what = "tree of " if tree else ""
             raise Locked("{user} does not hold the write lock of the {what}{item!r}.", user=user, what=what, item=item)
 
     def holds_read(self, user: str, item: str) -> bool:
         """Return whether the user holds a read lock of an id."""
-        root = self._roots.get(self._where.get(item, ""))
+        root = self._roots.get(self._root_ids.get(item, ""))
         return root is not None and user in root.readers.get(item, ())
 
-    def locked_roots(self, besides: Iterable[str] = ()) -> list[str]:
+    def locked_roots(self, excluding: Iterable[str] = ()) -> list[str]:
         """Return the roots of trees with locks, except the given ones."""
-        skipped = set(besides)
+        skipped = set(excluding)
         return [name for name in self._roots if name not in skipped]
 
-    def write_locked_roots(self, besides: Iterable[str] = ()) -> list[str]:
+    def write_locked_roots(self, excluding: Iterable[str] = ()) -> list[str]:
         """Return the roots of trees with write locks, except the given ones."""
-        skipped = set(besides)
+        skipped = set(excluding)
         return [name for name, root in self._roots.items() if root.writers and name not in skipped]
 
     def writer_of(self, item: str) -> str | None:
         """Return the user who may write an item: its writer, or the holder of its tree."""
-        root = self._roots.get(self._where.get(item) or self._known_root(item))
+        root = self._locked_root(item)
         if root is None:
             return None
         if root.tree:
@@ -121,7 +123,7 @@ class LockTable:
 
     def holders_of(self, item: str) -> set[str]:
         """Return the users who may write an item, or hold a read lock on it."""
-        root = self._roots.get(self._where.get(item) or self._known_root(item))
+        root = self._locked_root(item)
         writer = self.writer_of(item)
         return set(root.readers.get(item, ()) if root else ()) | ({writer} if writer else set())
 
@@ -130,11 +132,11 @@ class LockTable:
         found = {user: sorted(set().union(*ids.values())) for user, ids in self._announced.items()}
         return {user: ids for user, ids in found.items() if ids}
 
-    def written_by(self, user: str) -> list[str]:
-        """Return exactly the ids on which the user holds announced write locks, without those locked by a tree."""
+    def write_locked_by(self, user: str) -> list[str]:
+        """Return the ids on which the user's client holds write locks, without the other ids of a locked tree."""
         return list(self._announced.get(user, ()))
 
-    def read_by(self, user: str) -> list[str]:
+    def read_locked_by(self, user: str) -> list[str]:
         """Return the ids on which the user's client holds read locks."""
         return list(dict.fromkeys(self._reads.get(user, ())))
 
@@ -142,37 +144,37 @@ class LockTable:
         """Return the users whose clients hold write or read locks."""
         return sorted({user for held in (self._announced, self._reads) for user, ids in held.items() if ids})
 
-    def since(self, user: str, item: str) -> str:
-        """Return when the user's client locked an id."""
+    def locked_at(self, user: str, item: str) -> str:
+        """Return the time at which the user's client locked an id."""
         return self._since[user, item]
 
     def could_lock_tree(self, user: str, item: str) -> bool:
-        """Return whether the user holds the tree of an id, or could lock it now (a dry run asks this)."""
+        """Return whether the user holds the tree of an id, or could lock it now (for dry runs)."""
         if self.holds(user, item, tree=True):
             return True
-        root = self._roots.get(self._where.get(item) or self._known_root(item))
+        root = self._locked_root(item)
         if root is None or root.free:
             return True
         return not root.readers and not root.tree and set(root.writers.items()) <= {(item, user)}
 
-    # ------------------------------------------------------------------------------------------------ freed, moved
+    # ------------------------------------------------------------------------------------------------ changes
     def release_announced(self, user: str, ids: Iterable[str]) -> list[str]:
         """Release the user's locks among `ids`; return the ids for ObjectsUnlocked."""
         freed: set[str] = set()
         for item in ids:
             if item in self._announced.get(user, ()):
-                freed |= self._free_write(user, item)
+                freed |= self._remove_write(user, item)
         return sorted(freed)
 
     def drop(self, ids: Iterable[str]) -> dict[str, list[str]]:
-        """Drop all locks on removed items, which their removal event implies.
+        """Remove all locks on removed items. Their removal event implies that they are unlocked.
 
-        Return the other ids that became free, by owner: the rest of a tree locked through a removed item.
+        Return the other ids that are unlocked thereby, by owner: the rest of a tree locked through a removed item.
         """
         ids = list(ids)
         freed: dict[str, set[str]] = {}
         for item in ids:
-            root_id = self._where.pop(item, None)
+            root_id = self._root_ids.pop(item, None)
             for user, reads in list(self._reads.items()):
                 self._since.pop((user, item), None)
                 if item in reads:
@@ -186,7 +188,7 @@ class LockTable:
                 root.readers.pop(item, None)
                 if root.writers.pop(item, None) is not None:
                     root.tree = root.tree and bool(root.writers)
-                self._tidy(root_id)
+                self._remove_unused(root_id)
         self._notify()
         rest = {user: found.difference(ids, *self._announced[user].values()) for user, found in freed.items()}
         return {user: sorted(found) for user, found in rest.items() if found}
@@ -194,7 +196,7 @@ class LockTable:
     def move_root(self, ids: Iterable[str], new_root: str) -> None:
         """Move the locks of ids (an action point and all below it) to the tree that they now belong to."""
         for item in ids:
-            old_id = self._where.get(item)
+            old_id = self._root_ids.get(item)
             if old_id is None or old_id == new_root:
                 continue
             old, new = self._roots[old_id], self._roots.setdefault(new_root, _Root())
@@ -202,44 +204,45 @@ class LockTable:
                 new.readers[item] = readers
             if (writer := old.writers.pop(item, None)) is not None:
                 new.writers[item] = writer
-                # A lock of the whole old tree becomes one of the point alone where others hold parts of the new one.
+                # A lock of the whole old tree covers the new one, unless others hold locks in it.
                 new.tree = new.tree or (old.tree and len(new.writers) == 1 and not new.readers)
                 old.tree = old.tree and bool(old.writers)
-            self._where[item] = new_root
-            self._tidy(old_id)
+            self._root_ids[item] = new_root
+            self._remove_unused(old_id)
         self._notify()
 
     def release_all(self, user: str) -> list[str]:
-        """Release all locks of a user who does not return; return the announced ids."""
+        """Release all locks of a user who left; return the announced ids."""
         for item in self._reads.pop(user, []):
             self._since.pop((user, item), None)
-            self._free_read(user, item)
+            self._remove_read(user, item)
         return self.release_announced(user, list(self._announced.get(user, ())))
 
     def clear(self) -> None:
-        """Forget everything (nothing is open any more)."""
+        """Remove all locks, since the document is closed."""
         self._roots.clear()
-        self._where.clear()
+        self._root_ids.clear()
         self._announced.clear()
         self._reads.clear()
         self._since.clear()
         self._notify()
 
-    # ------------------------------------------------------------------------------------------------ inside
-    def _known_root(self, item: str) -> str:
-        if item in OWN_ROOTS:
-            return item
-        try:
-            return self.tree.root_of(item)
-        except NotFound:
-            return item
+    # ------------------------------------------------------------------------------------------------ internals
+    def _locked_root(self, item: str) -> _Root | None:
+        """Return the locks of the tree that an id belongs to, None if there are none."""
+        if (root_id := self._root_ids.get(item)) is None:
+            root_id = item
+            if item not in OWN_ROOTS:
+                with contextlib.suppress(NotFound):
+                    root_id = self.tree.root_of(item)
+        return self._roots.get(root_id)
 
     def _is_writer(self, user: str, item: str) -> bool:
-        root = self._roots.get(self._where.get(item, ""))
+        root = self._roots.get(self._root_ids.get(item, ""))
         return root is not None and root.writers.get(item) == user
 
     def _is_announced(self, user: str, root_id: str, item: str) -> bool:
-        """Return whether a client asked for the lock that covers an id; one that a request holds will not last."""
+        """Return whether the lock that covers an id is one of a client, not of a request that is being handled."""
         announced = self._announced.get(user, {})
         return item in announced or any(writer in announced for writer in self._roots[root_id].writers)
 
@@ -255,57 +258,58 @@ class LockTable:
                 blockers=self._blockers(root, ""),
             )
 
+    def _refuse_read(self, root: _Root | None, item: str) -> None:
+        if root is not None and (root.tree or item in root.writers):
+            raise Locked("{item!r} is locked by {blockers}.", item=item, blockers=self._blockers(root, item))
+
     @staticmethod
     def _blockers(root: _Root, item: str) -> str:
         writer = root.writers.get(item)
         users = {writer} if writer else set(root.readers.get(item, ())) or set(root.writers.values())
         return ", ".join(sorted(users or {user for readers in root.readers.values() for user in readers}))
 
-    def _take_write(self, user: str, root_id: str, item: str, tree: bool = False) -> None:
+    def _add_write(self, user: str, root_id: str, item: str, tree: bool = False) -> None:
         self._refuse_write(self._roots.get(root_id), item, tree)
         root = self._roots.setdefault(root_id, _Root())
         root.writers[item] = user
         root.tree = tree
-        self._where[item] = root_id
+        self._root_ids[item] = root_id
 
-    def _take_all(self, user: str, root_ids: dict[str, str]) -> None:
+    def _add_writes(self, user: str, root_ids: dict[str, str]) -> None:
         for item, root_id in root_ids.items():
             self._refuse_write(self._roots.get(root_id), item, tree=False)
         for item, root_id in root_ids.items():
-            self._take_write(user, root_id, item)
+            self._add_write(user, root_id, item)
 
-    def _take_read(self, user: str, root_id: str, item: str) -> None:
-        root = self._roots.setdefault(root_id, _Root())
-        if root.tree or item in root.writers:
-            raise Locked("{item!r} is locked by {blockers}.", item=item, blockers=self._blockers(root, item))
-        readers = root.readers.setdefault(item, {})
+    def _add_read(self, user: str, root_id: str, item: str) -> None:
+        self._refuse_read(self._roots.get(root_id), item)
+        readers = self._roots.setdefault(root_id, _Root()).readers.setdefault(item, {})
         readers[user] = readers.get(user, 0) + 1
-        self._where[item] = root_id
+        self._root_ids[item] = root_id
 
-    def _read_all(self, user: str, root_ids: dict[str, str]) -> None:
+    def _add_reads(self, user: str, root_ids: dict[str, str]) -> None:
         for item, root_id in root_ids.items():
-            if (root := self._roots.get(root_id)) is not None and (root.tree or item in root.writers):
-                raise Locked("{item!r} is locked by {blockers}.", item=item, blockers=self._blockers(root, item))
+            self._refuse_read(self._roots.get(root_id), item)
         for item, root_id in root_ids.items():
-            self._take_read(user, root_id, item)
+            self._add_read(user, root_id, item)
 
-    def _free_write(self, user: str, item: str) -> set[str]:
+    def _remove_write(self, user: str, item: str) -> set[str]:
         freed = self._announced.get(user, {}).pop(item, None) or {item}
         self._since.pop((user, item), None)
         if user in self._announced and not self._announced[user]:
             del self._announced[user]
-        root_id = self._where.get(item)
+        root_id = self._root_ids.get(item)
         if root_id is not None and (root := self._roots.get(root_id)) is not None:
             root.writers.pop(item, None)
             if root.tree:
                 freed |= {root_id, *self.tree.tree_of(root_id)}
                 root.tree = False
-            self._tidy(root_id, item)
+            self._remove_unused(root_id, item)
         self._notify()
         return freed
 
-    def _free_read(self, user: str, item: str) -> None:
-        root_id = self._where.get(item)
+    def _remove_read(self, user: str, item: str) -> None:
+        root_id = self._root_ids.get(item)
         if root_id is None or (root := self._roots.get(root_id)) is None:
             return
         readers = root.readers.get(item, {})
@@ -315,7 +319,7 @@ class LockTable:
             readers.pop(user, None)
         if not readers:
             root.readers.pop(item, None)
-        self._tidy(root_id, item)
+        self._remove_unused(root_id, item)
         self._notify()
 
     def _forget_read(self, user: str, item: str) -> None:
@@ -325,12 +329,12 @@ class LockTable:
         if not self._reads[user]:
             del self._reads[user]
 
-    def _tidy(self, root_id: str, item: str | None = None) -> None:
+    def _remove_unused(self, root_id: str, item: str | None = None) -> None:
         root = self._roots.get(root_id)
         if root is None:
             return
         if item is not None and item not in root.writers and item not in root.readers:
-            self._where.pop(item, None)
+            self._root_ids.pop(item, None)
         if root.free:
             del self._roots[root_id]
 

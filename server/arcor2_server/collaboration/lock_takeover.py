@@ -31,10 +31,10 @@ class LockTakeover:
     def held(self, user: str) -> list[HeldLock]:
         """Return what the client of a user locked, without what the server locks for the time of a request."""
         locks = self._locks
-        kinds: dict[str, LockType | Unset] = dict.fromkeys(locks.read_by(user), UNSET)
-        for item in locks.written_by(user):
+        kinds: dict[str, LockType | Unset] = dict.fromkeys(locks.read_locked_by(user), UNSET)
+        for item in locks.write_locked_by(user):
             kinds[item] = LockType.TREE if locks.holds(user, item, tree=True) else LockType.OBJECT
-        return [HeldLock(item, self._name_of(item), locks.since(user, item), kind) for item, kind in kinds.items()]
+        return [HeldLock(item, self._name_of(item), locks.locked_at(user, item), kind) for item, kind in kinds.items()]
 
     def release(self, user: str, by: str) -> list[Event]:
         """Release the locks of a user who left; return the events to send. The user is notified on returning."""

@@ -1,4 +1,4 @@
-"""Locks as clients and requests acquire, wait for and release them (protocol, section 6)."""
+"""Acquires and releases locks for clients and requests, and waits for busy ones (protocol, section 6)."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterable
@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from arcor2_hw.data.base import now
 from arcor2_hw.exceptions import NotFound
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.lock_table import (
     ACTION,
     ADDING_OBJECT,
@@ -22,31 +23,37 @@ from arcor2_server.collaboration.lock_table import (
 __all__ = ["ACTION", "ADDING_OBJECT", "PROJECT", "SCENE", "SERVER", "LockTree", "Locked", "Locks"]
 
 EXCLUSIVE_LIMIT: Final = 30.0
-"""Seconds for which a lock operation waits for the end of an exclusive one before it is refused."""
+"""Time limit for the end of an exclusive operation before another lock operation is refused, s."""
 
 
 class Locks(LockTable):
-    """The locks of the server. One event loop, so what is done between two awaits is atomic.
+    """The locks of the server. All run in one event loop, so what a method does between two awaits is atomic.
 
-    A lock is announced when a client asked for it (write_lock); those that the server takes for the duration of a
-    request are silent.
+    Locks that a client requests (write_lock) are announced to other clients. Locks that the server takes for the
+    duration of a request are silent.
+
+    Args:
+        retries: Number of further attempts to acquire a busy lock.
+        retry_wait: Time between two attempts, s.
     """
 
     def __init__(self, retries: int = 13, retry_wait: float = 0.15) -> None:
         super().__init__()
-        self._patience = retries * retry_wait
+        self._wait_limit = retries * retry_wait
         self._exclusive: asyncio.Task[Any] | None = None
 
-    # ------------------------------------------------------------------------------------------------ of clients
+    # ------------------------------------------------------------------------------------------------ for clients
     async def write_lock(self, user: str, item: str, tree: bool = False) -> list[str]:
         """Lock an item for a client. Return the ids to announce, empty if the user holds the lock already.
 
-        Raise Locked or NotFound if that is impossible.
+        Raises:
+            Locked: Another user holds a lock.
+            NotFound: The item does not exist.
         """
-        root_id = (await self._enter([item]))[item]
+        root_id = (await self._find_roots([item]))[item]
         if self.holds(user, item, tree=tree) and self._is_announced(user, root_id, item):
             return []
-        self._take_write(user, root_id, item, tree)
+        self._add_write(user, root_id, item, tree)
         ids = {item}
         if tree:
             ids |= {root_id, *self.tree.tree_of(root_id)}
@@ -55,32 +62,32 @@ class Locks(LockTable):
         return sorted(ids)
 
     async def write_unlock(self, user: str, item: str) -> list[str]:
-        """Unlock an item for a client. Return the ids to announce. Raise Locked if the user does not hold this lock."""
-        await self._pass()
+        """Unlock an item for a client; return the ids to announce. Raise Locked if the user does not hold this lock."""
+        await self._wait_for_exclusive()
         if not self._is_writer(user, item):
             raise Locked("{user} does not hold a write lock of {item!r}.", user=user, item=item)
-        return sorted(self._free_write(user, item))
+        return sorted(self._remove_write(user, item))
 
     async def read_lock(self, user: str, item: str) -> None:
-        """Lock for reading, for a client. Raise Locked or NotFound if that is impossible."""
-        self._take_read(user, (await self._enter([item]))[item], item)
+        """Take a read lock for a client. Raise Locked if the item is locked, or NotFound if it does not exist."""
+        self._add_read(user, (await self._find_roots([item]))[item], item)
         self._reads.setdefault(user, []).append(item)
         self._since.setdefault((user, item), now())
 
     async def read_unlock(self, user: str, item: str) -> None:
-        """Release a read lock of a client. Raise Locked if there is none."""
-        await self._pass()
+        """Release a read lock of a client. Raise Locked if the user does not hold it."""
+        await self._wait_for_exclusive()
         if item not in self._reads.get(user, ()):
             raise Locked("{user} does not hold a read lock of {item!r}.", user=user, item=item)
         self._forget_read(user, item)
-        self._free_read(user, item)
+        self._remove_read(user, item)
 
     async def update_lock(self, user: str, item: str, tree: bool) -> list[str]:
-        """Widen a lock to its tree, or narrow it. Gives the ids to announce: as locked (widened) or as free."""
-        await self._pass()
+        """Extend a lock to its tree, or reduce it to the item. Return the ids to announce as locked or unlocked."""
+        await self._wait_for_exclusive()
         if not self._is_writer(user, item):
             raise Locked("{user} does not hold a write lock of {item!r}.", user=user, item=item)
-        root_id = self._where[item]
+        root_id = self._root_ids[item]
         root = self._roots[root_id]
         if root.tree is tree:
             raise Locked("The lock of {item!r} is of that type already.", item=item)
@@ -99,23 +106,25 @@ class Locks(LockTable):
             self._notify()
         return sorted(whole)
 
-    # ------------------------------------------------------------------------------------------------ of the server
+    # ------------------------------------------------------------------------------------------------ for requests
     async def acquire(self, user: str, *ids: str) -> None:
-        """Take silent write locks on all ids at once, for longer than a request; free them by `release`.
+        """Take silent write locks on all ids at once, for longer than a request. `release` frees them.
 
-        Busy ones are waited for (13 x 0.15 s); then Locked. NotFound for an unknown item.
+        Raises:
+            Locked: An item is still locked after the time limit.
+            NotFound: An item does not exist.
         """
-        await self._eventually(lambda root_ids: self._take_all(user, root_ids), ids)
+        await self._retry(lambda root_ids: self._add_writes(user, root_ids), ids)
 
     def release(self, user: str, *ids: str) -> None:
-        """Free what `acquire` took; an id that was removed meanwhile is passed over."""
+        """Free the locks that `acquire` took. Ids that were removed meanwhile are ignored."""
         for item in ids:
             if self._is_writer(user, item):
-                self._free_write(user, item)
+                self._remove_write(user, item)
 
     @asynccontextmanager
     async def auto(self, user: str, *ids: str) -> AsyncIterator[None]:
-        """Hold silent write locks on all ids meanwhile (`auto`). Locked also when the user holds one of them."""
+        """Hold silent write locks on all ids (`auto`). Raise Locked also if the user holds one of them already."""
         await self.acquire(user, *ids)
         try:
             yield
@@ -125,7 +134,7 @@ class Locks(LockTable):
     @asynccontextmanager
     async def auto_skip_held(self, user: str, *ids: str) -> AsyncIterator[None]:
         """Hold silent write locks on the ids that the user does not hold already (`auto*`)."""
-        await self._pass()
+        await self._wait_for_exclusive()
         missing = [item for item in dict.fromkeys(ids) if not self.holds(user, item)]
         async with self.auto(user, *missing):
             yield
@@ -133,23 +142,24 @@ class Locks(LockTable):
     @asynccontextmanager
     async def read(self, user: str, *ids: str) -> AsyncIterator[None]:
         """Hold read locks on the ids that the user neither reads nor writes already (`autoR`)."""
-        await self._pass()
+        await self._wait_for_exclusive()
         missing = [i for i in dict.fromkeys(ids) if not self.holds(user, i) and not self.holds_read(user, i)]
-        await self._eventually(lambda root_ids: self._read_all(user, root_ids), missing)
+        await self._retry(lambda root_ids: self._add_reads(user, root_ids), missing)
         try:
             yield
         finally:
             for item in missing:
-                self._free_read(user, item)
+                self._remove_read(user, item)
 
     @asynccontextmanager
     async def exclusive(self) -> AsyncIterator[None]:
-        """Keep all lock operations of others out (`global`).
+        """Prevent all lock operations of others (`global`).
 
-        Locked at once while anybody holds an announced lock, and when silent ones do not end in time.
+        Raises:
+            Locked: A client holds a lock, or a request holds one for longer than the time limit.
         """
         self._refuse_announced()
-        deadline = asyncio.get_running_loop().time() + self._patience
+        deadline = asyncio.get_running_loop().time() + self._wait_limit
         while self._exclusive is not None or self.write_locked_roots():
             await self._wait_for_change(deadline, "Something is being changed: try again.")
             self._refuse_announced()
@@ -160,9 +170,9 @@ class Locks(LockTable):
             self._exclusive = None
             self._notify()
 
-    # ------------------------------------------------------------------------------------------------ waiting
+    # ------------------------------------------------------------------------------------------------ internals
     async def _root_of(self, item: str) -> str:
-        if (root := self._where.get(item)) is not None:
+        if (root := self._root_ids.get(item)) is not None:
             return root
         if item in OWN_ROOTS:
             return item
@@ -177,27 +187,27 @@ class Locks(LockTable):
         if found := self.announced():
             raise Locked("Something is locked by {found}.", found=", ".join(sorted(found)))
 
-    async def _eventually(self, take: Callable[[dict[str, str]], None], items: Iterable[str]) -> None:
-        deadline = asyncio.get_running_loop().time() + self._patience
+    async def _retry(self, lock: Callable[[dict[str, str]], None], items: Iterable[str]) -> None:
+        deadline = asyncio.get_running_loop().time() + self._wait_limit
         while True:
-            # Looked up anew each time: what is waited for may be removed or moved meanwhile.
-            root_ids = await self._enter(items)
+            # Each attempt finds the roots again, since items may be removed or moved meanwhile.
+            root_ids = await self._find_roots(items)
             try:
-                take(root_ids)
+                lock(root_ids)
             except Locked as error:
-                await self._wait_for_change(deadline, str(error))
+                await self._wait_for_change(deadline, error.message)
             else:
                 return
 
-    async def _enter(self, items: Iterable[str]) -> dict[str, str]:
-        """Wait for the end of an exclusive operation; give the roots, valid until the caller next awaits."""
+    async def _find_roots(self, items: Iterable[str]) -> dict[str, str]:
+        """Wait for the end of an exclusive operation; return the roots of items, valid until the next await."""
         while True:
-            await self._pass()
+            await self._wait_for_exclusive()
             root_ids = {item: await self._root_of(item) for item in dict.fromkeys(items)}
             if self._exclusive is None or self._exclusive is asyncio.current_task():
                 return root_ids
 
-    async def _pass(self) -> None:
+    async def _wait_for_exclusive(self) -> None:
         """Wait while another task holds `exclusive`."""
         if self._exclusive is None or self._exclusive is asyncio.current_task():
             return
@@ -205,7 +215,7 @@ class Locks(LockTable):
         while self._exclusive is not None:
             await self._wait_for_change(deadline, "The scene or project is being opened, saved or closed.")
 
-    async def _wait_for_change(self, deadline: float, refusal: str) -> None:
+    async def _wait_for_change(self, deadline: float, refusal: str | Message) -> None:
         changed = self._changed
         try:
             async with asyncio.timeout_at(deadline):

@@ -95,7 +95,7 @@ class Users:
             for owner, ids in self._locks.announced().items()
             if owner != name
         ]
-        if own := self._locks.written_by(name):
+        if own := self._locks.write_locked_by(name):
             events.append(make_event("ObjectsLocked", LockData(own, name)))
         notices = [NotificationData(notice, NotificationLevel.WARN) for notice in self._notices.pop(name, [])]
         events += [make_event("Notification", notice) for notice in notices]

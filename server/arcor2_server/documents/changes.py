@@ -52,10 +52,14 @@ OF_SCENE: Final = frozenset({Kind.SCENE, Kind.OBJECT})
 
 
 class Item(Struct, frozen=True, array_like=True):
-    """One item. `parent`: the action point of an orientation, joints or action, else empty.
+    """One item of a document.
 
-    `rank` orders the items of one kind: a restored item returns to its old position. Values are never modified in
-    place.
+    Attributes:
+        kind: The kind of the item.
+        id: Its id, unique within the kind.
+        parent: The action point of an orientation, joints or action, else empty.
+        rank: Orders the items of one kind, so that a restored item returns to its old position.
+        value: Never modified in place.
     """
 
     kind: Kind
@@ -66,7 +70,7 @@ class Item(Struct, frozen=True, array_like=True):
 
 
 class Change(Struct, frozen=True, array_like=True):
-    """An item is added (`before` is None), replaced, or removed (`after` is None)."""
+    """Adds an item (`before` is None), replaces it, or removes it (`after` is None)."""
 
     kind: Kind
     id: str
@@ -76,12 +80,12 @@ class Change(Struct, frozen=True, array_like=True):
     after: Any
 
     def inverse(self) -> "Change":
-        """Return the change that takes this one back."""
+        """Return the change that reverts this one."""
         return Change(self.kind, self.id, self.parent, self.rank, self.after, self.before)
 
 
-class How(enum.StrEnum):
-    """The kind of an edit."""
+class EditKind(enum.StrEnum):
+    """Kinds of edit."""
 
     EDIT = "edit"
     UNDO = "undo"
@@ -91,11 +95,21 @@ class How(enum.StrEnum):
     """The stored document was changed while it was closed; such an edit has no user."""
 
 
-class Edit(Struct, frozen=True):
-    """The changes of one request, which are applied, undone and stored together. `number` grows by one per edit.
+FILE_NAMES: Final = {"kind": "how", "target": "of"}
+"""Fields of an edit that have another name in the files of closed histories."""
 
-    `request`: the request that made the edit; for an undo or redo, the request of the edit that it reverts.
-    `of`: the number of that edit, or the restored revision.
+
+class Edit(Struct, frozen=True, rename=FILE_NAMES):
+    """The changes of one request, which are applied, undone and stored together.
+
+    Attributes:
+        number: Grows by one per edit.
+        time: When the edit was made.
+        user: Who made it.
+        changes: In the order in which they are applied.
+        request: The request that made the edit; for an undo or redo, the request of the edit that it reverts.
+        kind: The kind of the edit.
+        target: The number of the edit that an undo or redo reverts, or the restored revision.
     """
 
     number: int
@@ -103,12 +117,12 @@ class Edit(Struct, frozen=True):
     user: str
     changes: list[Change]
     request: str = ""
-    how: How = How.EDIT
-    of: int = 0
+    kind: EditKind = EditKind.EDIT
+    target: int = 0
 
 
 def net(changes: Iterable[Change]) -> list[Change]:
-    """Return one change for each item: from before the first of the changes to after the last, none without effect."""
+    """Combine changes into one per item, from before the first to after the last; drop those without effect."""
     found: dict[tuple[Kind, str], Change] = {}
     for change in changes:
         key = (change.kind, change.id)
@@ -118,7 +132,7 @@ def net(changes: Iterable[Change]) -> list[Change]:
     return [change for change in found.values() if change.before != change.after]
 
 
-class _Row(Struct, frozen=True, array_like=True):
+class _ItemRow(Struct, frozen=True, array_like=True):
     kind: Kind
     id: str
     parent: str
@@ -135,29 +149,28 @@ class _ChangeRow(Struct, frozen=True, array_like=True):
     after: Raw
 
 
-_encode = msgspec.json.Encoder().encode
-_decode_items = msgspec.json.Decoder(list[_Row]).decode
+encode_rows: Final = msgspec.json.Encoder().encode
+"""Encode items or changes for storage."""
+_decode_items = msgspec.json.Decoder(list[_ItemRow]).decode
 _decode_changes = msgspec.json.Decoder(list[_ChangeRow]).decode
 _values: Final = {kind: msgspec.json.Decoder(of | None).decode for kind, of in VALUE_TYPES.items()}
 
 
-def encode_items(items: list[Item]) -> bytes:
-    """Write items for the journal."""
-    return _encode(items)
-
-
 def decode_items(data: bytes) -> list[Item]:
-    """Read what `encode_items` wrote; msgspec.DecodeError when it is damaged."""
+    """Decode stored items.
+
+    Raises:
+        msgspec.DecodeError: The data is damaged.
+    """
     return [Item(row.kind, row.id, row.parent, row.rank, _values[row.kind](row.value)) for row in _decode_items(data)]
 
 
-def encode_changes(changes: list[Change]) -> bytes:
-    """Write changes for the journal."""
-    return _encode(changes)
-
-
 def decode_changes(data: bytes) -> list[Change]:
-    """Read what `encode_changes` wrote; msgspec.DecodeError when it is damaged."""
+    """Decode stored changes.
+
+    Raises:
+        msgspec.DecodeError: The data is damaged.
+    """
     return [
         Change(row.kind, row.id, row.parent, row.rank, _values[row.kind](row.before), _values[row.kind](row.after))
         for row in _decode_changes(data)

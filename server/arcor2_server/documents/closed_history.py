@@ -14,7 +14,17 @@ from msgspec.structs import replace
 from arcor2_hw.data.base import now
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
-from arcor2_server.documents.changes import OF_SCENE, Change, Edit, How, Item, Kind, decode_changes, decode_items
+from arcor2_server.documents.changes import (
+    FILE_NAMES,
+    OF_SCENE,
+    Change,
+    Edit,
+    EditKind,
+    Item,
+    Kind,
+    decode_changes,
+    decode_items,
+)
 from arcor2_server.documents.document import UNTIMED, Document
 from arcor2_server.documents.history import History
 from arcor2_server.documents.unsaved import Unsaved
@@ -35,14 +45,14 @@ class ClosedHistory(msgspec.Struct, frozen=True):
     edits: list[Edit]
 
 
-class _EditRow(msgspec.Struct, frozen=True):
+class _EditRow(msgspec.Struct, frozen=True, rename=FILE_NAMES):
     number: int
     time: str
     user: str
     changes: msgspec.Raw
     request: str
-    how: How
-    of: int
+    kind: EditKind
+    target: int
 
 
 class _Stored(msgspec.Struct, frozen=True):
@@ -119,7 +129,7 @@ def _read(path: Path) -> ClosedHistory:
     """Read a stored history. Raises OSError, and zlib.error or ValueError when the file is damaged."""
     stored = msgspec.json.decode(zlib.decompress(path.read_bytes()), type=_Stored)
     edits = [
-        Edit(row.number, row.time, row.user, decode_changes(row.changes), row.request, row.how, row.of)
+        Edit(row.number, row.time, row.user, decode_changes(row.changes), row.request, row.kind, row.target)
         for row in stored.edits
     ]
     return ClosedHistory(stored.document, decode_items(stored.items), edits)
@@ -170,7 +180,7 @@ def continue_history(
         return None
     edits = closed.edits
     if changes:
-        edits = [*edits, Edit(edits[-1].number + 1, now(), "", changes, how=How.EXTERNAL)]
+        edits = [*edits, Edit(edits[-1].number + 1, now(), "", changes, kind=EditKind.EXTERNAL)]
     return document, edits
 
 

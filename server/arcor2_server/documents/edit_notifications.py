@@ -8,7 +8,7 @@ from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.editor import HistoryChangedData, HistoryStep
 from arcor2_hw.data.events import Event
 from arcor2_server.documents import Session
-from arcor2_server.documents.changes import Change, Edit, How, Kind
+from arcor2_server.documents.changes import Change, Edit, EditKind, Kind
 from arcor2_server.documents.history import History
 from arcor2_server.events import Connection, EventHub, encode, make_event
 
@@ -115,7 +115,7 @@ _BY_IMPORTANCE: Final = (
 
 def _original(edit: Edit, history: History) -> Edit:
     """Return the original edit of an undo or redo, as far as it is stored."""
-    while edit.how in (How.UNDO, How.REDO) and (found := history.find(edit.of)) is not None:
+    while edit.kind in (EditKind.UNDO, EditKind.REDO) and (found := history.find(edit.target)) is not None:
         edit = found
     return edit
 
@@ -125,9 +125,9 @@ def sentence(edit: Edit) -> str:
 
     Of an undo, what was taken back: that is what Redo would do again.
     """
-    if edit.how is How.RESTORE:
-        return f"going back to revision {edit.of}"
-    changes = [change.inverse() for change in edit.changes] if edit.how is How.UNDO else edit.changes
+    if edit.kind is EditKind.RESTORE:
+        return f"going back to revision {edit.target}"
+    changes = [change.inverse() for change in edit.changes] if edit.kind is EditKind.UNDO else edit.changes
     if not changes:
         return edit.request
     # What else changes follows from it: joints of a moved point become invalid, its actions go with it.

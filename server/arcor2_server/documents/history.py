@@ -3,7 +3,7 @@
 from collections import defaultdict, deque
 from collections.abc import Iterator
 
-from arcor2_server.documents.changes import Edit, How
+from arcor2_server.documents.changes import Edit, EditKind
 
 
 class History:
@@ -53,11 +53,11 @@ class History:
 
     def _note(self, edit: Edit) -> None:
         undoable, redoable = self._undoable[edit.user], self._redoable[edit.user]
-        if edit.how in (How.UNDO, How.REDO):
-            self._taken_back.add(edit.of)
-            source, target = (undoable, redoable) if edit.how is How.UNDO else (redoable, undoable)
-            if edit.of in source:
-                source.remove(edit.of)
+        if edit.kind in (EditKind.UNDO, EditKind.REDO):
+            self._taken_back.add(edit.target)
+            source, target = (undoable, redoable) if edit.kind is EditKind.UNDO else (redoable, undoable)
+            if edit.target in source:
+                source.remove(edit.target)
             target.append(edit.number)
         else:
             undoable.append(edit.number)
@@ -106,12 +106,12 @@ class History:
             found.append(edit)
         return found[::-1]
 
-    def last_to_touch(self, ids: set[str], *, after: int, besides: str) -> Edit | None:
-        """Give the latest edit after number `after` that touched any of the ids; one of others than `besides` first."""
+    def last_change_of(self, ids: set[str], *, after: int, except_user: str) -> Edit | None:
+        """Give the latest edit after number `after` that touched any of the ids; one of others than `except_user` first."""
         own = None
         for edit in reversed(self.since(after)):
             if any(change.id in ids for change in edit.changes):
-                if edit.user != besides:
+                if edit.user != except_user:
                     return edit
                 own = own or edit
         return own

@@ -1,4 +1,4 @@
-"""The journal: writes edits to the disk before they are acknowledged, and restores them after a restart."""
+"""Writes edits to the disk before they are acknowledged, and restores them after a restart."""
 
 import asyncio
 import queue
@@ -22,11 +22,15 @@ _Job = tuple[Edit | Base | None, int, "asyncio.Future[None]"]
 
 
 class Journal:
-    """The journal: one thread with one file. Waiting jobs are written in one commit, in order.
+    """The journal of the open document: a thread with one file. Waiting jobs are written in one commit, in order.
 
     After a failure all jobs of the same epoch fail, also later ones, since the edits that they build on are lost.
-    `on_failure` is called in the event loop before the callers get their StorageError; it has to revert the edits and
-    to start a new epoch (`next_epoch`). `convert` changes what is restored; it is called by the thread.
+
+    Args:
+        path: The SQLite file.
+        on_failure: Called in the event loop before the callers get their StorageError. It has to revert the edits
+            and to start a new epoch.
+        convert: Changes the restored content; called by the thread.
     """
 
     def __init__(
@@ -46,11 +50,11 @@ class Journal:
         self._failure = StorageError()
         self.loss: Loss | None = None
 
-    # ------------------------------------------------------------------------------------------ life
     async def open(self) -> Recovered | None:
-        """Start, and return what an earlier server left open. `loss` says what of it is lost to damage.
+        """Start the thread, and return what an earlier server left open. `loss` describes what is lost to damage.
 
-        Raises StorageError when the directory cannot be written.
+        Raises:
+            StorageError: The file cannot be read or written.
         """
         self._loop = asyncio.get_running_loop()
         started: asyncio.Future[Recovered | None] = self._loop.create_future()
@@ -59,7 +63,7 @@ class Journal:
         return await started
 
     async def close(self) -> None:
-        """Write what waits, and end the thread."""
+        """Write the waiting jobs, and stop the thread."""
         if self._thread is not None:
             self._jobs.put(None)
             await asyncio.to_thread(self._thread.join)
@@ -67,19 +71,19 @@ class Journal:
 
     # ------------------------------------------------------------------------------------------ jobs
     def append(self, edit: Edit) -> "asyncio.Future[None]":
-        """Put an edit at the end; the future is done when it is on the disk."""
+        """Append an edit; the future is done when it is on the disk."""
         return self._put(edit)
 
     def rebase(self, base: Base) -> "asyncio.Future[None]":
-        """Begin with another document, or with the same one at a later edit."""
+        """Replace the document that the edits start from: by another one, or by the same one after a later edit."""
         return self._put(base)
 
     def clear(self) -> "asyncio.Future[None]":
-        """Forget everything: nothing is open."""
+        """Delete everything, since no document is open."""
         return self._put(None)
 
     def next_epoch(self) -> None:
-        """Go on after a failure."""
+        """Accept jobs again after a failure."""
         self._epoch += 1
 
     def _put(self, job: Edit | Base | None) -> "asyncio.Future[None]":
@@ -101,27 +105,27 @@ class Journal:
                 return
             self._loop.call_soon_threadsafe(_resolve, started, recovered, None)
             file.extend_log()
-            ending = False
-            while not ending:
+            stopped = False
+            while not stopped:
                 batch = [self._jobs.get()]
                 while not self._jobs.empty():
                     batch.append(self._jobs.get())
-                ending = None in batch
+                stopped = None in batch
                 self._write_batch(file, [job for job in batch if job is not None])
 
     def _write_batch(self, file: JournalFile, batch: list[_Job]) -> None:
         assert self._loop is not None
-        late = [done for _, epoch, done in batch if epoch <= self._failed_epoch]
-        if late:
-            self._loop.call_soon_threadsafe(self._finish, late, self._failure, None)
-        live = [job for job in batch if job[1] > self._failed_epoch]
-        if not live:
+        refused = [done for _, epoch, done in batch if epoch <= self._failed_epoch]
+        if refused:
+            self._loop.call_soon_threadsafe(self._finish, refused, self._failure, None)
+        accepted = [job for job in batch if job[1] > self._failed_epoch]
+        if not accepted:
             return
-        futures = [done for _, _, done in live]
+        futures = [done for _, _, done in accepted]
         try:
-            file.commit([job for job, _, _ in live])
+            file.commit([job for job, _, _ in accepted])
         except (sqlite3.Error, OSError) as error:
-            self._failed_epoch = live[-1][1]
+            self._failed_epoch = accepted[-1][1]
             self._failure = StorageError(
                 "The change could not be stored, {path} cannot be written: {reason}.", path=self._path, reason=error
             )
@@ -139,7 +143,7 @@ class Journal:
 
 def _resolve(future: "asyncio.Future[Any]", result: Any, error: Exception | None) -> None:
     if future.done():
-        return  # whoever waited was cancelled
+        return  # cancelled by the caller
     if error is None:
         future.set_result(result)
     else:

@@ -13,25 +13,25 @@ from arcor2_hw.data.project import BareProject
 from arcor2_hw.data.scene import BareScene
 from arcor2_server.documents.changes import (
     Edit,
-    How,
+    EditKind,
     Item,
     Kind,
     decode_changes,
     decode_items,
-    encode_changes,
-    encode_items,
+    encode_rows,
 )
 
 ALL: Final = 2**63 - 1
-"""As `Base.forget`: drop all edits, those of another document too."""
+"""Value of `Base.forget` that drops all edits, also those of another document."""
 
 LONGEST_NAME: Final = 60
-"""Characters of a name in a position."""
-COLUMNS: Final = "number, time, user, changes, request, how, target"
+"""Maximum length of a name in a position, characters."""
+EDIT_COLUMNS: Final = "number, time, user, changes, request, how, target"
+"""Columns of the table `edit` without the checksum."""
 
 
 class Times(msgspec.Struct, frozen=True):
-    """Times at which a document was created, saved, and changed after it was saved; empty if it was not."""
+    """Times at which a document was created, saved, and changed after it was saved; empty for what did not happen."""
 
     created: str = ""
     modified: str = ""
@@ -44,15 +44,15 @@ class Times(msgspec.Struct, frozen=True):
 
     @property
     def unsaved(self) -> bool:
-        """Whether there is anything that is not saved."""
+        """Whether the document has unsaved changes."""
         return not self.modified or bool(self.changed)
 
-    def touched(self, time: str, *, differs: bool) -> "Times":
-        """Return the times after a change, which may have brought a document back to what is saved."""
+    def after_edit(self, time: str, *, differs: bool) -> "Times":
+        """Return the times after an edit. `differs`: the document differs from the saved one."""
         return replace(self, changed=time if differs or not self.modified else "")
 
-    def settled(self, *, differs: bool, saved: BareScene | BareProject | None = None) -> "Times":
-        """Return the times of a document that was compared with what is saved, or was saved."""
+    def after_comparison(self, *, differs: bool, saved: BareScene | BareProject | None = None) -> "Times":
+        """Return the times after the document was compared with the saved one, or was saved as `saved`."""
         changed = self.changed if differs or (saved is None and not self.modified) else ""
         return replace(self if saved is None else Times.of(saved), changed=changed)
 
@@ -66,7 +66,7 @@ class Times(msgspec.Struct, frozen=True):
 
 
 class Recovered(msgspec.Struct, frozen=True):
-    """The content of the journal: the document as `items` after edit `number`, and all stored edits."""
+    """The restored document as `items` after edit `number`, and all stored edits."""
 
     items: list[Item]
     number: int
@@ -81,9 +81,9 @@ class Recovered(msgspec.Struct, frozen=True):
 
 
 class Base(msgspec.Struct, frozen=True):
-    """A complete document: its items after edit `number`.
+    """A job that writes a complete document: its items after edit `number`.
 
-    Stored edits up to `forget` are dropped. Then `edits`, which lead to the document, are stored.
+    Drops stored edits up to `forget`, then stores `edits`, which lead to the document.
     """
 
     items: list[Item]
@@ -95,7 +95,7 @@ class Base(msgspec.Struct, frozen=True):
 
 
 class Position(msgspec.Struct, frozen=True):
-    """The last acknowledged change: the opening of which document, its number, author and time.
+    """The last acknowledged change: its number, author and time.
 
     `serial` grows by one whenever a document is opened or closed. `document` is empty if none is open.
     """
@@ -120,14 +120,18 @@ class Position(msgspec.Struct, frozen=True):
 
     @property
     def last_change(self) -> str:
-        """A clause that names the last change."""
+        """A clause with the author and time of the last change."""
         return f", the last one by {self.user} at {self.time[:19].replace('T', ' ')} UTC" if self.time else ""
 
 
 class Loss(msgspec.Struct, frozen=True):
     """What a damaged journal lost, as sentences for users.
 
-    `incomplete`: the reopened document differs from the last acknowledged state.
+    Attributes:
+        reason: How the damage was detected, a clause.
+        lost: What is lost.
+        stored_as: The path of the damaged file.
+        incomplete: The reopened document differs from the last acknowledged state.
     """
 
     reason: str
@@ -140,12 +144,20 @@ class Loss(msgspec.Struct, frozen=True):
         return f"The journal of unsaved changes is damaged: {self.reason}. {self.lost}{stored}"
 
 
-class Damaged(Exception):
-    """The content of the file cannot be used."""
+class JournalDamaged(Exception):
+    """The document in the journal cannot be restored."""
 
 
-class Reading(msgspec.Struct):
-    """The content of a file: `recovered` is intact, `lost` describes the rest, `damage` how it was detected."""
+class JournalContent(msgspec.Struct):
+    """The content of a journal file: what is intact, and what is damaged.
+
+    Attributes:
+        serial: See `Position`.
+        recovered: What is intact.
+        damage: How the damage was detected, a clause.
+        lost: What is lost, as sentences.
+        incomplete: The intact part differs from the last acknowledged state.
+    """
 
     serial: int = 0
     recovered: Recovered | None = None
@@ -155,105 +167,108 @@ class Reading(msgspec.Struct):
 
 
 # ---------------------------------------------------------------------------------------------- rows
-def write(connection: sqlite3.Connection, job: Edit | Base | None, serial: int) -> None:
-    """Write one job: append an edit, begin with a whole document, or forget everything (None)."""
+def write_job(connection: sqlite3.Connection, job: Edit | Base | None, serial: int) -> None:
+    """Write one job: append an edit, replace the document, or delete everything (None)."""
     match job:
-        case Edit(number, time, user, changes, request, how, of):
-            row = (number, time, user, encode_changes(changes), request, how.value, of)
-            connection.execute("insert into edit values (?, ?, ?, ?, ?, ?, ?, ?)", (*row, edit_sum(row)))
+        case Edit(number, time, user, changes, request, kind, target):
+            row = (number, time, user, encode_rows(changes), request, kind.value, target)
+            connection.execute("insert into edit values (?, ?, ?, ?, ?, ?, ?, ?)", (*row, edit_checksum(row)))
         case Base(items, number, scene, project, forget, edits):
             times = (msgspec.json.encode(scene).decode(), msgspec.json.encode(project).decode())
-            whole = (encode_items(items), number, *times)
+            base_row = (encode_rows(items), number, *times)
+            checksum = base_checksum(base_row, serial)
             connection.execute("update opening set serial = ?", (serial,))
-            connection.execute(
-                "insert or replace into base values (1, ?, ?, ?, ?, ?)", (*whole, base_sum(whole, serial))
-            )
+            connection.execute("insert or replace into base values (1, ?, ?, ?, ?, ?)", (*base_row, checksum))
             connection.execute("delete from edit where number <= ?", (forget,))
             for edit in edits:
-                write(connection, edit, serial)
+                write_job(connection, edit, serial)
         case None:
             connection.execute("update opening set serial = ?", (serial,))
             connection.execute("delete from base")
             connection.execute("delete from edit")
 
 
-def edit_sum(row: Sequence[Any]) -> int:
+def edit_checksum(row: Sequence[Any]) -> int:
     """Return the checksum of a row of `edit`, given without its last column."""
     number, time, user, changes, *rest = row
     return zlib.crc32(changes, zlib.crc32(repr((number, time, user, *rest)).encode(errors="replace")))
 
 
-def base_sum(row: Sequence[Any], serial: int) -> int:
+def base_checksum(row: Sequence[Any], serial: int) -> int:
     """Return the checksum of the row of `base`, given without the first and the last column."""
     items, *rest = row
     return zlib.crc32(items, zlib.crc32(repr((*rest, serial)).encode(errors="replace")))
 
 
 def document_of(items: list[Item]) -> str:
-    """Return kind and name of what is open."""
+    """Return kind and name of a document: `project 'demo'`; empty if there is none."""
     names = {item.kind: item.value.name for item in items if item.kind in (Kind.SCENE, Kind.PROJECT)}
     if Kind.PROJECT in names:
         return f"project {names[Kind.PROJECT][:LONGEST_NAME]!r}"
     return f"scene {names[Kind.SCENE][:LONGEST_NAME]!r}" if Kind.SCENE in names else ""
 
 
-def read_rows(connection: sqlite3.Connection) -> Reading:
-    """Read what is intact. Raises Damaged when the document itself is not."""
+def read_content(connection: sqlite3.Connection) -> JournalContent:
+    """Read what is intact.
+
+    Raises:
+        JournalDamaged: The document itself is damaged.
+    """
     (serial,) = connection.execute("select serial from opening").fetchone() or (None,)
     if serial is None:
-        raise Damaged("a row is missing")
-    reading = Reading(serial)
+        raise JournalDamaged("a row is missing")
+    content = JournalContent(serial)
     base = connection.execute("select items, edit, scene_times, project_times, sum from base").fetchone()
-    rows = connection.execute(f"select {COLUMNS}, sum from edit order by number").fetchall()  # noqa: S608
+    rows = connection.execute(f"select {EDIT_COLUMNS}, sum from edit order by number").fetchall()  # noqa: S608
     if base is None:
         if rows:
-            raise Damaged("a row is missing")
-        return reading
+            raise JournalDamaged("a row is missing")
+        return content
     items, number, *times, checksum = base
-    if base_sum((items, number, *times), serial) != checksum:
-        raise Damaged("the checksum of the document is wrong")
-    intact = {row[0]: row for row in rows if edit_sum(row[:-1]) == row[-1]}
+    if base_checksum((items, number, *times), serial) != checksum:
+        raise JournalDamaged("the checksum of the document is wrong")
+    intact = {row[0]: row for row in rows if edit_checksum(row[:-1]) == row[-1]}
     first, last = number + 1, number
     while first - 1 in intact:
         first -= 1
     while last + 1 in intact:
         last += 1
     edits = [
-        Edit(number, time, user, decode_changes(changes), request, How(how), of)
-        for number, time, user, changes, request, how, of, _ in (intact[key] for key in range(first, last + 1))
+        Edit(number, time, user, decode_changes(changes), request, EditKind(kind), target)
+        for number, time, user, changes, request, kind, target, _ in (intact[key] for key in range(first, last + 1))
     ]
     scene, project = (msgspec.json.decode(text, type=Times) for text in times)
-    reading.recovered = Recovered(decode_items(items), number, scene, project, edits)
-    document = document_of(reading.recovered.items)
+    content.recovered = Recovered(decode_items(items), number, scene, project, edits)
+    document = document_of(content.recovered.items)
     if beyond := [row[0] for row in rows if row[0] > last]:
-        reading.damage = f"the checksum of change {last + 1} is wrong, or it is missing"
-        reading.lost, reading.incomplete = _lost_changes(document, last, Position(0, beyond[-1])), True
+        content.damage = f"the checksum of change {last + 1} is wrong, or it is missing"
+        content.lost, content.incomplete = _lost_changes(document, last, Position(0, beyond[-1])), True
     elif any(row[0] < first for row in rows):
-        reading.damage = f"the checksum of change {first - 1} is wrong, or it is missing"
-        reading.lost = f"All changes of {document} are present, but those before number {first} cannot be undone."
-    return reading
+        content.damage = f"the checksum of change {first - 1} is wrong, or it is missing"
+        content.lost = f"All changes of {document} are present, but those before number {first} cannot be undone."
+    return content
 
 
-def compare(reading: Reading, expected: Position) -> None:
-    """Note in `reading` what is missing of the changes that were acknowledged."""
-    found = reading.recovered
-    if not expected.document and reading.serial <= expected.serial:
-        # Everything was closed. What the file still holds was discarded or saved.
+def note_missing(content: JournalContent, expected: Position) -> None:
+    """Note in `content` which acknowledged changes are missing from it."""
+    found = content.recovered
+    if not expected.document and content.serial <= expected.serial:
+        # The document was closed, so the content of the file is saved or discarded.
         if found is not None:
-            reading.damage = reading.damage or "the newest changes are missing"
-        reading.recovered, reading.lost = None, ""
-    elif (reading.serial, -1 if found is None else found.last) < (expected.serial, expected.number):
-        reading.damage = reading.damage or "the newest changes are missing"
-        if found is not None and reading.serial == expected.serial:
-            reading.lost, reading.incomplete = _lost_changes(expected.document, found.last, expected), True
+            content.damage = content.damage or "the newest changes are missing"
+        content.recovered, content.lost = None, ""
+    elif (content.serial, -1 if found is None else found.last) < (expected.serial, expected.number):
+        content.damage = content.damage or "the newest changes are missing"
+        if found is not None and content.serial == expected.serial:
+            content.lost, content.incomplete = _lost_changes(expected.document, found.last, expected), True
         else:
-            # What is left belongs to a document that was closed before.
-            reading.recovered = None
-            reading.lost = (
+            # The content belongs to a document that was closed before.
+            content.recovered = None
+            content.lost = (
                 f"Unsaved changes of {expected.document} are lost{expected.last_change}. "
                 "Open it again: it is as last saved."
             )
-    reading.serial = max(reading.serial, expected.serial)
+    content.serial = max(content.serial, expected.serial)
 
 
 def _lost_changes(document: str, last: int, expected: Position) -> str:

@@ -1,4 +1,4 @@
-"""Moves secrets out of a journal that an earlier version wrote in clear."""
+"""Moves secrets to the secret store from a journal that an earlier version wrote in plain text."""
 
 from collections.abc import Callable
 from typing import Any, Final

@@ -16,7 +16,7 @@ from arcor2_hw.data.project import (
 )
 from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_hw.exceptions import NotFound, StorageError
-from arcor2_server.documents.changes import OF_SCENE, Change, Edit, How, Kind
+from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Kind
 from arcor2_server.documents.checks import scene_problems
 from arcor2_server.documents.closed_history import ClosedHistories
 from arcor2_server.documents.document import Document
@@ -140,8 +140,8 @@ class Session(OpenDocument):
         except StorageError as error:
             log.warning("what is open cannot be compared with what is saved", reason=str(error))
         self._unsaved = Unsaved.between(Document.of(saved, saved_project), self.document)
-        self._scene_times = self._scene_times.settled(differs=self._unsaved.scene)
-        self._project_times = self._project_times.settled(differs=self._unsaved.project)
+        self._scene_times = self._scene_times.after_comparison(differs=self._unsaved.scene)
+        self._project_times = self._project_times.after_comparison(differs=self._unsaved.project)
         self._forget_snapshots()
 
     # ------------------------------------------------------------------------------------------ edits
@@ -156,13 +156,13 @@ class Session(OpenDocument):
         return self._number - len(self.history)
 
     async def commit(
-        self, user: str, changes: Sequence[Change], request: str = "", how: How = How.EDIT, of: int = 0
+        self, user: str, changes: Sequence[Change], request: str = "", kind: EditKind = EditKind.EDIT, target: int = 0
     ) -> None:
-        """Apply changes as one edit; return when they are on disk. `request`, `how`, `of`: see Edit.
+        """Apply changes as one edit; return when they are on disk. `request`, `kind`, `target`: see Edit.
 
         Other requests see them at once. Raise StorageError if they cannot be stored; they are reverted then.
         """
-        edit = Edit(self._number + 1, now(), user, list(changes), request, how, of)
+        edit = Edit(self._number + 1, now(), user, list(changes), request, kind, target)
         stored = self._journal.append(edit)
         self._pending.append(_Pending(edit, self._scene_times, self._project_times))
         stored.add_done_callback(self._edit_stored)
@@ -180,9 +180,9 @@ class Session(OpenDocument):
             self._unsaved.note(change)
         kinds = {change.kind for change in edit.changes}
         if kinds & OF_SCENE:
-            self._scene_times = self._scene_times.touched(edit.time, differs=self._unsaved.scene)
+            self._scene_times = self._scene_times.after_edit(edit.time, differs=self._unsaved.scene)
         if kinds - OF_SCENE:
-            self._project_times = self._project_times.touched(edit.time, differs=self._unsaved.project)
+            self._project_times = self._project_times.after_edit(edit.time, differs=self._unsaved.project)
         self._forget_snapshots()
 
     def _edit_stored(self, future: "asyncio.Future[None]") -> None:
@@ -289,11 +289,11 @@ class Session(OpenDocument):
         storage = self._storage
         if self.scene_changed:
             saved = await self._save(storage.put_scene(self.require_scene()), scene=True)
-            self._scene_times = self._scene_times.settled(differs=self._unsaved.scene, saved=saved)
+            self._scene_times = self._scene_times.after_comparison(differs=self._unsaved.scene, saved=saved)
             self._forget_snapshots()
         if self.project_changed:
             saved = await self._save(storage.put_project(self.require_project()), scene=False)
-            self._project_times = self._project_times.settled(differs=self._unsaved.project, saved=saved)
+            self._project_times = self._project_times.after_comparison(differs=self._unsaved.project, saved=saved)
             self._forget_snapshots()
         # Not waited for: what a restart finds saved is compared with what the journal leads to.
         self._shorten()

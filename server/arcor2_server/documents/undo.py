@@ -6,7 +6,7 @@ from typing import Final
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.project import END, START
 from arcor2_hw.data.role import Role
-from arcor2_server.documents.changes import OF_SCENE, Change, Edit, How, Kind, net
+from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Kind, net
 from arcor2_server.documents.checks import Types
 from arcor2_server.documents.consistency import Unsound, check_sound, title
 from arcor2_server.documents.document import Document, action_of
@@ -42,10 +42,10 @@ def require_possible(
 
 
 def _by(history: History, ids: set[str], after: int, user: str, opening: str = "") -> str:
-    edit = history.last_to_touch(ids, after=after, besides=user) if ids else None
+    edit = history.last_change_of(ids, after=after, except_user=user) if ids else None
     if edit is None:
         return ""
-    if edit.how is How.EXTERNAL:
+    if edit.kind is EditKind.EXTERNAL:
         return f"{opening} outside the editor, while the document was closed (edit {edit.number})" + "." * bool(opening)
     who = "you" if edit.user == user else edit.user
     return f"{opening} by {who} (edit {edit.number}{f', {edit.request}' if edit.request else ''})" + "." * bool(opening)

@@ -18,7 +18,7 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_server.collaboration.locks import Locked, Locks
 from arcor2_server.documents import Session
-from arcor2_server.documents.changes import OF_SCENE, Change, Edit, How, Kind, net
+from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Kind, net
 from arcor2_server.documents.dependents import Dependents
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.undo import (
@@ -54,11 +54,11 @@ def _described(edit: Edit, *, in_force: bool) -> HistoryEdit:
         time=edit.time,
         user=edit.user,
         request=edit.request,
-        how=edit.how.value,
+        how=edit.kind.value,
         in_force=in_force,
         items=items,
         touched=len(changes),
-        of=UNSET if edit.how is How.EDIT else edit.of,
+        of=UNSET if edit.kind is EditKind.EDIT else edit.target,
     )
 
 
@@ -94,12 +94,12 @@ class HistoryRequests:
     @rpc("Undo")
     async def undo(self, context: Context, args: UndoArgs) -> UndoData:
         """Take back an edit of the caller."""
-        return await self._take_back(context, args.number, How.UNDO)
+        return await self._take_back(context, args.number, EditKind.UNDO)
 
     @rpc("Redo")
     async def redo(self, context: Context, args: RedoArgs) -> UndoData:
         """Take back an undo of the caller."""
-        return await self._take_back(context, args.number, How.REDO)
+        return await self._take_back(context, args.number, EditKind.REDO)
 
     @rpc("RestoreRevision")
     async def restore_revision(self, context: Context, args: RestoreRevisionArgs) -> RestoreRevisionData:
@@ -119,11 +119,11 @@ class HistoryRequests:
                 raise RequestRefused("The document is as it was in revision {revision}.", revision=args.revision)
             async with self._locked(context, changes):
                 if session.document is document and session.revision == at:
-                    revision = await self._make(context, changes, args.revision, context.request, How.RESTORE)
+                    revision = await self._make(context, changes, args.revision, context.request, EditKind.RESTORE)
                     return RestoreRevisionData(revision)
         raise RequestRefused("Others are editing: try again.")
 
-    async def _take_back(self, context: Context, number: int | Unset, how: How) -> UndoData:
+    async def _take_back(self, context: Context, number: int | Unset, how: EditKind) -> UndoData:
         self._session.require_scene_open()
         while True:
             edit = self._chosen(context, number, how)
@@ -134,10 +134,10 @@ class HistoryRequests:
                     revision = await self._make(context, changes, edit.number, edit.request, how)
                     return UndoData(edit.number, edit.request, revision)
 
-    def _chosen(self, context: Context, number: int | Unset, how: How) -> Edit:
+    def _chosen(self, context: Context, number: int | Unset, how: EditKind) -> Edit:
         history, user = self._session.history, context.user
         if isinstance(number, Unset):
-            latest = history.undoable(user) if how is How.UNDO else history.redoable(user)
+            latest = history.undoable(user) if how is EditKind.UNDO else history.redoable(user)
             if latest is None:
                 raise RequestRefused("There is nothing that you could {value}.", value=how.value)
             return latest
@@ -146,7 +146,7 @@ class HistoryRequests:
             raise RequestRefused("There is no edit {number}, or it is not kept any more.", number=number)
         if edit.user != user:
             raise RequestRefused("Edit {number} was made by {user}.", number=number, user=edit.user)
-        if not (history.can_undo(user, number) if how is How.UNDO else history.can_redo(user, number)):
+        if not (history.can_undo(user, number) if how is EditKind.UNDO else history.can_redo(user, number)):
             raise RequestRefused("Edit {number} is nothing that you could {value}.", number=number, value=how.value)
         return edit
 
@@ -165,7 +165,7 @@ class HistoryRequests:
                     )
             yield
 
-    async def _make(self, context: Context, changes: Sequence[Change], after: int, request: str, how: How) -> int:
+    async def _make(self, context: Context, changes: Sequence[Change], after: int, request: str, how: EditKind) -> int:
         """Make the changes that take back edits since number `after`, unless this is a dry run; gives the revision."""
         session, user = self._session, context.user
         document = session.document

@@ -103,7 +103,7 @@ class ProjectRequests:
         async with self._locks.auto(context.user, PROJECT):
             self._editing.require_no_program(context)
             await self._editing.require_name_free(context, args.name, "project")
-            if self._locks.write_locked_roots(besides=(PROJECT,)):
+            if self._locks.write_locked_roots(excluding=(PROJECT,)):
                 raise RequestRefused("Something is locked: all locks have to be given back first.")
             scene = await self._scene_for(context, args.scene_id)
             if problems := session.scene_problems(scene):

@@ -98,7 +98,7 @@ class SceneRequests:
                     "{name} has changes that are not saved: save it, or close it by force.", name=scene.name
                 )
             self._online.require_offline()
-            if self._locks.locked_roots(besides=(SCENE,)):
+            if self._locks.locked_roots(excluding=(SCENE,)):
                 raise RequestRefused("Something in the scene is locked: all locks have to be given back first.")
             if context.dry_run:
                 return

@@ -219,7 +219,7 @@ class Edits(RuleBasedStateMachine):
         if read:
             self.ask(self.who(number), "ReadUnlock" if give_back else "ReadLock", object_id=item)
         elif give_back:
-            for held in self.desk.services.locks.written_by(self.who(number)):
+            for held in self.desk.services.locks.write_locked_by(self.who(number)):
                 self.ask(self.who(number), "WriteUnlock", object_id=held)
         else:
             self.ask(self.who(number), "WriteLock", object_id=item, lock_tree=tree)
@@ -256,7 +256,7 @@ class Edits(RuleBasedStateMachine):
         for number in range(len(NAMES)):
             self.lock_time_out(number)
         for who in sorted(self.clients):
-            for held in self.desk.services.locks.written_by(who):
+            for held in self.desk.services.locks.write_locked_by(who):
                 assert not isinstance(self.ask(who, "WriteUnlock", object_id=held), Refused)
             for held in list(self.desk.services.locks._reads.get(who, ())):
                 self.ask(who, "ReadUnlock", object_id=held)

@@ -162,7 +162,7 @@ async def make(person: Person, edit: Edit, ids: dict[str, str]) -> None:
     if lock:
         await person.lock(filled(lock, ids), tree=tree)
     await person.ask(request, **filled(args, ids))
-    if lock and person.desk.services.locks.written_by("alice"):
+    if lock and person.desk.services.locks.write_locked_by("alice"):
         await person.ask("WriteUnlock", object_id=filled(lock, ids))
 
 

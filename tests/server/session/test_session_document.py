@@ -33,8 +33,7 @@ from arcor2_server.documents.changes import (
     Kind,
     decode_changes,
     decode_items,
-    encode_changes,
-    encode_items,
+    encode_rows,
 )
 from arcor2_server.documents.document import Document
 
@@ -73,7 +72,7 @@ def some_project(points: int = 3, actions: int = 2) -> tuple[Scene, Project]:
 
 
 def state(document: Document) -> tuple[bytes, Scene | None, Project | None]:
-    return encode_items(document.items()), document.scene, document.project
+    return encode_rows(document.items()), document.scene, document.project
 
 
 def lookups(document: Document) -> dict[str, object]:
@@ -146,7 +145,7 @@ def _random_edit(document: Document, draw: random.Random) -> list[Change]:
 def test_random_edits_undo_redo_and_replay(seed: int, length: int) -> None:
     draw = random.Random(seed)
     document = Document.of(*some_project())
-    base = encode_items(document.items())
+    base = encode_rows(document.items())
     steps, states = [], [state(document)]
     for _ in range(length):
         changes = _random_edit(document, draw)
@@ -158,7 +157,7 @@ def test_random_edits_undo_redo_and_replay(seed: int, length: int) -> None:
     # Through the journal: base and changes, written and read, are the same document.
     replayed = Document(decode_items(base))
     for changes in steps:
-        replayed.apply(decode_changes(encode_changes(changes)))
+        replayed.apply(decode_changes(encode_rows(changes)))
     assert state(replayed) == states[-1]
     assert lookups(replayed) == lookups(document)
     # Back step by step, order of the items included, and forth again.

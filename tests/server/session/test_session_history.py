@@ -284,7 +284,7 @@ async def test_an_undo_that_cannot_be_kept_is_taken_back(
         raise sqlite3.OperationalError("database or disk is full")
 
     with monkeypatch.context() as patch:
-        patch.setattr(journal_file, "write", full)
+        patch.setattr(journal_file, "write_job", full)
         assert "disk is full" in await refused(alice)
     assert shown(desk) == before
     assert not desk.session.has_changes

@@ -222,14 +222,14 @@ async def test_what_cannot_be_kept_is_taken_back(tmp_path: Path, monkeypatch: py
         await open_project(alice, points=2)
         await alice.ask("SaveProject")
         before, number = desk.session.project, len(desk.session.history)
-        write, failing = journal_file.write, True
+        write, failing = journal_file.write_job, True
 
         def full(connection: sqlite3.Connection, job: object, serial: int) -> None:
             if failing:
                 raise sqlite3.OperationalError("database or disk is full")
             write(connection, job, serial)  # type: ignore[arg-type]
 
-        monkeypatch.setattr(journal_file, "write", full)
+        monkeypatch.setattr(journal_file, "write_job", full)
         bob.take()
         edits = [add_point(person, f"new{n}") for n, person in enumerate((alice, bob, alice, bob))]
         results = await asyncio.gather(*edits, return_exceptions=True)

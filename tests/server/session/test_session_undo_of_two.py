@@ -126,7 +126,7 @@ async def test_refused_while_others_hold_locks(desk: Desk, alice: Person, bob: P
     # Ones own locks are no hindrance, and stay.
     await alice.lock(p, tree=True)
     await alice.ask("Undo")
-    assert desk.services.locks.written_by("alice") == [p]
+    assert desk.services.locks.write_locked_by("alice") == [p]
     await alice.ask("WriteUnlock", object_id=p)
     assert desk.services.locks.locked_roots() == []
 
@@ -148,7 +148,7 @@ async def test_locks_follow_what_goes_and_what_hangs_elsewhere(
     p = await work.add_point("p")
     await alice.lock(p)
     await alice.ask("Undo")
-    assert desk.services.locks.written_by("alice") == [a]
+    assert desk.services.locks.write_locked_by("alice") == [a]
     await alice.ask("WriteUnlock", object_id=a)
     await alice.ask("SaveProject")
 
