@@ -22,15 +22,15 @@ from arcor2_server.documents.changes import Edit
 from arcor2_server.documents.journal_records import (
     EDIT_COLUMNS,
     Base,
+    JournalContent,
     JournalDamaged,
     Loss,
     Position,
-    JournalContent,
     Recovered,
     base_checksum,
-    note_missing,
     document_of,
     edit_checksum,
+    note_missing,
     read_content,
     write_job,
 )
