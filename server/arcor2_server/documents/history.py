@@ -106,12 +106,12 @@ class History:
             found.append(edit)
         return found[::-1]
 
-    def last_change_of(self, ids: set[str], *, after: int, except_user: str) -> Edit | None:
-        """Give the latest edit after number `after` that touched any of the ids; one of others than `except_user` first."""
+    def last_change_of(self, ids: set[str], *, after: int, user: str) -> Edit | None:
+        """Return the latest edit after number `after` that changed any of the ids, preferably by another user."""
         own = None
         for edit in reversed(self.since(after)):
             if any(change.id in ids for change in edit.changes):
-                if edit.user != except_user:
+                if edit.user != user:
                     return edit
                 own = own or edit
         return own

@@ -42,7 +42,7 @@ def require_possible(
 
 
 def _by(history: History, ids: set[str], after: int, user: str, opening: str = "") -> str:
-    edit = history.last_change_of(ids, after=after, except_user=user) if ids else None
+    edit = history.last_change_of(ids, after=after, user=user) if ids else None
     if edit is None:
         return ""
     if edit.kind is EditKind.EXTERNAL:
