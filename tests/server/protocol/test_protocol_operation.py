@@ -1,6 +1,5 @@
 """What the requests about operation answer in every state of the server, and which role each needs."""
 
-import asyncio
 import itertools
 from pathlib import Path
 from typing import Any
@@ -101,13 +100,12 @@ async def test_a_robot_is_streamed_while_a_program_runs(tmp_path: Path) -> None:
 
         await viewer.ask("StreamRobot", **what, rate=30)
         viewer.take(), other.take()
-        await asyncio.sleep(1.0)
+        await until(lambda: len(joints(viewer)) >= 20 and len(joints(other)) >= 2)
         seen, usual = joints(viewer), joints(other)
-        assert 15 <= len(seen) <= 36
         assert all("time_ms" in data for data in seen), "it gets the ordinary events too"
         steps = [after["time_ms"] - before["time_ms"] for before, after in itertools.pairwise(seen)]
-        assert 30.0 <= sum(steps) / len(steps) <= 60.0
-        assert usual, "who asked for nothing gets what the protocol has"
+        assert sum(steps) >= (len(steps) - 2) * 33.3, "faster than requested"
+        assert min(steps) <= 60.0, "as slow as the ordinary events"
         assert all("time_ms" not in data for data in usual)
         await viewer.ask("StreamRobot", **what, send=False)
         viewer.take()
