@@ -14,9 +14,9 @@ camera = OakD("obj_bench", "camera", Pose(), None, OakDSettings(sys.argv[1]))
 camera.connect(20.0)
 time.sleep(1.0)
 seconds = float(sys.argv[2])
-before, cpu, begin = camera.pictures_taken, time.process_time(), time.monotonic()
+before, cpu, begin = camera.images_received, time.process_time(), time.monotonic()
 time.sleep(seconds)
-cpu, frames, seconds = time.process_time() - cpu, camera.pictures_taken - before, time.monotonic() - begin
+cpu, frames, seconds = time.process_time() - cpu, camera.images_received - before, time.monotonic() - begin
 ages = []
 for _ in range(20):
     ages.append(camera.latency)

@@ -1,1 +1,1 @@
-"""An OAK-D camera over depthai, or a network source of its pictures (docs/devices/oak-d.md)."""
+"""Luxonis OAK-D cameras: over depthai, or as a network stream of images (docs/devices/oak-d.md)."""

@@ -1,4 +1,4 @@
-"""The feed of a camera on USB or Ethernet, by depthai's own camera and stereo nodes. It has run on no device yet."""
+"""DeviceFeed: images of a camera on USB or Ethernet by depthai's camera and stereo nodes. Not tested on a device."""
 
 import contextlib
 import socket
@@ -11,20 +11,25 @@ import depthai as dai
 from arcor2_hw.data.device import Identity
 from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
 
-from .calibration import BadCalibration, parameters
+from .calibration import parameters
 from .feed import Pipeline, Shot
 from .settings import OakDSettings
 
 POE_PORT: Final = 11490
-"""TCP port on which PoE cameras take a host (from general knowledge of XLink)."""
+"""TCP port on which PoE cameras accept a host (assumed from the XLink protocol)."""
 MONO_SIZE: Final = (640, 400)
+"""Size of the images of the stereo pair, pixels."""
 DEPTH_RANGE: Final = (0.35, 10.0)
-"""m, of the OAK-D's 75 mm base with extended disparity (from general knowledge of the camera)."""
+"""Depth range of an OAK-D with a baseline of 75 mm and extended disparity, m (assumed)."""
 ISO: Final = 400
+"""Sensor sensitivity while the exposure time is set manually."""
 
 
 def find(who: str, address: str, timeout: float) -> dai.DeviceInfo:
-    """Look for the camera before it is opened: opening one that is not there takes 11.5 s. Raises NotConnected."""
+    """Return the camera with an address. Raises NotConnected.
+
+    depthai needs 11.5 s to report a missing camera when it opens one, so this searches first.
+    """
     found = dai.Device.getAllAvailableDevices()
     matching = [info for info in found if address in ("", info.getDeviceId(), info.name)]
     if len(matching) > 1:
@@ -36,7 +41,7 @@ def find(who: str, address: str, timeout: float) -> dai.DeviceInfo:
         )
     if matching:
         return matching[0]
-    if _is_ip(address):  # beyond a router it does not answer to the search
+    if _is_ip(address):  # the search does not reach cameras behind a router
         try:
             socket.create_connection((address, POE_PORT), timeout).close()
         except OSError as e:
@@ -55,35 +60,37 @@ def _is_ip(address: str) -> bool:
 
 
 def boot(who: str, info: dai.DeviceInfo, timeout: float) -> dai.Device:
-    """Open a camera within `timeout` s; one that comes up later is closed again. Raises DeviceTimeout, NotConnected."""
-    box: list[dai.Device | BaseException] = []
+    """Open a camera. One that starts only after `timeout` s is closed again. Raises DeviceTimeout, NotConnected."""
+    result: list[dai.Device | BaseException] = []
     late = threading.Event()
 
     def run() -> None:
         try:
             device = dai.Device(info)
-        except BaseException as e:  # noqa: BLE001 - told to who waits
-            box.append(e)
+        except BaseException as e:  # noqa: BLE001 - raised by the waiting thread
+            result.append(e)
             return
-        box.append(device)
+        result.append(device)
         if late.is_set():
             device.close()
 
     thread = threading.Thread(target=run, name=f"booting {who}", daemon=True)
     thread.start()
     thread.join(timeout)
-    if not box:
+    if not result:
         late.set()
         raise DeviceTimeout("{device} has not started within {timeout:.1f} s", device=who, timeout=timeout)
-    if isinstance(box[0], BaseException):
-        raise NotConnected("{device} cannot be opened; another program may use it", str(box[0]), device=who) from box[0]
-    return box[0]
+    if isinstance(result[0], BaseException):
+        raise NotConnected(
+            "{device} cannot be opened; another program may use it", str(result[0]), device=who
+        ) from result[0]
+    return result[0]
 
 
 class DeviceFeed:
-    """A camera on USB or the network. Colour is undistorted on the camera, and depth aligned to that."""
+    """A camera on USB or Ethernet. The camera undistorts the colour image and aligns the depth image to it."""
 
-    def __init__(self, who: str, name: str, settings: OakDSettings, timeout: float) -> None:
+    def __init__(self, who: str, settings: OakDSettings, timeout: float) -> None:
         deadline = time.monotonic() + timeout
         self.who = who
         info = find(who, settings.address, timeout)
@@ -105,7 +112,7 @@ class DeviceFeed:
             stereo.setLeftRightCheck(True)
             stereo.setExtendedDisparity(True)
             depth = stereo.depth
-            if self._device.getPlatform() == dai.Platform.RVC4:  # aligns in a node of its own
+            if self._device.getPlatform() == dai.Platform.RVC4:  # has a separate node for alignment
                 align = pipeline.create(dai.node.ImageAlign)
                 stereo.depth.link(align.input)
                 color.link(align.inputAlignTo)
@@ -114,13 +121,10 @@ class DeviceFeed:
                 color.link(stereo.inputAlignTo)
             self._control = camera.inputControl.createInputQueue()
             self._pipeline = Pipeline(pipeline, color, depth)
-            self.parameters = parameters(self._device.readCalibration(), *self.size, undistorted=True)
+            self.parameters = parameters(who, self._device.readCalibration(), *self.size, undistorted=True)
             model = str(self._device.getDeviceName())
             self.identity = Identity("Luxonis", model, self._device.getDeviceId(), f"depthai {dai.__version__}")
             self._pipeline.start()
-        except BadCalibration as e:
-            self.close()
-            raise DeviceFault("{device}: {reason}", "", "calibration", device=who, reason=e) from e
         except RuntimeError as e:
             self.close()
             raise DeviceFault("{device} cannot be set up", str(e), "pipeline", device=who) from e
@@ -129,21 +133,21 @@ class DeviceFeed:
             raise
 
     def next(self, timeout: float) -> Shot | None:
-        """Wait for the next picture; None when none came. Raises ConnectionLost."""
+        """Return the next image; None when none came within `timeout` s. Raises ConnectionLost."""
         shot = None if self._pipeline is None else self._pipeline.next(timeout)
         if shot is None and self._device.isClosed():
             raise ConnectionLost("{device}: the connection was lost", device=self.who)
         return shot
 
     def temperature(self) -> float | None:
-        """Return the mean temperature of the chip, deg C. Raises ConnectionLost."""
+        """Return the mean temperature of the chip, °C. Raises ConnectionLost."""
         try:
             return float(self._device.getChipTemperature().average)
         except RuntimeError as e:
             raise ConnectionLost("{device}: the connection was lost", str(e), device=self.who) from e
 
     def set_exposure(self, exposure: float | None, timeout: float) -> None:
-        """Set the exposure, s, None for automatic; the camera does not confirm it. Raises Refused."""
+        """Set the exposure time, s; None: automatic. The camera does not confirm it. Raises Refused."""
         control = dai.CameraControl()
         if exposure is None:
             control.setAutoExposureEnable()

@@ -1,7 +1,7 @@
-"""Feeds: a depthai pipeline that ends in a host Sync and a queue, whichever source is behind it.
+"""Feeds: sources of images, each a depthai pipeline that ends in a Sync node on the host and a queue.
 
-A camera gives its own colour and stereo nodes, a network source a host node that is fed from the stream: device_feed,
-network_feed. These modules import depthai and are themselves imported only when a camera is connected.
+device_feed builds the pipeline from the nodes of a camera, network_feed from a host node that reads a network stream.
+These modules import depthai; they are imported only when a camera is connected.
 """
 
 import contextlib
@@ -15,37 +15,32 @@ import numpy.typing as npt
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.device import Identity
 
-MATCHED: Final = datetime.timedelta(milliseconds=17)
-"""Colour and depth further apart are not of one instant: half a picture at 30 Hz."""
-QUEUE: Final = 2
+SYNC_THRESHOLD: Final = datetime.timedelta(milliseconds=17)
+"""Longest time between colour and depth images of one instant: half a period at 30 Hz."""
+QUEUE_SIZE: Final = 2
 JPEG: Final = dai.ImgFrame.Type.BITSTREAM
 
 
 class Shot(NamedTuple):
-    """Colour and depth of one instant as depthai has them; `monotonic` in s on this computer's clock."""
+    """Colour and depth images of one instant, taken at `monotonic` (this computer's clock, s)."""
 
     color: dai.ImgFrame
     depth: dai.ImgFrame
     monotonic: float
 
     @property
-    def number(self) -> int:
-        """Return the number that the source gave it."""
-        return int(self.color.getSequenceNum())
-
-    @property
     def exposure(self) -> float | None:
-        """Return the exposure, s; None when the source does not tell."""
+        """Return the exposure time, s; None when the source does not report it."""
         seconds = self.color.getExposureTime().total_seconds()
         return seconds if seconds > 0.0 else None
 
     def depth_mm(self) -> npt.NDArray[np.uint16]:
-        """Return the depth: height × width, mm; of the message's own memory."""
+        """Return the depth image: height × width, mm. It shares the memory of the message."""
         data = np.asarray(self.depth.getData())
         return data.view("<u2").reshape(self.depth.getHeight(), self.depth.getWidth())
 
     def color_rgb(self) -> npt.NDArray[np.uint8]:
-        """Return the colour as a copy: height × width × 3, R, G, B."""
+        """Return a copy of the colour image: height × width × 3, R, G, B."""
         data = np.asarray(self.color.getData())
         if self.color.getType() == JPEG:
             import io
@@ -59,7 +54,7 @@ class Shot(NamedTuple):
 
 
 class Feed(Protocol):
-    """Where pictures come from."""
+    """A source of images."""
 
     identity: Identity
     parameters: CameraParameters
@@ -67,36 +62,36 @@ class Feed(Protocol):
     depth_range: tuple[float, float]
 
     def next(self, timeout: float) -> Shot | None:
-        """Wait for the next picture; None when none came. Raises what the source was lost by."""
+        """Return the next image; None when none came within `timeout` s. Raises DeviceError when the source is lost."""
 
     def temperature(self) -> float | None:
-        """Return the temperature of the chip, deg C; None when it is not told."""
+        """Return the temperature of the chip, °C; None when unknown."""
 
     def set_exposure(self, exposure: float | None, timeout: float) -> None:
-        """Set the exposure, s, None for automatic. Raises Refused, DeviceTimeout, ConnectionLost."""
+        """Set the exposure time, s; None: automatic. Raises Refused, DeviceTimeout, ConnectionLost."""
 
     def close(self) -> None:
         """Close; does nothing when closed."""
 
 
 class Pipeline:
-    """The common end of every pipeline: what comes out has colour and depth of one instant."""
+    """The end of every pipeline: it pairs colour and depth images of one instant."""
 
     def __init__(self, pipeline: dai.Pipeline, color: dai.Node.Output, depth: dai.Node.Output) -> None:
         self._pipeline = pipeline
         sync = pipeline.create(dai.node.Sync)
         sync.setRunOnHost(True)
-        sync.setSyncThreshold(MATCHED)
+        sync.setSyncThreshold(SYNC_THRESHOLD)
         color.link(sync.inputs["color"])
         depth.link(sync.inputs["depth"])
-        self._queue = sync.out.createOutputQueue(QUEUE, False)
+        self._queue = sync.out.createOutputQueue(QUEUE_SIZE, False)
 
     def start(self) -> None:
-        """Start it."""
+        """Start the pipeline."""
         self._pipeline.start()
 
     def next(self, timeout: float) -> Shot | None:
-        """Wait for the next picture; None when none came."""
+        """Return the next image; None when none came within `timeout` s, or after `close`."""
         try:
             group: Any = self._queue.get(datetime.timedelta(seconds=timeout))
         except RuntimeError:  # the queue was closed
@@ -107,7 +102,7 @@ class Pipeline:
         return Shot(color, depth, color.getTimestamp().total_seconds())
 
     def close(self) -> None:
-        """Stop it; harmless when it was stopped."""
-        with contextlib.suppress(RuntimeError):  # it was closed by its device
+        """Stop the pipeline; does nothing when stopped."""
+        with contextlib.suppress(RuntimeError):  # its device has closed it
             self._pipeline.stop()
             self._pipeline.wait()

@@ -1,4 +1,4 @@
-"""A network source: one TCP connection, read by the thread that asks for the next frame. Knows nothing of depthai."""
+"""NetworkSource: the TCP connection to a source that streams images. Independent of depthai."""
 
 import contextlib
 import math
@@ -14,30 +14,28 @@ import msgspec
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
 
 from .stream import (
-    FIXED,
+    PREFIX,
     BadStream,
     Clock,
     FrameHeader,
-    Front,
     Hello,
     Kind,
     Refusal,
     Status,
-    check,
-    front,
-    message,
-    read,
+    encode,
+    read_header,
+    read_prefix,
+    verify,
 )
 
-SEND_TIMEOUT: Final = 0.5
 CLOCK_PERIOD: Final = 0.5
-"""Time between questions for the source's clock, s."""
+"""Time between requests for the source's clock, s."""
 CLOCKS: Final = 20
-"""Answers of which the promptest counts: 10 s, in which two quartz clocks drift apart by a millisecond at most."""
+"""Number of answers of which the fastest is used. In these 10 s, two quartz clocks drift apart by at most 1 ms."""
 
 
 class SourceFrame(NamedTuple):
-    """A frame as it came; valid until the next is asked for. `monotonic` is on this computer's clock."""
+    """A frame, valid until the next one is read. `monotonic` is its time on this computer's clock, s."""
 
     header: FrameHeader
     monotonic: float
@@ -46,28 +44,42 @@ class SourceFrame(NamedTuple):
 
 
 class NetworkSource:
-    """The connection to one source. `next_frame` is called by one thread, all else by others."""
+    """The connection to a source. One thread calls `next_frame`; other threads may call everything else.
 
-    def __init__(self, who: str, host: str, port: int, coding: str, status: Callable[[Status], None]) -> None:
+    Args:
+        who: Name and address of the source, for errors.
+        host: Name or address of the source.
+        port: TCP port of the source.
+        coding: Coding of colour images: "bgr" or "jpeg".
+        on_status: Called with each status that the source sends.
+    """
+
+    def __init__(self, who: str, host: str, port: int, coding: str, on_status: Callable[[Status], None]) -> None:
         self.who = who
-        self._where, self._coding, self._tell_status = (host, port), coding, status
+        self._address, self._coding, self._on_status = (host, port), coding, on_status
         self._socket: socket.socket | None = None
         self._sending = threading.Lock()
         self._buffer = bytearray(1 << 20)
         self._offsets: deque[tuple[float, float]] = deque(maxlen=CLOCKS)
-        self._asked_clock = 0.0
+        self._clock_asked_at = 0.0
         self._refusal: str = ""
-        self._status = threading.Condition()
+        self._answered = threading.Condition()
         self._statuses = 0
         self.hello: Hello
         self.eeprom: dict[str, Any]
 
-    # -------------------------------------------------------------------------------- life
+    # -------------------------------------------------------------------------------- connection
     def open(self, deadline: float) -> None:
-        """Connect and take the hello; nothing is asked for yet. Raises NotConnected, DeviceTimeout, DeviceFault."""
+        """Connect and read the hello until `deadline` (monotonic, s); no frames are requested yet.
+
+        Raises:
+            NotConnected: The source cannot be reached.
+            DeviceTimeout: It does not answer in time.
+            DeviceFault: It does not use this protocol.
+        """
         left = max(deadline - time.monotonic(), 0.001)
         try:
-            link = socket.create_connection(self._where, left)
+            link = socket.create_connection(self._address, left)
         except TimeoutError:
             raise DeviceTimeout(
                 "{device} did not take the connection within {left:.1f} s", device=self.who, left=left
@@ -77,13 +89,13 @@ class NetworkSource:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket = link
         self._offsets.clear()
-        head, header, payload = self._message(deadline)
-        if head.kind is not Kind.HELLO:
+        kind, header, payload = self._receive(deadline)
+        if kind is not Kind.HELLO:
             raise DeviceFault(
-                "{device} does not say hello but {name}", "", "protocol", device=self.who, name=head.kind.name.lower()
+                "{device} does not say hello but {name}", "", "protocol", device=self.who, name=kind.name.lower()
             )
         try:
-            self.hello = read(header, Hello)
+            self.hello = read_header(header, Hello)
             self.eeprom = msgspec.json.decode(payload, type=dict[str, Any])
         except (BadStream, msgspec.DecodeError) as e:
             raise DeviceFault(
@@ -91,25 +103,25 @@ class NetworkSource:
             ) from e
 
     def start(self, client: str) -> None:
-        """Ask for frames."""
-        self._say(Kind.START, {"client": client, "color": self._coding})
+        """Request frames in the name of `client`."""
+        self._send(Kind.START, {"client": client, "color": self._coding})
         self._ask_clock()
 
     def close(self) -> None:
-        """Close; does nothing when closed. Whoever waits in it wakes."""
+        """Close; does nothing when closed. A call that waits for data fails."""
         link, self._socket = self._socket, None
         if link is not None:
             with contextlib.suppress(OSError):
                 link.shutdown(socket.SHUT_RDWR)
             link.close()
 
-    # -------------------------------------------------------------------------------- asking
+    # -------------------------------------------------------------------------------- requests
     def set_exposure(self, exposure: float | None, timeout: float) -> None:
-        """Set the exposure; return when the source says so. Raises Refused, DeviceTimeout, ConnectionLost."""
-        with self._status:
+        """Set the exposure time, s, and wait for the confirmation. Raises Refused, DeviceTimeout, ConnectionLost."""
+        with self._answered:
             before, self._refusal = self._statuses, ""
-            self._say(Kind.CONTROL, {"exposure": exposure})
-            answered = self._status.wait_for(lambda: self._statuses > before or self._refusal, timeout)
+            self._send(Kind.CONTROL, {"exposure": exposure})
+            answered = self._answered.wait_for(lambda: self._statuses > before or self._refusal, timeout)
             if self._refusal:
                 raise Refused("{device} refuses: {refusal}", device=self.who, refusal=self._refusal)
             if not answered:
@@ -118,108 +130,111 @@ class NetworkSource:
                 )
 
     def _ask_clock(self) -> None:
-        self._asked_clock = time.monotonic()
-        self._say(Kind.CLOCK, {"asked": self._asked_clock})
+        self._clock_asked_at = time.monotonic()
+        self._send(Kind.CLOCK, {"asked": self._clock_asked_at})
 
-    def _say(self, kind: Kind, header: dict[str, object]) -> None:
+    def _send(self, kind: Kind, header: dict[str, object]) -> None:
         link = self._socket
         if link is None:
             raise NotConnected("{device} is not connected", device=self.who)
         try:
             with self._sending:
-                link.sendall(message(kind, header))
+                link.sendall(encode(kind, header))
         except OSError as e:
             raise ConnectionLost("{device}: the connection was lost", str(e), device=self.who) from e
 
-    # -------------------------------------------------------------------------------- reading
+    # -------------------------------------------------------------------------------- frames
     def next_frame(self, timeout: float) -> SourceFrame:
-        """Wait for a frame. Raises DeviceTimeout after `timeout` s, ConnectionLost, DeviceFault."""
+        """Return the next frame. Raises DeviceTimeout after `timeout` s, ConnectionLost, DeviceFault."""
         deadline = time.monotonic() + timeout
         while True:
-            if time.monotonic() - self._asked_clock > CLOCK_PERIOD:
+            if time.monotonic() - self._clock_asked_at > CLOCK_PERIOD:
                 self._ask_clock()
-            head, header, payload = self._message(deadline)
+            kind, header, payload = self._receive(deadline)
             try:
-                if head.kind is Kind.FRAME:
-                    told = read(header, FrameHeader)
-                    if self._offsets:
-                        return self._frame(told, payload)
-                    continue  # before the first answer of the clock nobody knows how old it is
-                self._take(head.kind, header)
+                if kind is not Kind.FRAME:
+                    self._handle(kind, header)
+                elif self._offsets:  # else its age is unknown
+                    return self._frame(read_header(header, FrameHeader), payload)
             except BadStream as e:
                 raise DeviceFault("{device}: {reason}", "", "protocol", device=self.who, reason=e) from e
 
-    def _take(self, kind: Kind, header: bytes) -> None:
+    def _handle(self, kind: Kind, header: bytes) -> None:
         if kind is Kind.CLOCK:
-            clock, now = read(header, Clock), time.monotonic()
+            clock, now = read_header(header, Clock), time.monotonic()
             if clock.asked > now or not math.isfinite(clock.at):
                 raise BadStream("the clock was never asked that")
             self._offsets.append((now - clock.asked, (now + clock.asked) / 2.0 - clock.at))
         elif kind is Kind.STATUS:
-            status = read(header, Status)
-            self._tell_status(status)
-            with self._status:
+            self._on_status(read_header(header, Status))
+            with self._answered:
                 self._statuses += 1
-                self._status.notify_all()
+                self._answered.notify_all()
         elif kind is Kind.REFUSED:
-            with self._status:
-                self._refusal = read(header, Refusal).reason[:200]
-                self._status.notify_all()
+            with self._answered:
+                self._refusal = read_header(header, Refusal).reason[:200]
+                self._answered.notify_all()
         else:
             raise BadStream(f"a {kind.name.lower()} was not to be expected")
 
-    def _frame(self, told: FrameHeader, payload: memoryview) -> SourceFrame:
+    def _frame(self, header: FrameHeader, payload: memoryview) -> SourceFrame:
         size = self.hello.width * self.hello.height
-        if told.color != self._coding or told.color_bytes < 1 or told.color_bytes + told.depth_bytes != len(payload):
-            raise BadStream(f"a frame of {told.color_bytes} + {told.depth_bytes} bytes of {told.color} came")
-        if told.color == "bgr" and told.color_bytes != 3 * size:
-            raise BadStream(f"colour has {told.color_bytes} bytes, not {3 * size}")
-        if told.depth_bytes not in (0, 2 * size):
-            raise BadStream(f"depth has {told.depth_bytes} bytes, not {2 * size}")
+        if (
+            header.color != self._coding
+            or header.color_bytes < 1
+            or header.color_bytes + header.depth_bytes != len(payload)
+        ):
+            raise BadStream(f"a frame of {header.color_bytes} + {header.depth_bytes} bytes of {header.color} came")
+        if header.color == "bgr" and header.color_bytes != 3 * size:
+            raise BadStream(f"colour has {header.color_bytes} bytes, not {3 * size}")
+        if header.depth_bytes not in (0, 2 * size):
+            raise BadStream(f"depth has {header.depth_bytes} bytes, not {2 * size}")
         _, offset = min(self._offsets)
-        # An estimate that is off by half a way of the answer must not make a picture come from the future.
-        moment = min(told.stamp + offset, time.monotonic())
+        # The estimated offset is wrong by up to half the round-trip time; a frame must not come from the future.
+        moment = min(header.stamp + offset, time.monotonic())
         if not math.isfinite(moment):
-            raise BadStream(f"a frame's stamp is {told.stamp}")
-        return SourceFrame(told, moment, payload[: told.color_bytes], payload[told.color_bytes :])
+            raise BadStream(f"a frame's stamp is {header.stamp}")
+        return SourceFrame(header, moment, payload[: header.color_bytes], payload[header.color_bytes :])
 
-    def _message(self, deadline: float) -> tuple[Front, bytes, memoryview]:
+    def _receive(self, deadline: float) -> tuple[Kind, bytes, memoryview]:
+        """Return kind, header and payload of the next message; the payload is valid until the next call."""
         view = memoryview(self._buffer)
-        self._read(view[: FIXED.size], deadline, idle=True)
+        self._fill(view[: PREFIX.size], deadline, between=True)
         try:
-            head = front(bytes(view[: FIXED.size]))
-            length = head.header + head.payload
+            prefix = read_prefix(bytes(view[: PREFIX.size]))
+            length = prefix.header + prefix.payload
             if length > len(self._buffer):
                 self._buffer = bytearray(length)
                 view = memoryview(self._buffer)
-            self._read(view[: head.header], deadline)
-            header = bytes(view[: head.header])
-            check(head, header)
+            self._fill(view[: prefix.header], deadline)
+            header = bytes(view[: prefix.header])
+            verify(prefix, header)
         except BadStream as e:
             raise DeviceFault("{device}: {reason}", "", "protocol", device=self.who, reason=e) from e
-        payload = view[head.header : length]
-        self._read(payload, deadline)
-        return head, header, payload
+        payload = view[prefix.header : length]
+        self._fill(payload, deadline)
+        return prefix.kind, header, payload
 
-    def _read(self, into: memoryview, deadline: float, idle: bool = False) -> None:
-        link, came = self._socket, 0
-        while came < len(into):
+    def _fill(self, buffer: memoryview, deadline: float, between: bool = False) -> None:
+        """Read until the buffer is full; `between`: no message has started yet."""
+        link, count = self._socket, 0
+        while count < len(buffer):
             if link is None:
                 raise ConnectionLost("{device}: the connection was closed", device=self.who)
             left = deadline - time.monotonic()
             if left <= 0.0:
-                raise self._silent(idle and came == 0)
+                raise self._silent(between and count == 0)
             try:
                 link.settimeout(left)
-                got = link.recv_into(into[came:])
+                received = link.recv_into(buffer[count:])
             except TimeoutError:
-                raise self._silent(idle and came == 0) from None
+                raise self._silent(between and count == 0) from None
             except OSError as e:
                 raise ConnectionLost("{device}: the connection was lost", str(e), device=self.who) from e
-            if got == 0:
+            if received == 0:
                 why = f"it said: {self._refusal}" if self._refusal else "the source closed it"
                 raise ConnectionLost("{device}: the connection was lost: {reason}", device=self.who, reason=why)
-            came += got
+            count += received
 
     def _silent(self, between: bool) -> DeviceError:
         what = "sends nothing" if between else "stopped in the middle of a message"

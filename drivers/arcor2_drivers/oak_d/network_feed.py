@@ -1,4 +1,4 @@
-"""The feed of a network source: a host node that takes frames from the stream, in a pipeline without a device."""
+"""NetworkFeed: images of a network source, by a depthai pipeline without a device."""
 
 import datetime
 import time
@@ -10,33 +10,33 @@ import numpy as np
 from arcor2_hw.data.device import Identity
 from arcor2_hw.exceptions import DeviceError, DeviceFault
 
-from .calibration import BadCalibration, handler_of, parameters
+from .calibration import handler_of, parameters
 from .feed import JPEG, Pipeline, Shot
 from .network import NetworkSource
 from .settings import OakDSettings
 from .stream import Status
 
-LOOK: Final = 0.1
-"""Time after which somebody who waits for a picture looks whether the source has failed, s."""
+CHECK_PERIOD: Final = 0.1
+"""Time between checks for a failed source while waiting for an image, s."""
 
 
-class _Network(dai.node.ThreadedHostNode):
-    """The node that takes frames from the stream. Its thread is depthai's: no logging there, nothing that counts it."""
+class _StreamNode(dai.node.ThreadedHostNode):
+    """The node that reads frames from the stream. It runs on a thread of depthai: do not log there."""
 
     def __init__(self) -> None:
         super().__init__()
         self.color = self.createOutput()
         self.depth = self.createOutput()
         self.source: NetworkSource
-        self.first_within = self.timeout = 1.0
+        self.first_timeout = self.timeout = 1.0
         self.failure: BaseException | None = None
 
     def run(self) -> None:
-        """Take frames until told to end."""
+        """Send frames until the pipeline stops."""
         source = self.source
         size = (source.hello.width, source.hello.height)
-        nothing = np.zeros(size[0] * size[1] * 2, np.uint8)
-        timeout = self.first_within
+        no_depth = np.zeros(size[0] * size[1] * 2, np.uint8)
+        timeout = self.first_timeout
         try:
             while self.isRunning():
                 frame = source.next_frame(timeout)
@@ -45,9 +45,9 @@ class _Network(dai.node.ThreadedHostNode):
                 exposure = frame.header.exposure
                 stamp, number = datetime.timedelta(seconds=frame.monotonic), frame.header.number
                 self.color.send(_image(frame.color, kind, size, stamp, number, exposure))
-                depth = frame.depth if len(frame.depth) else nothing
+                depth = frame.depth if len(frame.depth) else no_depth
                 self.depth.send(_image(depth, dai.ImgFrame.Type.RAW16, size, stamp, number, exposure))
-        except BaseException as e:  # noqa: BLE001 - told to the thread that waits for pictures
+        except BaseException as e:  # noqa: BLE001 - raised by the thread that waits for images
             self.failure = e
 
 
@@ -67,43 +67,40 @@ def _image(
 
 
 class NetworkFeed:
-    """A network source."""
+    """A network source; see NetworkSource for the connection."""
 
     def __init__(self, who: str, name: str, settings: OakDSettings, timeout: float) -> None:
         deadline = time.monotonic() + timeout
         assert settings.network is not None
         self.who = who
-        self._told: Status | None = None
-        self._source = NetworkSource(who, *settings.network, str(settings.color_coding), self._status)
+        self._status: Status | None = None
+        self._source = NetworkSource(who, *settings.network, str(settings.color_coding), self._on_status)
         self._pipeline: Pipeline | None = None
         try:
             self._source.open(deadline)
             hello = self._source.hello
             self.identity = Identity(hello.vendor, hello.model, hello.serial, hello.firmware)
             self.size, self.depth_range = (hello.width, hello.height), hello.depth_range
-            self.parameters = parameters(handler_of(self._source.eeprom), *self.size, undistorted=False)
+            self.parameters = parameters(who, handler_of(who, self._source.eeprom), *self.size, undistorted=False)
             pipeline = dai.Pipeline(createImplicitDevice=False)
-            self._node = pipeline.create(_Network)
+            self._node = pipeline.create(_StreamNode)
             self._node.source, self._node.timeout = self._source, settings.frame_timeout
             self._pipeline = Pipeline(pipeline, self._node.color, self._node.depth)
             self._source.start(name)
-            self._node.first_within = max(deadline - time.monotonic(), 0.001)
+            self._node.first_timeout = max(deadline - time.monotonic(), 0.001)
             self._pipeline.start()
-        except BadCalibration as e:
-            self.close()
-            raise DeviceFault("{device}: {reason}", "", "calibration", device=who, reason=e) from e
         except BaseException:
             self.close()
             raise
 
-    def _status(self, status: Status) -> None:
-        self._told = status
+    def _on_status(self, status: Status) -> None:
+        self._status = status
 
     def next(self, timeout: float) -> Shot | None:
-        """Wait for the next picture; None when none came. Raises what the source was lost by."""
+        """Return the next image; None when none came within `timeout` s. Raises DeviceError when the source is lost."""
         until = time.monotonic() + timeout
         while self._pipeline is not None:
-            shot = self._pipeline.next(min(LOOK, max(until - time.monotonic(), 0.0)))
+            shot = self._pipeline.next(min(CHECK_PERIOD, max(until - time.monotonic(), 0.0)))
             if shot is not None:
                 return shot
             error = self._node.failure
@@ -118,11 +115,11 @@ class NetworkFeed:
         return None
 
     def temperature(self) -> float | None:
-        """Return the temperature that the source told last, deg C."""
-        return None if self._told is None else self._told.temperature
+        """Return the temperature that the source reported last, °C; None before the first report."""
+        return None if self._status is None else self._status.temperature
 
     def set_exposure(self, exposure: float | None, timeout: float) -> None:
-        """Set the exposure, s, None for automatic. Raises Refused, DeviceTimeout, ConnectionLost."""
+        """Set the exposure time, s; None: automatic. Raises Refused, DeviceTimeout, ConnectionLost."""
         self._source.set_exposure(exposure, timeout)
 
     def close(self) -> None:

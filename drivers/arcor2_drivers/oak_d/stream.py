@@ -1,7 +1,7 @@
-"""The stream of a network source, version 1, as its client speaks it (docs/devices/oak-d.md). Big-endian numbers.
+"""Codec of the network stream, version 1, on the client's side (docs/devices/oak-d.md). Pure functions.
 
-A message is 16 bytes ("OAKS", version, kind, length of the header, length of the payload, CRC-32 of the first 12 bytes
-and the header), a header in JSON, and a payload. Nothing here does I/O; every length is capped.
+A message is a prefix of 16 bytes, a header in JSON and a payload. The prefix holds, in big-endian order: "OAKS",
+version, kind, length of the header, length of the payload, and the CRC-32 of the first 12 bytes and the header.
 """
 
 import enum
@@ -13,17 +13,17 @@ import msgspec
 
 MAGIC: Final = b"OAKS"
 VERSION: Final = 1
-FIXED: Final = struct.Struct(">4sBBHII")
+PREFIX: Final = struct.Struct(">4sBBHII")
 _CHECKED: Final = struct.Struct(">4sBBHI")
 LONGEST_HEADER: Final = 4096
 LONGEST_PAYLOAD: Final = 64 << 20
-"""Bytes: a 12-megapixel picture with its depth."""
+"""Longest payload, bytes: a 12-megapixel image with its depth."""
 
 H = TypeVar("H", bound=msgspec.Struct)
 
 
 class Kind(enum.IntEnum):
-    """What a message is."""
+    """Kind of a message."""
 
     HELLO = 1
     START = 2
@@ -35,17 +35,17 @@ class Kind(enum.IntEnum):
 
 
 class BadStream(Exception):
-    """What came is no message of this protocol; nothing sensible can follow."""
+    """The bytes are not a valid message; the connection has to be closed."""
 
 
-class Front(NamedTuple):
-    """The first 16 bytes of a message."""
+class Prefix(NamedTuple):
+    """The first 16 bytes of a message: kind, lengths of header and payload (bytes), and checksum."""
 
     kind: Kind
     header: int
     payload: int
     checked: bytes
-    check: int
+    checksum: int
 
 
 class Hello(msgspec.Struct, frozen=True):
@@ -66,7 +66,7 @@ class Hello(msgspec.Struct, frozen=True):
 
 
 class FrameHeader(msgspec.Struct, frozen=True):
-    """Header of a frame; `stamp` on the source's clock, `exposure` in s."""
+    """Header of a frame; `stamp` is on the source's clock, `exposure` is in s."""
 
     number: int
     stamp: float
@@ -77,14 +77,14 @@ class FrameHeader(msgspec.Struct, frozen=True):
 
 
 class Clock(msgspec.Struct, frozen=True):
-    """Header of the answer to a question for the clock."""
+    """Header of the answer to a clock request: when it was asked (our clock), and the source's clock then, s."""
 
     asked: float
     at: float
 
 
 class Status(msgspec.Struct, frozen=True):
-    """Header of a status: deg C, and the exposure that is set, None for automatic."""
+    """Header of a status: chip temperature, °C, and exposure time, s; None: automatic."""
 
     temperature: float
     exposure: float | None = None
@@ -96,9 +96,9 @@ class Refusal(msgspec.Struct, frozen=True):
     reason: str
 
 
-def front(data: bytes | bytearray) -> Front:
-    """Read the first 16 bytes. Raises BadStream."""
-    magic, version, kind, header, payload, check = FIXED.unpack_from(data)
+def read_prefix(data: bytes | bytearray) -> Prefix:
+    """Decode the first 16 bytes of a message. Raises BadStream."""
+    magic, version, kind, header, payload, checksum = PREFIX.unpack_from(data)
     if magic != MAGIC:
         raise BadStream(f"it does not speak this protocol: a message begins with {bytes(magic)!r}")
     if version != VERSION:
@@ -109,25 +109,25 @@ def front(data: bytes | bytearray) -> Front:
         found = Kind(kind)
     except ValueError:
         raise BadStream(f"there is no message of kind {kind}") from None
-    return Front(found, header, payload, bytes(data[: _CHECKED.size]), check)
+    return Prefix(found, header, payload, bytes(data[: _CHECKED.size]), checksum)
 
 
-def check(front_: Front, header: bytes | bytearray) -> None:
-    """Compare the checksum. Raises BadStream."""
-    if zlib.crc32(header, zlib.crc32(front_.checked)) != front_.check:
-        raise BadStream(f"the checksum of a message of kind {front_.kind.name.lower()} is wrong")
+def verify(prefix: Prefix, header: bytes | bytearray) -> None:
+    """Verify the checksum. Raises BadStream."""
+    if zlib.crc32(header, zlib.crc32(prefix.checked)) != prefix.checksum:
+        raise BadStream(f"the checksum of a message of kind {prefix.kind.name.lower()} is wrong")
 
 
-def read(header: bytes | bytearray, kind: type[H]) -> H:
-    """Read a header. Raises BadStream."""
+def read_header(header: bytes | bytearray, kind: type[H]) -> H:
+    """Decode a header. Raises BadStream."""
     try:
         return msgspec.json.decode(header, type=kind)
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise BadStream(f"a header is not readable: {error}") from error
 
 
-def message(kind: Kind, header: dict[str, object]) -> bytes:
-    """Return a message to the source; none has a payload."""
+def encode(kind: Kind, header: dict[str, object]) -> bytes:
+    """Return a message to the source. Messages to the source have no payload."""
     text = msgspec.json.encode(header)
     start = _CHECKED.pack(MAGIC, VERSION, kind, len(text), 0)
     return b"".join((start, struct.pack(">I", zlib.crc32(text, zlib.crc32(start))), text))

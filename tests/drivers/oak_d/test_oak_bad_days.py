@@ -150,7 +150,7 @@ from arcor2_drivers.oak_d.settings import OakDSettings
 from arcor2_hw.data.geometry import Pose
 camera = OakD("id", "camera", Pose(), None, OakDSettings(sys.argv[1]))
 camera.connect(20.0)
-kept = camera.trigger(), camera._observed.newest(1.0)
+kept = camera.trigger(), camera.newest(1.0)
 """
 
 

@@ -52,11 +52,11 @@ REFUSED = bytes.fromhex("4f414b53 01 07 000f 00000000 a9cc30ef") + b'{"reason":"
     ],
 )
 def test_what_the_source_sends(data: bytes, kind: Kind, header: Any, payload: bytes) -> None:
-    head = stream.front(data[:16])
+    head = stream.read_prefix(data[:16])
     assert (head.kind, head.payload) == (kind, len(payload))
     text = data[16 : 16 + head.header]
-    stream.check(head, text)
-    assert stream.read(text, type(header)) == header
+    stream.verify(head, text)
+    assert stream.read_header(text, type(header)) == header
     assert data[16 + head.header :] == payload
 
 
@@ -71,7 +71,7 @@ def test_what_the_source_sends(data: bytes, kind: Kind, header: Any, payload: by
     ],
 )
 def test_what_the_driver_sends(data: bytes, kind: Kind, header: dict[str, object]) -> None:
-    assert stream.message(kind, header) == data
+    assert stream.encode(kind, header) == data
 
 
 @pytest.mark.parametrize(
@@ -86,16 +86,16 @@ def test_what_the_driver_sends(data: bytes, kind: Kind, header: dict[str, object
 )
 def test_what_is_no_message(data: bytes, said: str) -> None:
     with pytest.raises(BadStream, match=f"^{said}"):
-        stream.front(data[:16])
+        stream.read_prefix(data[:16])
 
 
 def test_every_wrong_bit_of_the_framing_is_noticed() -> None:
-    framing = FRAME[: 16 + stream.front(FRAME[:16]).header]
+    framing = FRAME[: 16 + stream.read_prefix(FRAME[:16]).header]
     for bit in range(8 * len(framing)):
         wrong = bytearray(framing)
         wrong[bit // 8] ^= 1 << bit % 8
         with pytest.raises(BadStream):
-            stream.check(stream.front(wrong[:16]), bytes(wrong[16:]))
+            stream.verify(stream.read_prefix(wrong[:16]), bytes(wrong[16:]))
 
 
 @pytest.mark.parametrize(
@@ -112,22 +112,22 @@ def test_every_wrong_bit_of_the_framing_is_noticed() -> None:
 )
 def test_headers_that_are_none(text: bytes) -> None:
     with pytest.raises(BadStream, match=r"^a header is not readable"):
-        stream.read(text, FrameHeader)
+        stream.read_header(text, FrameHeader)
 
 
 def test_a_hello_that_makes_no_sense() -> None:
     for wrong in ({"width": 0}, {"height": 10**6}, {"fps": 0.0}):
         text = msgspec.json.encode({**msgspec.json.decode(HELLO[16:-13]), **wrong})
         with pytest.raises(BadStream, match="is no camera's mode"):
-            stream.read(text, Hello)
+            stream.read_header(text, Hello)
 
 
 @given(st.binary(min_size=16, max_size=16))
 def test_foreign_bytes_raise_nothing_else(data: bytes) -> None:
     for each in (data, b"OAKS" + data[4:], b"OAKS\x01" + data[5:]):
         try:
-            head = stream.front(each)
-            stream.check(head, data)
+            head = stream.read_prefix(each)
+            stream.verify(head, data)
         except BadStream:
             continue
         assert zlib.crc32(each[:12] + data) == int.from_bytes(each[12:16], "big")

@@ -1,0 +1,213 @@
+"""ImageStream: a thread receives every image of a camera and stores the newest. A mixin of object types."""
+
+import atexit
+import os
+import threading
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar, Final
+
+from arcor2_hw.data.device import Health, Severity
+from arcor2_hw.exceptions import DeviceError, DeviceTimeout, NotConnected, Refused, Stale
+from arcor2_hw.objects.connected import AlarmText, Connected
+from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+
+from .settings import OakDSettings
+
+if TYPE_CHECKING:
+    from .feed import Feed, Shot
+
+RECEIVE_TIMEOUT: Final = 0.1
+"""Longest time the thread waits for an image before it checks whether it should end, s."""
+CHECK_PERIOD: Final = 0.5
+"""Time between checks of the temperature and of frozen images, s."""
+HOT: Final = 90.0
+"""Chip temperature that raises an alarm, °C. The chip switches itself off at 105 °C (assumed from the Myriad X)."""
+EXPOSURE_TIMEOUT: Final = 1.0
+
+
+class ImageStream(Connected):
+    """A connection that receives images. A driver calls `use_camera` in `__init__`."""
+
+    ALARMS: ClassVar[Mapping[str, AlarmText]] = {
+        "hot": AlarmText("the camera is too hot", "let air pass it, or mount it on metal", Severity.WARNING),
+        "frozen": AlarmText("the camera repeats an old picture", "disconnect and connect; switch it off and on"),
+    }
+    images_received: int = 0
+    """Number of images received since the object was created."""
+
+    def use_camera(self, settings: OakDSettings) -> None:
+        """Prepare the connection; nothing is opened yet."""
+        self.keep_connection(f"{self.name} at {settings.address or 'the only camera'}")
+        self._config = settings
+        self._feed: Feed | None = None
+        self._newest: Shot | None = None
+        self._received_at = 0.0
+        self._new_image = threading.Condition()
+        self._exposure: float | None = None
+
+    # -------------------------------------------------------------------------------- connection
+    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
+        """Open the camera and receive its first image within `timeout` s.
+
+        Raises:
+            NotConnected: The camera is missing or used by another program, or depthai is not installed.
+            DeviceTimeout: The camera sent no image in time.
+            DeviceFault: The calibration or the stream is invalid.
+        """
+        super().connect(timeout)
+        # depthai crashes the process if a pipeline still exists when the interpreter ends.
+        atexit.unregister(self.disconnect)
+        atexit.register(self.disconnect)
+
+    def disconnect(self) -> None:
+        """Stop receiving images; does nothing when stopped."""
+        atexit.unregister(self.disconnect)
+        super().disconnect()
+        self._newest = None
+        self._exposure = None
+        self._active_alarms.clear()
+        self._wake()
+
+    def condition(self) -> Health:
+        """Return failure when the camera repeats an old image, off_spec when it is too hot."""
+        if "frozen" in self._active_alarms:
+            return Health.FAILURE
+        return Health.OFF_SPEC if self._active_alarms else Health.NORMAL
+
+    def stop_waiting(self) -> None:
+        """End the calls that wait for an image, with Cancelled."""
+        super().stop_waiting()
+        self._wake()
+
+    # -------------------------------------------------------------------------------- images
+    @property
+    def feed(self) -> "Feed":
+        """Return the feed. Raises NotConnected, ConnectionLost."""
+        self.observing.check()
+        feed = self._feed
+        if feed is None:
+            raise NotConnected(f"{self.who} is not connected")
+        return feed
+
+    @property
+    def latency(self) -> float:
+        """Return how old the newest image was when it arrived, s. Raises NotConnected, ConnectionLost."""
+        self.observing.check()
+        newest = self._newest
+        return float("inf") if newest is None else self._received_at - newest.monotonic
+
+    def newest(self, max_age: float) -> "Shot":
+        """Return the newest image. Raises Stale when it is older than `max_age` s, NotConnected, ConnectionLost."""
+        self.observing.check()
+        shot = self._newest
+        age = float("inf") if shot is None else time.monotonic() - shot.monotonic
+        if shot is None or age > max_age:
+            raise Stale(f"{self.who}: the newest picture is {age:.2f} s old, {max_age:g} s at most are asked for")
+        return shot
+
+    def next_after(self, moment: float, timeout: float) -> "Shot":
+        """Wait for the first image whose exposure ended after `moment` (monotonic, s).
+
+        Raises:
+            Stale: No such image came within `timeout` s.
+            Cancelled: `stop_waiting` was called.
+            ConnectionLost: The connection was lost.
+        """
+        deadline = time.monotonic() + timeout
+        go_on = self.begin("waiting for a picture")
+        with self._new_image:
+            while True:
+                go_on()
+                newest = self._newest
+                if newest is not None and newest.monotonic > moment:
+                    return newest
+                if (left := deadline - time.monotonic()) <= 0.0:
+                    break
+                self._new_image.wait(left)
+        age = "never" if newest is None else f"{time.monotonic() - newest.monotonic:.2f} s ago"
+        raise Stale(f"{self.who} gave no new picture within {timeout:g} s; the last was taken {age}")
+
+    def apply_exposure(self, exposure: float | None) -> None:
+        """Set the exposure time, s; None: automatic. After a reconnect it is set again."""
+        self.feed.set_exposure(exposure, EXPOSURE_TIMEOUT)
+        self._exposure = exposure
+
+    # -------------------------------------------------------------------------------- on the observing thread
+    def open_link(self, timeout: float) -> None:
+        """Open the camera and receive its first image."""
+        deadline = time.monotonic() + timeout
+        feed = self._feed = self._open_feed(timeout)
+        shot = None
+        while shot is None or time.monotonic() - shot.monotonic > self._config.max_age:
+            if (left := deadline - time.monotonic()) <= 0.0:
+                old = "no" if shot is None else "only an old"
+                raise DeviceTimeout(f"{self.who} sent {old} picture within {timeout:.1f} s")
+            shot = feed.next(min(RECEIVE_TIMEOUT, left)) or shot
+        self._store(shot)
+        if self._exposure is not None:  # this is a reconnect
+            try:
+                feed.set_exposure(self._exposure, min(EXPOSURE_TIMEOUT, max(deadline - time.monotonic(), 0.01)))
+            except Refused:
+                self._exposure = None
+
+    def _open_feed(self, timeout: float) -> "Feed":
+        """Open the source that the settings name; this imports depthai."""
+        os.environ.setdefault("DEPTHAI_LEVEL", "error")  # it warns of missing USB, which is normal in a container
+        try:
+            if self._config.network is not None:
+                from .network_feed import NetworkFeed
+
+                return NetworkFeed(self.who, self.name, self._config, timeout)
+            from .device_feed import DeviceFeed
+
+            return DeviceFeed(self.who, self._config, timeout)
+        except ModuleNotFoundError as e:
+            raise NotConnected(
+                f"{self.who}: depthai is not installed here; it comes with the extra `depthai` (arcor2-hw[depthai])",
+                str(e),
+            ) from e
+        except ImportError as e:
+            raise NotConnected(f"{self.who}: depthai is installed and cannot be loaded: {e}") from e
+
+    def watch(self, stopping: threading.Event) -> None:
+        """Receive images until `stopping` is set. Raises DeviceTimeout when none come."""
+        feed = self.feed
+        self._received_at = checked_at = time.monotonic()
+        while not stopping.is_set():
+            shot = feed.next(RECEIVE_TIMEOUT)
+            present = time.monotonic()
+            if shot is not None:
+                self._store(shot)
+            elif present - self._received_at > self._config.frame_timeout:
+                raise DeviceTimeout(f"{self.who} has sent no picture for {present - self._received_at:.1f} s")
+            if present - checked_at > CHECK_PERIOD:
+                checked_at = present
+                self._update_alarms(feed)
+
+    def close_link(self) -> None:
+        """Close the camera; does nothing when closed."""
+        feed, self._feed = self._feed, None
+        if feed is not None:
+            feed.close()
+
+    def on_lost(self, error: DeviceError) -> None:
+        """Wake the calls that wait for an image."""
+        self._wake()
+
+    def _store(self, shot: "Shot") -> None:
+        self._received_at = time.monotonic()
+        with self._new_image:
+            self._newest = shot
+            self.images_received += 1
+            self._new_image.notify_all()
+
+    def _update_alarms(self, feed: "Feed") -> None:
+        temperature, newest = feed.temperature(), self._newest
+        self.set_alarm("hot", temperature is not None and temperature >= HOT)
+        age = 0.0 if newest is None else self._received_at - newest.monotonic
+        self.set_alarm("frozen", age > self._config.frame_timeout)
+
+    def _wake(self) -> None:
+        with self._new_image:
+            self._new_image.notify_all()
