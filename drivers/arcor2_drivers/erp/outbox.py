@@ -1,4 +1,4 @@
-"""The stored outbox: what the service has to get, on disk before anybody is told that it is; and the orders at hand."""
+"""Outbox: a file with the messages that the service has not accepted yet, and with the open orders."""
 
 import contextlib
 import fcntl
@@ -28,12 +28,12 @@ CREATE TABLE IF NOT EXISTS asking (key TEXT PRIMARY KEY);
 PRAGMA user_version = 1;
 """
 _VERSION: Final = 1
-LOOK_AGAIN: Final = 0.02
-"""Time between looks whether the file is free, s."""
+LOCK_PERIOD: Final = 0.02
+"""Time between attempts to lock the file, s."""
 
 
 class Message(NamedTuple):
-    """One thing the service has to get."""
+    """A message to the service."""
 
     number: int
     key: str
@@ -43,7 +43,7 @@ class Message(NamedTuple):
 
 
 class Order(NamedTuple):
-    """An order at hand: of `quantity` pieces `reported` have their result stored."""
+    """An open order of `quantity` pieces; the results of `reported` of them are stored."""
 
     id: str
     product: str
@@ -52,7 +52,7 @@ class Order(NamedTuple):
 
 
 class OutboxState(Data, frozen=True):
-    """How the outbox is: so many wait, the oldest since then; so many were refused and are kept aside."""
+    """Number of waiting and of refused messages, time of the oldest waiting one, and the last error of delivery."""
 
     waiting: int
     refused: int
@@ -60,8 +60,8 @@ class OutboxState(Data, frozen=True):
     last_error: str = ""
 
 
-class Aside(NamedTuple):
-    """What the service has refused, when, and in which words."""
+class RefusedMessage(NamedTuple):
+    """A message that the service refused, when, and why."""
 
     key: str
     order_id: str
@@ -81,26 +81,27 @@ def file_of(directory: str, station: str, url: str) -> Path:
 
 
 class Outbox:
-    """A file with the messages of one station to one service; held by one process at a time.
+    """A file with the messages of one station to one service. One process at a time can open it.
 
-    Whatever returns has been written through to the disk. Raises StorageError naming device and file.
+    Every change is on disk when the method returns. Methods raise StorageError when the file cannot be read or written,
+    NotConnected when it is closed.
     """
 
     def __init__(self, who: str, file: Path) -> None:
         self._who, self.file = who, file
         self._one = threading.Lock()
         self._database: sqlite3.Connection | None = None
-        self._held: IO[bytes] | None = None
+        self._lock_file: IO[bytes] | None = None
 
     def open(self, patience: float = 0.0) -> None:
-        """Open. Raises Refused when another program has it open, and does not end within `patience` s."""
+        """Open the file. Raises Refused when another program keeps it open for `patience` s."""
         deadline = time.monotonic() + patience
         with self._one:
             if self._database is not None:
                 return
             try:
                 self.file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-                self._held = self.file.with_suffix(".lock").open("ab")
+                self._lock_file = self.file.with_suffix(".lock").open("ab")
                 self._lock(deadline)
                 database = sqlite3.connect(self.file, check_same_thread=False, isolation_level=None)
             except BlockingIOError:
@@ -123,20 +124,20 @@ class Outbox:
                 raise self._broken(e) from e
 
     def _lock(self, deadline: float) -> None:
-        """Have the file alone: who closed it just now may still wait for the answer to a last request."""
-        assert self._held is not None
+        """Lock the file. A sender that was just stopped may keep it until its last request ends."""
+        assert self._lock_file is not None
         while True:
             try:
-                fcntl.flock(self._held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(self._lock_file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 if time.monotonic() >= deadline:
                     raise
-                time.sleep(LOOK_AGAIN)
+                time.sleep(LOCK_PERIOD)
             else:
                 return
 
     def close(self) -> None:
-        """Close; does nothing when closed. What waits stays on disk."""
+        """Close the file; does nothing when closed. Waiting messages stay on disk."""
         with self._one:
             self._close()
 
@@ -147,9 +148,9 @@ class Outbox:
         self._release()
 
     def _release(self) -> None:
-        if self._held is not None:
-            self._held.close()
-            self._held = None
+        if self._lock_file is not None:
+            self._lock_file.close()
+            self._lock_file = None
 
     def _broken(self, error: Exception) -> StorageError:
         return StorageError(
@@ -158,21 +159,16 @@ class Outbox:
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        """Have a transaction that is on disk when it ends."""
-        with self._one:
-            if self._database is None:
-                raise NotConnected("{device} is not connected", device=self._who)
+        """Run a transaction; it is on disk when the context ends."""
+        with self._reading() as database:
+            database.execute("BEGIN IMMEDIATE")
             try:
-                self._database.execute("BEGIN IMMEDIATE")
-                try:
-                    yield self._database
-                    self._database.execute("COMMIT")
-                except BaseException:
-                    if self._database.in_transaction:
-                        self._database.execute("ROLLBACK")
-                    raise
-            except sqlite3.Error as e:
-                raise self._broken(e) from e
+                yield database
+                database.execute("COMMIT")
+            except BaseException:
+                if database.in_transaction:
+                    database.execute("ROLLBACK")
+                raise
 
     @contextlib.contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:
@@ -186,7 +182,15 @@ class Outbox:
 
     # -------------------------------------------------------------------------------- messages
     def add(self, path: str, order_id: str, body: bytes, *, piece: bool = False, last: bool = False) -> str:
-        """Store a message and give its key. `piece`: it counts as one of its order; `last`: the order ends with it."""
+        """Store a message and return its key.
+
+        Args:
+            path: Path of the request, from the service's URL.
+            order_id: Order that the message belongs to.
+            body: Body of the request.
+            piece: Whether it reports a piece of the order.
+            last: Whether the order ends with it.
+        """
         key = uuid.uuid4().hex
         with self._writing() as database:
             database.execute(
@@ -201,7 +205,7 @@ class Outbox:
         return key
 
     def heads(self) -> list[Message]:
-        """Return the first waiting message of each order, the oldest first."""
+        """Return the first waiting message of each order, oldest first."""
         with self._reading() as database:
             rows = database.execute(
                 "SELECT number, key, order_id, path, body FROM message WHERE number IN "
@@ -210,38 +214,38 @@ class Outbox:
         return [Message(*row) for row in rows]
 
     def delivered(self, message: Message) -> None:
-        """Forget a message: the service has it."""
+        """Delete a message that the service has accepted."""
         with self._writing() as database:
             database.execute("DELETE FROM message WHERE number = ?", (message.number,))
 
-    def put_aside(self, message: Message, why: str) -> None:
-        """Keep a message that the service refused; it is not sent again by itself."""
+    def mark_refused(self, message: Message, why: str) -> None:
+        """Mark a message that the service refused; it is sent again only after `resend_refused`."""
         with self._writing() as database:
             database.execute(
                 "UPDATE message SET state = 'refused', why = ?, since = ? WHERE number = ?",
                 (why, now(), message.number),
             )
 
-    def send_aside_again(self) -> int:
-        """Have what was refused sent again, under the same keys; give how many."""
+    def resend_refused(self) -> int:
+        """Let refused messages wait for delivery again, with the same keys. Return how many there are."""
         with self._writing() as database:
             return database.execute("UPDATE message SET state = 'waiting' WHERE state = 'refused'").rowcount
 
-    def note_aside(self) -> int:
-        """Note that somebody has dealt with what was refused; it stays in the file. Give how many."""
+    def acknowledge_refused(self) -> int:
+        """Mark refused messages as acknowledged; they stay in the file. Return how many there are."""
         with self._writing() as database:
             return database.execute("UPDATE message SET state = 'noted' WHERE state = 'refused'").rowcount
 
-    def aside(self) -> list[Aside]:
-        """Return what was refused."""
+    def refused(self) -> list[RefusedMessage]:
+        """Return the refused messages."""
         with self._reading() as database:
             rows = database.execute(
                 "SELECT key, order_id, body, since, why FROM message WHERE state = 'refused' ORDER BY number"
             ).fetchall()
-        return [Aside(key, order, body.decode(), since, why) for key, order, body, since, why in rows]
+        return [RefusedMessage(key, order, body.decode(), since, why) for key, order, body, since, why in rows]
 
     def state(self, last_error: str) -> OutboxState:
-        """Return how many wait, and since when."""
+        """Return the state of the outbox."""
         with self._reading() as database:
             waiting, since = database.execute(
                 "SELECT count(*), min(stored) FROM message WHERE state = 'waiting'"
@@ -251,15 +255,15 @@ class Outbox:
 
     # -------------------------------------------------------------------------------- orders
     def order(self) -> Order | None:
-        """Return the oldest order that is not all reported."""
+        """Return the oldest order that is not reported completely."""
         with self._reading() as database:
             row = database.execute(
                 "SELECT id, product, quantity, reported FROM open_order ORDER BY taken, rowid LIMIT 1"
             ).fetchone()
         return None if row is None else Order(*row)
 
-    def asking(self) -> str:
-        """Return the key to ask for an order with: the same until it was answered."""
+    def request_key(self) -> str:
+        """Return the key for requesting an order. It stays the same until `end_request`."""
         with self._writing() as database:
             row = database.execute("SELECT key FROM asking").fetchone()
             key: str = uuid.uuid4().hex if row is None else row[0]
@@ -267,8 +271,8 @@ class Outbox:
                 database.execute("INSERT INTO asking VALUES (?)", (key,))
         return key
 
-    def answered(self, order: Order | None) -> None:
-        """Note the answer: an order to be worked at, or None."""
+    def end_request(self, order: Order | None) -> None:
+        """Store the order that the service returned, if any; the next request has a new key."""
         with self._writing() as database:
             database.execute("DELETE FROM asking")
             if order is not None:

@@ -1,4 +1,4 @@
-"""The sender: one thread that delivers the outbox, in order, each message until the service has said that it has it."""
+"""Sender: a thread that delivers the messages of the outbox. It repeats each until the service confirms it."""
 
 import logging
 import threading
@@ -8,79 +8,78 @@ from typing import Final
 from arcor2_hw.exceptions import Arcor2Error, DeviceError, DeviceFault
 
 from .outbox import Message, Outbox
-from .service import RETRIED, Answer, Receipt, Service
+from .service import RETRIED, UNAUTHORIZED, Answer, Receipt, Service
 
 FIRST_PAUSE: Final = 0.2
-"""Time after the first failure, s; doubled after each further one."""
-BUSY: Final = (*RETRIED, 502, 503, 504)
-"""Statuses that speak of the service as a whole, not of one message."""
-DOORS: Final = (401, 403, 407)
-"""Statuses that mean that we are not let in."""
+"""Pause after the first failure, s; it doubles after each further one."""
+UNAVAILABLE: Final = (*RETRIED, 502, 503, 504)
+"""HTTP statuses that concern the whole service, not one message."""
 
 log = logging.getLogger(__name__)
 
 
 class Pause:
-    """A time before which nothing is tried; longer after each failure."""
+    """A pause between attempts that grows with each failure."""
 
     def __init__(self, longest: float) -> None:
         self._longest, self._next = longest, FIRST_PAUSE
         self.until = 0.0
 
     def grow(self, at_least: float = 0.0) -> None:
-        """Wait longer than last time, and as long as the service asked for."""
+        """Start a pause longer than the last one, and of at least `at_least` s."""
         self.until = time.monotonic() + max(self._next, at_least)
         self._next = min(2.0 * self._next, self._longest)
 
 
 class Sender:
-    """Delivers while it lives. Owns service and outbox: its thread closes them at its end."""
+    """Delivers messages until `stop`. Its thread closes service and outbox at its end."""
 
     def __init__(self, who: str, service: Service, outbox: Outbox, longest_pause: float) -> None:
         self._who, self._service, self._outbox = who, service, outbox
         self._longest = longest_pause
-        self._all = Pause(longest_pause)
-        self._orders: dict[str, Pause] = {}
-        self._asked_to_wait = False
+        self._service_pause = Pause(longest_pause)
+        self._order_pauses: dict[str, Pause] = {}
+        self._has_retry_after = False
         self._wake = threading.Event()
         self._ending = False
         self._changed = threading.Condition()
         self.last_error = ""
-        self.locked_out = ""
+        """Why the last delivery failed; empty after a success."""
+        self.unauthorized = ""
+        """How the service rejected our credentials; empty when it accepts them."""
         self._thread = threading.Thread(target=self._run, name=f"outbox of {who}", daemon=True)
 
     def start(self) -> None:
-        """Begin to deliver."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End soon: at once, or when the request under way has ended."""
+        """Tell the thread to end. It ends when its present request has."""
         self._ending = True
         self._service.close()
         self._wake.set()
-        with self._changed:
-            self._changed.notify_all()
+        self.notify()
 
     def join(self, timeout: float) -> bool:
-        """Wait for the end; tell whether it has come."""
+        """Wait at most `timeout` s for the end of the thread. Return whether it has ended."""
         self._thread.join(timeout)
         return not self._thread.is_alive()
 
     def wake(self, *, back: bool = False) -> None:
-        """Tell of a new message; `back`: the service answers again, so that there is no reason to wait longer."""
-        if back and not self._asked_to_wait:
-            self._all = Pause(self._longest)
-            self._orders = {}
+        """Check for messages to deliver now. `back`: the service answers again, which ends pauses."""
+        if back and not self._has_retry_after:
+            self._service_pause = Pause(self._longest)
+            self._order_pauses = {}
         self._wake.set()
 
     def wait_change(self, timeout: float) -> None:
-        """Return after the next attempt, or after `timeout` s."""
+        """Wait for the next attempt, at most `timeout` s."""
         with self._changed:
             if not self._ending:
                 self._changed.wait(timeout)
 
-    def tell_change(self) -> None:
-        """Wake whoever waits for a change."""
+    def notify(self) -> None:
+        """End the calls of `wait_change`."""
         with self._changed:
             self._changed.notify_all()
 
@@ -91,11 +90,11 @@ class Sender:
                 self._wake.clear()
                 try:
                     pause = self._round()
-                except Arcor2Error as e:  # the storage: nothing is lost, and it is tried again
-                    self._note(str(e))
-                    self._all.grow()
-                    pause = self._all.until - time.monotonic()
-                self.tell_change()
+                except Arcor2Error as e:  # storage error: the message stays in the outbox and is sent again
+                    self._report(str(e))
+                    self._service_pause.grow()
+                    pause = self._service_pause.until - time.monotonic()
+                self.notify()
                 if not self._ending:
                     self._wake.wait(pause)
         finally:
@@ -103,54 +102,54 @@ class Sender:
             self._outbox.close()
 
     def _round(self) -> float | None:
-        """Deliver what is due; give the seconds until something is, None when nothing waits."""
+        """Deliver the messages that are due. Return the time until the next is due, s; None when none waits."""
         while not self._ending:
             heads = self._outbox.heads()
             if not heads:
                 return None
             present = time.monotonic()
-            due = {head: max(self._all.until, self._held_back(head)) for head in heads}
+            due = {head: max(self._service_pause.until, self._paused_until(head)) for head in heads}
             ready = [head for head in heads if due[head] <= present]
             if not ready:
                 return max(min(due.values()) - present, 0.0)
             self._deliver(ready[0])
-            self.tell_change()
+            self.notify()
         return None
 
-    def _held_back(self, head: Message) -> float:
-        pause = self._orders.get(head.order_id)
+    def _paused_until(self, head: Message) -> float:
+        pause = self._order_pauses.get(head.order_id)
         return 0.0 if pause is None else pause.until
 
     def _deliver(self, message: Message) -> None:
         what = f"POST {message.path} of order {message.order_id}"
-        self._asked_to_wait = False
+        self._has_retry_after = False
         try:
             answer = self._service.request("POST", message.path, message.key, message.body)
             if answer.done:
                 self._check_receipt(answer, message, what)
         except DeviceError as e:
             if not self._ending:
-                self._note(f"{e} {e.detail}".strip())
-                self._all.grow()
+                self._report(f"{e} {e.detail}".strip())
+                self._service_pause.grow()
             return
         if answer.done:
             self._outbox.delivered(message)
-            self._all = Pause(self._longest)
-            self._orders.pop(message.order_id, None)
-            self.last_error = self.locked_out = ""
+            self._service_pause = Pause(self._longest)
+            self._order_pauses.pop(message.order_id, None)
+            self.last_error = self.unauthorized = ""
             return
-        text = f"{self._who} answered {what} by {answer.told}"
-        if answer.status in DOORS or 300 <= answer.status < 400 or answer.status in BUSY:
-            self.locked_out = text if answer.status in DOORS else ""
-            self._asked_to_wait = answer.retry_after > 0.0
-            self._all.grow(answer.retry_after)
+        text = f"{self._who} answered {what} by {answer.text}"
+        if answer.status in (*UNAUTHORIZED, *UNAVAILABLE) or 300 <= answer.status < 400:
+            self.unauthorized = text if answer.status in UNAUTHORIZED else ""
+            self._has_retry_after = answer.retry_after > 0.0
+            self._service_pause.grow(answer.retry_after)
         elif 400 <= answer.status < 500:
-            log.warning("%s; it is kept aside", text)
-            self._outbox.put_aside(message, answer.told)
-            self._all = Pause(self._longest)
+            log.warning("%s; it is not sent again before the user asks for it", text)
+            self._outbox.mark_refused(message, answer.text)
+            self._service_pause = Pause(self._longest)
         else:
-            self._orders.setdefault(message.order_id, Pause(self._longest)).grow(answer.retry_after)
-        self._note(text)
+            self._order_pauses.setdefault(message.order_id, Pause(self._longest)).grow(answer.retry_after)
+        self._report(text)
 
     def _check_receipt(self, answer: Answer, message: Message, what: str) -> None:
         receipt: Receipt = self._service.read(answer, Receipt, what)
@@ -159,7 +158,7 @@ class Sender:
                 "{device} answered {what} for another message", receipt.key[:80], "receipt", device=self._who, what=what
             )
 
-    def _note(self, text: str) -> None:
+    def _report(self, text: str) -> None:
         if not self.last_error:
-            log.warning("%s: results wait: %s", self._who, text)
+            log.warning("%s: results are waiting for delivery: %s", self._who, text)
         self.last_error = text

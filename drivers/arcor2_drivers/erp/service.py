@@ -1,4 +1,4 @@
-"""Requests to the service: one at a time on one connection, each with a deadline, a cap and a typed error."""
+"""Service: a connection to the service for one request at a time, and the data of its answers."""
 
 import contextlib
 import email.utils
@@ -6,24 +6,32 @@ import ssl
 import threading
 import time
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 import httpx
 import msgspec
 
 from arcor2_hw.data.base import Data
-from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
 
 from .settings import ErpSettings
 
+T = TypeVar("T")
+
 LONGEST_ANSWER: Final = 1 << 20
 LONGEST_TOKEN: Final = 8192
-IDLE: Final = 4.0
-"""Time an idle connection is used again, s: many services close one after five."""
+KEEP_ALIVE: Final = 4.0
+"""Time after which an idle connection is not used again, s: many services close it after 5 s."""
+RETRIED: Final = (408, 425, 429)
+"""HTTP statuses of the client errors that ask for another attempt."""
+UNAUTHORIZED: Final = (401, 403, 407)
+"""HTTP statuses that reject our credentials."""
+LONGEST_RETRY_AFTER: Final = 600.0
+"""Longest pause that a service can ask for, s."""
 
 
 class Answer(NamedTuple):
-    """What came back; `retry_after` in s, 0 when the service did not ask for a pause."""
+    """An answer of the service. `retry_after` is the pause that the service asks for, s; 0: none."""
 
     status: int
     body: bytes
@@ -31,12 +39,12 @@ class Answer(NamedTuple):
 
     @property
     def done(self) -> bool:
-        """Return whether the service did what was asked."""
+        """Return whether the service has done what was requested."""
         return self.status in (200, 201)
 
     @property
-    def told(self) -> str:
-        """Return what a service says beside its status."""
+    def text(self) -> str:
+        """Return the status and the error text of the service."""
         try:
             return f"{self.status}: {msgspec.json.decode(self.body, type=_Error).error[:200]}"
         except (msgspec.MsgspecError, UnicodeDecodeError):
@@ -48,42 +56,42 @@ class _Error(Data, frozen=True):
 
 
 class Status(Data, frozen=True):
-    """Who the service says it is."""
+    """Name and version of the service."""
 
     service: str
     version: str
 
 
 class Receipt(Data, frozen=True):
-    """What the service answers when it has taken something."""
+    """The confirmation of an accepted message."""
 
     key: str
 
 
-class ToldOrder(Data, frozen=True):
-    """An order as the service tells it."""
+class OrderData(Data, frozen=True):
+    """An order in the form of the service."""
 
     id: str
     product: str
     quantity: int
 
 
-class ToldNext(Data, frozen=True):
-    """The answer to the question for an order."""
+class NextOrder(Data, frozen=True):
+    """The answer to a request for an order."""
 
     key: str
-    order: ToldOrder | None
+    order: OrderData | None
 
 
 class Access(NamedTuple):
-    """What the files of the settings hold."""
+    """Token and certificates, read from the files in the settings."""
 
     headers: dict[str, str]
     tls: ssl.SSLContext | bool
 
     @classmethod
     def of(cls, who: str, settings: ErpSettings) -> "Access":
-        """Read token and certificates. Raises NotConnected naming the setting."""
+        """Read token and certificates. Raises NotConnected, which names the setting."""
         headers: dict[str, str] = {}
         what = "token_file"
         try:
@@ -105,7 +113,7 @@ class Access(NamedTuple):
 
 
 class Service:
-    """One connection to the service. `close` may come from any thread, also during a request."""
+    """A connection to the service. Any thread may call `close`, also during a request."""
 
     def __init__(self, who: str, settings: ErpSettings, access: Access) -> None:
         self._who, self._settings, self._access = who, settings, access
@@ -114,10 +122,12 @@ class Service:
         self._ended = False
 
     def request(self, method: str, path: str, key: str = "", body: bytes = b"", timeout: float = 0.0) -> Answer:
-        """Send a request and give the answer, whatever its status.
+        """Send a request and return the answer, whatever its status.
 
-        Raises NotConnected when nobody is there, DeviceTimeout, ConnectionLost when it broke off: then the service may
-        have done what was asked.
+        Raises:
+            NotConnected: The service cannot be reached.
+            DeviceTimeout: It did not answer in time.
+            ConnectionLost: The connection broke; the service may have executed the request.
         """
         limit = timeout or self._settings.request_timeout
         deadline = time.monotonic() + limit
@@ -127,6 +137,9 @@ class Service:
             if self._ended:
                 raise NotConnected("{device} is not connected", device=self._who)
             return self._request(method, path, key, body, deadline, limit)
+        except DeviceError:
+            self._drop()
+            raise
         finally:
             if self._ended:
                 self._drop()
@@ -139,7 +152,7 @@ class Service:
                 headers=self._access.headers,
                 verify=self._access.tls,
                 trust_env=False,
-                limits=httpx.Limits(max_connections=1, max_keepalive_connections=1, keepalive_expiry=IDLE),
+                limits=httpx.Limits(max_connections=1, max_keepalive_connections=1, keepalive_expiry=KEEP_ALIVE),
             )
         headers = {"Content-Type": "application/json", "Idempotency-Key": key} if key else {}
         late = f"{self._who} did not answer {method} {path} within {limit:g} s"
@@ -157,24 +170,18 @@ class Service:
                         )
                     if time.monotonic() > deadline:
                         raise DeviceTimeout(late, "the answer came too slowly")
-                return Answer(response.status_code, data, _pause(response.headers.get("Retry-After", "")))
-        except (ConnectionLost, DeviceTimeout):
-            self._drop()
-            raise
+                return Answer(response.status_code, data, parse_retry_after(response.headers.get("Retry-After", "")))
         except httpx.ConnectError as e:
-            self._drop()
             raise NotConnected("{device} cannot be reached", str(e), device=self._who) from e
         except httpx.TimeoutException as e:
-            self._drop()
             raise DeviceTimeout(late, type(e).__name__) from e
         except (httpx.HTTPError, httpx.InvalidURL, httpx.StreamError) as e:
-            self._drop()
             raise ConnectionLost(
                 "{device}: {method} {path} broke off", str(e), device=self._who, method=method, path=path
             ) from e
 
     def close(self) -> None:
-        """Close for good; a request under way ends by its own deadline and closes then."""
+        """Close for good. A request that is running ends within its own time limit and closes the connection then."""
         self._ended = True
         if self._one.acquire(blocking=False):
             try:
@@ -188,37 +195,36 @@ class Service:
                 self._client.close()
             self._client = None
 
-    # -------------------------------------------------------------------------------- what is asked
+    # -------------------------------------------------------------------------------- answers
     def status(self, timeout: float = 0.0) -> Status:
-        """Ask the service who it is. Raises Refused when it does not let us in, DeviceFault for no sensible answer."""
+        """Read name and version of the service. Raises Refused for bad credentials, DeviceFault for other errors."""
         answer = self.request("GET", "/status", timeout=timeout)
         self.check(answer, "GET /status")
-        status: Status = self.read(answer, Status, "GET /status")
-        return status
+        return self.read(answer, Status, "GET /status")
 
     def check(self, answer: Answer, what: str) -> None:
-        """Return when the service did what was asked. Raises Refused or DeviceFault with its words."""
+        """Raise Refused or DeviceFault with the text of the service, unless it has done what was requested."""
         if answer.done:
             return
-        if answer.status in (401, 403, 407):
+        if answer.status in UNAUTHORIZED:
             raise Refused(
                 "{device} does not let us in: token_file or client_certificate is not valid",
-                answer.told,
+                answer.text,
                 device=self._who,
             )
         if 400 <= answer.status < 500 and answer.status not in RETRIED:
-            raise Refused("{device} refuses {what}: {told}", answer.told, device=self._who, what=what, told=answer.told)
+            raise Refused("{device} refuses {what}: {text}", answer.text, device=self._who, what=what, text=answer.text)
         raise DeviceFault(
-            "{device} cannot do {what} now: {told}",
-            answer.told,
+            "{device} cannot do {what} now: {text}",
+            answer.text,
             answer.status,
             device=self._who,
             what=what,
-            told=answer.told,
+            text=answer.text,
         )
 
-    def read(self, answer: Answer, form: Any, what: str) -> Any:
-        """Read the answer's body. Raises DeviceFault."""
+    def read(self, answer: Answer, form: type[T], what: str) -> T:
+        """Decode the body of an answer. Raises DeviceFault."""
         try:
             return msgspec.json.decode(answer.body, type=form)
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as e:
@@ -231,13 +237,8 @@ class Service:
             ) from e
 
 
-RETRIED: Final = (408, 425, 429)
-"""Statuses of the 4xx that ask for another attempt."""
-LONGEST_RETRY_AFTER: Final = 600.0
-
-
-def _pause(text: str) -> float:
-    """Read Retry-After (RFC 9110, 10.2.3): seconds or a date; 0 for what is neither."""
+def parse_retry_after(text: str) -> float:
+    """Return the pause in a Retry-After header, s; 0 when invalid. It is a number or a date (RFC 9110, 10.2.3)."""
     try:
         seconds = float(text) if text.isdigit() else email.utils.parsedate_to_datetime(text).timestamp() - time.time()
     except (ValueError, OverflowError):

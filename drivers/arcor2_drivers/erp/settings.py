@@ -22,19 +22,19 @@ def is_loopback(host: str) -> bool:
 
 @dataclasses.dataclass
 class ErpSettings(Settings):
-    """Where the service is, our name there, and where results are stored until it has accepted them.
+    """Address and credentials of the service, and the outbox for results that it has not accepted yet.
 
     :param url: address of the service, as https://erp.example:8443/api/v1
-    :param station: our name at the service; letters, digits, dot, dash and underscore
+    :param station: name of this cell at the service; letters, digits, dot, dash and underscore
     :param outbox: directory of the stored outbox; empty for the user's data directory
     :param token_file: file with the bearer token; empty for none
     :param ca_file: PEM file of the certificate authority of the service; empty for those of the system
-    :param client_certificate: PEM file of our own certificate; empty for none
+    :param client_certificate: PEM file of the client certificate; empty for none
     :param client_key: PEM file of its private key
-    :param request_timeout: seconds the service has to answer one request
-    :param longest_pause: seconds between two attempts to deliver, at most
-    :param waiting_alarm: seconds a result may wait before an alarm is raised
-    :param poll: seconds between two requests for an order while there is none
+    :param request_timeout: time the service has to answer one request, s
+    :param longest_pause: longest time between two attempts to deliver a result, s
+    :param waiting_alarm: time a result may wait before an alarm is raised, s
+    :param poll: time between two requests for an order while there is none, s
     """
 
     url: str

@@ -14,7 +14,7 @@ from cryptography.x509.oid import NameOID
 
 from arcor2_drivers.erp.erp_service import ErpService
 from arcor2_drivers.erp.outbox import file_of
-from arcor2_drivers.erp.service import _pause
+from arcor2_drivers.erp.service import parse_retry_after
 from arcor2_drivers.erp.settings import ErpSettings
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import NotConnected, OutOfRange, Refused
@@ -62,7 +62,7 @@ def test_where_the_outbox_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     [("", 0.0), ("7", 7.0), ("-3", 0.0), ("soon", 0.0), ("99999", 600.0), ("Wed, 21 Oct 2015 07:28:00 GMT", 0.0)],
 )
 def test_retry_after(text: str, seconds: float) -> None:
-    assert _pause(text) == seconds
+    assert parse_retry_after(text) == seconds
 
 
 class Authority:
