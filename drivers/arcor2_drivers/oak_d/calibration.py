@@ -59,4 +59,4 @@ def handler_of(who: str, eeprom: dict[str, Any]) -> "dai.CalibrationHandler":
 
 
 def _fault(who: str, problem: str) -> DeviceFault:
-    return DeviceFault(f"{who}: {problem}", "", "calibration")
+    return DeviceFault("{device}: {problem}", "", "calibration", device=who, problem=problem)

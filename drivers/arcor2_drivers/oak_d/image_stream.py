@@ -87,7 +87,7 @@ class ImageStream(Connected):
         self.observing.check()
         feed = self._feed
         if feed is None:
-            raise NotConnected(f"{self.who} is not connected")
+            raise NotConnected("{device} is not connected", device=self.who)
         return feed
 
     @property
@@ -103,7 +103,12 @@ class ImageStream(Connected):
         shot = self._newest
         age = float("inf") if shot is None else time.monotonic() - shot.monotonic
         if shot is None or age > max_age:
-            raise Stale(f"{self.who}: the newest picture is {age:.2f} s old, {max_age:g} s at most are asked for")
+            raise Stale(
+                "{device}: the newest picture is {age:.2f} s old, {max_age:g} s at most are asked for",
+                device=self.who,
+                age=age,
+                max_age=max_age,
+            )
         return shot
 
     def next_after(self, moment: float, timeout: float) -> "Shot":
@@ -126,7 +131,12 @@ class ImageStream(Connected):
                     break
                 self._new_image.wait(left)
         age = "never" if newest is None else f"{time.monotonic() - newest.monotonic:.2f} s ago"
-        raise Stale(f"{self.who} gave no new picture within {timeout:g} s; the last was taken {age}")
+        raise Stale(
+            "{device} gave no new picture within {timeout:g} s; the last was taken {age}",
+            device=self.who,
+            timeout=timeout,
+            age=age,
+        )
 
     def apply_exposure(self, exposure: float | None) -> None:
         """Set the exposure time, s; None: automatic. After a reconnect it is set again."""
@@ -142,7 +152,9 @@ class ImageStream(Connected):
         while shot is None or time.monotonic() - shot.monotonic > self._config.max_age:
             if (left := deadline - time.monotonic()) <= 0.0:
                 old = "no" if shot is None else "only an old"
-                raise DeviceTimeout(f"{self.who} sent {old} picture within {timeout:.1f} s")
+                raise DeviceTimeout(
+                    "{device} sent {old} picture within {timeout:.1f} s", device=self.who, old=old, timeout=timeout
+                )
             shot = feed.next(min(RECEIVE_TIMEOUT, left)) or shot
         self._store(shot)
         if self._exposure is not None:  # this is a reconnect
@@ -164,11 +176,14 @@ class ImageStream(Connected):
             return DeviceFeed(self.who, self._config, timeout)
         except ModuleNotFoundError as e:
             raise NotConnected(
-                f"{self.who}: depthai is not installed here; it comes with the extra `depthai` (arcor2-hw[depthai])",
+                "{device}: depthai is not installed here; it comes with the extra `depthai` (arcor2-hw[depthai])",
                 str(e),
+                device=self.who,
             ) from e
         except ImportError as e:
-            raise NotConnected(f"{self.who}: depthai is installed and cannot be loaded: {e}") from e
+            raise NotConnected(
+                "{device}: depthai is installed and cannot be loaded: {reason}", device=self.who, reason=e
+            ) from e
 
     def watch(self, stopping: threading.Event) -> None:
         """Receive images until `stopping` is set. Raises DeviceTimeout when none come."""
@@ -180,7 +195,11 @@ class ImageStream(Connected):
             if shot is not None:
                 self._store(shot)
             elif present - self._received_at > self._config.frame_timeout:
-                raise DeviceTimeout(f"{self.who} has sent no picture for {present - self._received_at:.1f} s")
+                raise DeviceTimeout(
+                    "{device} has sent no picture for {present:.1f} s",
+                    device=self.who,
+                    present=present - self._received_at,
+                )
             if present - checked_at > CHECK_PERIOD:
                 checked_at = present
                 self._update_alarms(feed)
