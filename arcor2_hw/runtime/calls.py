@@ -1,4 +1,4 @@
-"""Calls of the server on devices, each answered once, and stops, which run next to any other call."""
+"""Calls and stops of devices for the server. Each is answered exactly once; stops run concurrently with calls."""
 
 import threading
 from collections.abc import Callable
@@ -20,14 +20,22 @@ Post = Callable[[m.ToServer], None]
 
 
 def error_data(error: BaseException, object_id: str = "") -> m.ErrorData:
-    """Return an error in the form in which it is sent to the server."""
+    """Convert an error to the form that is sent to the server."""
     code = error.code if isinstance(error, Arcor2Error) else "error"
     detail = error.detail if isinstance(error, Arcor2Error) else ""
     return m.ErrorData(code, type(error).__name__, str(error) or type(error).__name__, detail, object_id)
 
 
 class Calls:
-    """Makes the calls. `cell` returns the devices; `stopping` is called for each device that is stopped."""
+    """Start calls and stops, and answer them.
+
+    Args:
+        cell: Returns the current devices.
+        post: Sends an answer.
+        clock: Runs the deadlines.
+        stopping: Called for each device that is being stopped.
+        teaching: Receives the changes of hand teaching mode.
+    """
 
     def __init__(
         self,
@@ -45,7 +53,7 @@ class Calls:
         self._answering: threading.Thread | None = None
 
     def call(self, message: m.Call) -> None:
-        """Start a call; CallDone or CallFailed answers it."""
+        """Start a call, which is answered by CallDone or CallFailed."""
         device: Device | None = None
         try:
             device = self._cell()[message.object_id]
@@ -57,9 +65,9 @@ class Calls:
             job, own = device.prepare(method, message.arguments, message.control, answer)
             lane = device.stop_lane if message.cancel else device.lane_for(method)
             lane.submit(job)
-        except Exception as error:  # noqa: BLE001 - a call that cannot be made is answered too
-            told = error if device is None else describe(device, error)
-            self._post(m.CallFailed(message.id, error_data(told, message.object_id)))
+        except Exception as error:  # noqa: BLE001 - a call that cannot start is answered too
+            reported = error if device is None else describe(device, error)
+            self._post(m.CallFailed(message.id, error_data(reported, message.object_id)))
             return
         deadline = own if message.deadline is None else message.deadline
         if deadline is not None:
@@ -88,7 +96,7 @@ class Calls:
         return answer
 
     def stop_motion(self, message: m.StopMotion) -> None:
-        """Stop one device; the answer comes when it has stopped, or says why it has not."""
+        """Stop one device. The answer follows when it has stopped, or contains the error."""
         try:
             device = self._cell()[message.object_id]
         except Arcor2Error as error:
@@ -108,7 +116,7 @@ class Calls:
         self._stopping(device)
 
     def stop_all(self, message: m.StopAll, program: Program | None) -> None:
-        """Stop every device, or wait for the stops of a program; answered within STOP_DEADLINE."""
+        """Stop every device, or wait for the stops of the program. The answer follows within STOP_DEADLINE."""
         stops: list[SentStop] = []
         if program is None:
             stops = [send_stop(device) for device in self._cell() if device.up]
@@ -124,21 +132,21 @@ class Calls:
         self._answering = thread
 
     def settle(self) -> None:
-        """Wait until the last stop of all devices is answered."""
+        """Wait until the last `stop_all` is answered."""
         if self._answering is not None:
             self._answering.join(STOP_DEADLINE)
 
     def stop(self, device: Device, answer: Callable[[Device, BaseException | None], None]) -> None:
-        """Stop a device next to any other call; `answer` is called when it has stopped, or with the error."""
+        """Stop a device while its call runs. `answer` is called with the error, or None when it has stopped."""
         try:
-            begun = device.begin_stop(lambda job: answer(device, job.error))
+            started = device.begin_stop(lambda job: answer(device, job.error))
         except Arcor2Error as error:  # an earlier stop hangs
             answer(device, error)
             return
-        if begun is None:
+        if started is None:
             answer(device, None)
             return
-        stop, interrupted = begun
+        stop, interrupted = started
         self._clock.after(STOP_DEADLINE, lambda: device.stop_lane.expire(stop, STOP_DEADLINE))
         if interrupted is not None:
             cancelled = Cancelled("{name}: {method} was stopped", name=device.name, method=interrupted.method)

@@ -1,4 +1,4 @@
-"""All devices of a scene: connected, stopped and closed concurrently."""
+"""All devices of a scene, which are connected, stopped and closed concurrently."""
 
 import importlib
 import time
@@ -25,13 +25,13 @@ from arcor2_hw.runtime.surroundings import SceneSurroundings
 from arcor2_hw.runtime.world_updates import WorldUpdates
 
 CONTROL_DEADLINE: Final = 10.0
-"""Seconds for taking control: a controller may have to load and start its control program."""
-SETTLE: Final = 0.4
-"""Seconds that running calls have to return before their device is closed."""
+"""Time limit for taking control, s. A controller may have to load and start its control program."""
+CALL_END_WAIT: Final = 0.4
+"""Time that running calls have to return before their device is closed, s."""
 
 
 class SceneFault(Exception):
-    """A scene could not be opened: the error, and the object that it belongs to."""
+    """A scene could not be opened because of an error of one object."""
 
     def __init__(self, object_id: str, error: Arcor2Error) -> None:
         super().__init__(str(error))
@@ -47,9 +47,18 @@ def recipes(
     failed: Callable[[SceneFault], None] | None = None,
     secrets: Mapping[str, ObjectSecrets] = MappingProxyType({}),
 ) -> list[Recipe]:
-    """Return how every object is made; `secrets` are those of the objects, by id.
+    """Return the recipes of all objects.
 
-    SceneFault names the first that cannot be made; with `failed`, that is called for each instead.
+    Args:
+        scene: The scene.
+        classes: Object types by name.
+        models: Collision models by object type.
+        overridden: Parameters that override those of the scene.
+        failed: Called for each object without a recipe; the others are returned.
+        secrets: Values of secret settings by object id.
+
+    Raises:
+        SceneFault: The first object without a recipe, unless `failed` is given.
     """
     overridden = list(overridden)
     _import_numpy(classes.values())
@@ -74,10 +83,17 @@ def recipes(
 def scene_recipes(
     message: OpenScene, failed: Callable[[SceneFault], None] | None = None, only: str = ""
 ) -> list[Recipe]:
-    """Load the types of the objects of a scene, or of `only` that one, and return how each is made.
+    """Load the object types of a scene and return the recipes of its objects.
 
-    SceneFault for the first object that cannot be made; with `failed`, that is called for each. Otherwise NotFound
-    or InvalidData for a type.
+    Args:
+        message: The scene, its types and their models.
+        failed: Called for each object without a recipe; the others are returned.
+        only: Id of the only object to prepare; empty for all.
+
+    Raises:
+        SceneFault: The first object without a recipe, unless `failed` is given.
+        NotFound: A type does not exist, unless `failed` or `only` is given.
+        InvalidData: A type cannot be imported, unless `failed` or `only` is given.
     """
     objects = [one for one in message.scene.objects if only in ("", one.id)]
     codes = {code.name: code for code in message.types}
@@ -103,17 +119,17 @@ def scene_recipes(
 
 
 def _import_numpy(classes: Iterable[type[Generic]]) -> None:
-    """Import numpy before the devices connect, each on a thread of its own.
+    """Import numpy before the devices connect on their threads.
 
-    A vendor's library that is loaded while another thread is importing numpy fails. The import takes 0.1 s, which
-    scenes without robots and cameras do without.
+    Vendor libraries fail to load while another thread imports numpy. The import takes 0.1 s, so scenes without robots
+    and cameras skip it.
     """
     if any(issubclass(each, Robot | Camera) for each in classes):
         importlib.import_module("numpy")
 
 
 class Cell:
-    """The devices by the id of their scene object."""
+    """The devices of a scene by object id."""
 
     def __init__(self) -> None:
         self._devices: dict[str, Device] = {}
@@ -121,9 +137,9 @@ class Cell:
         self._ended: SimpleQueue[Job | None] = SimpleQueue()
         self._abandoned = False
         self.assets: Mapping[str, str] = {}
-        """Files of meshes and of robots' models that were uploaded, by the asset's id."""
+        """Files of uploaded meshes and robot models by asset id."""
         self.updates = WorldUpdates()
-        """Bodies and calibrations that the server has sent."""
+        """Added bodies and calibrations from the server."""
         self.changed: Callable[[Device], None] = lambda _: None
         """Called when the connection of a device changes, on the thread that observes it."""
 
@@ -139,18 +155,18 @@ class Cell:
             raise NotFound("the scene has no object {object_id}", object_id=object_id) from None
 
     def find(self, name: str) -> Generic:
-        """Return the instance of an object by its name or id, for another object; NotFound, NotConnected."""
+        """Return the instance of an object by name or id. Raises NotFound, NotConnected."""
         for device in self:
             if name in (device.name, device.id):
                 return device.require()
         raise NotFound("the scene has no object {name}", name=name)
 
     def find_robot(self, name: str) -> Robot:
-        """Return a robot by its name or id, for a gripper; for an empty name the only robot of the scene.
+        """Return a robot by name or id; the only robot of the scene if the name is empty.
 
         Raises:
-            NotFound: There is no such robot, or several when no name is given.
-            NotConnected: The robot does not exist yet, or has failed.
+            NotFound: The robot does not exist, or the name is empty and the scene has none or several.
+            NotConnected: The robot is not connected yet, or has failed.
         """
         if name:
             found = self.find(name)
@@ -166,12 +182,15 @@ class Cell:
         assert isinstance(robot, Robot)
         return robot
 
-    # -------------------------------------------------------------------------------- up and down
+    # -------------------------------------------------------------------------------- open and close
     def open(self, how: Iterable[Recipe], failed: Callable[[SceneFault], None] | None = None) -> None:
-        """Create and connect all objects concurrently; SceneFault for the first that fails, as soon as it fails.
+        """Create and connect all objects concurrently. Call `close` afterwards, also after an error.
 
-        With `failed`, that is called for each that fails, and the others continue.
-        Connected objects stay connected; `close` follows in any case. ProgramStopped if `abandon` is called meanwhile.
+        failed: called for each object that fails; the others continue.
+
+        Raises:
+            SceneFault: The first object that fails, as soon as it fails, unless `failed` is given.
+            ProgramStopped: `abandon` was called.
         """
         began = time.monotonic()
         pending: dict[Job, tuple[Device, float]] = {}
@@ -208,11 +227,11 @@ class Cell:
         return device
 
     def mark_absent(self, fault: SceneFault) -> None:
-        """Record an object that could not be prepared, with the error that its callers get."""
+        """Record that an object has no device. Access to it raises the error of the fault."""
         self._absent[fault.object_id] = fault.error
 
-    def require_failed(self, object_id: str) -> None:
-        """Raise Refused unless an object has failed; NotFound."""
+    def require_failure(self, object_id: str) -> None:
+        """Raise Refused unless an object has failed. Raises NotFound."""
         if object_id in self._absent:
             return
         device = self[object_id]
@@ -221,13 +240,13 @@ class Cell:
             raise Refused("{name} has not failed", name=device.name)
 
     def retry(self, how: Recipe) -> None:
-        """Create and connect an object that has failed once more; SceneFault when it fails again."""
+        """Create and connect a failed object again. Raises SceneFault if it fails again."""
         object_id = how.scene_object.id
         former = self._devices.get(object_id)
         if former is not None and former.failure is None:
             former.fail(NotConnected("{name} is being connected anew", name=former.name))
         if former is not None and former.closed_by is not None:
-            former.closed_by.wait(CLOSE_DEADLINE)  # both would be at the same port
+            former.closed_by.wait(CLOSE_DEADLINE)  # both instances would use the same port
         device = self._make(how)
         self._absent.pop(object_id, None)
         job, deadline = device.open(lambda _: None)
@@ -239,13 +258,13 @@ class Cell:
             raise SceneFault(object_id, error) from job.error
 
     def abandon(self) -> None:
-        """End an `open` that is in progress."""
+        """Make `open` raise ProgramStopped."""
         self._abandoned = True
         self._ended.put(None)
 
     def close(self) -> Arcor2Error | None:
-        """Disconnect all devices concurrently, within about CLOSE_DEADLINE; return the first error."""
-        settled = time.monotonic() + SETTLE
+        """Disconnect all devices concurrently, within about CLOSE_DEADLINE, and return the first error."""
+        settled = time.monotonic() + CALL_END_WAIT
         while time.monotonic() < settled and any(d.lane.busy_with or d.stop_lane.busy_with for d in self):
             time.sleep(0.002)
         deadline = time.monotonic() + CLOSE_DEADLINE
@@ -273,9 +292,9 @@ class Cell:
 
     # -------------------------------------------------------------------------------- stop and control
     def stop_all(self, because: BaseException | None = None) -> list[SentStop]:
-        """Send a stop to every device without waiting; return the stops.
+        """Send a stop to every device without waiting for the outcome, and return the stops.
 
-        With `because`, running and waiting calls end at once with that error for their callers.
+        because: error that ends the running and queued calls at once for their callers; None to let them return.
         """
         stops = []
         for device in self:
@@ -284,8 +303,8 @@ class Cell:
                 running.give_up(because)
         return stops
 
-    def wait_still(self, within: float) -> bool:
-        """Wait until no device reports that it moves; return False when one still does after `within` s."""
+    def wait_standstill(self, within: float) -> bool:
+        """Wait until no device moves. Return False if one still moves after `within` s."""
         deadline = time.monotonic() + within
         while any(device.moving for device in self):
             if time.monotonic() >= deadline:
@@ -294,7 +313,7 @@ class Cell:
         return True
 
     def take_control(self) -> None:
-        """Take control of every device that has the concept, concurrently; SceneFault names one that refuses."""
+        """Take control of every device that supports it, concurrently. Raises SceneFault if a device refuses."""
         jobs = []
         for device in self:
             if overrides(device.recipe.cls, "take_control"):

@@ -1,7 +1,7 @@
-"""Looks at each device of a cell.yaml: connects, reads, disconnects. A process of its own, as a cell host is.
+"""Check each device of a cell.yaml: connect, read, disconnect. Runs in its own process.
 
-`python -m arcor2_hw.runtime.checking cell.yaml [NAME ...]` prints one Checked as JSON a line, in the order of the ends.
-Only what observes is called; control is never taken.
+`python -m arcor2_hw.runtime.checking cell.yaml [NAME ...]` prints a line with one Checked in JSON per device. The
+check only observes: it never takes control.
 """
 
 import argparse
@@ -27,14 +27,15 @@ from arcor2_hw.runtime.creation import find_type, recipe
 from arcor2_hw.runtime.device import CLOSE_DEADLINE, Device, describe
 from arcor2_hw.runtime.lane import Job
 
-ASKED_WITHIN: Final = 3.0
-"""Seconds for each question to a device that is connected."""
-BAD_FILE: Final = 2
+QUERY_TIMEOUT: Final = 3.0
+"""Time limit of each query to a connected device, s."""
+EXIT_BAD_FILE: Final = 2
+"""Exit status if the file cannot be read."""
 T = TypeVar("T")
 
 
 def check(given: CellDevice) -> Checked:
-    """Connect a device, read it, disconnect it. Whatever goes wrong is told in the result."""
+    """Connect a device, read its state and disconnect it. The result contains any problem."""
     nothing = Checked(given.name, given.type)
     try:
         cls = find_type(given.type)
@@ -60,7 +61,7 @@ def check(given: CellDevice) -> Checked:
 
 
 def _with_detail(device: Device, error: BaseException) -> str:
-    """Give an error with its detail, where that adds something."""
+    """Return the text of an error, with its detail unless the text contains it."""
     named = describe(device, error)
     return f"{named} ({named.detail})" if named.detail and named.detail not in str(named) else str(named)
 
@@ -69,12 +70,12 @@ def _read(device: Device, found: Checked) -> Checked:
     instance = device.require()
     problem = ""
 
-    def ask(what: str, question: Callable[[], T], otherwise: T) -> T:
+    def query(what: str, function: Callable[[], T], otherwise: T) -> T:
         nonlocal problem
-        job = Job(what, question)
+        job = Job(what, function)
         device.lane.submit(job)
-        if not job.wait(ASKED_WITHIN):
-            device.lane.expire(job, ASKED_WITHIN)
+        if not job.wait(QUERY_TIMEOUT):
+            device.lane.expire(job, QUERY_TIMEOUT)
         if job.error is None:
             answer: T = job.value
             return answer
@@ -82,11 +83,11 @@ def _read(device: Device, found: Checked) -> Checked:
             problem = problem or _with_detail(device, job.error)
         return otherwise
 
-    identity = ask("identify", instance.identify, None)
-    alarms = ask("alarms", instance.alarms, list[Alarm]())
-    owner = ask("control_owner", instance.control_owner, None)
-    health = ask("health", lambda: instance.health, Health.FAILURE)
-    connection = ask("connection", lambda: instance.connection, Connection.FAILED)
+    identity = query("identify", instance.identify, None)
+    alarms = query("alarms", instance.alarms, list[Alarm]())
+    owner = query("control_owner", instance.control_owner, None)
+    health = query("health", lambda: instance.health, Health.FAILURE)
+    connection = query("connection", lambda: instance.connection, Connection.FAILED)
     return msgspec.structs.replace(
         found,
         identity=identity,
@@ -107,19 +108,19 @@ def _close(device: Device) -> None:
 
 
 def main() -> None:
-    """Check the devices of a file, or those named, all at once."""
-    parser = argparse.ArgumentParser(description="Looks at the devices of a cell.yaml.")
+    """Check all devices of a file, or only the named ones, concurrently."""
+    parser = argparse.ArgumentParser(description="Check the devices of a cell.yaml.")
     parser.add_argument("file", type=Path)
-    parser.add_argument("names", nargs="*", help="only these")
+    parser.add_argument("names", nargs="*", help="names of the devices to check, by default all")
     options = parser.parse_args()
-    # What a vendor's library prints must not get between the lines of the result.
+    # Output of vendor libraries must not mix with the result.
     results = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     try:
         cell = read_cell(options.file)
     except Arcor2Error as error:
         sys.stderr.write(f"{error}\n")
-        os._exit(BAD_FILE)
+        os._exit(EXIT_BAD_FILE)
     one = threading.Lock()
 
     def work(given: CellDevice) -> None:
@@ -134,7 +135,7 @@ def main() -> None:
         thread.start()
     for thread in threads:
         thread.join()
-    os._exit(0)  # whatever a library has left running
+    os._exit(0)  # even if a library still runs threads
 
 
 if __name__ == "__main__":

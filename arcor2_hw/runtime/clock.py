@@ -11,7 +11,7 @@ _log = logging.getLogger(__name__)
 
 
 class Clock:
-    """Calls functions periodically or once; they must return quickly."""
+    """Call functions once or periodically, on one thread. The functions must return quickly."""
 
     def __init__(self) -> None:
         self._due: list[tuple[float, int, float, Callable[[], object]]] = []
@@ -49,9 +49,9 @@ class Clock:
                     continue
                 heapq.heappop(self._due)
                 if period:
-                    # Periods that were missed while the process was stopped are not made up for.
+                    # Calls that were missed while the process was suspended are skipped.
                     heapq.heappush(self._due, (max(moment + period, now), next(self._number), period, function))
             try:
                 function()
-            except Exception:  # noqa: BLE001 - the other timers continue
-                _log.exception("at its time, %s failed", function)
+            except Exception:  # noqa: BLE001 - the other timers must continue
+                _log.exception("Timer function %s failed", function)

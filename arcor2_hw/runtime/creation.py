@@ -1,4 +1,4 @@
-"""From a scene object to an instance: its class, its constructor's arguments, its settings."""
+"""Preparation of instances from scene objects: class, constructor arguments and settings."""
 
 import dataclasses
 import enum
@@ -29,22 +29,22 @@ from arcor2_hw.runtime import older
 from arcor2_hw.runtime.messages import TypeCode
 
 ENTRY_POINTS: Final = "arcor2_hw.object_types"
-"""Entry point group under which installed object types are found, by the type's name."""
+"""Entry point group of installed object types; the name of an entry is that of the type."""
 
 _NO_SECRETS: Final = ObjectSecrets()
 
 source_hooks: list[Callable[[], None]] = [older.install]
-"""Called before an uploaded source is imported: they provide what older sources import."""
+"""Functions called before the first uploaded source is imported: they provide the modules of older sources."""
 
 
 def prepare_for_sources() -> None:
-    """Prepare the process for uploaded sources; to be called before one is imported."""
+    """Prepare this process for importing uploaded sources. Call it before the first import."""
     for hook in source_hooks:
         hook()
 
 
 def module_name(type_name: str) -> str:
-    """Return the name of the module of an object type (protocol, section 9.1)."""
+    """Return the module name of an object type (protocol, section 9.1)."""
     return str(humps.depascalize(type_name))
 
 
@@ -63,7 +63,7 @@ def _import(module: str, type_name: str) -> ModuleType:
         return importlib.import_module(module)
     except Arcor2Error:
         raise
-    except BaseException as error:  # an object type's module may do anything when it is imported
+    except BaseException as error:  # importing an object type may raise anything
         if isinstance(error, KeyboardInterrupt):
             raise
         detail = f"{type(error).__name__}: {error}"
@@ -73,9 +73,9 @@ def _import(module: str, type_name: str) -> ModuleType:
 
 
 def write_sources(types: Iterable[TypeCode]) -> str | None:
-    """Write uploaded sources as the package `object_types` into a private directory, and put it on the path.
+    """Write uploaded sources as package `object_types` into a private directory and add that to the import path.
 
-    Return the directory; None when there is nothing to write.
+    Return the directory, or None if no type is uploaded.
     """
     uploaded = [code for code in types if not code.entry_point and code.source]
     if not uploaded:
@@ -98,7 +98,7 @@ def write_sources(types: Iterable[TypeCode]) -> str | None:
 
 
 def load_type(code: TypeCode) -> type[Generic]:
-    """Import an object type; NotFound or InvalidData naming it."""
+    """Import an object type. Raises NotFound or InvalidData."""
     if code.entry_point:
         module, _, attribute = code.entry_point.partition(":")
         return _class_of(_import(module, code.name), attribute or code.name)
@@ -108,7 +108,7 @@ def load_type(code: TypeCode) -> type[Generic]:
 
 
 def find_type(name: str) -> type[Generic]:
-    """Find an object type by its name: in the package's own `object_types`, among the installed, among the bases."""
+    """Find an object type by name in the package `object_types`, the installed types or the base classes."""
     module = f"object_types.{module_name(name)}"
     try:
         here = importlib.util.find_spec(module) is not None
@@ -127,7 +127,7 @@ def find_type(name: str) -> type[Generic]:
 
 # ------------------------------------------------------------------------------------------------ settings
 def settings_type(cls: type[Generic]) -> type[Settings] | None:
-    """Return the dataclass of an object type's settings; None when it has none."""
+    """Return the dataclass of the settings of an object type, or None if it has none."""
     for base in cls.__mro__:
         constructor = base.__dict__.get("__init__")
         if constructor is None:
@@ -140,7 +140,7 @@ def settings_type(cls: type[Generic]) -> type[Settings] | None:
             ) from error
         if hint is None:
             if any(p.kind is p.VAR_KEYWORD for p in inspect.signature(constructor).parameters.values()):
-                continue  # passes them on to the next base
+                continue  # passes its arguments to the next base class
             return None
         for candidate in (hint, *typing.get_args(hint)):
             if isinstance(candidate, type) and issubclass(candidate, Settings) and candidate is not Settings:
@@ -159,7 +159,12 @@ def _setting(hint: Any, parameter: Parameter) -> Any:
 
 
 def with_secrets(name: str, parameters: Mapping[str, Parameter], secrets: ObjectSecrets) -> dict[str, Parameter]:
-    """Replace references to secrets by their values; InvalidData for one that is not stored or is withheld."""
+    """Replace references to secrets by their values.
+
+    Raises:
+        AddressChanged: The secrets are withheld because the address of the device has changed.
+        InvalidData: A secret is not stored.
+    """
     found = dict(parameters)
     for key, parameter in parameters.items():
         if not is_reference(parameter.value.strip('"')):
@@ -178,7 +183,7 @@ def with_secrets(name: str, parameters: Mapping[str, Parameter], secrets: Object
 
 
 def fill_settings(cls: type[Generic], name: str, parameters: Mapping[str, Parameter]) -> Settings | None:
-    """Make the settings of object `name` from its parameters; InvalidData names the object and the parameter."""
+    """Create the settings of an object from its parameters. Raises InvalidData."""
     kind = settings_type(cls)
     if kind is None:
         if parameters:
@@ -219,12 +224,12 @@ def fill_settings(cls: type[Generic], name: str, parameters: Mapping[str, Parame
         raise InvalidData("{name}: setting {missing} is missing", name=name, missing=", ".join(missing))
     try:
         return kind(**values)
-    except (ValueError, TypeError, AssertionError) as error:  # a dataclass may check itself
+    except (ValueError, TypeError, AssertionError) as error:  # __post_init__ may check the values
         raise InvalidData("{name}: settings: {reason}", name=name, reason=error) from error
 
 
 def address_of(settings: Settings | None) -> str:
-    """Return the address of a device for messages, from its settings; empty when there is none."""
+    """Return the address of a device from its settings, for messages; empty if it has none."""
     if settings is None:
         return ""
     wanted = (
@@ -247,7 +252,7 @@ def address_of(settings: Settings | None) -> str:
 # ------------------------------------------------------------------------------------------------ instances
 @dataclasses.dataclass(frozen=True, slots=True)
 class Recipe:
-    """All that is needed to make one instance."""
+    """Class and constructor arguments of one instance."""
 
     scene_object: SceneObject
     cls: type[Generic]
@@ -267,9 +272,9 @@ def recipe(
     overrides: Iterable[SceneObjectOverride] = (),
     secrets: ObjectSecrets = _NO_SECRETS,
 ) -> Recipe:
-    """Return how an object is made (protocol, section 9.2); InvalidData names object and parameter.
+    """Return the recipe of an object (protocol, section 9.2). Raises InvalidData.
 
-    secrets: values of the object's secret settings.
+    secrets: values of the secret settings of the object.
     """
     name = scene_object.name
     if cls.abstract():

@@ -1,4 +1,4 @@
-"""A device in the cell host: the instance and its lanes."""
+"""A device in the cell host: the instance of the object type and its lanes."""
 
 import inspect
 import time
@@ -22,31 +22,35 @@ from arcor2_hw.objects.surroundings import Surroundings
 from arcor2_hw.runtime.creation import Recipe
 from arcor2_hw.runtime.lane import Job, Lane
 from arcor2_hw.runtime.methods import OBSERVING, OVERTAKES_WITHIN, overrides, stop_of
-from arcor2_hw.runtime.own_process.process import STARTS_WITHIN, DeviceProcess
+from arcor2_hw.runtime.own_process.process import START_TIMEOUT, DeviceProcess
 from arcor2_hw.runtime.values import decode_arguments
 
 CONSTRUCTION_DEADLINE: Final = 10.0
-"""Seconds beyond the connect timeout for a constructor that, by the older convention, opens the device itself."""
+"""Time in addition to the connect timeout for constructors that connect the device (older convention), s."""
 STOP_DEADLINE: Final = 2.0
-"""Seconds a `stop` may take before it is reported as failed."""
+"""Time limit of `stop`, s."""
 STOP_GRACE: Final = 2.0
-"""Seconds that a stopped call has to return before it is reported as cancelled."""
+"""Time that a stopped call has to return before it is reported as cancelled, s."""
 CLOSE_DEADLINE: Final = 1.2
-"""Seconds `disconnect` has (objects promise 1 s)."""
+"""Time limit of `disconnect`, s. Object types must return within 1 s."""
 
 
 def connect_timeout(cls: type[Generic]) -> float:
-    """Return the seconds that an object type needs to connect: the default of `timeout`."""
+    """Return the time limit of `connect` of an object type, s: the default of its parameter `timeout`."""
     parameter = inspect.signature(cls.connect).parameters.get("timeout")
     default = None if parameter is None else parameter.default
     return float(default) if isinstance(default, int | float) else DEFAULT_CONNECT_TIMEOUT
 
 
 class Device:
-    """One object of the scene. Every call on the instance is made on one of its lanes.
+    """One object of the scene. Every call of its instance runs on one of its lanes.
 
-    `changed` is called when its connection changes, on the thread that keeps the connection. `find` gives the instance
-    of another object of the scene, `find_robot` the robot that carries a gripper. `surroundings` is for a robot.
+    Args:
+        recipe: Class and constructor arguments.
+        changed: Called when the connection changes, on the thread that observes it.
+        find: Returns the instance of another object of the scene by name or id.
+        surroundings: Obstacles and other robots, for a robot.
+        find_robot: Returns the robot that carries a gripper.
     """
 
     def __init__(
@@ -62,7 +66,7 @@ class Device:
         self._surroundings = surroundings
         self._find = find
         self._changed = changed
-        self._lives: list[Observing] = []
+        self._connections: list[Observing] = []
         self.id = recipe.scene_object.id
         self.name = recipe.scene_object.name
         self.instance: Generic | None = None
@@ -72,18 +76,18 @@ class Device:
         self.closing = False
         self._opening: Job | None = None
         self.closed_by: Job | None = None
-        """The call that closes it after a failure."""
+        """The call that closes the device after a failure."""
         self._process: DeviceProcess | None = None
-        """The process of an object type that asks for its own."""
+        """The child process of an object type that requires its own process."""
         self.failure: Arcor2Error | None = None
-        """Why it could not be connected, in a scene that continues without it."""
+        """Why the device could not be connected, in a scene that continues without it."""
 
     # -------------------------------------------------------------------------------- life
     def open(self, notify: Callable[[Job], None]) -> tuple[Job, float]:
-        """Start to create and connect the instance; return the call and its deadline."""
+        """Start to create and connect the instance. Return the call and its deadline, s."""
         cls = self.recipe.cls
         deadline = connect_timeout(cls) + (1.0 if overrides(cls, "connect") else CONSTRUCTION_DEADLINE)
-        deadline += STARTS_WITHIN if cls.own_process else 0.0
+        deadline += START_TIMEOUT if cls.own_process else 0.0
         job = self._opening = Job("connect", self._open, notify=notify)
         self.lane.submit(job)
         return job, deadline
@@ -95,7 +99,7 @@ class Device:
         return opening is not None and opening.ended and opening.error is None and not self.closing
 
     def _open(self) -> None:
-        with listening(self._life_changed):
+        with listening(self._connection_changed):
             self.instance = instance = self._make()
             if isinstance(instance, CollisionObject):
                 instance.tell_enabled(lambda: self._changed(self))
@@ -108,13 +112,13 @@ class Device:
             if isinstance(instance, Robot) and self._surroundings is not None:
                 instance.surround(self._surroundings)
             instance.connect()
-        if self.closing:  # connected too late: the caller has given up
+        if self.closing:  # the deadline has passed
             self.instance = None
             instance.cleanup()
             self._end_process()
 
     def _make(self) -> Generic:
-        """Make the instance, in a process of its own if its type asks for one."""
+        """Create the instance, in a child process if its type requires one."""
         recipe = self.recipe
         if not recipe.cls.own_process:
             return recipe.make()
@@ -125,15 +129,15 @@ class Device:
         if self._process is not None:
             self._process.end()
 
-    def _life_changed(self, life: Observing) -> None:
-        if life not in self._lives:
-            self._lives.append(life)
+    def _connection_changed(self, life: Observing) -> None:
+        if life not in self._connections:
+            self._connections.append(life)
         self._changed(self)
 
     def connection_reason(self) -> str:
-        """Return why the connection is lost or failed; empty when it is not, or when the reason is unknown."""
+        """Return why the connection is lost or has failed; empty if it has not, or for an unknown reason."""
         given = "" if self.instance is None else self.instance.connection_reason
-        return given or next((life.reason for life in self._lives if life.reason), "")
+        return given or next((life.reason for life in self._connections if life.reason), "")
 
     def require_not_lost(self, method: str) -> None:
         """Raise ConnectionLost while the connection is lost."""
@@ -146,7 +150,7 @@ class Device:
             )
 
     def fail(self, error: Arcor2Error) -> None:
-        """Mark the device as failed and close it, concurrently with everything else."""
+        """Mark the device as failed and start to close it."""
         self.failure = error
         try:
             self.closed_by = self.begin_close(lambda _: self.release_lanes())
@@ -157,20 +161,20 @@ class Device:
         self.instance = None
 
     def begin_close(self, notify: Callable[[Job], None] | None = None) -> Job | None:
-        """Start to disconnect; return the call, or None when there is nothing to close.
+        """Start to disconnect. Return the call, or None if there is no instance.
 
-        A device whose lane hangs is closed on the stop lane, which can still close its socket.
+        If the lane is busy, the stop lane disconnects the device, so that a hanging call does not prevent it.
         """
         self.closing = True
         instance = self.instance
         if instance is None:
             return None
-        job = Job("disconnect", instance.cleanup, notify=notify)  # calls disconnect unless an older type has its own
+        job = Job("disconnect", instance.cleanup, notify=notify)  # by default this calls disconnect
         (self.stop_lane if self.lane.busy_with else self.lane).submit(job)
         return job
 
     def release_lanes(self) -> None:
-        """End the threads, and the process of the device if it has one."""
+        """End the threads and the child process of the device."""
         self._end_process()
         for lane in (self.lane, self.stop_lane, self._watch_lane):
             if lane is not None:
@@ -179,19 +183,19 @@ class Device:
     # -------------------------------------------------------------------------------- calls
     @property
     def watch_lane(self) -> Lane:
-        """Return the lane for observing, which is created on first use."""
+        """Return the lane of methods that only observe. It is created on first use."""
         if self._watch_lane is None:
             self._watch_lane = Lane(self.name, "watch")
         return self._watch_lane
 
     def lane_for(self, method: str) -> Lane:
-        """Return the lane on which a method is called."""
+        """Return the lane on which a method runs."""
         if method in OBSERVING and isinstance(self.instance, Robot):
             return self.watch_lane
         return self.lane
 
     def require(self) -> Generic:
-        """Return the instance; NotConnected when there is none, or it has failed."""
+        """Return the instance. Raises NotConnected if the device is not connected or has failed."""
         if self.failure is not None:
             raise NotConnected(
                 "{name} is not there: {failure}", self.failure.detail, name=self.name, failure=self.failure
@@ -201,7 +205,7 @@ class Device:
         return self.instance
 
     def take_control(self) -> None:
-        """Take control unless the cell host has it. To be called on the lane."""
+        """Take control unless this process has it. Call it on the lane."""
         instance = self.require()
         if instance.control_owner() != "us":
             instance.take_control()
@@ -209,9 +213,17 @@ class Device:
     def prepare(
         self, method: str, arguments: Mapping[str, bytes], control: bool, notify: Callable[[Job], None]
     ) -> tuple[Job, float | None]:
-        """Prepare a call of a method with arguments in JSON; return it with the deadline of the method.
+        """Prepare the call of a method, and return it with the deadline of the method, s.
 
-        Raises NotFound, InvalidData.
+        Args:
+            method: Name of the method or property.
+            arguments: JSON by name of the parameter.
+            control: Whether to take control before the call.
+            notify: Called with the call when it has ended.
+
+        Raises:
+            NotConnected: The device is not connected.
+            InvalidData: The device has no such method, or an argument is not valid.
         """
         instance = self.require()
         if method.startswith("_") or (not hasattr(type(instance), method) and method not in vars(instance)):
@@ -228,7 +240,7 @@ class Device:
             if control:
                 self.require_not_lost(method)
                 self.take_control()
-                self.lane_for(method).check_wanted()  # a stop may have come while control was taken
+                self.lane_for(method).check_wanted()  # a stop may have arrived while control was being taken
             return bound(**keywords)
 
         return Job(method, run, notify=notify), deadline_of(bound)
@@ -236,27 +248,26 @@ class Device:
     # -------------------------------------------------------------------------------- stop
     @property
     def stop_method(self) -> Callable[[], Any] | None:
-        """Return the method that stops this device; None when there is none."""
+        """Return the method that stops this device, or None if it has none."""
         return stop_of(self.instance)
 
     def cancelled_by(self, action: str) -> str:
-        """Return the name of the method that cancels an action; InvalidData when there is none."""
+        """Return the name of the method that cancels an action. Raises InvalidData if there is none."""
         method = type(self.require()).CANCEL_MAPPING.get(action)
         if method is None:
             raise InvalidData("{name}.{action} cannot be cancelled", name=self.name, action=action)
         return method
 
     def _cancel_method(self, action: str) -> Callable[[], Any] | None:
-        """Return the method, other than `stop`, that cancels a running action; None when there is none."""
+        """Return the method that cancels a running action, or None if there is none or it is `stop`."""
         name = getattr(type(self.instance), "CANCEL_MAPPING", {}).get(action)
         found = getattr(self.instance, name, None) if name else None
         return found if callable(found) and found != self.stop_method else None
 
     def begin_stop(self, notify: Callable[[Job], None] | None = None) -> tuple[Job, Job | None] | None:
-        """Stop the device past everything else: call `stop`, and whatever cancels the running action.
+        """Cancel the queued calls, and call `stop` and the cancel method of the running action on the stop lane.
 
-        Return the call and the call that it interrupts. Without `stop`, and with nothing that cancels the running
-        action, return None; calls that wait are cancelled all the same.
+        Return the call and the call that it interrupts, or None if the device has neither method.
         """
         running = self.lane.current
         stop, cancel = self.stop_method, None if running is None else self._cancel_method(running.method)
@@ -275,9 +286,10 @@ class Device:
         interrupted: Job | None,
         moment: float,
     ) -> None:
-        """Call `stop`, again if a call that had only just begun has not returned, and then `cancel` if needed.
+        """Call `stop`, and `cancel` if the interrupted call still runs.
 
-        The command of a call that had only just begun may have overtaken the first stop.
+        The command of a call that started just before `moment` may reach the device after the stop. If such a call does
+        not return, `stop` is called again.
         """
         try:
             if stop is not None:
@@ -296,7 +308,7 @@ class Device:
 
 
 def describe(device: Device, error: BaseException) -> Arcor2Error:
-    """Return an error that names the device, its type and its address; a typed error keeps its type."""
+    """Return an error whose message names the device, its type and address. Errors of our classes keep their class."""
     where = f"{device.name} ({device.recipe.cls.__name__})"
     address = device.recipe.address
     text = str(error) or type(error).__name__
@@ -309,7 +321,7 @@ def describe(device: Device, error: BaseException) -> Arcor2Error:
     if isinstance(error, Arcor2Error):
         if not prefix and not suffix:
             return error
-        named = type(error).__new__(type(error))  # its constructor may want other arguments
+        named = type(error).__new__(type(error))  # the constructor may have other parameters
         named.args = (f"{prefix}{text}{suffix}",)
         vars(named).update(vars(error))
         named.__cause__ = error
@@ -321,5 +333,5 @@ def describe(device: Device, error: BaseException) -> Arcor2Error:
 
 
 def until(deadline: float) -> float:
-    """Return the seconds left until a time of the monotonic clock, never negative."""
+    """Return the time left until a time of the monotonic clock, s; at least 0."""
     return max(0.0, deadline - time.monotonic())

@@ -1,4 +1,4 @@
-"""The documents in a package's folder, as host and server read them."""
+"""Reading of the JSON documents in the folder of a package, for the cell host and the server."""
 
 from pathlib import Path
 from typing import TypeVar
@@ -12,7 +12,11 @@ T = TypeVar("T")
 
 
 def read_document(path: Path, kind: type[T]) -> T:
-    """Read a JSON document in snake_case or camelCase; InvalidPackage names the file."""
+    """Read a JSON document whose keys are in snake_case or camelCase.
+
+    Raises:
+        InvalidPackage: The file is missing or damaged. The message names it.
+    """
     try:
         raw = path.read_bytes()
     except OSError as error:

@@ -1,4 +1,4 @@
-"""What a package's script does with an exception that ends it."""
+"""Reporting of an exception that ends the script of a package."""
 
 import sys
 

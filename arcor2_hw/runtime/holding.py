@@ -1,6 +1,6 @@
-"""Held motion in the host: a robot moves as long as leases are renewed, and is stopped here when one runs out.
+"""Hold-to-run in the cell host: a robot moves as long as leases are renewed, and is stopped when a lease expires.
 
-Whoever hangs, client, network or server: the lease ends by the clock of this process, and by the driver's own.
+The clock of this process, and that of the driver, end the lease even if the client, the network or the server hangs.
 """
 
 import contextlib
@@ -22,16 +22,14 @@ from arcor2_hw.runtime.jogging import Jog
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.teaching import SET_MODE, Teaching
 
-RENEWED_WITHIN: Final = 2.0
-"""Seconds that a driver has to take a renewal, or to make an arm stiff again; a good one takes milliseconds."""
-
-
-JUST_AFTER: Final = 0.001
-"""Seconds from the end of a lease to the check whether it was renewed."""
+DRIVER_TIMEOUT: Final = 2.0
+"""Time limit of a driver to accept a renewal or to end hand teaching, s. It usually takes milliseconds."""
+EXPIRY_MARGIN: Final = 0.001
+"""Time from the end of a lease to the check whether it was renewed, s."""
 
 
 class _Hold:
-    """One press of the button, from its first lease until the robot stands."""
+    """One press of the button, from its first lease until the robot has stopped."""
 
     def __init__(self, device: Device, lease: m.Lease) -> None:
         self.device = device
@@ -40,17 +38,17 @@ class _Hold:
         self.arm: dict[str, Any] = {} if lease.arm_id is None else {"arm_id": lease.arm_id}
         self.newest = lease
         self.jog: Jog | None = None
-        self.begun = False
-        self.unanswered: list[int] = []
-        """Leases that are to be answered by the next call of the driver."""
-        self.let_go: list[int] = []
+        self.driver_started = False
+        self.lease_ids: list[int] = []
+        """Ids of the leases that the next call of the driver answers."""
+        self.release_ids: list[int] = []
         self.job: Job | None = None
         self.ending = False
         self.error: Arcor2Error | None = None
 
 
 class Holds:
-    """At most one hold of each device. Leases come on the reader's thread, time passes on the clock's."""
+    """At most one hold of each device. Leases arrive on the reader thread and expire on the clock thread."""
 
     def __init__(self, cell: Callable[[], Cell], post: Post, clock: Clock, calls: Calls, teaching: Teaching) -> None:
         self._cell = cell
@@ -61,18 +59,18 @@ class Holds:
         self._lock = threading.Lock()
         self._held: dict[str, _Hold] = {}
         self._ended: dict[str, int] = {}
-        """Number of the last hold that has ended, by device: it and earlier ones never start again."""
+        """Number of the last hold that has ended, by device. Leases with this or a lower number are refused."""
 
     @property
     def any(self) -> bool:
-        """Return whether any device is held."""
+        """Return whether any robot is being held."""
         return bool(self._held)
 
     # -------------------------------------------------------------------------------- leases
     def lease(self, message: m.Lease) -> None:
-        """Start, renew or end a hold; CallDone (with the scale of a jog) or CallFailed answers it."""
+        """Start, renew or end a hold. CallDone, with the scale of a jog, or CallFailed answers it."""
         try:
-            hold = self._taken(message)
+            hold = self._register(message)
         except Arcor2Error as error:
             self._post(m.CallFailed(message.id, error_data(error, message.object_id)))
             return
@@ -81,17 +79,17 @@ class Holds:
         elif message.until == 0.0:
             self.end(hold, None)
         else:
-            self._clock.after(message.until - time.monotonic() + JUST_AFTER, lambda: self._check_expired(hold))
-            self._act(hold)
+            self._clock.after(message.until - time.monotonic() + EXPIRY_MARGIN, lambda: self._check_expired(hold))
+            self._pass_on(hold)
 
-    def _taken(self, message: m.Lease) -> _Hold | None:
-        """Note a lease; gives its hold, None when it lets go of one that has ended. Raises NotFound, Refused."""
+    def _register(self, message: m.Lease) -> _Hold | None:
+        """Record a lease and return its hold, or None if it ends a hold that has ended. Raises NotFound, Refused."""
         device = self._cell()[message.object_id]
         with self._lock:
             hold = self._held.get(message.object_id)
             if hold is not None and hold.number == message.hold:
                 if message.until == 0.0:
-                    hold.let_go.append(message.id)
+                    hold.release_ids.append(message.id)
                     return hold
                 if hold.ending:
                     raise hold.error or Refused("{name}: that hold was ended", name=device.name)
@@ -106,28 +104,28 @@ class Holds:
             if hold is None:
                 hold = self._held[message.object_id] = _Hold(device, message)
             hold.newest = message
-            hold.unanswered.append(message.id)
+            hold.lease_ids.append(message.id)
             return hold
 
     def _check_expired(self, hold: _Hold) -> None:
-        """End a hold that has run out. On the clock's thread, when a lease ends."""
+        """End a hold whose lease has expired. Runs on the clock thread."""
         if hold.newest.until <= time.monotonic():
             what = "jog" if hold.kind is HoldKind.JOG else "hold"
             self.end(hold, Cancelled("{name}: the {what} was not renewed in time", name=hold.device.name, what=what))
 
-    # -------------------------------------------------------------------------------- acting
-    def _act(self, hold: _Hold) -> None:
-        """Pass the newest lease to the driver; if it is busy with one, after that."""
+    # -------------------------------------------------------------------------------- calls of the driver
+    def _pass_on(self, hold: _Hold) -> None:
+        """Pass the newest lease to the driver, or wait until the driver has accepted the previous one."""
         with self._lock:
-            if hold.ending or hold.job is not None or not hold.unanswered:
+            if hold.ending or hold.job is not None or not hold.lease_ids:
                 return
-            numbers, hold.unanswered = hold.unanswered, []
+            numbers, hold.lease_ids = hold.lease_ids, []
             job = hold.job = Job(
                 "jog" if hold.kind is HoldKind.JOG else SET_MODE,
                 lambda: self._pass_to_driver(hold),
                 notify=lambda done: self._answer_leases(hold, done, numbers),
             )
-            within = RENEWED_WITHIN + (0.0 if hold.begun else CONTROL_DEADLINE)
+            within = DRIVER_TIMEOUT + (0.0 if hold.driver_started else CONTROL_DEADLINE)
         lane = hold.device.lane
         try:
             lane.submit(job)
@@ -137,10 +135,10 @@ class Holds:
         self._clock.after(within, lambda: lane.expire(job, within))
 
     def _pass_to_driver(self, hold: _Hold) -> float:
-        """Call the driver, on the device's lane; gives the scale of the velocity."""
+        """Call the driver and return the scale of the velocity. Runs on the lane of the device."""
         device, robot = hold.device, hold.device.require()
         assert isinstance(robot, Robot)
-        if not hold.begun:
+        if not hold.driver_started:
             device.require_not_lost("jog" if hold.kind is HoldKind.JOG else "hand teaching")
             device.take_control()
             device.lane.check_wanted()
@@ -151,7 +149,7 @@ class Holds:
         lease = hold.newest
         if hold.jog is not None:
             return hold.jog.drive(lease)
-        if not hold.begun:
+        if not hold.driver_started:
             robot.set_hand_teaching_mode(True, **hold.arm)
         return 1.0
 
@@ -165,16 +163,16 @@ class Holds:
             hold.job = None
             self.end(hold, error)
             return
-        if hold.kind is HoldKind.HAND_TEACHING and not hold.begun:
+        if hold.kind is HoldKind.HAND_TEACHING and not hold.driver_started:
             self._teaching.set(device, hold.arm, True)
-        hold.begun = True
+        hold.driver_started = True
         value = encode_json({"scale": job.value}).encode()
         for number in numbers:
             self._post(m.CallDone(number, value))
         hold.job = None
-        self._act(hold)
+        self._pass_on(hold)
 
-    # -------------------------------------------------------------------------------- ends
+    # -------------------------------------------------------------------------------- end
     def stopping(self, device: Device) -> None:
         """End the hold of a device that is being stopped."""
         hold = self._held.get(device.id)
@@ -182,7 +180,7 @@ class Holds:
             self.end(hold, Cancelled("{name} was stopped", name=device.name))
 
     def teaching_ended(self, device: Device, arm: Mapping[str, Any], error: Arcor2Error) -> None:
-        """End the hold of an arm whose hand teaching has ended, or report that, and make the arm stiff."""
+        """End the hold of an arm that has left hand teaching mode, or without a hold report it and reset the mode."""
         hold = self._held.get(device.id)
         if hold is not None and hold.kind is HoldKind.HAND_TEACHING:
             self.end(hold, error)
@@ -190,39 +188,39 @@ class Holds:
         robot, lane = device.instance, device.lane
         if isinstance(robot, Robot):
             job = Job(SET_MODE, lambda: robot.set_hand_teaching_mode(False, **arm))
-            with contextlib.suppress(DeviceTimeout):  # the lane hangs; the arm is not movable any more either way
+            with contextlib.suppress(DeviceTimeout):  # the lane hangs, but the arm has left the mode anyway
                 lane.submit(job)
-                self._clock.after(RENEWED_WITHIN, lambda: lane.expire(job, RENEWED_WITHIN))
+                self._clock.after(DRIVER_TIMEOUT, lambda: lane.expire(job, DRIVER_TIMEOUT))
         self._post(m.HandTeachingEnded(device.id, error_data(error, device.id), arm.get("arm_id")))
 
     def end(self, hold: _Hold, error: Arcor2Error | None) -> None:
-        """Stop the robot, then report it; `error` is the reason, None when the button was released."""
+        """Stop the robot and report the end of the hold. `error`: the reason, None if the button was released."""
         with self._lock:
             if hold.ending:
                 return
             hold.ending, hold.error = True, error
             self._teaching.set(hold.device, hold.arm, False)
-            numbers, hold.unanswered = hold.unanswered, []
+            numbers, hold.lease_ids = hold.lease_ids, []
         why = error or Cancelled("{name} was let go", name=hold.device.name)
         for number in numbers:
             self._post(m.CallFailed(number, error_data(why, hold.device.id)))
         if hold.kind is HoldKind.JOG:
-            self._calls.stop(hold.device, lambda _, problem: self._at_rest(hold, problem))
+            self._calls.stop(hold.device, lambda _, problem: self._report_end(hold, problem))
         else:
-            self._stiffen(hold)
+            self._end_hand_teaching(hold)
 
-    def _stiffen(self, hold: _Hold) -> None:
-        """Make the arm stiff, behind the call that may be making it movable; by a stop where that does not do."""
+    def _end_hand_teaching(self, hold: _Hold) -> None:
+        """Switch hand teaching off after the calls in progress. If that fails, stop the robot."""
         device, lane = hold.device, hold.device.lane
         robot = device.instance
         assert isinstance(robot, Robot)
 
         def done(job: Job) -> None:
             if job.error is None:
-                self._at_rest(hold, None)
+                self._report_end(hold, None)
             else:
                 problem = job.error
-                self._calls.stop(device, lambda _, other: self._at_rest(hold, problem if other else None))
+                self._calls.stop(device, lambda _, other: self._report_end(hold, problem if other else None))
 
         job = Job(SET_MODE, lambda: robot.set_hand_teaching_mode(False, **hold.arm), notify=done)
         try:
@@ -230,19 +228,19 @@ class Holds:
         except DeviceTimeout as error:
             job.finish(None, error)
             return
-        self._clock.after(RENEWED_WITHIN, lambda: lane.expire(job, RENEWED_WITHIN))
+        self._clock.after(DRIVER_TIMEOUT, lambda: lane.expire(job, DRIVER_TIMEOUT))
 
-    def _at_rest(self, hold: _Hold, problem: BaseException | None) -> None:
+    def _report_end(self, hold: _Hold, problem: BaseException | None) -> None:
         device = hold.device
         error = hold.error if problem is None else describe(device, problem)
         with self._lock:
             self._ended[device.id] = hold.number
             if self._held.get(device.id) is hold:
                 del self._held[device.id]
-            let_go, hold.let_go = hold.let_go, []
-        told = None if error is None else error_data(error, device.id)
-        self._post(m.HoldEnded(device.id, hold.number, told))
-        for number in let_go:
+            release_ids, hold.release_ids = hold.release_ids, []
+        reported = None if error is None else error_data(error, device.id)
+        self._post(m.HoldEnded(device.id, hold.number, reported))
+        for number in release_ids:
             if problem is None:
                 self._post(m.CallDone(number))
             else:

@@ -1,7 +1,8 @@
-"""The cell host: the one process that owns the device instances of a scene or of a program's run.
+"""The cell host: the only process that owns the device instances of a scene or of a program run.
 
-Started by the server with one end of a socket pair (`--fd N`). The main thread runs the script, so that a signal can
-interrupt whatever the script waits for; one thread reads, one writes, one keeps the time, each device has its lanes.
+The server starts it with one end of a socket pair (`--fd N`). The main thread runs the script, so that a signal can
+interrupt whatever the script waits for. One thread reads messages, one writes them, and one runs timers. Each device
+has its lanes.
 """
 
 import argparse
@@ -39,22 +40,22 @@ from arcor2_hw.runtime.streaming import RatedStreams, Streams
 from arcor2_hw.runtime.teaching import TEACHING_PERIOD, Teaching
 from arcor2_hw.runtime.watch import OBSERVE_PERIOD, Watch
 
-GONE_WITHIN: Final = 1.8
-"""Seconds from the loss of the server to the end of this process, even if a call hangs."""
-NUDGE_PERIOD: Final = 0.1
-"""Seconds between two interruptions of a script that does not end although it is stopped."""
-LOST_WITHIN: Final = 5.0
-"""Seconds that a script has to end when it is stopped because a device is lost."""
-ROOM_WITHIN: Final = 1.0
-"""Seconds that an event of the program waits for a slow server."""
-AHEAD: Final = -5
-"""Requested niceness: processes that own devices run before those of user interfaces."""
-FLUSH: Final = 0.3
-"""Seconds for the last messages."""
+EXIT_TIMEOUT: Final = 1.8
+"""Time from the end of the server to the exit of this process, even if a call hangs, s."""
+INTERRUPT_PERIOD: Final = 0.1
+"""Period at which a script that does not end after a stop is interrupted, s."""
+SCRIPT_END_TIMEOUT: Final = 5.0
+"""Time that a script has to end after the connection of a device is lost, s."""
+EVENT_WAIT: Final = 1.0
+"""Longest time that an event of the program waits for a slow server, s."""
+NICENESS: Final = -5
+"""Niceness of this process: devices have priority over user interfaces."""
+FLUSH_TIMEOUT: Final = 0.3
+"""Time to send the last messages, s."""
 
 
 class _LogHandler(logging.Handler):
-    """Sends what drivers and scripts log to the server."""
+    """Send the log records of drivers and scripts to the server."""
 
     def __init__(self, link: Link) -> None:
         super().__init__()
@@ -65,7 +66,7 @@ class _LogHandler(logging.Handler):
 
 
 class Host:
-    """One scene or one run, from the first message to the exit."""
+    """Serve one scene or one program run, from the first message to the exit."""
 
     def __init__(self, sock: socket.socket) -> None:
         self.link = Link(sock)
@@ -80,8 +81,8 @@ class Host:
         self._holds = Holds(lambda: self._cell, self.link.post, self.clock, self._calls, self._teaching)
         self._streams = Streams(self.link.post_stream)
         self._rated = RatedStreams(lambda: self._cell, self.clock, self._streams)
-        self._watch = Watch(self._cell, self.link.post, self._lost)
-        self._leaving = threading.Event()
+        self._watch = Watch(self._cell, self.link.post, self._device_lost)
+        self._shutting_down = threading.Event()
         self._stop_requested = threading.Event()
         self._scene: m.OpenScene | None = None
         self._retrying = threading.Lock()
@@ -90,16 +91,16 @@ class Host:
         wake_up.setblocking(False)
         signal.set_wakeup_fd(wake_up.detach(), warn_on_full_buffer=False)
         signal.signal(signal.SIGTERM, lambda *_: None)  # arrives on the wake-up socket: the reader acts
-        signal.signal(signal.SIGUSR1, self._interrupted)
+        signal.signal(signal.SIGUSR1, self._on_interrupt)
 
     # -------------------------------------------------------------------------------- main thread
     def run(self) -> int:
-        """Serve until the scene is closed or the program has ended; return the exit status."""
+        """Serve until the scene is closed or the program has ended, and return the exit status."""
         logging.basicConfig(level=logging.INFO, format="%(name)s: %(message)s", handlers=[_LogHandler(self.link)])
         logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs every request, and drivers poll
         self.clock.every(m.HEARTBEAT_PERIOD, lambda: self.link.post(m.Heartbeat()))
         self.clock.every(OBSERVE_PERIOD, lambda: self._watch.check_all())
-        self.clock.every(NUDGE_PERIOD, self._nudge)
+        self.clock.every(INTERRUPT_PERIOD, self._interrupt_script)
         self.clock.every(TEACHING_PERIOD, self._teaching.check_all)
         self.clock.start()
         self.link.post(m.Ready(os.getpid()))
@@ -121,15 +122,15 @@ class Host:
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, ValueError):
                 stream.flush()
-        self.link.close(FLUSH)
+        self.link.close(FLUSH_TIMEOUT)
         return status
 
     def _open_scene(self, message: m.OpenScene) -> bool:
-        """Open the scene; return False when the host has to exit."""
+        """Open the scene. Return False if the host has to exit."""
         fault: SceneFault | None = None
         self._scene = message
         self._cell.assets = message.assets
-        failed = self._missing if message.keep_going else None
+        failed = self._skip_object if message.keep_going else None
         try:
             self._types = write_sources(message.types)
             self._cell.open(scene_recipes(message, failed), failed)
@@ -137,9 +138,9 @@ class Host:
             fault = caught
         except Arcor2Error as error:
             fault = SceneFault("", error)
-        except ProgramStopped:  # closed, or the server gone, while objects were coming up
+        except ProgramStopped:  # the scene was closed, or the server ended, while the objects were connecting
             return True
-        except Exception as error:  # noqa: BLE001 - whatever a type does when it is loaded
+        except Exception as error:  # noqa: BLE001 - loading an object type may raise anything
             fault = SceneFault(
                 "", Arcor2Error("{type}: {reason}", traceback_text(error), type=type(error).__name__, reason=error)
             )
@@ -147,23 +148,23 @@ class Host:
             self._cell.close()
             self.link.post(m.SceneFailed(error_data(fault.error, fault.object_id)))
             return False
-        for device in self._cell:  # clients know how each device is when they learn that the scene is online
+        for device in self._cell:  # clients receive the state of each device before the scene is online
             self._watch.check_connection(device)
         self.link.post(m.SceneOpened())
         self.clock.every(message.streaming_period if message.streaming_period > 0 else 0.1, self._stream_subscribed)
         return True
 
-    def _missing(self, fault: SceneFault) -> None:
-        """Continue without an object."""
+    def _skip_object(self, fault: SceneFault) -> None:
+        """Continue without an object that could not be created or connected."""
         self._cell.mark_absent(fault)
         self._watch.report(fault.object_id, Connection.FAILED, str(fault.error))
 
     def _retry(self, message: m.RetryObject) -> None:
-        """Create and connect an object again. On its own thread, because loading its type may take long."""
+        """Create and connect an object again. Runs on its own thread, because loading the type may take long."""
         object_id = message.object_id
         try:
             assert self._scene is not None
-            self._cell.require_failed(object_id)
+            self._cell.require_failure(object_id)
             if not self._retrying.acquire(blocking=False):
                 raise Refused("another object is being retried: wait for that")
             try:
@@ -171,11 +172,11 @@ class Host:
                 (recipe,) = scene_recipes(self._scene, only=object_id)
                 self._cell.retry(recipe)
             except SceneFault as fault:
-                self._missing(fault)
+                self._skip_object(fault)
                 raise fault.error from fault
             finally:
                 self._retrying.release()
-        except Exception as error:  # noqa: BLE001 - whatever a type does when it is loaded
+        except Exception as error:  # noqa: BLE001 - loading an object type may raise anything
             self.link.post(m.CallFailed(message.id, error_data(error, object_id)))
             return
         self._watch.check_connection(self._cell[object_id])
@@ -183,7 +184,7 @@ class Host:
 
     def _close_scene(self) -> None:
         active = (
-            self._leaving.is_set()
+            self._shutting_down.is_set()
             or self._holds.any
             or any(device.lane.busy_with or device.moving for device in self._cell)
         )
@@ -198,16 +199,16 @@ class Host:
             start_paused=message.start_paused,
             breakpoints=frozenset(message.breakpoints),
             shared_breakpoints=frozenset(message.shared_breakpoints),
-            here=message.cell,
+            cell_file=message.cell,
             secrets=message.secrets,
         )
         self._cell = program.cell
         self._cell.assets, self._cell.updates = message.assets, self._updates
-        self._watch = Watch(program.cell, self.link.post, self._lost)
+        self._watch = Watch(program.cell, self.link.post, self._device_lost)
         program.inside = True
         self.program = program
         set_current(program)
-        if self._leaving.is_set() or self._stop_requested.is_set():
+        if self._shutting_down.is_set() or self._stop_requested.is_set():
             self._stop_program()
         if message.streaming_period > 0:
             self.clock.every(message.streaming_period, self._stream_all)
@@ -228,7 +229,7 @@ class Host:
         if program.error is not None and not (handled and isinstance(program.error, Arcor2Error)):
             _save_traceback(directory, program.error)
         problem = program.settle(failed)
-        self._calls.settle()  # before the devices it asks are closed
+        self._calls.settle()  # before the devices are closed
         problem = program.cell.close() or problem
         why = program.error or problem
         self.link.post(
@@ -237,8 +238,8 @@ class Host:
 
     # -------------------------------------------------------------------------------- channel of the program
     def event(self, name: str, encoded: bytes, number: int = 0, action: str = "", time: float = 0.0) -> None:
-        """Pass on an encoded event of the program, which waits a little for a server that does not keep up."""
-        self.link.wait_for_room(ROOM_WITHIN)
+        """Send an encoded event of the program. Wait up to EVENT_WAIT for a server that does not keep up."""
+        self.link.wait_for_room(EVENT_WAIT)
         self.link.post(m.ProgramEvent(name, encoded, number, action, time))
 
     def changed(self, state: str) -> None:
@@ -246,7 +247,7 @@ class Host:
         self.link.post(m.ProgramChanged(state))
 
     def action_over(self, number: int, duration: float, error: str) -> None:
-        """Report the end of an action that has no event."""
+        """Report the end of an action for which there is no event."""
         self.link.post(m.ActionFailed(number, duration, error))
 
     # -------------------------------------------------------------------------------- reader thread
@@ -254,19 +255,19 @@ class Host:
         try:
             for message in self.link.messages(self._wake):
                 self._handle(message)
-        except (msgspec.MsgspecError, ValueError) as error:  # the stream is out of step: as good as lost
+        except (msgspec.MsgspecError, ValueError) as error:  # the next messages cannot be read either
             self.link.post(m.LogLine("error", f"the server sent what is no message: {error}"))
-        self._leave()
+        self._shut_down()
 
     def _handle(self, message: m.HostBound) -> None:
         match message:
             case m.OpenScene() | m.RunPackage():
-                for body in message.bodies:  # at once: what follows may change them
+                for body in message.bodies:  # at once, because later messages may change them
                     self._updates.put(body)
                 for object_id, calibration in message.calibrations.items():
                     self._updates.calibrate(object_id, calibration)
                 self._work.put(message)
-            case m.PutBody():
+            case m.AddBody():
                 self._updates.put(message.body)
             case m.RemoveBodies():
                 self._updates.remove(message.ids)
@@ -280,14 +281,14 @@ class Host:
             case m.StopMotion():
                 self._calls.stop_motion(message)
             case m.StopAll():
-                self._calls.stop_all(message, self.program)  # first: a program that has ended waits for the answer
+                self._calls.stop_all(message, self.program)  # first, because a program that ends waits for this answer
                 self._stop_program()
             case m.Lease():
                 self._holds.lease(message)
             case m.RetryObject():
                 threading.Thread(target=self._retry, args=(message,), name="retry", daemon=True).start()
             case m.Stream():
-                self._rated.want(message)
+                self._rated.set_rates(message)
             case m.Subscribe():
                 self._subscribed[message.object_id] = message
             case m.StopProgram():
@@ -301,33 +302,33 @@ class Host:
     def _stopping(self, device: Device) -> None:
         self._holds.stopping(device)
 
-    def _leave(self) -> None:
-        """Stop motion, disconnect and exit in bounded time, because the server has ended or requested it."""
-        watchdog = threading.Timer(GONE_WITHIN, os._exit, (3,))
+    def _shut_down(self) -> None:
+        """Stop motion, disconnect and exit within EXIT_TIMEOUT, because the server has ended or sent SIGTERM."""
+        watchdog = threading.Timer(EXIT_TIMEOUT, os._exit, (3,))
         watchdog.daemon = True
         watchdog.start()
-        self._leaving.set()
+        self._shutting_down.set()
         self._cell.stop_all()
         self._stop_program()
         self._cell.abandon()
         self._work.put(m.CloseScene())
 
     def _stop_program(self) -> None:
-        self._stop_requested.set()  # before the check: a program that is just being created sees one or the other
+        self._stop_requested.set()  # before the check, so that a program that is being created is stopped too
         if self.program is not None and not self.program.stop_requested:
             self.program.stop()
-            self._nudge()
+            self._interrupt_script()
 
-    def _lost(self, device: Device, reason: str) -> None:
-        """End the program that works with a device that is lost; a scene that is online goes on without it."""
+    def _device_lost(self, device: Device, reason: str) -> None:
+        """End the program if it needs a device that is lost. An online scene continues without the device."""
         program = self.program
         if program is None or not device.recipe.cls.loss_ends_program or not program.device_lost(device, reason):
             return
-        self._nudge()
-        self.clock.after(LOST_WITHIN, lambda: program.ended or os._exit(4))
+        self._interrupt_script()
+        self.clock.after(SCRIPT_END_TIMEOUT, lambda: program.ended or os._exit(4))
 
     # -------------------------------------------------------------------------------- clock thread
-    def _nudge(self) -> None:
+    def _interrupt_script(self) -> None:
         program = self.program
         if program is not None and program.stop_requested and not program.ended:
             signal.pthread_kill(_MAIN, signal.SIGUSR1)
@@ -344,8 +345,8 @@ class Host:
                 self._streams.send(device, joints=True, eef=True)
 
     # -------------------------------------------------------------------------------- signal handler
-    def _interrupted(self, number: int, frame: types.FrameType | None) -> None:  # noqa: ARG002
-        """Raise ProgramStopped in the script; never inside our own code, which checks by itself."""
+    def _on_interrupt(self, number: int, frame: types.FrameType | None) -> None:  # noqa: ARG002
+        """Raise ProgramStopped in the script, but not in our code, which checks for the stop itself."""
         program = self.program
         if program is not None and program.stop_requested and not program.inside and not program.ended:
             raise ProgramStopped
@@ -366,7 +367,7 @@ def _execute(directory: Path, program: Program) -> None:
     code = compile(script.read_bytes(), str(script), "exec")
     try:
         program.inside = False
-        exec(code, module.__dict__)  # noqa: S102 - running the program is what this process is for
+        exec(code, module.__dict__)  # noqa: S102 - this process exists to run the script
     finally:
         program.inside = True
 
@@ -378,14 +379,14 @@ def _save_traceback(directory: Path, error: BaseException) -> None:
 
 
 def main() -> None:
-    """Serve the socket that was inherited as `--fd`, then end the process, whatever threads are left."""
-    parser = argparse.ArgumentParser(description="Owns the devices of a scene. Started by the server.")
-    parser.add_argument("--fd", type=int, required=True, help="the inherited socket to the server")
+    """Serve the socket inherited as `--fd`, then end the process even if threads still run."""
+    parser = argparse.ArgumentParser(description="Run the devices of a scene. The server starts this process.")
+    parser.add_argument("--fd", type=int, required=True, help="inherited socket to the server")
     options = parser.parse_args()
     faulthandler.enable()
-    with contextlib.suppress(OSError):  # a service needs LimitNICE for it, and a desktop does without
-        os.setpriority(os.PRIO_PROCESS, 0, AHEAD)
-    sys.setswitchinterval(0.0005)  # a script that computes must not keep a stop waiting
+    with contextlib.suppress(OSError):  # not permitted without LimitNICE in the service file
+        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
+    sys.setswitchinterval(0.0005)  # a script that computes must not delay a stop
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(line_buffering=True, errors="backslashreplace")

@@ -14,12 +14,12 @@ _on_lane = threading.local()
 
 
 def on_any_lane() -> bool:
-    """Return whether the current thread is a lane's: what it calls is part of another call."""
+    """Return whether this is the thread of a lane, so that what it calls is part of another call."""
     return getattr(_on_lane, "here", False)
 
 
 class Job:
-    """One call. It ends once: when the lane has run it, at its deadline, or when its caller gives it up."""
+    """One call. It ends exactly once: when it returns, at its deadline, or when its caller gives it up."""
 
     __slots__ = (
         "_claim",
@@ -64,7 +64,7 @@ class Job:
         return self._claim.locked()
 
     def finish(self, value: Any = None, error: BaseException | None = None) -> bool:
-        """End the call; return False if it had ended already, so that this answer is dropped."""
+        """End the call with a result or an error. Return False if it had ended before, so that these are dropped."""
         if not self._claim.acquire(blocking=False):
             return False
         self.value = value
@@ -75,15 +75,15 @@ class Job:
         return True
 
     def give_up(self, error: BaseException) -> bool:
-        """End the call without waiting for its answer."""
-        self.given_up = True  # before `finish`: at the end of the call the lane already refuses further ones
+        """End the call with an error without waiting until it returns. Return False if it had ended before."""
+        self.given_up = True  # before `finish`, so that the lane refuses calls made by `notify`
         if self.finish(None, error):
             return True
         self.given_up = False
         return False
 
     def wait(self, timeout: float | None) -> bool:
-        """Wait for the end, at most `timeout` s; return False on timeout."""
+        """Wait until the call has ended, at most `timeout` s. Return False on timeout."""
         if self._gate.acquire(timeout=-1 if timeout is None else max(timeout, 0.0)):
             self._gate.release()
             return True
@@ -97,17 +97,17 @@ class Job:
 
 
 class Lane:
-    """Runs the calls of one device on one thread.
+    """Run the calls of one device on one thread.
 
-    A call that is not back at its deadline fails with DeviceTimeout, its late answer is dropped, and until the thread
-    is back every further call is refused at once, naming what the device is still busy with.
+    A call that has not returned at its deadline fails with DeviceTimeout, and its result is dropped. Until it returns,
+    the lane hangs and refuses further calls at once.
     """
 
     def __init__(self, device: str, purpose: str = "") -> None:
         self.device = device
         self._queue: SimpleQueue[Job | None] = SimpleQueue()
         self._current: Job | None = None
-        self._epoch = 0  # counts the stops: a call from before one is cancelled
+        self._epoch = 0  # number of stops so far; a call that was queued before a stop is cancelled
         self._thread = threading.Thread(target=self._run, name=f"{device} {purpose}".strip(), daemon=True)
         self._thread.start()
 
@@ -120,7 +120,11 @@ class Lane:
         keywords: Mapping[str, Any] = _NO_ARGUMENTS,
         deadline: float | None = None,
     ) -> Any:
-        """Run a call and return its result; DeviceTimeout after `deadline` s. On the lane itself, call it directly."""
+        """Run a call and return its result. On the thread of the lane, call the function directly.
+
+        Raises:
+            DeviceTimeout: The call has not returned after `deadline` s, or the lane hangs.
+        """
         if threading.current_thread() is self._thread:
             return function(*arguments, **keywords)
         job = Job(method, function, arguments, keywords)
@@ -130,7 +134,7 @@ class Lane:
         return job.outcome()
 
     def submit(self, job: Job) -> None:
-        """Queue a call; DeviceTimeout at once when the lane is hung."""
+        """Queue a call. Raises DeviceTimeout if the lane hangs."""
         current = self._current
         if current is not None and current.given_up:
             raise self._hung(current)
@@ -138,7 +142,7 @@ class Lane:
         self._queue.put(job)
 
     def expire(self, job: Job, deadline: float) -> None:
-        """End a call whose deadline has passed, and those that wait behind it."""
+        """End a call whose deadline has passed, and all queued calls."""
         if job is not self._current:
             current = self._current
             busy = "" if current is None else f": the device is busy with {current.method}"
@@ -164,14 +168,14 @@ class Lane:
                 waiting.finish(None, self._hung(job))
 
     def interrupt(self) -> Job | None:
-        """Cancel the waiting calls and mark the running one, which is returned, so that it ends as Cancelled."""
+        """Cancel the queued calls. Mark the running call, so that it ends as Cancelled, and return it."""
         self._epoch += 1
         current = self._current
         self.cancel_waiting()
         return current
 
     def cancel_waiting(self) -> None:
-        """Cancel the calls that have not started."""
+        """Cancel the queued calls."""
         for waiting in self._drain():
             waiting.finish(
                 None,
@@ -179,9 +183,9 @@ class Lane:
             )
 
     def check_wanted(self) -> None:
-        """Raise Cancelled if the running call was stopped or given up. To be called on the lane, before it acts.
+        """Raise Cancelled if the running call was stopped or given up. A call uses it before it commands the device.
 
-        The time from which a command may overtake a stop starts anew.
+        This also restarts the time in which a command may reach the device after a stop.
         """
         job = self._current
         if job is None:
@@ -193,28 +197,28 @@ class Lane:
     # -------------------------------------------------------------------------------- state
     @property
     def current(self) -> Job | None:
-        """Return the running call; None when there is none."""
+        """Return the running call, or None if the lane is idle."""
         return self._current
 
     @property
     def busy_with(self) -> str:
-        """Return the name of the running method; empty when there is none."""
+        """Return the name of the running method; empty if the lane is idle."""
         current = self._current
         return "" if current is None else current.method
 
     @property
     def hung(self) -> bool:
-        """Return whether a call that was given up is still running."""
+        """Return whether a call that was given up has not returned."""
         current = self._current
         return current is not None and current.given_up
 
     def close(self) -> None:
-        """End the thread after the running call, and cancel the waiting calls."""
+        """Cancel the queued calls and end the thread after the running call."""
         self.interrupt()
         self._queue.put(None)
 
     def join(self, timeout: float) -> bool:
-        """Wait until the thread has ended after `close`; return False on timeout."""
+        """Wait until the thread has ended after `close`, at most `timeout` s. Return False on timeout."""
         self._thread.join(timeout)
         return not self._thread.is_alive()
 
@@ -247,7 +251,7 @@ class Lane:
         _on_lane.here = True
         while (job := self._queue.get()) is not None:
             job.since = time.monotonic()
-            self._current = job  # before the check whether it has ended, so that its deadline finds it here
+            self._current = job  # before the check, so that `expire` on another thread sees it
             if job.ended or job.epoch != self._epoch:
                 self._current = None
                 job.finish(
@@ -259,7 +263,7 @@ class Lane:
             error: BaseException | None = None
             try:
                 value = job.function(*job.arguments, **job.keywords)
-            except BaseException as caught:  # noqa: BLE001 - whatever a driver raises belongs to its caller
+            except BaseException as caught:  # noqa: BLE001 - the caller receives every error
                 error = caught
             if job.epoch != self._epoch and not isinstance(error, Arcor2Error):
                 error = Cancelled(

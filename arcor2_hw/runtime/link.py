@@ -1,4 +1,4 @@
-"""The host's end of the socket to the server: a writing thread, and a reader that signals can wake."""
+"""The cell host's end of the socket to the server: a writer thread, and a reader that signals can wake."""
 
 import select
 import signal
@@ -20,16 +20,16 @@ from arcor2_hw.runtime.messages import (
 )
 
 STREAM_BACKLOG: Final = 1000
-"""Number of messages waiting for a slow server above which streamed values are dropped."""
+"""Number of queued messages above which streamed values are dropped."""
 BACKLOG: Final = 4096
-"""Number of messages waiting for a slow server above which a program waits before its next event."""
+"""Number of queued messages above which a program waits before its next event."""
 _CHUNK: Final = 1 << 18
-_LOOK: Final = 0.002
-"""Seconds between two checks of the number of waiting messages."""
+_ROOM_POLL: Final = 0.002
+"""Period at which the number of queued messages is checked, s."""
 
 
 class Link:
-    """Messages to and from the server."""
+    """Send messages to the server and receive its messages."""
 
     def __init__(self, sock: socket.socket) -> None:
         self._socket = sock
@@ -41,24 +41,24 @@ class Link:
 
     # -------------------------------------------------------------------------------- out
     def post(self, message: ToServer) -> None:
-        """Send a message; never blocks, never raises."""
+        """Queue a message. Does not block or raise."""
         self._outbox.put(message)
 
     def post_stream(self, message: StreamEvent) -> None:
-        """Send a value that a newer one replaces; drop it when the server does not read."""
+        """Queue a streamed value, or drop it if the server does not keep up."""
         if self._outbox.qsize() < STREAM_BACKLOG:
             self._outbox.put(message)
 
     def wait_for_room(self, timeout: float) -> None:
-        """Wait while too many messages are waiting, at most `timeout` s: a hanging server does not stop a program."""
+        """Wait while the queue is too long, at most `timeout` s, so that a hanging server does not block a program."""
         if self._outbox.qsize() < BACKLOG:
             return
         deadline = time.monotonic() + timeout
         while self._outbox.qsize() >= BACKLOG and time.monotonic() < deadline:
-            time.sleep(_LOOK)
+            time.sleep(_ROOM_POLL)
 
     def close(self, timeout: float) -> None:
-        """Send the waiting messages; give up when the server reads nothing for `timeout` s."""
+        """Send the queued messages. Return early if the server reads nothing for `timeout` s."""
         self._outbox.put(None)
         sent = -1
         while self._writer.is_alive() and sent != self._sent:
@@ -84,13 +84,13 @@ class Link:
                     self._socket.sendall(b"".join(batch))
                     self._sent += len(batch)
                 except OSError:
-                    alive = False  # the reader notices it too; further messages are dropped
+                    alive = False  # the reader ends too; further messages are dropped
             if last:
                 return
 
     # -------------------------------------------------------------------------------- in
     def messages(self, wake: socket.socket) -> Iterator[HostBound]:
-        """Yield the messages of the server, until it closes the connection or SIGTERM arrives on `wake`."""
+        """Yield the messages of the server until it closes the connection or SIGTERM arrives on `wake`."""
         buffer = bytearray()
         poll = select.poll()
         poll.register(self._socket, select.POLLIN)
@@ -108,10 +108,10 @@ class Link:
                 if not chunk:
                     return
                 buffer += chunk
-                yield from _take(buffer)
+                yield from _take_messages(buffer)
 
 
-def _take(buffer: bytearray) -> Iterator[Any]:
+def _take_messages(buffer: bytearray) -> Iterator[Any]:
     """Remove all complete messages from the start of a buffer and yield them."""
     while len(buffer) >= PREFIX_SIZE:
         end = PREFIX_SIZE + body_length(bytes(buffer[:PREFIX_SIZE]))

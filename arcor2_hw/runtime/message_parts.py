@@ -6,11 +6,12 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectModel
 
 
-class PutIn(Struct, frozen=True):
-    """Something that stands in the way beside the objects of the scene.
+class AddedBody(Struct, frozen=True):
+    """An obstacle that is not an object of the scene, or a part that a robot holds.
 
-    pose: in the world, or in the frame of the link that holds it. scale: of a mesh, whose file is `file`. robot: the id
-    of the object that holds it with `link`, empty when nobody does; it may touch the links `touching`, too.
+    pose: in the world, or in the frame of the link that holds the part. scale: of a mesh, whose file is `file`. robot:
+    id of the robot that holds the part with `link`; empty for an obstacle. touching: further links that the part may
+    touch.
     """
 
     id: str
@@ -24,7 +25,7 @@ class PutIn(Struct, frozen=True):
 
 
 class HeldPart(Struct, frozen=True):
-    """A part that a link of a robot holds, pose in the frame of that. model: None for an object of the scene."""
+    """A part that a link of a robot holds. pose: in the frame of the link. model: None for an object of the scene."""
 
     name: str
     link: str
@@ -35,7 +36,7 @@ class HeldPart(Struct, frozen=True):
 class DeviceStop(Struct, frozen=True):
     """The result of a stop on one device.
 
-    reason: why it was not stopped, empty when it was. method: the call that ran when the stop came, empty for none.
+    reason: why the device was not stopped; empty if it was. method: the call that the stop interrupted; empty for none.
     """
 
     object_id: str

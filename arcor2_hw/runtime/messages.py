@@ -1,6 +1,6 @@
-"""What server and cell host say to each other: one tagged union per direction, length-prefixed msgpack.
+"""Messages between server and cell host: one tagged union per direction, msgpack with a length prefix.
 
-Arguments and results of calls travel as JSON documents in bytes, exactly as they stand in scenes, projects and events.
+Arguments and results of calls are JSON documents in bytes, exactly as in scenes, projects and events.
 """
 
 from typing import Any, Final, Literal
@@ -18,19 +18,20 @@ from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.framing import PREFIX_SIZE as PREFIX_SIZE
+from arcor2_hw.runtime.message_parts import AddedBody as AddedBody
 from arcor2_hw.runtime.message_parts import DeviceStop as DeviceStop
 from arcor2_hw.runtime.message_parts import HeldPart as HeldPart
-from arcor2_hw.runtime.message_parts import PutIn as PutIn
 
 MAX_MESSAGE: Final = 64 * 1024 * 1024
+"""Maximum length of a message, bytes."""
 HEARTBEAT_PERIOD: Final = 0.25
-"""Seconds between two heartbeats of the host."""
+"""Period of the heartbeats of the host, s."""
 SILENCE_LIMIT: Final = 1.0
-"""Seconds without a word after which the host is reported as not answering."""
+"""Time without a message after which the host is reported as not answering, s."""
 
 
 class ErrorData(Struct, frozen=True):
-    """An error as it crosses the process border: the code of its class, and the device to blame."""
+    """An error on its way between processes: code and name of its class, texts, and the device that raised it."""
 
     code: str
     type: str
@@ -40,7 +41,7 @@ class ErrorData(Struct, frozen=True):
 
 
 class TypeCode(Struct, frozen=True):
-    """How the host gets at an object type: entry point ("module:Class") if installed, else module and source."""
+    """Where the host finds an object type: entry point ("module:Class") if installed, else module and source code."""
 
     name: str
     entry_point: str = ""
@@ -50,16 +51,15 @@ class TypeCode(Struct, frozen=True):
 
 # ------------------------------------------------------------------------------------------------ server to host
 class ToHost(Struct, frozen=True, tag=True):
-    """Base of everything the server says."""
+    """Base of the messages from the server to the host."""
 
 
 class OpenScene(ToHost, frozen=True):
-    """Create and connect all objects at once. Answer: SceneOpened or SceneFailed.
+    """Create and connect all objects concurrently. Answer: SceneOpened or SceneFailed.
 
-    keep_going: an object that cannot be made or connected is told as failed by DeviceChanged, and the others come up.
-    assets: files of the meshes and of robots' models that were uploaded, by id. bodies: what stands in the way besides.
-    calibrations: kinematics of robots as their controllers told them, by id. secrets: values of secret settings by
-    the id of the object.
+    keep_going: whether the scene opens without objects that cannot be created or connected; DeviceChanged reports them.
+    assets: files of uploaded meshes and robot models, by id. bodies: obstacles that are not objects of the scene.
+    calibrations: kinematics read from robot controllers, by object id. secrets: secret settings, by object id.
     """
 
     scene: Scene
@@ -70,23 +70,23 @@ class OpenScene(ToHost, frozen=True):
     project: Project | None = None
     keep_going: bool = False
     assets: dict[str, str] = field(default_factory=dict)
-    bodies: list[PutIn] = field(default_factory=list)
+    bodies: list[AddedBody] = field(default_factory=list)
     calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
     secrets: dict[str, ObjectSecrets] = field(default_factory=dict)
 
 
 class RetryObject(ToHost, frozen=True):
-    """Make and connect an object anew that has failed. Answer: CallDone or CallFailed with this id."""
+    """Create and connect a failed object again. Answer: CallDone or CallFailed with this id."""
 
     id: int
     object_id: str
 
 
 class RunPackage(ToHost, frozen=True):
-    """Run script.py of a package directory. The script's life is told by ProgramChanged and ProgramEvent.
+    """Run script.py of a package directory. ProgramChanged and ProgramEvent report its progress.
 
-    cell: the settings of devices at this place, which win over those of the package. breakpoints: ids of action points
-    and actions, which must be there. shared_breakpoints: more of them, left out where the project lacks them. assets,
+    cell: settings of devices in this cell, which override those of the package. breakpoints: ids of action points and
+    actions, all of which must exist. shared_breakpoints: further ids; those that the project lacks are ignored. assets,
     bodies, calibrations, secrets: as in OpenScene.
     """
 
@@ -98,35 +98,35 @@ class RunPackage(ToHost, frozen=True):
     cell: Cell | None = None
     shared_breakpoints: list[str] = field(default_factory=list)
     assets: dict[str, str] = field(default_factory=dict)
-    bodies: list[PutIn] = field(default_factory=list)
+    bodies: list[AddedBody] = field(default_factory=list)
     calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
     secrets: dict[str, ObjectSecrets] = field(default_factory=dict)
 
 
-class PutBody(ToHost, frozen=True):
-    """Something stands in the way from now on, in place of what had that id."""
+class AddBody(ToHost, frozen=True):
+    """Add an obstacle, replacing the one with the same id."""
 
-    body: PutIn
+    body: AddedBody
 
 
 class RemoveBodies(ToHost, frozen=True):
-    """What was put in under these ids is gone."""
+    """Remove added obstacles."""
 
     ids: list[str]
 
 
 class Calibrate(ToHost, frozen=True):
-    """Kinematics of a robot are from now on those that its controller told; None: nominal ones."""
+    """Set the kinematics that the controller of a robot reported; None for the nominal kinematics."""
 
     object_id: str
     calibration: KinematicCalibration | None
 
 
 class Call(ToHost, frozen=True):
-    """Call a method on its device's executor. Answer: CallDone or CallFailed with this id.
+    """Call a method of a device. Answer: CallDone or CallFailed with this id.
 
-    control: take control first when it is not ours. cancel: call what the object type says cancels `method`, past what
-    the device is doing. deadline: seconds; None: the method's own.
+    control: whether to take control first. cancel: whether to call the method that cancels `method`, without waiting
+    for the running call. deadline: s; None for the deadline of the method.
     """
 
     id: int
@@ -139,23 +139,20 @@ class Call(ToHost, frozen=True):
 
 
 class StopMotion(ToHost, frozen=True):
-    """Stop one device on its stop lane. Answer: CallDone or CallFailed with this id."""
+    """Stop one device without waiting for its running call. Answer: CallDone or CallFailed with this id."""
 
     id: int
     object_id: str
 
 
 class StopAll(ToHost, frozen=True):
-    """Stop the program, if one runs, and all devices, concurrently.
-
-    Answer: CallDone with this id and a JSON list of DeviceStop.
-    """
+    """Stop the running program and all devices. Answer: CallDone with this id and a JSON list of DeviceStop."""
 
     id: int
 
 
 class Subscribe(ToHost, frozen=True):
-    """Send, or no longer send, joints or end effector poses of a robot at the streaming period."""
+    """Select whether joints and end effector poses of a robot are sent at the streaming period."""
 
     object_id: str
     joints: bool
@@ -163,7 +160,7 @@ class Subscribe(ToHost, frozen=True):
 
 
 class Stream(ToHost, frozen=True):
-    """Send joints and end effector poses of a robot at these rates (Hz) from now on, each with its time."""
+    """Set the rates, Hz, at which joints and end effector poses of a robot are sent with timestamps."""
 
     object_id: str
     joints: list[float]
@@ -171,10 +168,11 @@ class Stream(ToHost, frozen=True):
 
 
 class Lease(ToHost, frozen=True):
-    """Let a robot be moved until a moment of the monotonic clock; 0: let go. The first of a number begins the hold.
+    """Start, renew or end hold-to-run of a robot. Answer: CallDone or CallFailed with this id; at the end HoldEnded.
 
-    Answer: CallDone (`{"scale": fraction of the velocity}`) or CallFailed with this id; at its end, HoldEnded.
-    A jog has either `twist` in the axes of `frame`, or `joints` with rates.
+    hold: number of the hold; the first lease with a number starts it. until: time of the monotonic clock at which the
+    robot is stopped unless the lease is renewed; 0 ends the hold. A jog has either `twist` (m/s, rad/s) in the axes of
+    `frame`, or `joints` with velocities (rad/s, m/s). The value of CallDone is `{"scale": fraction of the velocity}`.
     """
 
     id: int
@@ -194,21 +192,21 @@ class Pause(ToHost, frozen=True):
 
 
 class Resume(ToHost, frozen=True):
-    """Go on."""
+    """Continue the program."""
 
 
 class Step(ToHost, frozen=True):
-    """Go on for one action."""
+    """Continue the program for one action."""
 
 
 class SetBreakpoints(ToHost, frozen=True):
-    """Pause from now on where RunPackage said, and at these shared breakpoints."""
+    """Replace the shared breakpoints. Those of RunPackage remain."""
 
     shared_breakpoints: list[str]
 
 
 class StopProgram(ToHost, frozen=True):
-    """Stop lane of all devices, then an exception in the script."""
+    """Stop all devices, then end the script by an exception."""
 
 
 class CloseScene(ToHost, frozen=True):
@@ -217,53 +215,53 @@ class CloseScene(ToHost, frozen=True):
 
 # ------------------------------------------------------------------------------------------------ host to server
 class ToServer(Struct, frozen=True, tag=True):
-    """Base of everything the host says."""
+    """Base of the messages from the host to the server."""
 
 
 class Ready(ToServer, frozen=True):
-    """The host is up, the common imports are done."""
+    """The host has started and imported the common modules."""
 
     pid: int
 
 
 class Heartbeat(ToServer, frozen=True):
-    """Sent every HEARTBEAT_PERIOD from a thread of its own."""
+    """Sent every HEARTBEAT_PERIOD from the thread of the clock."""
 
 
 class SceneOpened(ToServer, frozen=True):
-    """All objects are there and connected."""
+    """All objects are connected, except those reported by DeviceChanged."""
 
 
 class SceneFailed(ToServer, frozen=True):
-    """An object could not be created or connected; those that could are closed again. The host exits."""
+    """An object could not be created or connected. The host closes the others and exits."""
 
     error: ErrorData
 
 
 class SceneClosed(ToServer, frozen=True):
-    """All objects are closed; `error` when one could not be closed cleanly."""
+    """All objects are closed. `error`: of the first that could not be closed cleanly."""
 
     error: ErrorData | None = None
 
 
 class CallDone(ToServer, frozen=True):
-    """The method returned; `value` is the result as JSON, empty for None."""
+    """The method returned. `value`: the result as JSON, empty for None."""
 
     id: int
     value: bytes = b""
 
 
 class CallFailed(ToServer, frozen=True):
-    """The method raised, was refused or ran out of time."""
+    """The method raised an error, was refused or exceeded its deadline."""
 
     id: int
     error: ErrorData
 
 
 class StreamEvent(ToServer, frozen=True):
-    """RobotJoints or RobotEef of the protocol, as the whole encoded event, for subscribers (or all, from a program).
+    """An encoded RobotJoints or RobotEef event for subscribers, or for all clients while a program runs.
 
-    rate: that of the Stream it is for; 0 at the streaming period.
+    rate: of the Stream to which it belongs, Hz; 0 for the streaming period.
     """
 
     event: str
@@ -273,7 +271,7 @@ class StreamEvent(ToServer, frozen=True):
 
 
 class HoldEnded(ToServer, frozen=True):
-    """A hold has ended and the robot is at rest, or `error` says that it did not obey; None: it was let go."""
+    """A hold has ended. `error`: why the hold ended or the robot did not stop; None if the user released the button."""
 
     object_id: str
     hold: int
@@ -281,10 +279,10 @@ class HoldEnded(ToServer, frozen=True):
 
 
 class ProgramEvent(ToServer, frozen=True):
-    """PackageInfo, ActionStateBefore, ActionStateAfter, ProjectException: the whole encoded event.
+    """An encoded event: PackageInfo, ActionStateBefore, ActionStateAfter or ProjectException.
 
-    Of actions, `number` counts their calls from 1; `name` is the action's, else what is called. `time`: with
-    ActionStateBefore when it was told, s since the epoch; with ActionStateAfter how long the action took, s.
+    number: counts the calls of actions from 1. name: of the action, or device and method if it has no name. time: start
+    of the action, s since the epoch (ActionStateBefore); its duration, s (ActionStateAfter).
     """
 
     event: str
@@ -295,9 +293,9 @@ class ProgramEvent(ToServer, frozen=True):
 
 
 class ActionFailed(ToServer, frozen=True):
-    """An action has ended after `duration` s in a way for which the protocol has no event: by an error.
+    """An action has ended without an event: it failed, or (`error` empty) the project declares no actions.
 
-    Without an error it is one of a program whose project knows no actions. `number`: as in ProgramEvent.
+    number: as in ProgramEvent. duration: s.
     """
 
     number: int
@@ -306,9 +304,9 @@ class ActionFailed(ToServer, frozen=True):
 
 
 class ProgramChanged(ToServer, frozen=True):
-    """The program is now running, pausing, paused, or has ended (`stopped`).
+    """The state of the program: running, pausing, paused, or stopped when it has ended.
 
-    With `stopped`, `finished` tells an end as meant (flow action or end of script), `error` what went wrong.
+    finished: whether the script reached its end or a flow action finished it. error: why it failed.
     """
 
     state: str
@@ -317,7 +315,7 @@ class ProgramChanged(ToServer, frozen=True):
 
 
 class HandTeachingEnded(ToServer, frozen=True):
-    """Hand teaching that was switched on by a call has ended without a request; `error` says why."""
+    """A robot has left hand teaching mode without a request. `error`: the reason."""
 
     object_id: str
     error: ErrorData
@@ -325,9 +323,9 @@ class HandTeachingEnded(ToServer, frozen=True):
 
 
 class DeviceChanged(ToServer, frozen=True):
-    """A device's connection, health, alarms or owner of control changed; `reason` why the connection is lost.
+    """The connection, health, alarms or control owner of a device has changed.
 
-    in_the_way: false for a collision object that is disabled for now. held: the parts that a robot holds.
+    reason: of a lost connection. in_the_way: false for a disabled collision object. held: the parts that a robot holds.
     """
 
     object_id: str
@@ -352,7 +350,7 @@ HostBound = (
     OpenScene
     | RetryObject
     | RunPackage
-    | PutBody
+    | AddBody
     | RemoveBodies
     | Calibrate
     | Call
@@ -392,10 +390,10 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 def encode(message: ToHost | ToServer) -> bytes:
-    """Give a message with its length in front."""
+    """Encode a message with its length prefix."""
     return framing.framed(_encode(message))
 
 
 def body_length(prefix: bytes) -> int:
-    """Read the length prefix; ValueError beyond MAX_MESSAGE."""
+    """Return the length that a prefix declares. Raises ValueError beyond MAX_MESSAGE."""
     return framing.body_length(prefix, MAX_MESSAGE)

@@ -1,4 +1,4 @@
-"""How methods of object types are treated: which only observe, which read memory, which one stops the device."""
+"""Kinds of methods of object types: those that only observe, that do no I/O, and the one that stops the device."""
 
 from collections.abc import Callable
 from typing import Any, Final
@@ -6,10 +6,10 @@ from typing import Any, Final
 from arcor2_hw.objects import Axis, Generic, MultiArmRobot, Robot
 
 OVERTAKES_WITHIN: Final = 0.1
-"""Seconds after the start of a call in which its command may not have reached the device yet."""
+"""Time after the start of a call in which its command may not have reached the device yet, s."""
 
 NO_STOP: Final = (Robot.stop, MultiArmRobot.stop)
-"""Hooks that only raise the not-implemented error."""
+"""Hooks of the base classes that only raise Arcor2NotImplemented."""
 
 OBSERVING: Final = frozenset(
     {
@@ -31,21 +31,21 @@ OBSERVING: Final = frozenset(
         "suctions",
     }
 )
-"""Methods of a robot that are called on its watch lane, so that they are answered while an action runs."""
+"""Methods of a robot that run on its watch lane, so that they return while an action runs."""
 
 PLAIN: Final = frozenset(
     {"id", "name", "settings", "pose", "collision_model", "enabled", "connection", "health", "move_in_progress"}
 )
-"""Properties of the base classes that read memory and do no I/O: they are read on any thread."""
+"""Properties of the base classes that do no I/O. They are read on any thread."""
 
 
 def overrides(cls: type[Generic], name: str) -> bool:
-    """Return whether an object type has its own `name`, instead of the one of Generic."""
+    """Return whether an object type overrides a member of Generic."""
     return getattr(cls, name, None) is not getattr(Generic, name)
 
 
 def stop_of(instance: Generic | None) -> Callable[[], Any] | None:
-    """Return the method that stops a device; None when there is none."""
+    """Return the method that stops a device, or None if it has none."""
     if isinstance(instance, Axis):
         return instance.halt
     found = getattr(instance, "stop", None)

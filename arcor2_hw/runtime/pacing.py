@@ -1,4 +1,4 @@
-"""The gate between the actions of a program: pause, resume, step, breakpoints, stop."""
+"""The gate that every action of a program passes: pause, resume, step, breakpoints, stop."""
 
 import enum
 import threading
@@ -14,93 +14,99 @@ class _Mode(enum.Enum):
 
 
 class Gate:
-    """Every outermost action passes it before it starts and after it has ended.
+    """Hold the threads of a script before and after each action while the program is paused.
 
-    `tell` is called with "paused" once nothing runs any more, and with "running" when it goes on.
-    `settle` waits until nothing moves; it is called without any lock.
+    Args:
+        notify: Called with "paused" when no action runs any more, and with "running" when the program continues.
+        settle: Called before a pause to wait until no device moves. No lock is held.
+        start_paused: Whether to pause before the first action.
+        breakpoints: Ids of actions and action points before which the program pauses.
     """
 
     def __init__(
         self,
-        tell: Callable[[str], None],
+        notify: Callable[[str], None],
         settle: Callable[[], object] = lambda: None,
         *,
         start_paused: bool = False,
         breakpoints: Set[str] = frozenset(),
     ) -> None:
-        self._tell = tell
+        self._notify = notify
         self._settle = settle
         self._breakpoints = breakpoints
         self._mode = _Mode.RUN
         self._steps = 0
-        if start_paused:  # as if a step had just been used up: pause before the next action
+        if start_paused:  # the same state as after a single step
             self._mode = _Mode.STEP
         self._reported = False
-        self._under_way = 0
+        self._running = 0
         self._stopped = False
         self._changed = threading.Condition()
 
     # -------------------------------------------------------------------------------- commands
     def pause(self) -> None:
-        """Let no further action start. "paused" is reported at once when none is running."""
+        """Pause before the next action. Report "paused" at once if no action is running."""
         with self._changed:
             self._mode = _Mode.PAUSE
-            self._tell_paused()
+            self._report_paused()
 
     def resume(self) -> None:
-        """Go on."""
-        self._go(_Mode.RUN)
+        """Continue the program."""
+        self._continue(_Mode.RUN)
 
     def step(self) -> None:
-        """Go on for one action."""
-        self._go(_Mode.STEP)
+        """Continue for one action."""
+        self._continue(_Mode.STEP)
 
     def stop(self) -> None:
-        """Let no action pass any more: present and later callers get ProgramStopped."""
+        """Raise ProgramStopped in all threads that wait at the gate or arrive later."""
         with self._changed:
             self._stopped = True
             self._changed.notify_all()
 
-    def _go(self, mode: _Mode) -> None:
+    def _continue(self, mode: _Mode) -> None:
         with self._changed:
             self._mode = mode
             self._steps = 1
             self._reported = False
-            self._tell("running")
+            self._notify("running")
             self._changed.notify_all()
 
     # -------------------------------------------------------------------------------- actions
     def set_breakpoints(self, breakpoints: Set[str]) -> None:
-        """Pause at other ids from the next action on."""
+        """Replace the breakpoints, from the next action on."""
         with self._changed:
             self._breakpoints = breakpoints
 
     def before(self, ids: Set[str] = frozenset()) -> None:
-        """Wait until an action may start; `ids`: its own, and of its action points. Raises ProgramStopped."""
+        """Wait until an action may start. Raises ProgramStopped.
+
+        ids: of the action and its action points, compared with the breakpoints.
+        """
         with self._changed:
             if (self._mode is _Mode.STEP and not self._steps) or not self._breakpoints.isdisjoint(ids):
                 self._mode = _Mode.PAUSE
             self._wait()
             if self._mode is _Mode.STEP:
                 self._steps = 0
-            self._under_way += 1
+            self._running += 1
 
     def after(self) -> None:
-        """Say that the action has ended, and wait for leave to go on. Raises ProgramStopped."""
+        """Record the end of an action, then wait while the program is paused. Raises ProgramStopped."""
         if self._mode is _Mode.PAUSE:
             self._settle()
         with self._changed:
-            self._under_way -= 1
+            self._running -= 1
             self._wait()
 
     def _wait(self) -> None:
         while self._mode is _Mode.PAUSE and not self._stopped:
-            self._tell_paused()
+            self._report_paused()
             self._changed.wait()
         if self._stopped:
             raise ProgramStopped
 
-    def _tell_paused(self) -> None:
-        if not self._under_way and not self._reported:
+    def _report_paused(self) -> None:
+        if not self._running and not self._reported:
             self._reported = True
-            self._tell("paused")
+            self._notify("paused")

@@ -1,4 +1,4 @@
-"""A package's data on disk, and the places of its action points in the world."""
+"""The data of a package on disk, and its action points in world coordinates."""
 
 import copy
 import sys
@@ -16,13 +16,13 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.runtime.creation import prepare_for_sources
 from arcor2_hw.runtime.documents import read_document
-from arcor2_hw.runtime.program import POINT
+from arcor2_hw.runtime.program import ACTION_POINT_ATTRIBUTE
 
 T = TypeVar("T")
 
 
 def package_name(directory: Path, default: str) -> str:
-    """Return the package's name from package.json; `default` when it has none."""
+    """Return the name of the package from package.json, or `default` if it has none."""
     try:
         return str(msgspec.json.decode((directory / "package.json").read_bytes())["name"])
     except (OSError, msgspec.MsgspecError, KeyError, TypeError):
@@ -53,8 +53,8 @@ class PackageData:
         )
 
 
-class Places:
-    """Action points in the world, worked out once; everything given is a copy that the script may change."""
+class WorldPoints:
+    """Action points in world coordinates, computed once. Methods return copies, which the script may change."""
 
     def __init__(self, scene: Scene, project: Project) -> None:
         index = ProjectIndex(scene, project)
@@ -75,13 +75,13 @@ class Places:
         for parameter in project.parameters:
             self._parameters[parameter.id] = msgspec.json.decode(parameter.value)
 
-    def _marked(self, value: T, item: str) -> T:
+    def _copy_with_point(self, value: T, item: str) -> T:
         found = copy.deepcopy(value)
-        setattr(found, POINT, self._point_of[item])
+        setattr(found, ACTION_POINT_ATTRIBUTE, self._point_of[item])
         return found
 
     def bare_action_point(self, action_point_id: str) -> ActionPoint:
-        """Return an action point as the project has it, with its position in the world."""
+        """Return an action point of the project with its position in world coordinates."""
         try:
             point = self._points[action_point_id]
         except KeyError:
@@ -91,7 +91,7 @@ class Places:
         return msgspec.structs.replace(point, position=self.position(action_point_id), parent=msgspec.UNSET)
 
     def position(self, action_point_id: str) -> Position:
-        """Return the position of an action point in the world."""
+        """Return the position of an action point in world coordinates."""
         try:
             return copy.deepcopy(self._positions[action_point_id])
         except KeyError:
@@ -100,16 +100,16 @@ class Places:
             ) from None
 
     def pose(self, orientation_id: str) -> Pose:
-        """Return the pose in the world of an action point with this orientation."""
+        """Return the world pose of an action point with this orientation."""
         try:
-            return self._marked(self._poses[orientation_id], orientation_id)
+            return self._copy_with_point(self._poses[orientation_id], orientation_id)
         except KeyError:
             raise NotFound("the project has no orientation {orientation_id}", orientation_id=orientation_id) from None
 
     def joints(self, joints_id: str) -> ProjectRobotJoints:
-        """Return joints of an action point."""
+        """Return a joint configuration of an action point."""
         try:
-            return self._marked(self._joints[joints_id], joints_id)
+            return self._copy_with_point(self._joints[joints_id], joints_id)
         except KeyError:
             raise NotFound("the project has no joints {joints_id}", joints_id=joints_id) from None
 
@@ -122,7 +122,7 @@ class Places:
 
 
 def put_on_path(directory: Path) -> None:
-    """Make the package's own modules importable, before everything else of their names; older ones too."""
+    """Make the modules of the package importable. They take precedence over installed modules of the same name."""
     prepare_for_sources()
     path = str(directory)
     if path in sys.path:

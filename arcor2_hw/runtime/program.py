@@ -1,4 +1,4 @@
-"""A running program: how its actions are reported, how it is paused, how it is stopped."""
+"""A running program: reporting of its actions, pause and stop."""
 
 import itertools
 import threading
@@ -28,10 +28,10 @@ from arcor2_hw.runtime.pacing import Gate
 from arcor2_hw.runtime.stopping import SentStop, wait_stopped
 from arcor2_hw.runtime.values import encode_shown, results
 
-POINT: Final = "action_point_id"
-"""The attribute by which a pose knows its action point."""
-STILL_WITHIN: Final = 2.0
-"""Seconds that a device has to come to standstill after the action before a pause."""
+ACTION_POINT_ATTRIBUTE: Final = "action_point_id"
+"""Attribute of a pose with the id of its action point."""
+STANDSTILL_TIMEOUT: Final = 2.0
+"""Time that a device has to come to standstill after the action before a pause, s."""
 
 _encode = msgspec.json.Encoder().encode
 
@@ -40,17 +40,17 @@ class Channel(Protocol):
     """Destination of the events of a program."""
 
     def event(self, name: str, encoded: bytes, number: int = 0, action: str = "", time: float = 0.0) -> None:
-        """Pass on an encoded event; of an action with the number of its call, its name, and a time (ProgramEvent)."""
+        """Send an encoded event. `number`, `action` and `time` describe the call of an action, see ProgramEvent."""
 
     def changed(self, state: str) -> None:
         """Report that the program is running or paused."""
 
     def action_over(self, number: int, duration: float, error: str) -> None:
-        """Report the end of an action that has no event: by an error, or in a project without actions."""
+        """Report the end of an action for which there is no event: it failed, or the project declares no actions."""
 
 
 class Action:
-    """One call of an action. `id` is None in a project that knows no actions."""
+    """One call of an action. `id` is None in a project that declares no actions."""
 
     __slots__ = ("began", "id", "number")
 
@@ -61,7 +61,7 @@ class Action:
 
 
 class Program:
-    """One run. `stop` comes from another thread, all else from the script's threads."""
+    """One run of a program. Another thread calls `stop`; the threads of the script call everything else."""
 
     def __init__(
         self,
@@ -71,33 +71,33 @@ class Program:
         start_paused: bool = False,
         breakpoints: Set[str] = frozenset(),
         shared_breakpoints: Set[str] = frozenset(),
-        here: CellFile | None = None,
+        cell_file: CellFile | None = None,
         secrets: Mapping[str, ObjectSecrets] = MappingProxyType({}),
     ) -> None:
         self.channel = channel
-        self.here = here
-        """The settings of devices at this place, which win over those of the package."""
+        self.cell_file = cell_file
+        """Settings of devices in this cell, which override those of the package."""
         self.secrets = secrets
-        """Values of secret settings by the id of the object."""
+        """Values of the secret settings by object id."""
         self.package_id = package_id
         self.cell = Cell()
         self.breakpoints = frozenset(breakpoints)
         self.gate = Gate(
             channel.changed,
-            lambda: self.cell.wait_still(STILL_WITHIN),
+            lambda: self.cell.wait_standstill(STANDSTILL_TIMEOUT),
             start_paused=start_paused,
             breakpoints=self.breakpoints | shared_breakpoints,
         )
         self.stop_requested = False
         self.ended = False
-        """The script has ended; the devices are being closed, which no stop may interrupt."""
+        """Whether the script has ended. The devices are being closed then, which a stop must not interrupt."""
         self.inside = False
-        """The main thread of the script is in our code, where an asynchronous exception would do harm."""
+        """Whether the main thread runs our code, which an asynchronous exception would leave in an undefined state."""
         self.error: BaseException | None = None
-        self._blamed: tuple[BaseException, Device] | None = None
+        self._error_source: tuple[BaseException, Device] | None = None
         self._failed: tuple[BaseException, Action] | None = None
         self._main = threading.main_thread()
-        self._telling = threading.Lock()
+        self._reporting = threading.Lock()
         self._device_lost = False
         self._stops: list[SentStop] = []
         self._stop_sent = threading.Event()
@@ -107,7 +107,11 @@ class Program:
 
     # -------------------------------------------------------------------------------- the project
     def load(self, project: Project) -> None:
-        """Read the names of actions and points from the project; NotFound for an unknown breakpoint."""
+        """Read the names of actions and points from the project.
+
+        Raises:
+            NotFound: A breakpoint is not at an action or action point of the project.
+        """
         self._action_ids = {a.name: a.id for point in project.action_points for a in point.actions}
         self._joints_points = {j.id: point.id for point in project.action_points for j in point.robot_joints}
         if unknown := self.breakpoints.difference((p.id for p in project.action_points), self._action_ids.values()):
@@ -117,7 +121,7 @@ class Program:
             )
 
     def started(self, info: PackageInfoData) -> None:
-        """Report that all devices are connected and the first action follows."""
+        """Report that all devices are connected and the program starts."""
         self.channel.changed("running")
         self.channel.event("PackageInfo", _encode(Event("PackageInfo", data=info)))
 
@@ -137,20 +141,27 @@ class Program:
         points: set[str] = set()
         for argument in arguments:
             if isinstance(argument, Pose):
-                if (point := argument.__dict__.get(POINT)) is not None:
+                if (point := argument.__dict__.get(ACTION_POINT_ATTRIBUTE)) is not None:
                     points.add(point)
             elif isinstance(argument, ProjectRobotJoints) and (known := self._joints_points.get(argument.id)):
                 points.add(known)
         return points
 
     def set_shared_breakpoints(self, ids: Set[str]) -> None:
-        """Set breakpoints in addition to those that were given at the start."""
+        """Replace the breakpoints that users share. The breakpoints given at the start remain."""
         self.gate.set_breakpoints(self.breakpoints | ids)
 
     def action_begins(self, what: str, name: str | None, arguments: Sequence[Any]) -> Action:
-        """Report that action `name` starts, and wait while the program is paused.
+        """Report that an action starts, and wait while the program is paused.
 
-        Raises InvalidData when the project knows no such action, ProgramStopped.
+        Args:
+            what: Device and method, for messages.
+            name: Name of the action in the project.
+            arguments: Values of the parameters.
+
+        Raises:
+            InvalidData: The project has no such action.
+            ProgramStopped: The program was stopped.
         """
         self.check()
         action_id: str | None = None
@@ -176,7 +187,7 @@ class Program:
         return action
 
     def action_ended(self, action: Action, value: Any) -> None:
-        """Report the result of an action that has ended; wait while the program is paused. Raises ProgramStopped."""
+        """Report the result of an action, then wait while the program is paused. Raises ProgramStopped."""
         duration = time.monotonic() - action.began
         if action.id is None:
             self.channel.action_over(action.number, duration, "")
@@ -187,19 +198,19 @@ class Program:
         self.gate.after()
 
     def action_failed(self, action: Action, error: BaseException) -> None:
-        """Report that an action has ended without a result. Raises ProgramStopped."""
+        """Report that an action has failed, then wait while the program is paused. Raises ProgramStopped."""
         self._failed = error, action
         duration = time.monotonic() - action.began
         self.channel.action_over(action.number, duration, str(error) or type(error).__name__)
         self.gate.after()
 
-    def blame(self, device: Device, error: BaseException) -> None:
-        """Record which device an error came from, so that its report names the device."""
-        self._blamed = error, device
+    def record_error_source(self, device: Device, error: BaseException) -> None:
+        """Record the device that raised an error, so that the report of the error names it."""
+        self._error_source = error, device
 
-    # -------------------------------------------------------------------------------- ends
+    # -------------------------------------------------------------------------------- stop and end
     def stop(self) -> None:
-        """Stop all devices next to any running call, then end the script."""
+        """Stop all devices while their calls run, then end the script."""
         self.stop_requested = True
         self._stops = self.cell.stop_all(ProgramStopped("the program was stopped"))
         self._stop_sent.set()
@@ -207,20 +218,20 @@ class Program:
         self.gate.stop()
 
     def device_lost(self, device: Device, reason: str) -> bool:
-        """Stop because a device is lost; return whether that was necessary."""
+        """Stop the program because the connection of a device is lost. Return whether the program was still running."""
         error = ConnectionLost("{name}: the connection is lost, so the program was stopped", reason, name=device.name)
-        with self._telling:
+        with self._reporting:
             if self.ended or self.stop_requested or self.error is not None:
                 return False
             self._device_lost = True
-            self._tell_exception(describe(device, error))
+            self._report_exception(describe(device, error))
         self.stop()
         return True
 
     def settle(self, failed: bool) -> Arcor2Error | None:
-        """Wait for the stop that was sent; after a failure send it first, so that no device keeps moving.
+        """Wait until all devices have stopped and return the error of the first that has not.
 
-        Return the error of the first device that did not stop.
+        failed: whether the program failed. The stops are sent then, so that no device keeps moving.
         """
         if self.stop_requested:
             self._stop_sent.wait(STOP_DEADLINE)  # the script may end before the stop is sent to the last device
@@ -229,21 +240,21 @@ class Program:
         return wait_stopped(self._stops)
 
     def sent_stops(self) -> list[SentStop]:
-        """Return the stops of a program that is being stopped, once they are sent to all devices."""
+        """Wait until the stops of the program are sent to all devices, and return them."""
         self._stop_sent.wait(STOP_DEADLINE)
         return self._stops
 
     def exception(self, error: BaseException) -> None:
-        """Report an exception that ended the script, once."""
-        with self._telling:
+        """Report the exception that ended the script, unless it was reported before."""
+        with self._reporting:
             if self.error is not error and not self._device_lost:
-                self._tell_exception(error)
+                self._report_exception(error)
 
-    def _tell_exception(self, error: BaseException) -> None:
+    def _report_exception(self, error: BaseException) -> None:
         self.error = error
         text = str(error) or type(error).__name__
-        if self._blamed is not None and self._blamed[0] is error:
-            text = str(describe(self._blamed[1], error))
+        if self._error_source is not None and self._error_source[0] is error:
+            text = str(describe(self._error_source[1], error))
         action_id: str | msgspec.UnsetType = msgspec.UNSET
         if self._failed is not None and self._failed[0] is error and self._failed[1].id is not None:
             action_id = self._failed[1].id
@@ -265,6 +276,6 @@ def current() -> Program | None:
 
 
 def set_current(program: Program | None) -> None:
-    """Say which program `Resources` belongs to."""
+    """Set the program to which `Resources` belongs."""
     global _current
     _current = program

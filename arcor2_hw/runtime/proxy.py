@@ -1,4 +1,4 @@
-"""Objects that a script calls as devices: every call runs on the lane of the device, and actions are reported."""
+"""Proxies of devices for a script: every call runs on the lane of the device, and actions are reported."""
 
 import inspect
 import types
@@ -19,15 +19,15 @@ _PROGRAM = "_arcor2_program"
 
 
 def _bind(bound: Any, arguments: tuple[Any, ...], keywords: Mapping[str, Any]) -> list[Any]:
-    """Return all arguments in the order of the signature, as if they were positional."""
+    """Return the values of all arguments, positional and named, in the order of the signature."""
     try:
         return list(inspect.signature(bound).bind(*arguments, **keywords).arguments.values())
-    except TypeError:  # the call itself raises the better error
+    except TypeError:  # the call itself raises an error with a better message
         return list(arguments)
 
 
 def _plain_call(device: Device, program: Program, name: str, bound: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap a method that is no action."""
+    """Wrap a method that is not an action: it runs on the lane of the device and is not reported."""
     cls = type(device.require())
     if name == "stop" or name in cls.CANCEL_MAPPING.values():
         lane, deadline = device.stop_lane, cast("float | None", STOP_DEADLINE)
@@ -44,7 +44,7 @@ def _plain_call(device: Device, program: Program, name: str, bound: Callable[...
         try:
             return lane.call(name, bound, arguments, keywords, deadline)
         except Exception as error:
-            program.blame(device, error)
+            program.record_error_source(device, error)
             raise
         finally:
             program.inside = False
@@ -53,7 +53,7 @@ def _plain_call(device: Device, program: Program, name: str, bound: Callable[...
 
 
 def _action_call(device: Device, program: Program, name: str, bound: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap an action: the outermost call is reported before and after, and may be paused."""
+    """Wrap an action: it is reported before and after it runs and can be paused, unless another action calls it."""
     lane, deadline = device.lane, deadline_of(bound)
     what = f"{device.name}.{name}"
 
@@ -72,7 +72,7 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
             program.action_failed(action, error)
             if program.stop_requested and isinstance(error, Exception):
                 raise ProgramStopped from error
-            program.blame(device, error)
+            program.record_error_source(device, error)
             raise
         program.action_ended(action, value)
         return value
@@ -96,7 +96,7 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
 
 
 class Proxy:
-    """Represents a device; `isinstance` sees the class of the device."""
+    """Forward attributes and methods to a device. `isinstance` returns the same as for the device itself."""
 
     def __init__(self, device: Device, program: Program) -> None:
         self.__dict__[_DEVICE] = device
@@ -119,7 +119,7 @@ class Proxy:
             return value
         wrap = _plain_call if metadata_of(value) is None else _action_call
         wrapped = wrap(device, program, name, value)
-        self.__dict__[name] = wrapped  # found there the next time, past this method
+        self.__dict__[name] = wrapped  # the next access does not call __getattr__
         return wrapped
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -134,5 +134,5 @@ class Proxy:
 
 
 def proxy(device: Device, program: Program) -> Generic:
-    """Return the object that a script calls as the device."""
+    """Return the proxy of a device for a script."""
     return cast("Generic", Proxy(device, program))

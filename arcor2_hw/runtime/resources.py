@@ -1,4 +1,4 @@
-"""Resources: objects and points for a package's script, of the host's program or, outside a cell host, of its own."""
+"""Resources: the objects and action points that the script of a package uses."""
 
 import types
 from pathlib import Path
@@ -12,21 +12,27 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped
 from arcor2_hw.runtime.cell import SceneFault, recipes
 from arcor2_hw.runtime.creation import find_type, prepare_for_sources
-from arcor2_hw.runtime.package import PackageData, Places, package_name, put_on_path
+from arcor2_hw.runtime.package import PackageData, WorldPoints, package_name, put_on_path
 from arcor2_hw.runtime.program import Program, current
 from arcor2_hw.runtime.proxy import proxy
 from arcor2_hw.runtime.standalone import Standalone
 
-# A script that is run by hand imports this before its object types, which it imports before anything is called here.
+# A script that is run by hand imports this module first, then its object types, and only then calls something here.
 prepare_for_sources()
 
 
 class Resources:
-    """The objects of the scene by id, and the action points in the world.
+    """The objects of the scene by id, and the action points in world coordinates.
 
-    As a context: entering creates and connects the objects, tells PackageInfo, takes control of the devices; leaving
-    closes them. A program that is stopped, or finished by a flow action, leaves the context without an exception.
-    Raises InvalidPackage, NotFound, InvalidData, and what a device raises when it cannot be connected.
+    Entering the context creates and connects the objects, takes control of the devices and publishes PackageInfo.
+    Leaving it closes the devices. A program that was stopped, or finished by a flow action, leaves the context without
+    an exception.
+
+    Raises:
+        InvalidPackage: A document of the package cannot be read.
+        NotFound: The project refers to something that does not exist.
+        InvalidData: A value in the scene or project is not valid.
+        Arcor2Error: A device cannot be connected.
     """
 
     def __init__(self) -> None:
@@ -38,10 +44,10 @@ class Resources:
         self._program: Program = program
         self._directory = Path.cwd() if self._standalone is None else self._standalone.directory
         self.objects: dict[str, Any] = {}
-        """What the script calls, by the id of the scene object. Any: the script annotates each with its own type."""
+        """Proxies of the devices by id of the scene object. Typed Any, because the script annotates each of them."""
         data = PackageData(self._directory)
         self._data = data
-        self._places = Places(data.scene, data.project)
+        self._points = WorldPoints(data.scene, data.project)
         program.load(data.project)
 
     # -------------------------------------------------------------------------------- data
@@ -56,24 +62,24 @@ class Resources:
         return self._data.project
 
     def action_point(self, action_point_id: str) -> ActionPoint:
-        """Return an action point with its position in the world; NotFound."""
-        return self._places.bare_action_point(action_point_id)
+        """Return an action point with its position in world coordinates. Raises NotFound."""
+        return self._points.bare_action_point(action_point_id)
 
     def position(self, action_point_id: str) -> Position:
-        """Return the position of an action point in the world, as a copy; NotFound."""
-        return self._places.position(action_point_id)
+        """Return a copy of the position of an action point in world coordinates. Raises NotFound."""
+        return self._points.position(action_point_id)
 
     def pose(self, orientation_id: str) -> Pose:
-        """Return the pose in the world of an orientation at its action point, as a copy; NotFound."""
-        return self._places.pose(orientation_id)
+        """Return a copy of the world pose of an action point with this orientation. Raises NotFound."""
+        return self._points.pose(orientation_id)
 
     def joints(self, joints_id: str) -> ProjectRobotJoints:
-        """Return joints of an action point, as a copy; NotFound."""
-        return self._places.joints(joints_id)
+        """Return a copy of a joint configuration of an action point. Raises NotFound."""
+        return self._points.joints(joints_id)
 
     def parameter(self, parameter_id: str) -> Any:
-        """Return the value of a project parameter; NotFound."""
-        return self._places.parameter(parameter_id)
+        """Return the value of a project parameter. Raises NotFound."""
+        return self._points.parameter(parameter_id)
 
     # -------------------------------------------------------------------------------- life
     def __enter__(self) -> "Resources":
@@ -96,8 +102,8 @@ class Resources:
         program.check()
         classes = {name: find_type(name) for name in {o.type for o in data.scene.objects}}
         try:
-            here = [] if program.here is None else overlay(program.here, data.scene)
-            overridden = [*data.project.object_overrides, *here]
+            local = [] if program.cell_file is None else overlay(program.cell_file, data.scene)
+            overridden = [*data.project.object_overrides, *local]
             program.cell.open(recipes(data.scene, classes, data.models, overridden, secrets=program.secrets))
             program.check()
             program.cell.take_control()
@@ -119,7 +125,7 @@ class Resources:
         return isinstance(error, ProgramFinished | ProgramStopped)
 
     def _close(self, failed: bool) -> Arcor2Error | None:
-        """Close the devices of a standalone script; after a failure stop all devices first."""
+        """Close the devices of a standalone script. After a failure, stop all devices first."""
         self._program.ended = True
         problem = self._program.settle(failed)
         if self._standalone is not None:

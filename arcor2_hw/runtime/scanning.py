@@ -1,7 +1,7 @@
-"""Finds what is connected to this machine. A process of its own: vendors' libraries may hang or crash.
+"""Scan for connected devices. Runs in its own process, because vendor libraries may hang or crash.
 
-`python -m arcor2_hw.runtime.scanning serial | can BUS | oak` prints the Found as one JSON list. Nothing is written to a
-serial port. On a named CAN bus it listens, then reads the identity object of each node by SDO, which changes nothing.
+`python -m arcor2_hw.runtime.scanning serial | can BUS | oak` prints a JSON list of Found. Serial ports are not
+opened. On a CAN bus it listens, then reads the identity object of each node by SDO, which does not change the nodes.
 """
 
 import argparse
@@ -17,18 +17,20 @@ import msgspec
 from arcor2_hw.data.discovery import Found
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotConnected, NotFound
 
-LISTENS: Final = 1.2
-"""Seconds of listening on a CAN bus: heartbeats come at least each second by custom."""
-ANSWERS: Final = 0.4
-"""Seconds in which the nodes answer the question who is there."""
+LISTEN_TIME: Final = 1.2
+"""Time of listening on a CAN bus, s. Nodes usually send a heartbeat at least once a second."""
+SEARCH_TIME: Final = 0.4
+"""Time in which nodes answer the search, s."""
 SDO_TIMEOUT: Final = 0.3
+"""Time in which a node answers an SDO request, s."""
 DEVICE_TYPE, DEVICE_NAME, IDENTITY = 0x1000, 0x1008, 0x1018
-"""Objects of CiA 301."""
-FAILED: Final = 3
+"""Indexes in the object dictionary (CiA 301)."""
+EXIT_FAILED: Final = 3
+"""Exit status after an error."""
 
 
 def serial_ports() -> list[Found]:
-    """List the serial ports; none is opened. Raises NotFound when pyserial is not installed."""
+    """List the serial ports without opening them. Raises NotFound if pyserial is not installed."""
     try:
         from serial.tools import list_ports
     except ImportError as error:
@@ -36,16 +38,17 @@ def serial_ports() -> list[Found]:
     found = []
     for port in sorted(list_ports.comports()):
         if port.hwid in ("", "n/a") and port.description in ("", "n/a"):
-            continue  # a port that the kernel lists, with nothing behind it
+            continue  # the kernel lists the port, but it has no hardware
         usb = f" (USB {port.vid:04x}:{port.pid:04x})" if port.vid is not None else ""
         found.append(Found("serial port", port.device, f"{port.description}{usb}", port.serial_number or ""))
     return found
 
 
 def bus_options(named: str) -> dict[str, Any]:
-    """Read the name of a bus as python-can takes it. Raises InvalidData.
+    """Convert the name of a CAN bus to arguments of python-can. Raises InvalidData.
 
-    slcan:CHANNEL[@BITRATE] with a serial port or socket://host:port, socketcan:INTERFACE, socketcand:HOST:PORT/BUS.
+    named: slcan:CHANNEL[@BITRATE], where the channel is a serial port or socket://host:port; socketcan:INTERFACE; or
+    socketcand:HOST:PORT/BUS.
     """
     kind, _, rest = named.partition(":")
     if kind == "slcan" and rest:
@@ -73,23 +76,25 @@ def bus_options(named: str) -> dict[str, Any]:
 
 
 def can_nodes(named: str) -> list[Found]:
-    """Listen on a CAN bus, then read who each CANopen node is. Raises InvalidData, NotFound, NotConnected."""
+    """Find the CANopen nodes of a bus and read their identity. Raises InvalidData, NotFound, NotConnected."""
     options = bus_options(named)
     try:
         import can
         import canopen
     except ImportError as error:
         raise NotFound("python-can and canopen are not installed (arcor2-hw[can])") from error
-    logging.getLogger("canopen").setLevel(logging.CRITICAL)  # a node without an object is no error here
-    network: Any = canopen.Network()  # no hints in the library
+    logging.getLogger("canopen").setLevel(
+        logging.CRITICAL
+    )  # it logs errors when a node lacks an object, which is normal here
+    network: Any = canopen.Network()  # the library has no type hints
     try:
         network.connect(**options)
     except (can.CanError, OSError, ValueError) as error:
         raise NotConnected("{named} cannot be opened: {reason}", named=named, reason=error) from error
     try:
-        time.sleep(LISTENS)
+        time.sleep(LISTEN_TIME)
         network.scanner.search()
-        time.sleep(ANSWERS)
+        time.sleep(SEARCH_TIME)
         return [_node(network, named, number) for number in sorted(network.scanner.nodes)]
     except (can.CanError, OSError) as error:
         raise NotConnected("{named} was lost: {reason}", named=named, reason=error) from error
@@ -98,7 +103,7 @@ def can_nodes(named: str) -> list[Found]:
 
 
 def _node(network: Any, named: str, number: int) -> Found:
-    """Read the identity of a node; what it does not have is left out."""
+    """Read the identity of a node. Objects that it lacks are left out."""
     import canopen
     from canopen.sdo.exceptions import SdoError
 
@@ -127,7 +132,7 @@ def _node(network: Any, named: str, number: int) -> Found:
 
 
 def oak_cameras() -> list[Found]:
-    """List the OAK cameras on USB and in the network. Raises NotFound when depthai is not installed."""
+    """List the OAK cameras on USB and in the network. Raises NotFound if depthai is not installed."""
     try:
         import depthai
     except ImportError as error:
@@ -140,13 +145,13 @@ def oak_cameras() -> list[Found]:
 
 
 def main() -> None:
-    """Scan for one kind of thing."""
-    parser = argparse.ArgumentParser(description="Finds what is connected.")
+    """Scan for one kind of device and print the result."""
+    parser = argparse.ArgumentParser(description="Scan for connected devices.")
     parser.add_argument("kind", choices=("serial", "can", "oak"))
     parser.add_argument("bus", nargs="?", default="")
     options = parser.parse_args()
     results = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a vendor's library prints
+    os.dup2(2, 1)  # so that output of vendor libraries does not mix with the result
     kinds: dict[str, Callable[[], list[Found]]] = {
         "serial": serial_ports,
         "oak": oak_cameras,
@@ -157,7 +162,7 @@ def main() -> None:
     except Arcor2Error as error:
         sys.stderr.write(f"{error}\n")
         sys.stderr.flush()
-        os._exit(FAILED)
+        os._exit(EXIT_FAILED)
     results.write(msgspec.json.encode(found))
     results.flush()
     os._exit(0)

@@ -1,4 +1,4 @@
-"""A script run by hand (`python script.py`): events as lines on standard output, commands from standard input."""
+"""Support for scripts run by hand (`python script.py`): events on standard output, commands from standard input."""
 
 import argparse
 import os
@@ -20,19 +20,19 @@ from arcor2_hw.runtime.streaming import Streams
 _encode = msgspec.json.Encoder().encode
 
 
-class _Lines:
-    """The channel to standard output; one event per line (protocol, section 12.4)."""
+class _StdoutChannel:
+    """Channel that prints one event per line (protocol, section 12.4)."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
 
-    def event(self, name: str, encoded: bytes, *_: object, **__: object) -> None:  # noqa: ARG002 - it is in the event
+    def event(self, name: str, encoded: bytes, *_: object, **__: object) -> None:  # noqa: ARG002 - the encoded event contains the name
         with self._lock:
             sys.stdout.write(encoded.decode() + "\n")
             sys.stdout.flush()
 
     def action_over(self, number: int, duration: float, error: str) -> None:
-        pass  # the protocol has no line for it
+        pass  # the protocol has no event for it
 
     def changed(self, state: str) -> None:
         self.event("PackageState", _encode(Event("PackageState", data=PackageStateData(PackageStateEnum(state)))))
@@ -56,43 +56,43 @@ class Standalone:
         main = sys.modules.get("__main__")
         script = getattr(main, "__file__", None)
         self.directory = Path(script).resolve().parent if script else Path.cwd()
-        channel = _Lines()
+        channel = _StdoutChannel()
         self.program = Program(channel, self.directory.name, start_paused=options.pause, breakpoints=breakpoints)
-        self._streams = Streams(lambda told: channel.event(told.event, told.encoded))
-        self._ticking = threading.Event()
+        self._streams = Streams(lambda event: channel.event(event.event, event.encoded))
+        self._ended = threading.Event()
 
     def start(self) -> None:
-        """Listen for commands and for Ctrl-C, and stream the robots."""
+        """Start to read commands, handle Ctrl-C and stream the state of robots."""
         if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGINT, self._interrupted)
-            signal.signal(signal.SIGTERM, self._interrupted)
-        threading.Thread(target=self._listen, name="commands", daemon=True).start()
-        threading.Thread(target=self._tick, name="streams", daemon=True).start()
+            signal.signal(signal.SIGINT, self._on_interrupt)
+            signal.signal(signal.SIGTERM, self._on_interrupt)
+        threading.Thread(target=self._read_commands, name="commands", daemon=True).start()
+        threading.Thread(target=self._stream, name="streams", daemon=True).start()
 
     def end(self) -> None:
         """Stop streaming."""
-        self._ticking.set()
+        self._ended.set()
 
-    def _interrupted(self, number: int, frame: types.FrameType | None) -> None:  # noqa: ARG002
+    def _on_interrupt(self, number: int, frame: types.FrameType | None) -> None:  # noqa: ARG002
         if not self.program.stop_requested:
-            # Not from here: a signal handler runs in the middle of whatever the main thread does, locks included.
+            # On another thread, because the main thread may hold a lock that the stop needs.
             threading.Thread(target=self.program.stop, name="stop").start()
         if not self.program.inside and not self.program.ended:
             raise ProgramStopped
 
-    def _listen(self) -> None:
+    def _read_commands(self) -> None:
         commands = {"p": self.program.gate.pause, "r": self.program.gate.resume, "s": self.program.gate.step}
         for line in sys.stdin:
             if (command := commands.get(line.strip())) is not None:
                 command()
 
-    def _tick(self) -> None:
+    def _stream(self) -> None:
         try:
             period = float(os.environ.get("ARCOR2_STREAMING_PERIOD", "0.1"))
         except ValueError:
             period = 0.1
         if period <= 0:
             return
-        while not self._ticking.wait(period):
+        while not self._ended.wait(period):
             for device in self.program.cell:
                 self._streams.send(device, joints=True, eef=True)

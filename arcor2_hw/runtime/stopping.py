@@ -1,4 +1,4 @@
-"""Stops that were sent to devices, and their outcomes."""
+"""Sending of stops to devices, and their outcomes."""
 
 import time
 from typing import Final, NamedTuple
@@ -9,16 +9,16 @@ from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.message_parts import DeviceStop
 
 UNSTOPPABLE_AFTER: Final = 0.25
-"""Seconds after which a call that nothing can stop is reported as still running."""
+"""Time after which a call that cannot be stopped is reported as still running, s."""
 POLL: Final = 0.005
-"""Seconds between two checks whether a call has returned."""
+"""Period of the check whether a call has returned, s."""
 
 
 class SentStop(NamedTuple):
-    """A stop of one device.
+    """A stop that was sent to one device.
 
-    call: the call on the stop lane, None where the device has nothing to call. running: what ran on the device when
-    the stop came, None if it was idle. problem: why the stop could not be sent.
+    call: on the stop lane; None if there is no method to call. running: the call that the stop interrupted; None if the
+    device was idle. problem: why the stop could not be sent.
     """
 
     device: Device
@@ -31,23 +31,23 @@ def send_stop(device: Device) -> SentStop:
     """Send a stop to a device without waiting for it."""
     running = device.lane.current
     try:
-        begun = device.begin_stop()
+        sent = device.begin_stop()
     except Arcor2Error as error:  # an earlier stop has not returned
         return SentStop(device, None, running, error)
-    return SentStop(device, None, running) if begun is None else SentStop(device, *begun)
+    return SentStop(device, None, running) if sent is None else SentStop(device, *sent)
 
 
 def wait_stopped(stops: list[SentStop], within: float = STOP_DEADLINE) -> Arcor2Error | None:
-    """Wait until the devices have obeyed; return the error of the first that has not."""
+    """Wait until the stops have returned, at most `within` s, and return the first error."""
     deadline = time.monotonic() + within
     errors = [_call_error(stop, deadline, within) for stop in stops]
     return next((error for error in errors if error is not None), None)
 
 
 def outcomes(stops: list[SentStop], within: float = STOP_DEADLINE) -> list[DeviceStop]:
-    """Wait until the devices have stopped, and report each to which a stop was sent or on which a call still runs.
+    """Wait until the devices have stopped, and return the outcome for each that was sent a stop or still runs a call.
 
-    within: seconds that all devices together have; they stop concurrently.
+    within: time limit for all devices, which stop concurrently, s.
     """
     deadline = time.monotonic() + within
     found = []
@@ -71,7 +71,7 @@ def _call_error(stop: SentStop, deadline: float, within: float) -> Arcor2Error |
 
 
 def _reason(stop: SentStop, deadline: float, within: float) -> str:
-    """Return why a device was not stopped, empty when it was."""
+    """Return why a device was not stopped; empty if it was."""
     error = stop.problem or _call_error(stop, deadline, within)
     if error is not None:
         return str(error)

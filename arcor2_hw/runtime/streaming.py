@@ -1,4 +1,4 @@
-"""Subscribed joints and end effector poses of robots, at the streaming period and at other rates."""
+"""Streaming of robot joints and end effector poses, at the streaming period and at other rates."""
 
 import contextlib
 import threading
@@ -43,16 +43,16 @@ def _eef(robot: Robot, time_ms: float | Unset) -> bytes:
 
 
 class Streams:
-    """Sends the state of robots. A robot that has not answered yet is not queried again, so nothing piles up."""
+    """Read and send the state of robots. A robot is not queried again before it has answered."""
 
     def __init__(self, send: Send) -> None:
         self._send = send
         self._pending: dict[tuple[str, bool, bool, float], Job] = {}
 
     def send(self, device: Device, *, joints: bool, eef: bool, rate: float = 0.0) -> None:
-        """Start to send joints or end effector poses of a device that is a robot; errors are left out.
+        """Start to read and send joints or end effector poses of a robot. Other devices are ignored.
 
-        rate: of the stream, Hz, whose events contain their time; 0 for the ordinary events.
+        rate: of the stream, Hz, whose events contain a timestamp; 0 for events without one.
         """
         robot = device.instance
         if not isinstance(robot, Robot) or device.closing:
@@ -61,15 +61,15 @@ class Streams:
         before = self._pending.get(key)
         if before is not None and not before.ended:
             return
-        job = Job("stream", self._look, (robot, joints, eef, rate))
+        job = Job("stream", self._read_and_send, (robot, joints, eef, rate))
         self._pending[key] = job
         try:
             device.watch_lane.submit(job)
         except DeviceTimeout as error:  # another query hangs on the lane
             job.finish(None, error)
 
-    def _look(self, robot: Robot, joints: bool, eef: bool, rate: float) -> None:
-        # A stale value or a disconnected robot causes no event: clients see the age of the last one.
+    def _read_and_send(self, robot: Robot, joints: bool, eef: bool, rate: float) -> None:
+        # A read error sends no event: clients see the age of the last one.
         time_ms: float | Unset = round(time.monotonic() * 1e3, 3) if rate else UNSET
         if joints:
             self._send(StreamEvent("RobotJoints", robot.id, _joints(robot, time_ms), rate))
@@ -78,33 +78,33 @@ class Streams:
 
 
 class RatedStreams:
-    """Schedules streams at other rates: each robot, event and rate is read and encoded once per period."""
+    """Schedule streams at other rates. Each robot, event and rate is read and encoded once per period."""
 
     def __init__(self, cell: Callable[[], Cell], clock: Clock, streams: Streams) -> None:
         self._cell = cell
         self._clock = clock
         self._streams = streams
         self._lock = threading.Lock()
-        self._wanted: dict[tuple[str, bool], frozenset[float]] = {}
-        self._beating: set[tuple[str, bool, float]] = set()
+        self._rates: dict[tuple[str, bool], frozenset[float]] = {}
+        self._scheduled: set[tuple[str, bool, float]] = set()
 
-    def want(self, message: Stream) -> None:
-        """Set the rates of a robot, replacing the previous ones. On the reader's thread."""
+    def set_rates(self, message: Stream) -> None:
+        """Replace the stream rates of a robot. Runs on the reader thread."""
         for joints, rates in ((True, message.joints), (False, message.eef)):
             with self._lock:
-                self._wanted[message.object_id, joints] = frozenset(rates)
-                new = [rate for rate in rates if (message.object_id, joints, rate) not in self._beating]
-                self._beating.update((message.object_id, joints, rate) for rate in new)
+                self._rates[message.object_id, joints] = frozenset(rates)
+                new = [rate for rate in rates if (message.object_id, joints, rate) not in self._scheduled]
+                self._scheduled.update((message.object_id, joints, rate) for rate in new)
             for rate in new:
-                self._beat(message.object_id, joints, rate, time.monotonic())
+                self._send_periodically(message.object_id, joints, rate, time.monotonic())
 
-    def _beat(self, object_id: str, joints: bool, rate: float, due: float) -> None:
+    def _send_periodically(self, object_id: str, joints: bool, rate: float, due: float) -> None:
         with self._lock:
-            if rate not in self._wanted[object_id, joints]:
-                self._beating.discard((object_id, joints, rate))
+            if rate not in self._rates[object_id, joints]:
+                self._scheduled.discard((object_id, joints, rate))
                 return
-        with contextlib.suppress(Arcor2Error):  # the device has failed; it may be retried
+        with contextlib.suppress(Arcor2Error):  # the device has failed and may be retried later
             self._streams.send(self._cell()[object_id], joints=joints, eef=not joints, rate=rate)
         now = time.monotonic()
-        following = max(due + 1.0 / rate, now)  # missed periods are not made up for
-        self._clock.after(following - now, lambda: self._beat(object_id, joints, rate, following))
+        following = max(due + 1.0 / rate, now)  # missed periods are skipped
+        self._clock.after(following - now, lambda: self._send_periodically(object_id, joints, rate, following))

@@ -1,4 +1,4 @@
-"""Robots in hand teaching mode: checked, so that an end without a request is reported."""
+"""Supervision of robots in hand teaching mode: reports when the robot leaves the mode by itself."""
 
 import threading
 from collections.abc import Callable, Mapping
@@ -11,16 +11,21 @@ from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.lane import Job
 
 TEACHING_PERIOD: Final = 0.1
-"""Seconds between two checks whether an arm is still in hand teaching mode."""
+"""Period of the check whether an arm is still in hand teaching mode, s."""
 ENDED_BY: Final = frozenset(
     {Safety.PROTECTIVE_STOP, Safety.SAFEGUARD_STOP, Safety.EMERGENCY_STOP, Safety.VIOLATION, Safety.FAULT}
 )
-"""Safety states in which an arm is not in hand teaching mode, whatever the driver reports."""
+"""Safety states that end hand teaching, even if the driver still reports the mode."""
 SET_MODE: Final = "set_hand_teaching_mode"
 
 
 class Teaching:
-    """`ended` is called, once per arm, when hand teaching has ended without a request: device, arm argument, reason."""
+    """Check the arms in hand teaching mode.
+
+    Args:
+        ended: Called once when an arm has left the mode without a request, with the device, the argument that names the
+            arm, and the reason.
+    """
 
     def __init__(self, ended: Callable[[Device, Mapping[str, Any], Arcor2Error], None]) -> None:
         self._ended = ended
@@ -29,7 +34,7 @@ class Teaching:
         self._pending: dict[tuple[str, str], Job] = {}
 
     def set(self, device: Device, arm: Mapping[str, Any], enabled: bool) -> None:
-        """Note that hand teaching of an arm was switched on or off by request."""
+        """Record that hand teaching of an arm was switched on or off by a request."""
         with self._lock:
             if enabled:
                 self._arms[_key(device, arm)] = device, arm
@@ -37,7 +42,7 @@ class Teaching:
                 self._arms.pop(_key(device, arm), None)
 
     def check_all(self) -> None:
-        """Start to check every arm. On the clock's thread."""
+        """Start the check of every arm. Runs on the thread of the clock."""
         with self._lock:
             arms = dict(self._arms)
         for key, (device, arm) in arms.items():
@@ -78,5 +83,5 @@ def _safety(robot: Robot) -> Safety:
     """Return the safety state; normal for a robot that cannot report it."""
     try:
         return robot.state().safety
-    except Exception:  # noqa: BLE001 - whatever a driver raises; the mode alone decides then
+    except Exception:  # noqa: BLE001 - a driver may raise anything; only the mode counts then
         return Safety.NORMAL

@@ -1,4 +1,4 @@
-"""Arguments from JSON by the hints of a method, results back to JSON."""
+"""Conversion of arguments from JSON by the type hints of a method, and of results to JSON."""
 
 import functools
 import inspect
@@ -19,7 +19,7 @@ OBJECTS: Final = "arcor2_hw.objects"
 
 
 def encode_shown(value: Any) -> str:
-    """Return a value as JSON text for display; a value that JSON cannot represent is described."""
+    """Return a value as JSON for display; `repr` of a value that JSON cannot represent."""
     try:
         return encode(value)
     except InvalidData:
@@ -27,7 +27,7 @@ def encode_shown(value: Any) -> str:
 
 
 def results(value: Any) -> list[str]:
-    """Return the results of an action as the protocol lists them: none, one, or the members of a tuple."""
+    """Return the results of an action in JSON: none, one, or the members of a tuple."""
     if value is None:
         return []
     if isinstance(value, tuple):
@@ -36,11 +36,11 @@ def results(value: Any) -> list[str]:
 
 
 def _hint(annotation: Any, module: str) -> Any:
-    """Evaluate one hint; one that exists for type checkers only stays as text."""
+    """Evaluate one hint. A hint that exists only for type checkers remains text."""
     if not isinstance(annotation, str):
         return annotation
     try:
-        return eval(annotation, vars(sys.modules[module]))  # noqa: S307 - the source is running in this process anyway
+        return eval(annotation, vars(sys.modules[module]))  # noqa: S307 - this process runs that source anyway
     except Exception:  # noqa: BLE001 - a hint may be anything
         return annotation
 
@@ -57,7 +57,7 @@ def _signature(function: Callable[..., Any]) -> tuple[inspect.Signature, Mapping
 
 @functools.cache
 def _inherited(cls: type, name: str) -> Mapping[str, Any]:
-    """Return the hints of a method; missing ones are taken from the method that it overrides."""
+    """Return the hints of a method. Missing hints are those of the method that it overrides."""
     hints: dict[str, Any] = {}
     for base in reversed(cls.__mro__):
         function = base.__dict__.get(name)
@@ -75,10 +75,10 @@ def _decode(raw: bytes, hint: Any) -> Any:
 
 
 def _positions(cls: type, name: str, given: Iterable[str]) -> list[str]:
-    """Return the names by which a method is called, in the order of its parameters; none where only names count.
+    """Return the names by which the server calls a method, in the order of its parameters.
 
-    Methods that one of our bases declares have the order of that declaration. Methods that offer the values of a
-    parameter have the order of `given`, since nothing declares them.
+    For a method of a base class that is the order of its declaration there. For a method that returns the values of a
+    dynamic parameter it is the order of `given`. For any other method the result is empty: only names count.
     """
     for base in cls.__mro__:
         declared = base.__dict__.get(name)
@@ -90,9 +90,10 @@ def _positions(cls: type, name: str, given: Iterable[str]) -> list[str]:
 
 
 def _own_names(cls: type, function: Callable[..., Any], given: Iterable[str]) -> dict[str, str]:
-    """Return the parameter of a method for each argument that the method itself calls otherwise.
+    """Map the names of arguments to the parameters of a method where they differ.
 
-    ARCOR2 calls the methods of its bases by position, so object types written for it may name parameters freely.
+    ARCOR2 calls the methods of its base classes by position, so object types written for it may name the parameters
+    freely.
     """
     parameters = _signature(function)[0].parameters
     places = [p.name for p in list(parameters.values())[1:] if p.kind is p.POSITIONAL_OR_KEYWORD]
@@ -102,11 +103,15 @@ def _own_names(cls: type, function: Callable[..., Any], given: Iterable[str]) ->
 
 
 def decode_arguments(bound: Any, arguments: Mapping[str, bytes], whose: str) -> dict[str, Any]:
-    """Return the arguments of a bound method, read from JSON by its hints.
+    """Decode the arguments of a bound method from JSON by its hints.
+
+    Args:
+        bound: The method.
+        arguments: JSON by name of the parameter.
+        whose: Name of the device, for messages.
 
     Raises:
-        InvalidData: An argument is unknown, missing or of the wrong type. The text names `whose`, the method and the
-            parameter.
+        InvalidData: An argument is unknown, missing or of the wrong type.
     """
     function = bound.__func__ if isinstance(bound, types.MethodType) else bound
     signature, hints = _signature(function)

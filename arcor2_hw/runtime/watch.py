@@ -1,4 +1,4 @@
-"""Changes of devices that are reported without a request: connection, health, alarms, control."""
+"""Observation of devices: reports changes of connection, health, alarms and control owner."""
 
 import threading
 import time
@@ -16,17 +16,20 @@ from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
 from arcor2_hw.runtime.methods import overrides
 
 OBSERVE_PERIOD: Final = 0.25
-"""Seconds between two checks of a device's connection and health (memory, by contract)."""
+"""Period of the check of connection and health, s. Reading them does no I/O."""
 INQUIRY_PERIOD: Final = 1.0
-"""Seconds between two checks of alarms and control, for which a driver may query the device."""
+"""Period of the check of alarms and control owner, s. A driver may query the device for them."""
 
 _WITH_REASON: Final = (Connection.LOST, Connection.FAILED)
 
 
 class Watch:
-    """Compares the condition of devices with that at the last check, and reports changes.
+    """Compare the state of devices with that of the last check and report changes.
 
-    A change of a connection is reported at once, each loss and each return once. `lost` is called after that.
+    Args:
+        cell: The devices.
+        post: Sends a report.
+        lost: Called after the report when a connection was lost, with the device and the reason.
     """
 
     def __init__(
@@ -38,20 +41,20 @@ class Watch:
         self._cell = cell
         self._post = post
         self._lost = lost
-        self._turn = threading.Lock()
+        self._lock = threading.Lock()
         cell.changed = self.check_connection
         self._pending: dict[str, Job] = {}
-        self._known: dict[str, DeviceChanged] = {}
-        self._inquired: dict[str, float] = {}
+        self._reported: dict[str, DeviceChanged] = {}
+        self._queried_at: dict[str, float] = {}
 
     def check_all(self) -> None:
-        """Start to check every device whose condition can change."""
+        """Start the check of every device whose state can change."""
         for device in self._cell:
             cls = device.recipe.cls
             if device.instance is None or device.closing:
                 continue
             static = not any(overrides(cls, name) for name in ("connection", "health", "alarms", "control_owner"))
-            if static and device.id in self._known:
+            if static and device.id in self._reported:
                 continue
             before = self._pending.get(device.id)
             if before is not None and not before.ended:
@@ -64,7 +67,7 @@ class Watch:
                 job.finish(None, error)
 
     def check_connection(self, device: Device) -> None:
-        """Check the connection only, which is memory. On the thread that observes it."""
+        """Check only the connection, without I/O. Runs on the thread that observes the connection."""
         instance = device.instance
         if instance is not None and not device.closing:
             self._compare(device, instance, None)
@@ -72,19 +75,19 @@ class Watch:
     def report(self, object_id: str, connection: Connection, reason: str = "") -> None:
         """Report the connection of an object that has no instance."""
         health = Health.FAILURE if connection is Connection.FAILED else Health.NORMAL
-        with self._turn:
+        with self._lock:
             found = DeviceChanged(object_id, connection, health, [], None, reason)
-            if found != self._known.get(object_id):
-                self._known[object_id] = found
+            if found != self._reported.get(object_id):
+                self._reported[object_id] = found
                 self._post(found)
 
     def _observe(self, device: Device, instance: Generic) -> None:
-        before = self._known.get(device.id)
+        before = self._reported.get(device.id)
         alarms: list[Alarm] = [] if before is None else before.alarms
         owner = None if before is None else before.control_owner
         moment = time.monotonic()
-        if moment - self._inquired.get(device.id, -INQUIRY_PERIOD) >= INQUIRY_PERIOD:
-            self._inquired[device.id] = moment
+        if moment - self._queried_at.get(device.id, -INQUIRY_PERIOD) >= INQUIRY_PERIOD:
+            self._queried_at[device.id] = moment
             alarms = _value_or(instance.alarms, alarms)
             owner = _value_or(instance.control_owner, owner)
         health = _value_or(lambda: instance.health, Health.FAILURE)
@@ -93,8 +96,8 @@ class Watch:
     def _compare(
         self, device: Device, instance: Generic, queried: tuple[Health, list[Alarm], str | None] | None
     ) -> None:
-        with self._turn:  # the connection is read in here, so that the last report is the last state
-            before = self._known.get(device.id)
+        with self._lock:  # reading under the lock ensures that the last report is the last state
+            before = self._reported.get(device.id)
             if queried is None:
                 queried = (Health.NORMAL, [], None)
                 if before is not None:
@@ -103,13 +106,13 @@ class Watch:
             reason = _value_or(device.connection_reason, "") if connection in _WITH_REASON else ""
             was = Connection.OFFLINE if before is None else before.connection
             if before is not None and connection is was:
-                reason = before.reason  # that of the loss, not those of further attempts
+                reason = before.reason  # keep the reason of the loss; later attempts to connect may fail for others
             in_the_way = _value_or(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
             held = _value_or(lambda: _held_parts(instance), [])
             found = DeviceChanged(device.id, connection, *queried, reason, in_the_way, held)
             if found == before:
                 return
-            self._known[device.id] = found
+            self._reported[device.id] = found
             self._post(found)
         if connection is not was and (connection is Connection.LOST or (connection is Connection.FAILED and device.up)):
             self._lost(device, reason)
@@ -125,8 +128,8 @@ def _held_parts(instance: Generic) -> list[HeldPart]:
 
 
 def _value_or(query: Callable[[], Any], otherwise: Any) -> Any:
-    """Return the result of a query, or the value known before if the device cannot answer."""
+    """Return the result of a query, or `otherwise` if it raises."""
     try:
         return query()
-    except Exception:  # noqa: BLE001 - a driver may raise anything; the next check queries it again
+    except Exception:  # noqa: BLE001 - a driver may raise anything; the next check tries again
         return otherwise

@@ -181,8 +181,8 @@ def line(host: HostProcess, by: Position) -> Any:
 UPSIDE_DOWN = Orientation(math.sqrt(0.5), -math.sqrt(0.5), 0.0, 0.0)
 
 
-def box(key: str, at: Position, x: float, y: float, z: float, **more: Any) -> m.PutBody:
-    return m.PutBody(m.PutIn(key, object_type.ObjectModel.of(object_type.Box(key, x, y, z)), Pose(at), **more))
+def box(key: str, at: Position, x: float, y: float, z: float, **more: Any) -> m.AddBody:
+    return m.AddBody(m.AddedBody(key, object_type.ObjectModel.of(object_type.Box(key, x, y, z)), Pose(at), **more))
 
 
 def collision(answer: Any, *names: str) -> None:
@@ -205,9 +205,9 @@ def test_what_was_put_in_stands_in_the_way_until_it_is_taken_out(scene: HostProc
     mesh.write_bytes(trimesh.creation.box((1.0, 1.0, 1.0)).export(file_type="stl"))
     model = object_type.ObjectModel.of(object_type.Mesh("lump", "lump.stl"))
     there = Pose(TIP + Position(0.0, 0.25, 0.0))
-    scene.send(m.PutBody(m.PutIn("lump", model, there, (0.1, 0.1, 0.1), str(mesh))))
+    scene.send(m.AddBody(m.AddedBody("lump", model, there, (0.1, 0.1, 0.1), str(mesh))))
     collision(line(scene, beside), "lump")
-    scene.send(m.PutBody(m.PutIn("lump", model, Pose(TIP + Position(0.0, 0.0, 0.3)), (0.1, 0.1, 0.1), str(mesh))))
+    scene.send(m.AddBody(m.AddedBody("lump", model, Pose(TIP + Position(0.0, 0.0, 0.3)), (0.1, 0.1, 0.1), str(mesh))))
     assert line(scene, beside) is None
     scene.send(m.RemoveBodies(["lump"]))
     assert go(scene, READY, safe=False) is None

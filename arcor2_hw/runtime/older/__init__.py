@@ -1,6 +1,6 @@
-"""Sources written for ARCOR2 run unchanged: what they import is ours, in this process, once `install` was called.
+"""Modules under the names of ARCOR2, so that sources written for it run unchanged after `install`.
 
-The modules exist only in memory. They come before installed ones of the same names, which are never looked at.
+The modules exist only in memory. They take precedence over installed modules of the same names.
 """
 
 import importlib
@@ -17,15 +17,15 @@ __all__ = ["install"]
 
 
 class _Finder(MetaPathFinder, Loader):
-    """Finds the modules of the table. Each counts as a package: so a name that one lacks is asked for here too."""
+    """Find the modules in OLDER_NAMES. Each is a package, so that imports of missing submodules reach this finder."""
 
     def find_spec(
         self,
         fullname: str,
-        path: Sequence[str] | None,  # noqa: ARG002 - the signature of every finder
+        path: Sequence[str] | None,  # noqa: ARG002 - required by the interface
         target: ModuleType | None = None,  # noqa: ARG002
     ) -> ModuleSpec | None:
-        """Find a module of ARCOR2; ImportError, saying what there is, for one that is not offered."""
+        """Find a module of ARCOR2. Raises ImportError if it is not supported."""
         if not is_older(fullname):
             return None
         if fullname in OLDER_NAMES:
@@ -33,11 +33,11 @@ class _Finder(MetaPathFinder, Loader):
         raise ImportError(not_offered(fullname), name=fullname)
 
     def create_module(self, spec: ModuleSpec) -> ModuleType | None:  # noqa: ARG002
-        """Leave it to Python to make the module."""
+        """Return None, so that Python creates the module."""
         return None
 
     def exec_module(self, module: ModuleType) -> None:
-        """Make the module look up its names on first use, since not every source needs all that they import."""
+        """Let the module look up each name on first use, so that only needed modules are imported."""
         names = OLDER_NAMES[module.__name__]
 
         def look_up(name: str) -> Any:
@@ -53,14 +53,14 @@ class _Finder(MetaPathFinder, Loader):
 
         module.__dict__["__getattr__"] = look_up
         module.__dict__["__all__"] = sorted(names)
-        module.__doc__ = f"What sources import from {module.__name__}."
+        module.__doc__ = f"Names that sources import from {module.__name__}."
 
 
 _FINDER: Final = _Finder()
 
 
 def install() -> None:
-    """Make the modules of ARCOR2 importable in this process; done once, however often it is called."""
+    """Make the modules of ARCOR2 importable in this process. Further calls do nothing."""
     if _FINDER in sys.meta_path:
         return
     for name in [name for name in sys.modules if name.partition(".")[0] in OLDER_PACKAGES]:

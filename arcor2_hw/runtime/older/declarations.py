@@ -1,10 +1,10 @@
-"""What older sources declare themselves with."""
+"""Types that older sources use in their declarations."""
 
 from typing import NamedTuple
 
 
 class DynamicParamTuple(NamedTuple):
-    """A value of DYNAMIC_PARAMS: the method that gives the values of a parameter, and the parameters it needs first."""
+    """Value of DYNAMIC_PARAMS: the method that returns the values of a parameter, and the parameters it depends on."""
 
     method: str
     parents: set[str]

@@ -1,4 +1,4 @@
-"""JSON as older sources use it."""
+"""JSON functions of older sources."""
 
 from typing import Any, TypeVar
 
@@ -11,13 +11,13 @@ T = TypeVar("T")
 
 
 class JsonException(InvalidData):
-    """This is no JSON, or cannot be told in JSON."""
+    """A text is not valid JSON, or a value cannot be encoded as JSON."""
 
     code = "json"
 
 
 def loads(text: str | bytes) -> Any:
-    """Read JSON; JsonException."""
+    """Decode JSON. Raises JsonException."""
     try:
         return msgspec.json.decode(text)
     except (msgspec.MsgspecError, UnicodeEncodeError, RecursionError) as error:
@@ -25,7 +25,7 @@ def loads(text: str | bytes) -> Any:
 
 
 def loads_type(text: str | bytes, kind: type[T]) -> T:
-    """Read JSON that has to be of a type, exactly: 1 is no float. JsonException."""
+    """Decode JSON whose value must be exactly of a type: 1 is not a float. Raises JsonException."""
     value = loads(text)
     if type(value) is not kind:
         raise JsonException("this is a {type}, not a {kind_name}", type=type(value).__name__, kind_name=kind.__name__)
@@ -33,7 +33,7 @@ def loads_type(text: str | bytes, kind: type[T]) -> T:
 
 
 def dumps(value: Any) -> str:
-    """Write JSON; JsonException."""
+    """Encode a value as JSON. Raises JsonException."""
     try:
         return encode(value)
     except InvalidData as error:

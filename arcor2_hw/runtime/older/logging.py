@@ -1,10 +1,10 @@
-"""Loggers as older sources ask for them."""
+"""Logging functions of older sources."""
 
 from logging import INFO, Logger, getLogger
 
 
 def get_logger(name: str, level: int = INFO) -> Logger:
-    """Give a logger of that level; what it is told goes to the server with everything else."""
+    """Return a logger with a level. Its records are sent to the server like all others."""
     logger = getLogger(name)
     logger.setLevel(level)
     return logger

@@ -1,7 +1,7 @@
-"""Calls of REST services as older sources make them; names and arguments from general knowledge of such sources.
+"""REST client of older sources; names and arguments are from general knowledge of such sources.
 
-Bodies and queries travel in camelCase, results are read back into snake_case, errors are told as the service tells them
-(`message` of openapi's WebApiError).
+Bodies and queries are sent in camelCase, results are converted to snake_case. Error messages are those of the service
+(`message` of WebApiError in OpenAPI).
 """
 
 import enum
@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 class Method(enum.Enum):
-    """What is asked of the service."""
+    """HTTP method."""
 
     GET = "GET"
     POST = "POST"
@@ -32,20 +32,20 @@ class Method(enum.Enum):
 
 
 class Timeout(NamedTuple):
-    """Seconds for the connection, and for each part of the answer."""
+    """Time limits for connecting and for each part of the answer, s."""
 
     connect: float = 3.05
     read: float = 20.0
 
 
 class RestException(DeviceError):
-    """A service cannot be reached, or answers what makes no sense."""
+    """A service cannot be reached, or its answer is not valid."""
 
     code = "rest"
 
 
 class RestHttpException(RestException):
-    """A service refuses; `error_code` is the HTTP status."""
+    """A service returned an error. `error_code` is the HTTP status."""
 
     code = "rest_refused"
 
@@ -55,7 +55,7 @@ class RestHttpException(RestException):
 
 
 class _Session:
-    """One client for all threads: it keeps connections open, and costs 20 ms to make."""
+    """One HTTP client for all threads. It keeps connections open, and creating it takes 20 ms."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -64,7 +64,7 @@ class _Session:
     def client(self) -> httpx.Client:
         with self._lock:
             if self._client is None:
-                # Devices stand in the local network: no proxy of the environment.
+                # Services run in the local network, so proxies of the environment do not apply.
                 self._client = httpx.Client(trust_env=False, follow_redirects=True)
             return self._client
 
@@ -79,7 +79,7 @@ _session = _Session()
 
 
 def close() -> None:
-    """Close the connections that are kept open."""
+    """Close all connections."""
     _session.close()
 
 
@@ -109,15 +109,18 @@ def call(
     params: Any = None,
     timeout: Timeout | None = None,
 ) -> Any:
-    """Call a service; gives its answer as `return_type`, or as a list of `list_return_type`, or nothing.
+    """Call a service and return its answer as `return_type`, as a list of `list_return_type`, or None.
 
-    body, params: dataclasses, our data, dictionaries, or lists of them. RestException names method and address;
-    RestHttpException when the service refuses.
+    body, params: dataclasses, Structs, dictionaries, or lists of them.
+
+    Raises:
+        RestException: The service cannot be reached, or its answer is not valid.
+        RestHttpException: The service returned an error.
     """
     where = f"{method.value} {url}"
     content = None if body is None else msgspec.json.encode(humps.camelize(_plain(body)))
     query = None if params is None else {k: v for k, v in humps.camelize(_plain(params)).items() if v is not None}
-    answer = _ask(method, url, query, content, timeout)
+    answer = _request(method, url, query, content, timeout)
     if return_type is None and list_return_type is None:
         return None
     if return_type is bytes:
@@ -136,10 +139,10 @@ def call(
 
 
 def get_image(url: str, timeout: Timeout | None = None) -> "Image.Image":
-    """Fetch a picture; RestException."""
+    """Fetch a picture. Raises RestException."""
     from PIL import Image, UnidentifiedImageError
 
-    answer = _ask(Method.GET, url, None, None, timeout)
+    answer = _request(Method.GET, url, None, None, timeout)
     try:
         picture = Image.open(io.BytesIO(answer.content))
         picture.load()
@@ -148,7 +151,7 @@ def get_image(url: str, timeout: Timeout | None = None) -> "Image.Image":
     return picture
 
 
-def _ask(
+def _request(
     method: Method, url: str, query: dict[str, Any] | None, content: bytes | None, timeout: Timeout | None
 ) -> httpx.Response:
     where = f"{method.value} {url}"
@@ -177,17 +180,17 @@ def _ask(
 
 
 def _reason(answer: httpx.Response) -> str:
-    """Give what the service says of its refusal."""
+    """Return the message of the service, or the HTTP status if there is none."""
     try:
-        told = msgspec.json.decode(answer.content, type=dict[str, Any])
+        content = msgspec.json.decode(answer.content, type=dict[str, Any])
     except (msgspec.MsgspecError, UnicodeDecodeError):
-        told = {}
-    message = told.get("message")
+        content = {}
+    message = content.get("message")
     return message if isinstance(message, str) and message else f"{answer.status_code} {answer.reason_phrase}"
 
 
 def _plain(value: Any) -> Any:
-    """Give a value as JSON has it; what is None is left out of objects."""
+    """Convert a value to dictionaries, lists and scalars. Members of objects that are None are left out."""
     to_dict = getattr(value, "to_dict", None)
     plain = to_dict() if callable(to_dict) else msgspec.to_builtins(value, enc_hook=_other)
     return _without_none(plain)

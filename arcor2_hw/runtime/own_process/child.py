@@ -1,6 +1,6 @@
-"""The process of one device: makes the instance, serves the calls of the cell host, and ends with it.
+"""The process of one device: creates the instance and serves the calls of the cell host.
 
-Started by the cell host with one end of a socket pair (`--fd N`). When the cell host dies, the device is stopped and
+The cell host starts it with one end of a socket pair (`--fd N`). When the cell host dies, the device is stopped and
 disconnected, as the cell host does when the server dies.
 """
 
@@ -25,27 +25,27 @@ from arcor2_hw.runtime.methods import OBSERVING, OVERTAKES_WITHIN, stop_of
 from arcor2_hw.runtime.own_process import state
 from arcor2_hw.runtime.own_process.peer import Header, Kind, Message, Peer
 
-GONE_WITHIN: Final = 1.7
-"""Seconds from the death of the cell host to the end of this process, whatever hangs."""
-STOPS_WITHIN: Final = 0.5
-"""Seconds that a stop has before the device is disconnected."""
-CLOSES_WITHIN: Final = 1.0
-"""Seconds that disconnecting has."""
+EXIT_TIMEOUT: Final = 1.7
+"""Time from the end of the cell host to the exit of this process, even if a call hangs, s."""
+STOP_TIMEOUT: Final = 0.5
+"""Time limit of a stop before the device is disconnected, s."""
+CLOSE_TIMEOUT: Final = 1.0
+"""Time limit of disconnecting, s."""
 STATE_PERIOD: Final = 0.02
-"""Seconds between two checks whether the state of the instance has changed."""
-FLUSH_WITHIN: Final = 0.1
-"""Seconds that an answer waits for the state to be read."""
+"""Period of the check whether the state of the instance has changed, s."""
+STATE_WAIT: Final = 0.1
+"""Time that an answer waits until the state has been read, s."""
 
 
 class _Calls:
-    """Calls on the instance that are not over, with the time of their start and what is set at their end."""
+    """The running calls of the instance: start time, and an event that is set at the end."""
 
     def __init__(self) -> None:
         self._running: dict[object, tuple[float, threading.Event]] = {}
 
     @contextlib.contextmanager
     def running(self) -> Iterator[None]:
-        """Count as running."""
+        """Count a call as running in this context."""
         key, ended = object(), threading.Event()
         self._running[key] = time.monotonic(), ended
         try:
@@ -55,7 +55,7 @@ class _Calls:
             ended.set()
 
     def since(self, moment: float) -> list[threading.Event]:
-        """Return what is set at the ends of the calls that started after a moment."""
+        """Return the events of the running calls that started after a time."""
         return [ended for start, ended in list(self._running.values()) if start > moment]
 
     def wait(self, timeout: float) -> None:
@@ -66,17 +66,17 @@ class _Calls:
 
 
 class DeviceServer(Peer):
-    """Serves calls on one instance."""
+    """Serve the calls of one instance."""
 
     def __init__(self, sock: socket.socket) -> None:
-        super().__init__(sock, idle=None)  # a driver may want all calls of a lane on one thread
+        super().__init__(sock, idle=None)  # a driver may require all calls of a lane on one thread
         self._instance: Generic | None = None
         self._names: list[str] = []
         self._connected = False
         self._closing = False
-        """Disconnecting was requested."""
+        """Whether disconnecting was requested."""
         self._epoch = 0
-        """Number of stops that have arrived: a call from before one that has not started is cancelled."""
+        """Number of stops so far. A call that arrived before a stop and has not started is cancelled."""
         self._calls = _Calls()
         self._connections: list[Observing] = []
         self._publishing = threading.RLock()
@@ -84,7 +84,7 @@ class DeviceServer(Peer):
 
     # -------------------------------------------------------------------------------- calls
     def arrived(self, message: Message) -> None:
-        """Note after how many stops a call has arrived."""
+        """Record the number of stops before a call."""
         if self._is_stop(message.header):
             self._epoch += 1
         message.epoch = self._epoch
@@ -99,7 +99,7 @@ class DeviceServer(Peer):
         return header.kind is Kind.CALL and header.target == 0 and bool(header.name)
 
     def execute(self, message: Message) -> Any:
-        """Serve a call on the instance, or on something that was sent as a reference."""
+        """Serve a call of the instance, or of an object that was sent as a reference."""
         header = message.header
         if self._instance is None:
             return self._make(message.payload)
@@ -125,7 +125,7 @@ class DeviceServer(Peer):
         return value
 
     def _make(self, payload: bytes) -> tuple[int, frozenset[str]]:
-        """Make the instance; return its number and the names of its public attributes."""
+        """Create the instance. Return its number and the names of its public attributes."""
         path, directory, given = self.codec.decode(payload)
         sys.path[:] = path
         os.chdir(directory)
@@ -143,9 +143,9 @@ class DeviceServer(Peer):
         return number, attributes
 
     def _stop(self, message: Message) -> Any:
-        """Stop the device, again if a call that had only just started has not returned.
+        """Stop the device, and stop it again if a call that started just before has not returned.
 
-        The command of such a call may have overtaken the first stop.
+        The command of such a call may have reached the device after the first stop.
         """
         moment = time.monotonic()
         value = self.perform(message)
@@ -157,8 +157,8 @@ class DeviceServer(Peer):
 
     # -------------------------------------------------------------------------------- state
     def flush(self) -> None:
-        """Send the state before what follows, if it has changed."""
-        self._publish(FLUSH_WITHIN)
+        """Send the state if it has changed."""
+        self._publish(STATE_WAIT)
 
     def _publish(self, within: float = -1) -> None:
         if self._instance is None or not self._publishing.acquire(timeout=within):
@@ -169,7 +169,7 @@ class DeviceServer(Peer):
                 self._published = found
                 self.send(Header(Kind.STATE), found)
         except (InvalidData, OSError):
-            pass  # what cannot be sent, or the cell host has ended
+            pass  # the state cannot be pickled, or the cell host has ended
         finally:
             self._publishing.release()
 
@@ -178,7 +178,7 @@ class DeviceServer(Peer):
             value = getattr(self._instance, name)
             if name == "connection_reason":
                 value = value or next((each.reason for each in self._connections if each.reason), "")
-        except Exception as error:  # noqa: BLE001 - whatever a driver raises
+        except Exception as error:  # noqa: BLE001 - a driver may raise anything
             return False, InvalidData("{name}: {type}: {reason}", name=name, type=type(error).__name__, reason=error)
         return True, value
 
@@ -194,19 +194,19 @@ class DeviceServer(Peer):
 
     # -------------------------------------------------------------------------------- end
     def leave(self) -> None:
-        """Stop and disconnect the device, unless the cell host has done so, in bounded time."""
+        """Stop and disconnect the device in bounded time, unless the cell host has done so."""
         instance = self._instance
         if instance is None or self._closing:
-            self._calls.wait(STOPS_WITHIN / 2)
+            self._calls.wait(STOP_TIMEOUT / 2)
             return
         if (stop := stop_of(instance)) is not None:
-            _within(STOPS_WITHIN, stop)
-        self._calls.wait(STOPS_WITHIN / 2)
-        _within(CLOSES_WITHIN, instance.cleanup)
+            _within(STOP_TIMEOUT, stop)
+        self._calls.wait(STOP_TIMEOUT / 2)
+        _within(CLOSE_TIMEOUT, instance.cleanup)
 
 
 def _within(seconds: float, function: Any) -> None:
-    """Run a function on a thread of its own and wait for it, at most some seconds."""
+    """Run a function on a new thread and wait for it, at most `seconds`."""
 
     def run() -> None:
         with contextlib.suppress(Exception):
@@ -218,7 +218,7 @@ def _within(seconds: float, function: Any) -> None:
 
 
 class _LogHandler(logging.Handler):
-    """Sends what the driver logs to the cell host."""
+    """Send the log records of the driver to the cell host."""
 
     def __init__(self, server: DeviceServer) -> None:
         super().__init__()
@@ -232,10 +232,10 @@ class _LogHandler(logging.Handler):
 
 def main() -> None:
     """Serve the socket that was inherited as `--fd` until the cell host closes it."""
-    parser = argparse.ArgumentParser(description="Runs one device. Started by the cell host.")
-    parser.add_argument("--fd", type=int, required=True, help="the inherited socket to the cell host")
+    parser = argparse.ArgumentParser(description="Run one device. The cell host starts this process.")
+    parser.add_argument("--fd", type=int, required=True, help="inherited socket to the cell host")
     options = parser.parse_args()
-    for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # the cell host ends this process in order
+    for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):  # only the cell host ends this process
         signal.signal(each, signal.SIG_IGN)
     faulthandler.enable()
     sys.setswitchinterval(0.0005)  # a call that computes must not delay a stop
@@ -245,7 +245,7 @@ def main() -> None:
     server = DeviceServer(socket.socket(fileno=options.fd))
     logging.basicConfig(level=logging.INFO, handlers=[_LogHandler(server)])
     server.receive()
-    faulthandler.dump_traceback_later(GONE_WITHIN, exit=True)  # also when a C call keeps the interpreter
+    faulthandler.dump_traceback_later(EXIT_TIMEOUT, exit=True)  # works even if C code holds the interpreter lock
     server.leave()
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):

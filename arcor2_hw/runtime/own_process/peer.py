@@ -1,8 +1,8 @@
-"""Calls between two processes over a socket: nested in each other, and concurrent.
+"""Nested and concurrent calls between two processes over a socket.
 
-A call is served by the thread that waits for the call it is part of, so a call back runs on the thread (and the lane)
-where it would run within one process. Any other call is served by a thread that belongs to the calling thread: calls of
-one lane are served in order by one thread, calls of different lanes by different threads.
+A nested call is served by the thread that waits for the outer call, so that it runs on the same thread (and lane) as
+within one process. Each thread of the caller has its own thread here for its outer calls: calls of one lane are served
+in order, calls of different lanes concurrently.
 """
 
 import enum
@@ -20,18 +20,18 @@ from arcor2_hw.framing import PREFIX_SIZE, body_length, framed, prefix
 from arcor2_hw.runtime.own_process.pickling import Codec, Description
 from arcor2_hw.runtime.own_process.stubs import stub_of
 
-LARGEST: Final = 1 << 30
-"""Bytes of one message; a picture of 12 megapixels with depth has 60 million."""
-COPIED: Final = 1 << 16
-"""Bytes of a payload from which it is sent apart from its header, to spare a copy."""
-IDLE: Final = 60.0
-"""Seconds after which a thread that serves calls ends when no call came."""
+MAX_MESSAGE: Final = 1 << 30
+"""Maximum length of a message, bytes. A picture of 12 megapixels with depth has 60 million."""
+SEPARATE_PAYLOAD: Final = 1 << 16
+"""Size above which a payload is sent separately from its header, without a copy, bytes."""
+IDLE_TIMEOUT: Final = 60.0
+"""Time after which an idle serving thread ends, s."""
 
 log = logging.getLogger(__name__)
 
 
 class Kind(enum.IntEnum):
-    """What a message is."""
+    """Kind of a message."""
 
     CALL = 0
     READ = 1
@@ -45,13 +45,13 @@ class Kind(enum.IntEnum):
 
 
 class Header(msgspec.Struct, array_like=True, frozen=True):
-    """What a message starts with; the payload follows.
+    """Header of a message, which is followed by the payload.
 
     Attributes:
-        number: Of the call, counted by the caller.
+        number: Of the call, assigned by the caller.
         thread: Caller's thread.
-        within: Number of the call of the other process that the caller is serving, 0 for none.
-        target: Number of the object, counted by the process that has it.
+        within: Number of the outer call, which the caller is serving; 0 for none.
+        target: Number of the object, assigned by its process.
         name: Method or attribute; empty to call the object itself.
     """
 
@@ -64,7 +64,7 @@ class Header(msgspec.Struct, array_like=True, frozen=True):
 
 
 class Message(msgspec.Struct):
-    """A received message. `epoch` is for the process that serves it."""
+    """A received message. `epoch` is set by the process that serves it."""
 
     header: Header
     payload: bytes
@@ -80,10 +80,10 @@ class Peer:
 
     Args:
         sock: Connected stream socket.
-        idle: Seconds after which a serving thread ends; None: never.
+        idle: Time after which an idle serving thread ends, s; None to keep it.
     """
 
-    def __init__(self, sock: socket.socket, idle: float | None = IDLE) -> None:
+    def __init__(self, sock: socket.socket, idle: float | None = IDLE_TIMEOUT) -> None:
         self.codec = Codec(self._stub)
         self._socket = sock
         self._idle = idle
@@ -91,29 +91,29 @@ class Peer:
         self._numbers = itertools.count(1)
         self._lock = threading.Lock()
         self._boxes: dict[int, SimpleQueue[Message | None]] = {}
-        """Of the calls that wait for an answer, by number."""
+        """Queues of the threads that wait for an answer, by number of the call."""
         self._workers: dict[int, SimpleQueue[Message | None]] = {}
-        """Of the threads that serve, by the caller's thread."""
+        """Queues of the serving threads, by thread of the caller."""
         self._closed = False
         self._here = threading.local()
         self._stubs: dict[int, Any] = {}
 
     # -------------------------------------------------------------------------------- to override
     def arrived(self, message: Message) -> None:
-        """Note a call, in the order of arrival. On the reader's thread; must not block."""
+        """Record a call in the order of arrival. Runs on the reader thread and must not block."""
 
     def execute(self, message: Message) -> Any:
-        """Do what a call asks for and return the result."""
+        """Serve a call and return the result."""
         return self.perform(message)
 
     def notified(self, message: Message) -> None:
-        """Take a message that is no call. On the reader's thread; must not block."""
+        """Handle a message that is not a call. Runs on the reader thread and must not block."""
 
     def flush(self) -> None:
-        """Send what the other process has to know before the next call or answer."""
+        """Send pending state before the next call or answer."""
 
     def lost(self) -> Arcor2Error:
-        """Return the error of a call that cannot be answered because the other process has ended."""
+        """Return the error of a call that has no answer because the other process has ended."""
         return ConnectionLost("the connection between two processes ended")
 
     # -------------------------------------------------------------------------------- calls
@@ -130,9 +130,9 @@ class Peer:
         self.request(Kind.WRITE, target, name, self.codec.encode(value))
 
     def request(self, kind: Kind, target: int, name: str, payload: bytes = b"") -> Any:
-        """Send a request and wait for the answer, meanwhile serving what is called back as part of it.
+        """Send a request, serve the nested calls of the other process, and return its answer.
 
-        There is no deadline here: whoever calls on a lane has the lane's, and the end of the process ends the wait.
+        There is no deadline: the lane of the caller has one, and the end of the other process ends the wait.
         """
         box: SimpleQueue[Message | None] = SimpleQueue()
         number = next(self._numbers)
@@ -158,11 +158,11 @@ class Peer:
         raise self.lost()
 
     def send(self, header: Header, payload: bytes = b"") -> None:
-        """Send a message. Raises OSError when the connection has ended."""
+        """Send a message. Raises OSError if the connection has ended."""
         head = framed(_encode(header))
         start = prefix(len(head) + len(payload)) + head
         with self._sending:
-            if len(payload) < COPIED:
+            if len(payload) < SEPARATE_PAYLOAD:
                 self._socket.sendall(start + payload)
             else:
                 self._socket.sendall(start)
@@ -170,7 +170,7 @@ class Peer:
 
     # -------------------------------------------------------------------------------- reading
     def receive(self) -> None:
-        """Read messages until the connection ends, then fail what waits for an answer."""
+        """Read messages until the connection ends, then fail all calls that wait for an answer."""
         try:
             while (message := self._next()) is not None:
                 match message.header.kind:
@@ -187,7 +187,7 @@ class Peer:
         except OSError:
             pass
         except Exception:
-            log.exception("The connection to another process is out of step and counts as lost.")
+            log.exception("Received an invalid message from another process. Its connection is closed.")
         with self._lock:
             self._closed = True
             waiting = [*self._boxes.values(), *self._workers.values()]
@@ -198,14 +198,14 @@ class Peer:
         start = self._take(PREFIX_SIZE)
         if start is None:
             return None
-        body = self._take(body_length(bytes(start), LARGEST))
+        body = self._take(body_length(bytes(start), MAX_MESSAGE))
         if body is None:
             return None
         end = PREFIX_SIZE + body_length(bytes(body[:PREFIX_SIZE]), len(body))
         return Message(_decode(body[PREFIX_SIZE:end]), bytes(body[end:]))
 
     def _take(self, size: int) -> memoryview | None:
-        """Return the next bytes of the stream, None at its end."""
+        """Return the next bytes of the stream, or None at its end."""
         found = memoryview(bytearray(size))
         filled = 0
         while filled < size:
@@ -249,7 +249,7 @@ class Peer:
         try:
             try:
                 kind, payload = Kind.REPLY, self.codec.encode(self.execute(message))
-            except BaseException as error:  # noqa: BLE001 - whatever is raised belongs to the caller
+            except BaseException as error:  # noqa: BLE001 - the caller receives every error
                 kind, payload = Kind.ERROR, self.codec.encode_error(error)
             self.flush()
             self.send(Header(kind, header.number), payload)
@@ -280,6 +280,6 @@ class Peer:
             return self._stubs[number]
 
     def adopt(self, number: int, stub: Any) -> None:
-        """Have `stub` stand for the object of the other process with that number."""
+        """Register the stub of an object of the other process."""
         with self._lock:
             self._stubs[number] = stub

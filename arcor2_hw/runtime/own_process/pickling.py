@@ -1,4 +1,4 @@
-"""Values, errors and references to objects on their way between the cell host and the process of a device.
+"""Pickling of values, errors and object references between the cell host and the process of a device.
 
 Pickle is used because drivers return whatever they like: structs, dataclasses, enumerations, images, NumPy arrays. It
 is safe here: both ends are processes of this program with the same rights, connected by an unnamed socket pair that no
@@ -16,15 +16,15 @@ from arcor2_hw.exceptions import Arcor2Error, DeviceError, InvalidData
 from arcor2_hw.objects import Generic
 
 _VALUES: Final = frozenset({bool, bytes, dict, float, int, list, set, str, tuple, type(None)})
-"""Types that are never references, checked first because they are the most frequent."""
+"""Types that are never sent as references. Checked first, because they are the most frequent."""
 
 
 class ByReference:
-    """Base of classes whose instances stay in their process; the other one gets a stub that forwards method calls."""
+    """Base of classes whose instances stay in their process. The other process gets a stub that forwards calls."""
 
 
 class Stub(ByReference):
-    """Base of what stands for an object of the other process. `_peer` is the connection, `_ref` the object's number."""
+    """Base of stubs. `_peer` is the connection to the process of the object, `_ref` the number of the object."""
 
     _peer: Any
     _ref: int
@@ -34,10 +34,10 @@ class Description(NamedTuple):
     """Reference to an object.
 
     Attributes:
-        number: Counted by the process that has the object.
-        cls: Type of an object of the scene; None for anything else, of which only methods are called.
-        attributes: Public attributes that the object has beyond those of its type.
-        settings: Settings of an object of the scene, which are copied.
+        number: Of the object, assigned by its process.
+        cls: Type of an object of the scene; None for other objects, of which only methods are called.
+        attributes: Public attributes of the object that its type does not have.
+        settings: A copy of the settings of an object of the scene.
     """
 
     number: int
@@ -47,10 +47,10 @@ class Description(NamedTuple):
 
 
 class Codec:
-    """Pickles values. Objects of the scene, functions and surroundings are sent as references.
+    """Pickle values. Objects of the scene, functions and surroundings are sent as references.
 
     Args:
-        stub: Returns the object that stands for one of the other process.
+        stub: Returns the stub of an object of the other process.
     """
 
     def __init__(self, stub: Callable[[Description], Any]) -> None:
@@ -59,23 +59,23 @@ class Codec:
         self._numbers: dict[int, int] = {}
 
     def export(self, value: Any) -> int:
-        """Return the number by which the other process names an object of this one."""
+        """Return the number by which the other process refers to an object of this process."""
         number = self._numbers.get(id(value))
         if number is None:
             number = len(self._exported)
-            self._exported[number] = value  # keeps it alive, so that id() stays unique
+            self._exported[number] = value  # a reference keeps the object alive, so that id() remains unique
             self._numbers[id(value)] = number
         return number
 
     def exported(self, number: int) -> Any:
-        """Return the object of this process with a number."""
+        """Return an object of this process by its number."""
         return self._exported[number]
 
     def encode(self, value: Any) -> bytes:
         """Pickle a value.
 
         Raises:
-            InvalidData: It contains something that cannot leave the process, such as a lock or a generator.
+            InvalidData: The value contains something that cannot be pickled, such as a lock or a generator.
         """
         buffer = io.BytesIO()
         try:
@@ -90,7 +90,7 @@ class Codec:
         """Return a value that the other process has pickled.
 
         Raises:
-            InvalidData: A class of it cannot be imported here.
+            InvalidData: A class of the value cannot be imported here.
         """
         try:
             return _Unpickler(io.BytesIO(data), self).load()
@@ -98,22 +98,22 @@ class Codec:
             raise InvalidData("a value from another process cannot be read: {reason}", reason=error) from error
 
     def encode_error(self, error: BaseException) -> bytes:
-        """Pickle an error with its traceback as a note; one that cannot be pickled becomes its nearest typed base."""
+        """Pickle an error with its traceback as a note, or its nearest base class if it cannot be pickled."""
         note = "".join(traceback.format_exception(error)).rstrip()
         if isinstance(error, Arcor2Error):
             for cls in type(error).__mro__:
                 if not issubclass(cls, Arcor2Error):
                     break
                 try:
-                    return self.encode((_restored, (cls, error.args, self._sendable(error), note)))
+                    return self.encode((_restore, (cls, error.args, self._sendable(error), note)))
                 except InvalidData:
                     continue
         try:
-            data = self.encode((_noted, (error, note)))
+            data = self.encode((_with_note, (error, note)))
             self.decode(data)
         except InvalidData:
             text = f"{type(error).__name__}: {error}"
-            return self.encode((_noted, (DeviceError(text, note), note)))
+            return self.encode((_with_note, (DeviceError(text, note), note)))
         return data
 
     def decode_error(self, data: bytes) -> BaseException:
@@ -134,15 +134,15 @@ class Codec:
         return found
 
 
-def _restored(cls: type[BaseException], args: tuple[Any, ...], state: dict[str, Any], note: str) -> BaseException:
-    """Make an error without its constructor, which may want other arguments."""
+def _restore(cls: type[BaseException], args: tuple[Any, ...], state: dict[str, Any], note: str) -> BaseException:
+    """Create an error without calling its constructor, which may have other parameters."""
     error = cls.__new__(cls, *args)
     error.args = args
     vars(error).update(state)
-    return _noted(error, note)
+    return _with_note(error, note)
 
 
-def _noted(error: BaseException, note: str) -> BaseException:
+def _with_note(error: BaseException, note: str) -> BaseException:
     error.add_note(f"In the process of the device:\n{note}")
     return error
 
@@ -153,7 +153,7 @@ class _Pickler(pickle.Pickler):
         self._codec = codec
 
     def persistent_id(self, obj: Any) -> tuple[int | None, Description] | None:
-        """Return the reference to an object: (its number at the other end, or None, and its description)."""
+        """Return the reference to an object: its number if the other process has it, and its description."""
         if type(obj) in _VALUES:
             return None
         if isinstance(obj, Stub) and obj._peer.codec is self._codec:
@@ -167,7 +167,7 @@ class _Pickler(pickle.Pickler):
         return None
 
     def reducer_override(self, obj: Any) -> Any:
-        """Send what pickle itself does not know."""
+        """Reduce types that pickle does not support."""
         if isinstance(obj, types.MappingProxyType):
             return types.MappingProxyType, (dict(obj),)
         return NotImplemented
@@ -179,13 +179,13 @@ class _Unpickler(pickle.Unpickler):
         self._codec = codec
 
     def persistent_load(self, pid: tuple[int | None, Description]) -> Any:
-        """Return the object of a reference: one of this process, or what stands for one of the other."""
+        """Return the object of a reference: an object of this process, or the stub of one of the other process."""
         number, description = pid
         return self._codec.stub(description) if number is None else self._codec.exported(number)
 
 
 def _by_reference(value: Any) -> bool:
-    """Return whether a value stays in this process: also a function that cannot be imported by its name."""
+    """Return whether a value is sent as a reference, like a function that cannot be imported by name."""
     if isinstance(value, types.MethodType):
         return not isinstance(value.__self__, Generic | type | types.ModuleType)
     if isinstance(value, types.FunctionType):

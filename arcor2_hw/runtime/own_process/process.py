@@ -1,4 +1,4 @@
-"""The process of one device as the cell host sees it: started, called, and noticed when it ends."""
+"""The cell host's side of the child process of one device: starts it, calls it and reports its end."""
 
 import contextlib
 import logging
@@ -18,18 +18,18 @@ from arcor2_hw.runtime.own_process import state
 from arcor2_hw.runtime.own_process.peer import Kind, Message, Peer
 from arcor2_hw.runtime.own_process.stubs import object_stub, stub_class
 
-STARTS_WITHIN: Final = 10.0
-"""Seconds for the process to start and to import the object type; it takes 0.3 on an idle computer."""
-ENDS_WITHIN: Final = 0.3
-"""Seconds that the process has to end by itself after its device was disconnected; then it is killed."""
-CLOSING: Final = frozenset({"cleanup", "disconnect"})
-"""Methods that do nothing once the process has ended."""
+START_TIMEOUT: Final = 10.0
+"""Time for the process to start and import the object type, s. It takes 0.3 s on an idle computer."""
+EXIT_WAIT: Final = 0.3
+"""Time that the process has to exit after its device was disconnected, s. Then it is killed."""
+CLOSE_METHODS: Final = frozenset({"cleanup", "disconnect"})
+"""Methods that do nothing after the process has ended."""
 
 
 class DeviceProcess(Peer):
     """A child process with one instance of an object type.
 
-    A fresh interpreter is started: a fork of a process with threads may copy locks that nobody releases.
+    The process runs a new interpreter, because a fork may copy a lock that another thread holds.
 
     Args:
         cls: Object type of the device.
@@ -46,7 +46,7 @@ class DeviceProcess(Peer):
         self._end_reason = ""
         self._end_known = threading.Event()
         with theirs:
-            self._process = subprocess.Popen(  # noqa: S603 - our own module
+            self._process = subprocess.Popen(  # noqa: S603 - it runs our own module
                 [sys.executable, "-P", "-m", "arcor2_hw.runtime.own_process.child", "--fd", str(theirs.fileno())],
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
@@ -60,10 +60,7 @@ class DeviceProcess(Peer):
 
     # -------------------------------------------------------------------------------- life
     def make(self, arguments: tuple[Any, ...], keywords: Mapping[str, Any]) -> Generic:
-        """Call the constructor in the process and return what stands for the instance.
-
-        Raises what the constructor raises.
-        """
+        """Call the constructor in the process and return a stub of the instance. Raises what the constructor raises."""
         given = self.codec.encode((self._cls, arguments, dict(keywords)))
         place = self.codec.encode((sys.path, str(Path.cwd()), given))
         ref, attributes = self.request(Kind.CALL, 0, "", place)
@@ -83,29 +80,31 @@ class DeviceProcess(Peer):
         return property(lambda _: state.value_of(self._state, name), write)
 
     def end(self) -> None:
-        """End the process, whose device is disconnected; kill it when it does not end. Harmless the second time."""
+        """End the process of a disconnected device, and kill it if it does not exit. Further calls do nothing."""
         self._ending = True
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         try:
-            self._process.wait(ENDS_WITHIN)
+            self._process.wait(EXIT_WAIT)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
 
     def _run(self) -> None:
-        """Read until the process ends, then report the device as failed."""
+        """Read messages until the process ends, then report the device as failed."""
         self.receive()
         if not self._ending:
             with contextlib.suppress(OSError):
-                self._socket.shutdown(socket.SHUT_RDWR)  # also when it only closed its end, or sent nonsense
+                self._socket.shutdown(
+                    socket.SHUT_RDWR
+                )  # the process may still run if it closed its end or sent an invalid message
             try:
-                self._process.wait(ENDS_WITHIN)
+                self._process.wait(EXIT_WAIT)
             except subprocess.TimeoutExpired:
                 self._process.kill()
         code = self._process.wait()
         self._socket.close()
-        self._end_reason = f"{self._name}: the process of the device {_how(code)}"
+        self._end_reason = f"{self._name}: the process of the device {_exit_description(code)}"
         self._end_known.set()
         if self._ending:
             return
@@ -125,25 +124,25 @@ class DeviceProcess(Peer):
         """Send a request and wait for the answer.
 
         Raises:
-            NotConnected: The process has ended before.
-            ConnectionLost: The process ended meanwhile.
+            NotConnected: The process had ended before the request.
+            ConnectionLost: The process ended before it answered.
         """
         if self._closed:
-            if name in CLOSING:
+            if name in CLOSE_METHODS:
                 return None
-            raise NotConnected(self._why(), "Try the device again, or start the scene again.")
+            raise NotConnected(self._end_text(), "Try the device again, or start the scene again.")
         return super().request(kind, target, name, payload)
 
     def lost(self) -> Arcor2Error:
         """Return the error of a call that was not answered."""
-        return ConnectionLost(self._why())
+        return ConnectionLost(self._end_text())
 
-    def _why(self) -> str:
-        self._end_known.wait(2.0 * ENDS_WITHIN)
+    def _end_text(self) -> str:
+        self._end_known.wait(2.0 * EXIT_WAIT)
         return self._end_reason or f"{self._name}: the process of the device has ended"
 
     def notified(self, message: Message) -> None:
-        """Take the new state of the instance, or a line for the log."""
+        """Store a new state of the instance, or log a record of the process."""
         content = self.codec.decode(message.payload)
         if message.header.kind is Kind.LOG:
             logger, level, text = content
@@ -161,7 +160,7 @@ def _settings(stub: Any) -> Any:
     return stub._settings
 
 
-def _how(code: int) -> str:
+def _exit_description(code: int) -> str:
     if code >= 0:
         return f"ended with status {code}"
     try:

@@ -1,4 +1,4 @@
-"""State of an instance that the cell host reads without waiting: the child process sends it whenever it changes."""
+"""State of an instance. The child process sends it on every change, so that the cell host reads it without waiting."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -17,19 +17,19 @@ NAMES: Final = (
     "move_in_progress",
     "parts",
 )
-"""Properties and attributes of the base classes that are memory by contract."""
+"""Properties and attributes of the base classes that do no I/O."""
 
 State = Mapping[str, tuple[bool, Any]]
-"""By name: whether it could be read, and the value or the error."""
+"""By name: whether reading succeeded, and the value or the error."""
 
 
 def names_of(cls: type[Generic], attributes: frozenset[str]) -> list[str]:
-    """Return the names that instances of an object type have, given their public attributes."""
+    """Return the names in NAMES that the instances of an object type have, given their public attributes."""
     return [name for name in NAMES if name in attributes or hasattr(cls, name)]
 
 
 def value_of(state: State, name: str) -> Any:
-    """Return a value of a state, or raise the error that reading it raised."""
+    """Return a value of a state, or raise the error that occurred when it was read."""
     read, value = state[name]
     if not read:
         raise value

@@ -1,4 +1,4 @@
-"""Stubs: what stands for an object of another process. Calls, and reads and writes of attributes, are forwarded."""
+"""Stubs of objects of another process, which forward calls and accesses to attributes."""
 
 import functools
 import inspect
@@ -25,7 +25,7 @@ class Connection(Protocol):
 
 
 class _ObjectStub(Stub):
-    """Part of a stub of an object of the scene; the other part is the object's own type, so that isinstance holds."""
+    """Mixin for stubs of scene objects. The other base class is the type of the object, for `isinstance`."""
 
     _stub_of: type[Generic]
 
@@ -37,7 +37,7 @@ class _ObjectStub(Stub):
 
 
 class _MethodsStub(Stub):
-    """Stub of a function, or of an object of which only methods are called."""
+    """Stub of a function or of an object of which only methods are called."""
 
     def __init__(self, peer: Connection, ref: int) -> None:
         self._peer, self._ref = peer, ref
@@ -60,7 +60,7 @@ def stub_of(peer: Connection, description: Description) -> Any:
 
 
 def object_stub(cls: type[Generic], peer: Connection, number: int, settings: Settings | None) -> Any:
-    """Return an instance of a class made by `stub_class`; no constructor is called."""
+    """Return an instance of a class made by `stub_class`, without calling a constructor."""
     stub = object.__new__(cls)
     vars(stub).update({"_peer": peer, "_ref": number, "_settings": settings})
     return stub
@@ -69,14 +69,14 @@ def object_stub(cls: type[Generic], peer: Connection, number: int, settings: Set
 def stub_class(
     cls: type[Generic], attributes: Iterable[str] = (), members: Mapping[str, Any] = types.MappingProxyType({})
 ) -> type[Generic]:
-    """Return a subclass of an object type whose public methods and properties are forwarded.
+    """Return a subclass of an object type that forwards public methods and properties.
 
-    A hook that the type leaves to its base class stays that of the base class.
+    Hooks that the type does not override are not forwarded.
 
     Args:
         cls: The object type.
-        attributes: Names of further attributes that are forwarded, which instances have.
-        members: What the class has instead of forwarding.
+        attributes: Names of instance attributes to forward.
+        members: Members that replace the forwarding ones.
     """
     found: dict[str, Any] = {"_stub_of": cls, "__module__": cls.__module__, "__qualname__": cls.__qualname__}
     for name in dir(cls):
@@ -93,9 +93,9 @@ def stub_class(
 
 
 def _forwarded(name: str, member: Any) -> Any:
-    """Return what forwards a member of a class; None for one that is the same in both processes."""
+    """Return a forwarding member for a member of a class, or None if it is the same in both processes."""
     if isinstance(member, types.FunctionType):
-        # A hook of Generic that the type does not override does the same here, and shows that it is not overridden.
+        # A hook that is not overridden does the same here, and must still be recognized as not overridden.
         same = member in NO_STOP or member is vars(Generic).get(name)
         return None if same else _method(name, member)
     if isinstance(member, staticmethod | classmethod | type) or not hasattr(type(member), "__get__"):

@@ -49,7 +49,7 @@ class HostWorld:
         self._robot_calibrations = robot_calibrations
         self._assets = assets
         self._hosts = (scene_host, program_host)
-        collisions.on_put.append(lambda obstacle: self._send(m.PutBody(self._body(obstacle))))
+        collisions.on_put.append(lambda obstacle: self._send(m.AddBody(self._body(obstacle))))
         collisions.on_remove.append(lambda keys: self._send(m.RemoveBodies(keys)))
         robot_calibrations.on_change.append(
             lambda robot: scene_host.send(m.Calibrate(robot.id, robot_calibrations.in_force(robot)))
@@ -92,13 +92,13 @@ class HostWorld:
             return {}
         return self.calibrations(scene.objects, project.object_overrides)
 
-    def _body(self, obstacle: Obstacle) -> m.PutIn:
+    def _body(self, obstacle: Obstacle) -> m.AddedBody:
         model, attachment = obstacle.model, obstacle.attachment
         file = ""
         if isinstance(model, Mesh) and self._assets.exists(model.asset_id):
             file = str(self._assets.file(model.asset_id))
         held = ("", "", []) if attachment is None else (attachment.robot, attachment.link, list(attachment.touching))
-        return m.PutIn(model.id, ObjectModel.of(model), obstacle.pose, obstacle.scale, file, *held)
+        return m.AddedBody(model.id, ObjectModel.of(model), obstacle.pose, obstacle.scale, file, *held)
 
 
 def _documents(data: Path) -> tuple[Scene, Project]:
