@@ -34,8 +34,7 @@ class PoseOptions(Data, frozen=True):
         expected_position: Standard deviation of its position, m.
         expected_orientation: Standard deviation of its orientation, rad.
         gravity: Direction of gravity in the camera's frame, of any length, from an accelerometer. The origin's z is
-            then
-            taken as vertical.
+            then taken as vertical.
         gravity_deviation: Standard deviation of that direction, rad.
         lowest: Minimum z of the camera in the frame of the origin, m; 0 for a camera above the table.
     """
@@ -89,9 +88,8 @@ class CameraPose(Data, frozen=True):
         pose: Pose of the camera in the frame of the origin.
         quality: Mean weight of all configured markers and boards, 0 to 1 (protocol).
         residual: Root mean square error of the corners, px.
-        covariance: 6 × 6, of a small displacement (x, y, z in m) and rotation (rotation vector in rad, applied
-            after the
-            pose), both in the frame of the origin.
+        covariance: 6 × 6, of a small displacement (x, y, z in m) and rotation (rotation vector in rad, applied after
+            the pose), both in the frame of the origin.
         position_deviation: Standard deviation along the worst axis, m.
         orientation_deviation: Standard deviation about the worst axis, rad.
         blur: Standard deviation of edges, px; 0 where it could not be measured.

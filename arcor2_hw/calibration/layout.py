@@ -42,8 +42,7 @@ class CharucoBoard(Data, frozen=True):
         marker: Side of a marker, m.
         pose: Pose of the board's middle in the frame of the origin.
         legacy_pattern: Whether it was printed by OpenCV before 4.6 with an even number of rows, which has a white
-            square
-            in the upper left corner.
+            square in the upper left corner.
     """
 
     columns: int

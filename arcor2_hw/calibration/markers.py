@@ -72,8 +72,7 @@ def measured(grey: Grey, lens: Lens, dictionary: MarkerDictionary, found: list[t
     """Measure the corners of detected markers; where edges cannot be measured, the detected corners are used.
 
     Grey values are converted to brightness by one of two tone curves, sRGB or linear: the one with which the edges of
-    the
-    largest marker are where they should be.
+    the largest marker are where they should be.
     """
     family = dictionary_number(dictionary)
     result: dict[int, Measured] = {}

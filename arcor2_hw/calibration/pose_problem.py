@@ -126,8 +126,7 @@ class PoseProblem:
     """Everything that one camera sees from one place, with intrinsics known to `deviations` (as Lens.numbers).
 
     The intrinsics are unknowns with prior knowledge. Their errors that the image shows do not affect the pose; the
-    others
-    increase the covariance of the pose.
+    others increase the covariance of the pose.
 
     Attributes:
         scale: Unit of standard deviations; above 1 where targets are not exactly where they should be.

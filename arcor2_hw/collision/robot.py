@@ -69,8 +69,7 @@ class CollisionRobot:
         obstacle: coal's manager of all parts.
         margin: Distance to the bodies of the world below which a configuration is in collision, m.
         revision: Grows whenever the same joint values may be judged differently: the base was moved, a body was
-            attached
-            or detached, an allowed contact changed.
+            attached or detached, an allowed contact changed.
     """
 
     def __init__(self, name: str, model: RobotModel, base: Array, q: Array, margin: float = 0.0) -> None:

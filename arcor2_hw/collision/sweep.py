@@ -79,8 +79,7 @@ class Sweep:
             a: Joint values at the start.
             b: Joint values at the end; they are checked too.
             resolution: Travel between two checked configurations, m. A coarse value finds most collisions quickly.
-                None:
-                a coarse check first, then `is_free_at_full_resolution`.
+                None: a coarse check first, then `is_free_at_full_resolution`.
         """
         if resolution is None:
             return self.is_free_between(a, b, 8.0 * self.resolution) and self.is_free_at_full_resolution(a, b)
@@ -92,8 +91,7 @@ class Sweep:
         """Return whether the motion from `a` to `b` is free of collision at the full resolution.
 
         Where the surroundings are farther away than the robot travels, no configuration between is checked. The links
-        of
-        the robot are always near each other, so self-collision is checked at every step.
+        of the robot are always near each other, so self-collision is checked at every step.
         """
         way, count = b - a, self._count(a, b, self.resolution)
         standing = self._standing

@@ -163,8 +163,7 @@ class Package:
         """Return the path of a file that a URDF refers to.
 
         `package://name/path`, `model://name/path`, `file:path` and relative paths are supported. Missing leading
-        folders
-        are tolerated.
+        folders are tolerated.
 
         Args:
             reference: Reference in the URDF.

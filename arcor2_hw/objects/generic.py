@@ -93,8 +93,7 @@ class Generic(abc.ABC):
 
         Args:
             find: Returns an object by its name or id. It raises NotFound when the scene has none, and NotConnected
-                while
-                the object is not created yet, because all objects are created concurrently.
+                while the object is not created yet, because all objects are created concurrently.
         """
 
     def disconnect(self) -> None:  # noqa: B027

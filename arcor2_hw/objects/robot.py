@@ -23,8 +23,7 @@ class Robot(GenericWithPose):
     """A robot with one arm.
 
     Poses of end effectors are in the world, joint values in rad (m where prismatic), `speed` is 0 to 1 of the
-    configured
-    maxima. A method whose body only raises Arcor2NotImplemented counts as not implemented.
+    configured maxima. A method whose body only raises Arcor2NotImplemented counts as not implemented.
     """
 
     category: ClassVar[str] = "Robots"
@@ -217,9 +216,9 @@ class Robot(GenericWithPose):
         """Move with a velocity that ends by itself after `valid_for`. It returns at once.
 
         It is called repeatedly during the motion, each time with the velocity from then on. It is not a move in
-        progress,
-        and is not refused because of itself. The caller keeps the speed of the end effector at or below 0.25 m/s; for
-        joint velocities by `tcp_speed` or `forward_kinematics`. A type that has neither limits the speed itself.
+        progress, and is not refused because of itself. The caller keeps the speed of the end effector at or below 0.25
+        m/s; for joint velocities by `tcp_speed` or `forward_kinematics`. A type that has neither limits the speed
+        itself.
 
         Args:
             twist: Velocity of the end effector in the axes of `frame`, m/s and rad/s.

@@ -62,8 +62,7 @@ class SafeMoves:
     """Kinematics and safe moves of one robot. It may be used by several threads; each has its own models.
 
     The URDF is the package named by `urdf_package_name` of the type: an uploaded asset of that name, or in `urdf/` next
-    to
-    the module of the class. Joints that the URDF lacks, such as those of a gripper, are ignored.
+    to the module of the class. Joints that the URDF lacks, such as those of a gripper, are ignored.
 
     Args:
         robot: The robot.

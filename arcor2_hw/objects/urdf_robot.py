@@ -24,10 +24,8 @@ class UrdfRobot(Robot):
 
     A type declares `urdf_package_name`, with the URDF in `urdf/` next to its module, and implements `robot_joints`,
     `follow` and `stop`. This class provides end effectors and their poses, forward and inverse kinematics, joint
-    limits,
-    and moves to poses and joints, linear or not, optionally safe: around obstacles of the scene, or refused. A driver
-    can
-    use `safe_moves` for more.
+    limits, and moves to poses and joints, linear or not, optionally safe: around obstacles of the scene, or refused. A
+    driver can use `safe_moves` for more.
     """
 
     _ABSTRACT = True
@@ -121,8 +119,7 @@ class UrdfRobot(Robot):
         """Move an end effector to a pose in the world, in a line or on any path.
 
         With `safe`, a line through an obstacle is refused, and other paths lead around obstacles. The robot stops when
-        an
-        obstacle comes into its path.
+        an obstacle comes into its path.
 
         Raises:
             KinematicsException: There is no path; the message says why.

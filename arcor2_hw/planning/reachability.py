@@ -93,8 +93,7 @@ class Reachability:
     """Judges poses for one arm of a robot in a collision world. Not safe for use by two threads at once.
 
     Results are cached by pose. After a change of the world only those results are checked again whose configurations
-    are
-    near the change; inverse kinematics is never solved again for them.
+    are near the change; inverse kinematics is never solved again for them.
 
     Attributes:
         computed: Number of poses for which inverse kinematics was solved.

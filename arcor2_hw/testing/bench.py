@@ -33,8 +33,7 @@ class Bench(abc.ABC):
     """One driver on one device.
 
     A hook is available when it is overridden. A case whose hooks are not all available is skipped; quality.yaml has to
-    state
-    the reason.
+    state the reason.
 
     Attributes:
         object_type: The driver's class.

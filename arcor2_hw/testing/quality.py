@@ -59,9 +59,8 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
         level: The claimed level; the suite checks it.
         tests: Folder of the tests in `rules`, from the project's root; default: all test folders.
         report: File next to this one, written by `--report` in a run on the real device.
-        frames: How the driver's frames are read, by kind (`arcor2_hw.testing.frames`), with the first words of
-            lines that
-            act, or the objects that may be written for observation.
+        frames: How the driver's frames are read, by kind (`arcor2_hw.testing.frames`), with the first words of lines
+            that act, or the objects that may be written for observation.
     """
 
     types: list[str]
