@@ -1,8 +1,13 @@
 """Arguments about action points, orientations and joints."""
 
+from typing import Final
+
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.geometry import Orientation, Position
 from arcor2_hw.data.robot import Joint, RobotArg
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
+from arcor2_hw.data.rpc.general import IdArgs
 
 
 class AddActionPointArgs(Data, frozen=True):
@@ -134,3 +139,33 @@ class UpdateActionPointUsingRobotArgs(Data, frozen=True):
 
     action_point_id: str
     robot: RobotArg
+
+
+ACTION_POINT_RPCS: Final = (
+    Rpc("AddActionPoint", AddActionPointArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("AddActionPointJointsUsingRobot", AddActionPointJointsUsingRobotArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("AddActionPointOrientation", AddActionPointOrientationArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc(
+        "AddActionPointOrientationUsingRobot",
+        AddActionPointOrientationUsingRobotArgs,
+        None,
+        Role.STANDARD_USER,
+        dry_run=True,
+    ),
+    Rpc("AddApUsingRobot", AddApUsingRobotArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("CopyActionPoint", CopyActionPointArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("RemoveActionPoint", IdArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("RemoveActionPointJoints", RemoveActionPointJointsArgs, None, Role.STANDARD_USER),
+    Rpc("RemoveActionPointOrientation", RemoveActionPointOrientationArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("RenameActionPoint", RenameActionPointArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("RenameActionPointJoints", RenameActionPointJointsArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("RenameActionPointOrientation", RenameActionPointOrientationArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("UpdateActionPointJoints", UpdateActionPointJointsArgs, None, Role.STANDARD_USER),
+    Rpc("UpdateActionPointJointsUsingRobot", UpdateActionPointJointsUsingRobotArgs, None, Role.STANDARD_USER),
+    Rpc("UpdateActionPointOrientation", UpdateActionPointOrientationArgs, None, Role.STANDARD_USER),
+    Rpc("UpdateActionPointOrientationUsingRobot", UpdateActionPointOrientationUsingRobotArgs, None, Role.STANDARD_USER),
+    Rpc("UpdateActionPointParent", UpdateActionPointParentArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("UpdateActionPointPosition", UpdateActionPointPositionArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("UpdateActionPointUsingRobot", UpdateActionPointUsingRobotArgs, None, Role.STANDARD_USER),
+)
+"""Requests about action points."""

@@ -1,12 +1,14 @@
 """Arguments and answers of requests about records of calibrations."""
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from msgspec import Meta
 
 from arcor2_hw.data.base import UNSET, Data, Unset
-from arcor2_hw.data.calibration import CalibrationKind, CalibrationRecord
+from arcor2_hw.data.calibration import CalibrationCheck, CalibrationKind, CalibrationRecord
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
 
 
 class ListCalibrationsArgs(Data, frozen=True):
@@ -34,3 +36,17 @@ class CheckCalibrationArgs(Data, frozen=True):
     pose: Pose | Unset = UNSET
     distance_limit: Annotated[float, Meta(gt=0)] = 0.002
     angle_limit: Annotated[float, Meta(gt=0)] = 0.0035
+
+
+CALIBRATION_RPCS: Final = (
+    Rpc("CheckCalibration", CheckCalibrationArgs, CalibrationCheck, Role.OPERATOR, additional=True),
+    Rpc(
+        "ListCalibrations",
+        ListCalibrationsArgs,
+        ListCalibrationsData,
+        Role.OPERATOR,
+        args_optional=True,
+        additional=True,
+    ),
+)
+"""Requests about calibrations."""

@@ -1,11 +1,23 @@
 """Arguments and answers of additional requests of the editor."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 from msgspec import Meta, field
 
 from arcor2_hw.data.base import UNSET, Data, Unset
-from arcor2_hw.data.editor import Name, Run, TraceEntry, ViewScope
+from arcor2_hw.data.editor import (
+    MovePreview,
+    Name,
+    Presence,
+    ProjectBreakpoints,
+    ReachabilityData,
+    Run,
+    TraceEntry,
+    ViewScope,
+    ViewState,
+)
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
 
 
 class GetViewStateArgs(Data, frozen=True):
@@ -83,3 +95,24 @@ class ReachabilityArgs(Data, frozen=True):
     arm_id: str | Unset = UNSET
     end_effector_id: str | Unset = UNSET
     ids: Annotated[set[Name], Meta(max_length=10_000)] | Unset = UNSET
+
+
+EDITOR_RPCS: Final = (
+    Rpc("GetBreakpoints", GetBreakpointsArgs, ProjectBreakpoints, Role.OPERATOR, args_optional=True, additional=True),
+    Rpc(
+        "GetExecutionTrace",
+        GetExecutionTraceArgs,
+        GetExecutionTraceData,
+        Role.OPERATOR,
+        args_optional=True,
+        additional=True,
+    ),
+    Rpc("GetViewState", GetViewStateArgs, ViewState, Role.OPERATOR, additional=True),
+    Rpc("ListRuns", ListRunsArgs, ListRunsData, Role.OPERATOR, args_optional=True, additional=True),
+    Rpc("PreviewMove", MovePreview, None, Role.STANDARD_USER, additional=True),
+    Rpc("Reachability", ReachabilityArgs, list[ReachabilityData], Role.OPERATOR, args_optional=True, additional=True),
+    Rpc("SetBreakpoints", SetBreakpointsArgs, ProjectBreakpoints, Role.STANDARD_USER, additional=True),
+    Rpc("SetViewState", SetViewStateArgs, SetViewStateData, Role.OPERATOR, additional=True),
+    Rpc("UpdatePresence", Presence, None, Role.OPERATOR, additional=True),
+)
+"""Requests of the editor."""

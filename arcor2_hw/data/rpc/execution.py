@@ -1,6 +1,11 @@
 """Arguments about packages and single actions."""
 
+from typing import Final
+
 from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.package import PackageSummary
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
 from arcor2_hw.data.rpc.general import IdArgs
 
 
@@ -57,3 +62,21 @@ class UploadPackageArgs(Data, frozen=True):
 
     id: str
     data: str
+
+
+EXECUTION_RPCS: Final = (
+    Rpc("BuildProject", BuildProjectArgs, BuildProjectData, Role.STANDARD_USER),
+    Rpc("CancelAction", None, None, Role.OPERATOR),
+    Rpc("DeletePackage", IdArgs, None, Role.ADVANCED_USER),
+    Rpc("ExecuteAction", ExecuteActionArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("ListPackages", None, list[PackageSummary], Role.OPERATOR),
+    Rpc("PausePackage", None, None, Role.OPERATOR),
+    Rpc("RenamePackage", RenamePackageArgs, None, Role.ADVANCED_USER),
+    Rpc("ResumePackage", None, None, Role.OPERATOR),
+    Rpc("RunPackage", RunPackageArgs, None, Role.OPERATOR),
+    Rpc("StepAction", None, None, Role.OPERATOR),
+    Rpc("StopPackage", None, None, Role.OPERATOR),
+    Rpc("TemporaryPackage", TemporaryPackageArgs, None, Role.STANDARD_USER, args_optional=True),
+    Rpc("UploadPackage", UploadPackageArgs, None, Role.PROGRAMMER),
+)
+"""Requests about packages and their execution."""

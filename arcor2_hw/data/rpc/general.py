@@ -1,11 +1,13 @@
 """General arguments and answers, and those about the server itself."""
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from msgspec import Meta, field
 
 from arcor2_hw.data.base import UNSET, Data, Unset
-from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
 
 
 class AuthenticateArgs(Data, frozen=True):
@@ -79,3 +81,14 @@ class SystemInfoData(Data, frozen=True):
     api_version: str
     supported_parameter_types: set[str] = field(default_factory=set)
     supported_rpc_requests: set[str] = field(default_factory=set)
+
+
+GENERAL_RPCS: Final = (
+    Rpc("Authenticate", AuthenticateArgs, AuthenticateData, Role.OPERATOR, additional=True),
+    Rpc("GetCameraPose", GetCameraPoseArgs, EstimatedPose, Role.TECHNICIAN),
+    Rpc("MarkersCorners", MarkersCornersArgs, list[MarkerCorners], Role.TECHNICIAN),
+    Rpc("RegisterUser", RegisterUserArgs, None, Role.OPERATOR),
+    Rpc("SubscribeEvents", SubscribeEventsArgs, None, Role.OPERATOR, additional=True),
+    Rpc("SystemInfo", None, SystemInfoData, Role.OPERATOR),
+)
+"""Requests about the server."""

@@ -1,10 +1,12 @@
 """Arguments and answers of Undo, Redo, RestoreRevision and History."""
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from msgspec import Meta
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
 
 
 class UndoArgs(Data, frozen=True):
@@ -80,3 +82,12 @@ class HistoryData(Data, frozen=True):
     edits: list[HistoryEdit]
     undo: int | Unset = UNSET
     redo: int | Unset = UNSET
+
+
+HISTORY_RPCS: Final = (
+    Rpc("History", HistoryArgs, HistoryData, Role.OPERATOR, args_optional=True, additional=True),
+    Rpc("Redo", RedoArgs, UndoData, Role.STANDARD_USER, args_optional=True, dry_run=True, additional=True),
+    Rpc("RestoreRevision", RestoreRevisionArgs, RestoreRevisionData, Role.STANDARD_USER, dry_run=True, additional=True),
+    Rpc("Undo", UndoArgs, UndoData, Role.STANDARD_USER, args_optional=True, dry_run=True, additional=True),
+)
+"""Requests about the history of edits."""

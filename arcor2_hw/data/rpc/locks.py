@@ -1,8 +1,11 @@
 """Arguments about locks."""
 
 import enum
+from typing import Final
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
 
 
 class ReadLockArgs(Data, frozen=True):
@@ -71,3 +74,15 @@ class TakeOverLocksData(Data, frozen=True):
     """Answer to TakeOverLocks: the released locks."""
 
     locks: list[HeldLock]
+
+
+LOCK_RPCS: Final = (
+    Rpc("ListLocks", None, list[LockHolder], Role.OPERATOR, additional=True),
+    Rpc("ReadLock", ReadLockArgs, None, Role.OPERATOR),
+    Rpc("ReadUnlock", ReadUnlockArgs, None, Role.OPERATOR),
+    Rpc("TakeOverLocks", TakeOverLocksArgs, TakeOverLocksData, Role.STANDARD_USER, dry_run=True, additional=True),
+    Rpc("UpdateLock", UpdateLockArgs, None, Role.STANDARD_USER),
+    Rpc("WriteLock", WriteLockArgs, None, Role.STANDARD_USER),
+    Rpc("WriteUnlock", WriteUnlockArgs, None, Role.STANDARD_USER),
+)
+"""Requests about locks."""

@@ -1,11 +1,16 @@
 """Arguments and answers about object types, overrides and aiming."""
 
+from typing import Final
+
 from msgspec import field
 
 from arcor2_hw.data.base import Data
-from arcor2_hw.data.object_type import ObjectModel
+from arcor2_hw.data.object_type import ObjectAction, ObjectModel, ObjectTypeMeta
 from arcor2_hw.data.parameter import IdValue, Parameter
 from arcor2_hw.data.robot import RobotArg
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
+from arcor2_hw.data.rpc.general import IdArgs, TypeArgs
 
 
 class ActionParamValuesArgs(Data, frozen=True):
@@ -68,3 +73,22 @@ class UpdateOverrideArgs(Data, frozen=True):
 
     id: str
     override: Parameter
+
+
+OBJECT_TYPE_RPCS: Final = (
+    Rpc("ActionParamValues", ActionParamValuesArgs, set[str], Role.STANDARD_USER),
+    Rpc("AddOverride", AddOverrideArgs, None, Role.ADVANCED_USER, dry_run=True),
+    Rpc("DeleteObjectTypes", set[str], list[DeleteObjectTypesData], Role.PROGRAMMER, args_optional=True, dry_run=True),
+    Rpc("DeleteOverride", DeleteOverrideArgs, None, Role.ADVANCED_USER, dry_run=True),
+    Rpc("GetActions", TypeArgs, list[ObjectAction], Role.OPERATOR),
+    Rpc("GetObjectTypes", None, list[ObjectTypeMeta], Role.OPERATOR),
+    Rpc("NewObjectType", ObjectTypeMeta, None, Role.PROGRAMMER, dry_run=True),
+    Rpc("ObjectAimingAddPoint", ObjectAimingAddPointArgs, ObjectAimingAddPointData, Role.TECHNICIAN, dry_run=True),
+    Rpc("ObjectAimingCancel", None, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("ObjectAimingDone", None, ObjectAimingAddPointData, Role.TECHNICIAN, dry_run=True),
+    Rpc("ObjectAimingStart", ObjectAimingStartArgs, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("ObjectTypeUsage", IdArgs, set[str], Role.OPERATOR),
+    Rpc("UpdateObjectModel", UpdateObjectModelArgs, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("UpdateOverride", UpdateOverrideArgs, None, Role.ADVANCED_USER, dry_run=True),
+)
+"""Requests about object types."""

@@ -6,6 +6,8 @@ from typing import Final
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
 from arcor2_hw.data.rpc.robots import RobotEventKind
 
 LONGEST_LEASE_MS: Final = 300
@@ -108,3 +110,13 @@ class AcknowledgeStopArgs(Data, frozen=True):
 
     object_id: str
     code: str | Unset = UNSET
+
+
+OPERATION_RPCS: Final = (
+    Rpc("AcknowledgeStop", AcknowledgeStopArgs, None, Role.OPERATOR, additional=True),
+    Rpc("HoldHandTeaching", HoldHandTeachingArgs, None, Role.STANDARD_USER, additional=True),
+    Rpc("JogRobot", JogRobotArgs, JogRobotData, Role.STANDARD_USER, additional=True),
+    Rpc("StopAll", None, StopAllData, Role.OPERATOR, additional=True),
+    Rpc("StreamRobot", StreamRobotArgs, None, Role.OPERATOR, additional=True),
+)
+"""Requests that operate devices."""

@@ -1,9 +1,14 @@
 """Arguments and answers about projects, actions and logic."""
 
+from typing import Final
+
 from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Unset
-from arcor2_hw.data.project import ActionParameter, BareProject, Flow, ProjectLogicIf
+from arcor2_hw.data.project import ActionParameter, BareProject, Flow, Project, ProjectLogicIf
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
+from arcor2_hw.data.rpc.general import IdArgs
 
 
 class AddActionArgs(Data, frozen=True):
@@ -130,3 +135,30 @@ class UpdateProjectParameterArgs(Data, frozen=True):
     id: str
     name: str | Unset = UNSET
     value: str | Unset = UNSET
+
+
+PROJECT_RPCS: Final = (
+    Rpc("AddAction", AddActionArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("AddLogicItem", AddLogicItemArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("AddProjectParameter", AddProjectParameterArgs, None, Role.ADVANCED_USER, dry_run=True),
+    Rpc("CloseProject", CloseProjectArgs, None, Role.STANDARD_USER, args_optional=True, dry_run=True),
+    Rpc("CopyProject", CopyProjectArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("DeleteProject", IdArgs, None, Role.STANDARD_USER),
+    Rpc("GetProject", IdArgs, Project, Role.OPERATOR),
+    Rpc("ListProjects", None, list[ListProjectsData], Role.OPERATOR),
+    Rpc("NewProject", NewProjectArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("OpenProject", IdArgs, None, Role.STANDARD_USER),
+    Rpc("ProjectsWithScene", IdArgs, set[str], Role.OPERATOR),
+    Rpc("RemoveAction", RemoveActionArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("RemoveLogicItem", RemoveLogicItemArgs, None, Role.STANDARD_USER),
+    Rpc("RemoveProjectParameter", RemoveProjectParameterArgs, None, Role.ADVANCED_USER, dry_run=True),
+    Rpc("RenameAction", RenameActionArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("RenameProject", RenameProjectArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("SaveProject", None, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("UpdateAction", UpdateActionArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("UpdateLogicItem", UpdateLogicItemArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("UpdateProjectDescription", UpdateProjectDescriptionArgs, None, Role.STANDARD_USER),
+    Rpc("UpdateProjectHasLogic", UpdateProjectHasLogicArgs, None, Role.ADVANCED_USER),
+    Rpc("UpdateProjectParameter", UpdateProjectParameterArgs, None, Role.STANDARD_USER, dry_run=True),
+)
+"""Requests about projects."""

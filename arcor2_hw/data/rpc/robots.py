@@ -1,10 +1,13 @@
 """Arguments about robots of an online scene."""
 
 import enum
+from typing import Final
 
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.robot import Joint, RobotMeta
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
 
 
 class CalibrateRobotArgs(Data, frozen=True):
@@ -191,3 +194,26 @@ class StopRobotArgs(Data, frozen=True):
     """Arguments of StopRobot."""
 
     robot_id: str
+
+
+ROBOT_RPCS: Final = (
+    Rpc("CalibrateRobot", CalibrateRobotArgs, None, Role.TECHNICIAN),
+    Rpc("ForwardKinematics", ForwardKinematicsArgs, Pose, Role.STANDARD_USER),
+    Rpc("GetEndEffectorPose", GetEndEffectorPoseArgs, Pose, Role.OPERATOR),
+    Rpc("GetEndEffectors", GetEndEffectorsArgs, set[str], Role.OPERATOR),
+    Rpc("GetGrippers", GetGrippersArgs, set[str], Role.OPERATOR),
+    Rpc("GetRobotArms", GetRobotArmsArgs, set[str], Role.OPERATOR),
+    Rpc("GetRobotJoints", GetRobotJointsArgs, list[Joint], Role.OPERATOR),
+    Rpc("GetRobotMeta", None, list[RobotMeta], Role.OPERATOR),
+    Rpc("GetSuctions", GetSuctionsArgs, set[str], Role.OPERATOR),
+    Rpc("HandTeachingMode", HandTeachingModeArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("InverseKinematics", InverseKinematicsArgs, list[Joint], Role.STANDARD_USER),
+    Rpc("MoveToActionPoint", MoveToActionPointArgs, None, Role.STANDARD_USER),
+    Rpc("MoveToJoints", MoveToJointsArgs, None, Role.STANDARD_USER),
+    Rpc("MoveToPose", MoveToPoseArgs, None, Role.STANDARD_USER),
+    Rpc("RegisterForRobotEvent", RegisterForRobotEventArgs, set[str], Role.OPERATOR),
+    Rpc("SetEefPerpendicularToWorld", SetEefPerpendicularToWorldArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("StepRobotEef", StepRobotEefArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("StopRobot", StopRobotArgs, None, Role.OPERATOR),
+)
+"""Requests about robots."""

@@ -1,15 +1,21 @@
 """Arguments and answers about scenes and their objects."""
 
 import enum
+from typing import Final
 
 from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.robot import RobotArg
-from arcor2_hw.data.rpc.general import IdArgs
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc.envelope import Rpc
+from arcor2_hw.data.rpc.general import IdArgs, RenameArgs
+from arcor2_hw.data.rpc.operation import RetryObjectArgs
+from arcor2_hw.data.scene import Scene
 
 
 class AddObjectToSceneArgs(Data, frozen=True):
@@ -118,3 +124,33 @@ class UpdateSceneDescriptionArgs(Data, frozen=True):
 
     scene_id: str
     new_description: str
+
+
+SCENE_RPCS: Final = (
+    Rpc("AddObjectToScene", AddObjectToSceneArgs, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("AddVirtualCollisionObjectToScene", AddVirtualCollisionObjectToSceneArgs, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("CalibrateCamera", CalibrateCameraArgs, None, Role.TECHNICIAN),
+    Rpc("CameraColorImage", CameraColorImageArgs, str, Role.OPERATOR),
+    Rpc("CameraColorParameters", CameraColorParametersArgs, CameraParameters, Role.OPERATOR),
+    Rpc("CloseScene", CloseSceneArgs, None, Role.STANDARD_USER, args_optional=True, dry_run=True),
+    Rpc("CopyScene", CopySceneArgs, str, Role.TECHNICIAN),
+    Rpc("DeleteScene", IdArgs, set[str], Role.TECHNICIAN, dry_run=True),
+    Rpc("GetScene", IdArgs, Scene, Role.OPERATOR),
+    Rpc("ListScenes", None, list[ListScenesData], Role.OPERATOR),
+    Rpc("NewScene", NewSceneArgs, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("OpenScene", IdArgs, None, Role.STANDARD_USER),
+    Rpc("RemoveFromScene", RemoveFromSceneArgs, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("RenameObject", RenameArgs, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("RenameScene", RenameArgs, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("RetryObject", RetryObjectArgs, None, Role.STANDARD_USER, additional=True),
+    Rpc("SaveScene", None, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("SceneObjectUsage", IdArgs, set[str], Role.OPERATOR),
+    Rpc("StartScene", None, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("StartSceneKeepGoing", None, None, Role.STANDARD_USER, dry_run=True, additional=True),
+    Rpc("StopScene", None, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("UpdateObjectParameters", UpdateObjectParametersArgs, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("UpdateObjectPose", UpdateObjectPoseArgs, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("UpdateObjectPoseUsingRobot", UpdateObjectPoseUsingRobotArgs, None, Role.TECHNICIAN),
+    Rpc("UpdateSceneDescription", UpdateSceneDescriptionArgs, None, Role.TECHNICIAN),
+)
+"""Requests about scenes."""
