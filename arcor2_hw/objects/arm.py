@@ -16,22 +16,22 @@ _CRITICAL: Final = frozenset({Safety.FAULT, Safety.VIOLATION})
 
 
 class StopCounter:
-    """Counts stop requests, so that no command given before a stop starts a motion after it."""
+    """Count stop requests, so that a command given before a stop does not start a motion after it."""
 
     def __init__(self) -> None:
         self.count = 0
 
     def request(self) -> None:
-        """Cancel every command that was given until now."""
+        """Cancel all commands given so far."""
         self.count += 1
 
     def guard(self) -> "StopGuard":
-        """Return the guard of a command that is given now."""
+        """Return the guard of a new command."""
         return StopGuard(self)
 
 
 class StopGuard:
-    """Tells one command whether a stop was requested since it was given."""
+    """Check for one command whether a stop was requested after it was given."""
 
     def __init__(self, counter: StopCounter) -> None:
         self._counter, self._count = counter, counter.count
@@ -41,7 +41,7 @@ class StopGuard:
         return self._counter.count != self._count
 
     def check(self, what: str) -> None:
-        """Raise Cancelled, naming the command, if a stop was requested."""
+        """Raise Cancelled if a stop was requested. `what`: name of the command, for the error."""
         if self.stopped():
             raise Cancelled("{what} was stopped.", what=what)
 
@@ -106,20 +106,20 @@ def check_end_effector(arm: str, end_effector: str) -> None:
 
 
 def check_confirmed(confirmed_by: str) -> None:
-    """Raise InvalidData unless a person is named who inspected the robot."""
+    """Raise InvalidData if `confirmed_by` is empty. It is the name of the person who inspected the robot."""
     if not confirmed_by.strip():
         raise InvalidData("confirmed_by must name the person who inspected the robot.")
 
 
 class SafetyAlarm:
-    """Reports an active safety stop as an alarm, with the time at which it was first seen."""
+    """Report an active safety stop as an alarm, with the time at which it was first observed."""
 
     def __init__(self, remedies: Mapping[Safety, str]) -> None:
         self._remedies = remedies
         self._since = Safety.NORMAL, now()
 
     def alarms(self, safety: Safety) -> list[Alarm]:
-        """Return the alarm of a safety state; none while the arm may move."""
+        """Return the alarm of a safety state, or an empty list if the arm may move."""
         if safety is not self._since[0]:
             self._since = safety, now()
         if safety in (Safety.NORMAL, Safety.REDUCED):
@@ -129,5 +129,5 @@ class SafetyAlarm:
 
 
 def label(safety: Safety) -> str:
-    """Return a safety state in words."""
+    """Return the name of a safety state with spaces."""
     return safety.value.replace("_", " ")

@@ -1,4 +1,4 @@
-"""AskedLine: a line made of functions, for drivers of released packages. New drivers derive from LineDevice."""
+"""AskedLine: a LineDevice made of functions, for drivers in released packages. New drivers derive from LineDevice."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,7 @@ from arcor2_hw.objects.settings import check_serial_port, within
 
 
 class AskedLine(LineDevice):
-    """A line whose hooks are functions; see LineDevice for what each does."""
+    """A LineDevice whose hooks are functions; see there."""
 
     def __init__(
         self,
@@ -30,11 +30,11 @@ class AskedLine(LineDevice):
         self.who = self.line.who = self.observing.what = who
 
     def send(self, data: bytes) -> None:
-        """Send what has no answer. Raises ConnectionLost, DeviceTimeout."""
+        """Send bytes that have no answer. Raises ConnectionLost, DeviceTimeout."""
         self.line.send(data)
 
     def close(self) -> None:
-        """Stop watching and close; does nothing when closed."""
+        """Stop observing and close the line."""
         self.disconnect()
 
     def on_lost(self, error: DeviceError) -> None:

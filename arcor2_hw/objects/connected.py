@@ -1,4 +1,4 @@
-"""Connected: the connection, the health and the alarms of a device. A mixin of object types."""
+"""Connected: connection, health and alarms of a device. A mixin of object types."""
 
 import threading
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ NOT_OBSERVED: Final = (Connection.LOST, Connection.FAILED)
 
 
 class AlarmText(NamedTuple):
-    """What an alarm says, and what to do about it."""
+    """Text of an alarm and how to remedy it."""
 
     text: str
     remedy: str
@@ -22,14 +22,14 @@ class AlarmText(NamedTuple):
 
 
 class Connected:
-    """A device whose connection a thread of its own keeps: it opens it, watches it, and opens it again after a loss.
+    """A device with an `Observing` connection, which is opened again after a loss.
 
-    Call `keep_connection` in `__init__`. A driver overrides `open_link`, `watch` and `close_link`, and where it has
-    something to do or to say `on_lost`, `condition` and ALARMS. Only observation comes back after a loss.
+    A driver calls `keep_connection` in `__init__` and overrides `open_link`, `watch` and `close_link`. It may override
+    `on_lost`, `condition` and ALARMS. After a loss only observation resumes, not control.
     """
 
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {}
-    """The alarms that `set_alarm` raises, by code."""
+    """Texts of the alarms by code, for `set_alarm`."""
     name: str
     who: str
     """Name and address, for errors."""
@@ -37,37 +37,37 @@ class Connected:
     _active_alarms: dict[str, Alarm]
 
     def keep_connection(self, who: str, observing: Observing | None = None) -> None:
-        """Prepare the connection; nothing is opened yet."""
+        """Create the connection without opening it."""
         self.who = who
         self.observing = observing or Observing(who, self.open_link, self.watch, self.close_link, self.on_lost)
         self._active_alarms = {}
 
     # -------------------------------------------------------------------------------- hooks
     def open_link(self, timeout: float) -> object:
-        """Open the connection within `timeout` s and see that the device answers. Raises DeviceError."""
+        """Open the connection within `timeout` s and check that the device answers. Raises DeviceError."""
 
     def watch(self, stopping: threading.Event) -> None:
-        """Watch the connection until `stopping` is set. Raises DeviceError when it is lost."""
+        """Watch the connection until `stopping` is set. Raises DeviceError after a loss."""
         stopping.wait()
 
     def close_link(self) -> None:
-        """Close the connection; does nothing when it is closed."""
+        """Close the connection. It does nothing when the connection is closed."""
 
     def on_lost(self, error: DeviceError) -> None:
-        """Do what a loss of the connection requires; called once per loss, before the connection is closed."""
+        """Handle a connection loss. It is called once per loss, before the connection is closed."""
 
     def condition(self) -> Health:
-        """Return the condition of a device that is observed. The default: failure with an alarm of severity error."""
+        """Return the health of an observed device. By default it depends on the active alarms."""
         worst = any(alarm.severity is not Severity.WARNING for alarm in self._active_alarms.values())
         return Health.FAILURE if worst else Health.CHECK_FUNCTION if self._active_alarms else Health.NORMAL
 
     # -------------------------------------------------------------------------------- connection
     def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
-        """Start to observe within `timeout` s; nothing is written. Raises NotConnected, DeviceTimeout, DeviceFault."""
+        """Start observing within `timeout` s. Raises NotConnected, DeviceTimeout, DeviceFault."""
         self.observing.start(timeout)
 
     def disconnect(self) -> None:
-        """Stop observing and close; does nothing when closed."""
+        """Stop observing and close the connection. It does nothing when the connection is closed."""
         self.observing.stop()
 
     @property
@@ -77,11 +77,11 @@ class Connected:
 
     @property
     def health(self) -> Health:
-        """Return the condition that the device last reported; failure while the connection is lost."""
+        """Return `condition`, or failure while the connection is lost or failed."""
         return Health.FAILURE if self.connection in NOT_OBSERVED else self.condition()
 
     def alarms(self) -> list[Alarm]:
-        """Return what a person should deal with."""
+        """Return the active alarms."""
         return list(self._active_alarms.values())
 
     def set_alarm(self, code: str, active: bool) -> None:
@@ -94,9 +94,9 @@ class Connected:
 
     # -------------------------------------------------------------------------------- stopping
     def begin(self, what: str) -> GoOn:
-        """Return the check for work that starts now: it raises Cancelled after a stop, ConnectionLost after a loss."""
+        """Return a check for new work: it raises Cancelled after a stop and ConnectionLost after a loss."""
         return self.observing.begin(what)
 
     def stop_waiting(self) -> None:
-        """End with Cancelled the work that has started."""
+        """Cancel the work in progress."""
         self.observing.cancel()

@@ -1,4 +1,4 @@
-"""Edges of digital points, and the listeners that are called for them."""
+"""Edges of digital points, debouncing, and listeners."""
 
 import logging
 from collections.abc import Callable
@@ -21,7 +21,7 @@ Listener = Callable[[Edge], None]
 
 
 class Debounced:
-    """A digital point whose changes count after `debounce` s; its first value counts at once."""
+    """Debounce a digital point: a change counts after `debounce` s, the first value at once."""
 
     def __init__(self, name: str, debounce: float) -> None:
         self.name, self._debounce = name, debounce
@@ -29,11 +29,11 @@ class Debounced:
         self._changed: tuple[float, Timestamp] | None = None
 
     def forget(self) -> None:
-        """Start again: what happened meanwhile is unknown."""
+        """Forget the value, because changes may have been missed."""
         self.value = self._changed = None
 
     def take(self, raw: bool, at: float) -> Edge | None:
-        """Take a sample of the time `at` (monotonic, s); return the edge that it completes."""
+        """Process a sample taken at the time `at` (monotonic, s). Return the edge that it completes, or None."""
         if self.value is None:
             self.value = raw
             return None
@@ -50,13 +50,13 @@ class Debounced:
 
 
 class EdgeListeners:
-    """Calls listeners on the thread that notices an edge; they have to be quick."""
+    """Call listeners on the thread that detects an edge. They must return quickly."""
 
     def __init__(self) -> None:
         self._all: tuple[tuple[str, Listener], ...] = ()
 
     def add(self, name: str, listener: Listener) -> Callable[[], None]:
-        """Call `listener` with each edge of a point; return the function that ends this."""
+        """Call `listener` with each edge of a point. Return the function that ends the subscription."""
         entry = (name, listener)
         self._all = (*self._all, entry)
 
@@ -66,7 +66,7 @@ class EdgeListeners:
         return end
 
     def notify(self, edge: Edge) -> None:
-        """Call the listeners of an edge. An error of one is logged and does not affect the others."""
+        """Call the listeners of an edge. An error of a listener is logged and does not affect the others."""
         for name, listener in self._all:
             if name == edge.name:
                 try:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 KEY: Final = "arcor2_view"
 """Key of the PictureNote in an image; a text chunk of a PNG file."""
-UNDISTORTING: Final = 10
-"""Number of iterations; each reduces the error of a usual lens by a factor of ten."""
+UNDISTORT_ITERATIONS: Final = 10
+"""Number of iterations; each reduces the error of a typical lens by a factor of ten."""
 
 
 class PictureNote(Data, frozen=True):
@@ -92,14 +92,14 @@ def _rays(
 
     k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = (*coefficients, *(0.0,) * (12 - len(coefficients)))
     v, u = np.indices((height, width), dtype=np.float32)
-    seen_x, seen_y = (u - np.float32(cx)) / np.float32(fx), (v - np.float32(cy)) / np.float32(fy)
-    x, y = seen_x.copy(), seen_y.copy()
-    for _ in range(UNDISTORTING if any(coefficients) else 0):
+    distorted_x, distorted_y = (u - np.float32(cx)) / np.float32(fx), (v - np.float32(cy)) / np.float32(fy)
+    x, y = distorted_x.copy(), distorted_y.copy()
+    for _ in range(UNDISTORT_ITERATIONS if any(coefficients) else 0):
         r2 = x * x + y * y
         factor = (1 + r2 * (k4 + r2 * (k5 + r2 * k6))) / (1 + r2 * (k1 + r2 * (k2 + r2 * k3)))
-        sideways = 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + r2 * (s1 + r2 * s2)
-        upright = p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + r2 * (s3 + r2 * s4)
-        x, y = (seen_x - sideways) * factor, (seen_y - upright) * factor
+        tangential_x = 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + r2 * (s1 + r2 * s2)
+        tangential_y = p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + r2 * (s3 + r2 * s4)
+        x, y = (distorted_x - tangential_x) * factor, (distorted_y - tangential_y) * factor
     found = np.stack([x, y], axis=-1).astype(np.float32)
     found.setflags(write=False)
     return found

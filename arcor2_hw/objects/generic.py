@@ -26,7 +26,7 @@ class Generic(abc.ABC):
         _ABSTRACT: Whether the type cannot be added to a scene.
         loss_reaction: What the device does when it loses the connection.
         loss_ends_program: Whether the running program ends when this device is disconnected.
-        own_process: Whether instances run in a process of their own, so that their computing delays no other device.
+        own_process: Whether instances run in their own process, so that their computations do not delay other devices.
         DYNAMIC_PARAMS: {parameter: (method that returns its values, names of the parameters it needs)}.
         CANCEL_MAPPING: {action: method that cancels it}.
         category: Category in the editor.
@@ -105,12 +105,12 @@ class Generic(abc.ABC):
 
     @property
     def connection(self) -> Connection:
-        """Return the state of the connection; a type without a connection is always online."""
+        """Return the state of the connection. A type without a connection is always online."""
         return Connection.ONLINE
 
     @property
     def connection_reason(self) -> str:
-        """Return why the connection is lost or failed, for types without `Observing`, which provides it."""
+        """Return why the connection is lost or failed. Types with an `Observing` connection need not override it."""
         return ""
 
     @property
@@ -146,7 +146,7 @@ class Generic(abc.ABC):
         """Release control. It does nothing without control."""
 
     def control_owner(self) -> str | None:
-        """Return who has control: "us", the name of another client, or None."""
+        """Return the owner of control: "us", the name of another client, or None."""
         return "us"
 
 
@@ -197,21 +197,21 @@ class CollisionObject(GenericWithPose):
         super().__init__(obj_id, name, pose, settings)
         self.collision_model = collision_model
         self._enabled = True
-        self._told: Callable[[], None] = lambda: None
+        self._enabled_listener: Callable[[], None] = lambda: None
 
     @property
     def enabled(self) -> bool:
-        """Return whether it is considered in collision checks."""
+        """Return whether collision checks consider the object."""
         return self._enabled
 
     @enabled.setter
     def enabled(self, value: bool) -> None:
         self._enabled = value
-        self._told()
+        self._enabled_listener()
 
-    def tell_enabled(self, listener: Callable[[], None]) -> None:
+    def on_enabled_changed(self, listener: Callable[[], None]) -> None:
         """Register a function that is called, on any thread, when the object is enabled or disabled."""
-        self._told = listener
+        self._enabled_listener = listener
 
     @action
     def set_enabled(self, state: bool, *, an: str | None = None) -> None:

@@ -1,4 +1,4 @@
-"""HoldsParts: attaches a gripped part to the robot in the collision world, and detaches it when it is released."""
+"""HoldsParts: attaches a gripped part to the robot in the collision world and detaches it on release."""
 
 import logging
 from collections.abc import Callable
@@ -16,9 +16,7 @@ from arcor2_hw.objects.surroundings import HeldPart
 CLEARANCE: Final = 0.002
 """Distance by which the model of a gripped part is smaller on every side, m.
 
-The part may thus rest on a surface, and be
-
-put down with the inaccuracy of taught poses.
+So the part may touch a surface when it is picked or placed at inaccurately taught poses.
 """
 LARGEST: Final = 2.0
 """Maximum edge length of a part, m."""
@@ -47,7 +45,7 @@ class _Holding(NamedTuple):
 
 
 class HoldsParts:
-    """Mixin of object types that grip parts: grippers, suction cups, and robots that switch a gripper of their own.
+    """Mixin of object types that grip parts: grippers, suction cups, and robots that control their own gripper.
 
     A driver calls `attach_part` when a part is gripped and `detach_part` when it is released or lost. The size of the
     part comes from the action `set_part`, or from the settings `part_size_x`, `part_size_y`, `part_size_z` and
@@ -107,10 +105,10 @@ class HoldsParts:
 
     # -------------------------------------------------------------------------------- for drivers
     def attach_part(self, size: PartSize | None = None, *, hanging: bool = False) -> None:
-        """Attach the part that was just gripped to the end effector of the robot. Never raises.
+        """Attach the part that was just gripped to the end effector of the robot. Errors are only logged.
 
         Args:
-            size: Size to assume when neither an action nor the settings state one.
+            size: Size to assume if neither an action nor the settings define one.
             hanging: Whether the part hangs below the tool centre point, as on a suction cup, instead of around it.
         """
         try:
@@ -119,7 +117,7 @@ class HoldsParts:
             log.warning("%s: safe moves do not consider the gripped part: %s", self.name, error)
 
     def detach_part(self) -> None:
-        """Detach the part; a collision object of the scene stays where it is now. Never raises."""
+        """Detach the part. A collision object of the scene gets its present pose. Errors are only logged."""
         holding, self._holding = self._holding, None
         if holding is None:
             return
@@ -153,7 +151,7 @@ class HoldsParts:
         robot.hold_part(part)
 
     def _carrying_robot(self) -> Robot | None:
-        """Return the robot that carries the gripper, None when there is none."""
+        """Return the robot that carries the gripper, or None if there is none."""
         if isinstance(self, Robot):
             return self
         if self._find_robot is None:

@@ -1,4 +1,4 @@
-"""HttpLink: a device that is asked over HTTP, one request at a time."""
+"""HttpLink: a connection to a device over HTTP, with one request at a time."""
 
 import threading
 from typing import Any
@@ -13,8 +13,8 @@ class HttpLink:
 
     Args:
         who: Name and address of the device, for errors.
-        url: Address of the device, as http://192.168.0.7.
-        timeout: Time the device has to answer one request, s.
+        url: Address of the device, such as http://192.168.0.7.
+        timeout: Time in which the device has to answer a request, s.
     """
 
     def __init__(self, who: str, url: str, timeout: float = 0.3) -> None:
@@ -24,12 +24,12 @@ class HttpLink:
         self._client: httpx.Client | None = None
 
     def open(self, timeout: float) -> None:
-        """Prepare for requests; nothing is sent: connecting is part of the first request."""
+        """Create the HTTP client. The first request opens the connection."""
         self.close()
         self._client = httpx.Client(base_url=self._url, timeout=self._timeout, trust_env=False)
 
     def close(self) -> None:
-        """Close; does nothing when closed."""
+        """Close the connection. It does nothing when the connection is closed."""
         client, self._client = self._client, None
         if client is not None:
             with self._one_request:

@@ -1,4 +1,4 @@
-"""A line of bytes to a device: a serial port or a TCP socket, with one question at a time."""
+"""A byte stream to a device over a serial port or a TCP socket, with one request at a time."""
 
 import contextlib
 import select
@@ -15,25 +15,26 @@ from arcor2_hw.objects.settings import check_serial_port
 T = TypeVar("T")
 
 READ_PERIOD: Final = 0.02
-"""Longest time a read waits for the first byte, s."""
+"""Longest time that a read waits for the first byte, s."""
 WRITE_TIMEOUT: Final = 0.5
-"""Longest time a write may take, s: a line that takes no bytes for that long is blocked."""
+"""Time limit of a write, s. A line that accepts no bytes for that long counts as blocked."""
 CHUNK: Final = 4096
+"""Maximum number of bytes of one read from a socket."""
 LONGEST_ANSWER: Final = 65536
-"""Longest answer, bytes; of a longer one the end is kept."""
+"""Maximum length of an answer, bytes. Only the end of a longer one is evaluated."""
 
 
 class Line:
     """A serial port, or a TCP socket given as `socket://host:port`.
 
-    A question whose answer does not come in time breaks the line. A broken line has to be opened again, so that a late
-    answer is never taken for the answer to the next question.
+    A request without an answer in time breaks the line, and a broken line has to be opened again. A late answer is thus
+    never mistaken for the answer to the next request.
 
     Args:
         who: Name and address of the device, for errors.
         port: Path of the serial port, or `socket://host:port`.
         baud_rate: Bits per second of the serial port.
-        answer_timeout: Time the device has to answer, s.
+        answer_timeout: Time in which the device has to answer, s.
     """
 
     def __init__(self, who: str, port: str, baud_rate: int = 9600, answer_timeout: float = 0.5) -> None:
@@ -41,7 +42,7 @@ class Line:
         self.who = who
         self.answer_timeout = answer_timeout
         self.loss: DeviceError | None = None
-        """What broke the line, until it is opened again."""
+        """Error that broke the line; None after it was opened again."""
         self._port, self._baud_rate = port, baud_rate
         self._open: _Port | None = None
         self._one_user = threading.RLock()
@@ -70,7 +71,7 @@ class Line:
         self.loss = None
 
     def close(self) -> None:
-        """Close the line; does nothing when it is closed. A question that waits for its answer fails."""
+        """Close the line. It does nothing when the line is closed. A request that waits for its answer fails."""
         port, self._open = self._open, None
         if port is not None:
             with contextlib.suppress(OSError):
@@ -78,7 +79,7 @@ class Line:
 
     @contextlib.contextmanager
     def held(self, patience: float = 0.0) -> Iterator[None]:
-        """Use the line exclusively. Raises Refused when it is in use for `patience` s, by default 4 answer times."""
+        """Lock the line. Raises Refused if it stays locked for `patience` s, by default 4 answer timeouts."""
         if not self._one_user.acquire(timeout=patience or 4.0 * self.answer_timeout):
             raise Refused("{device} is busy with another call", device=self.who)
         try:
@@ -88,7 +89,7 @@ class Line:
 
     @contextlib.contextmanager
     def held_if_free(self) -> Iterator[bool]:
-        """Use the line exclusively unless somebody else does; the value is false then."""
+        """Lock the line unless another thread holds the lock. The value tells whether it was locked."""
         free = self._one_user.acquire(blocking=False)
         try:
             yield free
@@ -108,15 +109,15 @@ class Line:
             raise self._lost(error) from error
 
     def receive(self) -> bytes:
-        """Return the bytes that came, after at most READ_PERIOD s. Raises ConnectionLost, NotConnected."""
+        """Return the received bytes after at most READ_PERIOD s. Raises ConnectionLost, NotConnected."""
         port = self._required()
         try:
             return port.read()
-        except (OSError, TypeError) as error:  # TypeError: pyserial, closed by another thread meanwhile
+        except (OSError, TypeError) as error:  # pyserial raises TypeError when another thread closes the port
             raise self._lost(error) from error
 
     def waiting(self) -> bytes:
-        """Return the bytes that came unasked, without waiting. Raises ConnectionLost, NotConnected."""
+        """Return unsolicited bytes without waiting. Raises ConnectionLost, NotConnected."""
         port = self._required()
         try:
             has_bytes = port.has_bytes()
@@ -124,19 +125,19 @@ class Line:
             raise self._lost(error) from error
         return self.receive() if has_bytes else b""
 
-    # -------------------------------------------------------------------------------- questions
+    # -------------------------------------------------------------------------------- requests
     def ask(self, question: bytes, answer: Callable[[bytes], T | None], name: str, timeout: float = 0.0) -> T:
-        """Send a question and return what `answer` makes of the bytes that came since.
+        """Send a request and return the decoded answer.
 
         Args:
-            question: The bytes to send. What came before is thrown away.
-            answer: Called with all bytes that came; returns None while the answer is not complete.
-            name: Name of the question, for errors.
-            timeout: Time the device has, s; 0 for the line's own.
+            question: The request. Bytes received before are discarded.
+            answer: Decodes all bytes received since; returns None while the answer is incomplete.
+            name: Name of the request, for errors.
+            timeout: Time in which the device has to answer, s; 0 for that of the line.
 
         Raises:
-            DeviceTimeout: No answer came in time. The line is broken then.
-            ConnectionLost: The line broke.
+            DeviceTimeout: The device did not answer in time. This breaks the line.
+            ConnectionLost: The line is broken.
         """
         limit = timeout or self.answer_timeout
         with self.held():
@@ -144,21 +145,21 @@ class Line:
                 raise loss
             self.waiting()
             self.send(question)
-            deadline, came = time.monotonic() + limit, b""
+            deadline, received = time.monotonic() + limit, b""
             while time.monotonic() < deadline:
                 if data := self.receive():
-                    came = (came + data)[-LONGEST_ANSWER:]
-                    if (found := answer(came)) is not None:
+                    received = (received + data)[-LONGEST_ANSWER:]
+                    if (found := answer(received)) is not None:
                         return found
-        how = "gave no valid answer to" if came else "did not answer"
+        how = "gave no valid answer to" if received else "did not answer"
         late = f"{self.who} {how} {name} within {limit:.3g} s"
-        raise self.broken(DeviceTimeout(late, repr(came[-200:])))
+        raise self.broken(DeviceTimeout(late, repr(received[-200:])))
 
     def ask_text(self, question: str, end: bytes = b"\r") -> str:
-        """Send a line of ASCII text and return the line that answers it, both without their `end`."""
+        """Send a line of ASCII text and return the line of the answer, both without `end`."""
 
-        def first_line(came: bytes) -> str | None:
-            return came.split(end, 1)[0].decode("ascii", "replace").strip() if end in came else None
+        def first_line(received: bytes) -> str | None:
+            return received.split(end, 1)[0].decode("ascii", "replace").strip() if end in received else None
 
         return self.ask(question.encode("ascii") + end, first_line, question)
 
@@ -186,7 +187,7 @@ class Line:
 
 
 class _Port(Protocol):
-    """What a line needs of a port; every method raises OSError when the other end is gone."""
+    """Interface of a port. Its methods raise OSError when the connection has ended."""
 
     def read(self) -> bytes: ...
 
@@ -223,7 +224,7 @@ class _Socket:
     def _readable(self, timeout: float) -> bool:
         try:
             return bool(select.select([self._socket], [], [], timeout)[0])
-        except ValueError as error:  # closed by another thread meanwhile
+        except ValueError as error:  # another thread has closed it
             raise ConnectionResetError("closed") from error
 
 

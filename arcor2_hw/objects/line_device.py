@@ -1,4 +1,4 @@
-"""LineDevice: a device that answers questions on a serial port or a TCP socket. A mixin of object types."""
+"""LineDevice: a device that answers requests on a serial port or a TCP socket. A mixin of object types."""
 
 import contextlib
 import threading
@@ -15,15 +15,15 @@ from arcor2_hw.objects.state_observer import CLOSED_BY_US
 T = TypeVar("T")
 
 LAST_ANSWER: Final = 0.3
-"""Time a question has to end before the line is closed, s."""
+"""Time that a request in progress has before the line is closed, s."""
 
 
 class LineDevice(Connected):
-    """A device on a text line; call `use_line` in `__init__`.
+    """A device on a `Line`. Call `use_line` in `__init__`.
 
-    A driver overrides `greet` (called when the line was opened), `poll` (called each `poll_period` s while the line is
-    free) and, where the device talks or falls silent by itself, `on_unasked` and `overdue`. They use `ask` and raise
-    DeviceError. An answer that does not come in time ends the connection, which is then opened again.
+    A driver overrides `greet`, which is called after the line was opened, and `poll`, which is called every
+    `poll_period` s while the line is free. It may override `on_unasked` for unsolicited data and `overdue` for missing
+    answers. These methods use `ask` and raise DeviceError. A missing answer ends the connection, which is opened again.
     """
 
     poll_period: float = 1.0
@@ -31,34 +31,34 @@ class LineDevice(Connected):
     line: Line
 
     def use_line(self, port: str, baud_rate: int, answer_timeout: float) -> None:
-        """Prepare the line; nothing is opened yet."""
+        """Create the line without opening it."""
         self.line = Line(f"{self.name} at {port}", port, baud_rate, answer_timeout)
         self.keep_connection(self.line.who)
         self._ending = False
 
     # -------------------------------------------------------------------------------- hooks
     def greet(self, deadline: float) -> None:
-        """See that the device answers, until `deadline` (monotonic, s). Raises DeviceError."""
+        """Check that the device answers before `deadline` (monotonic, s). Raises DeviceError."""
 
     def poll(self) -> None:
-        """Ask for the state of the device. Raises DeviceError."""
+        """Read the state of the device. Raises DeviceError."""
 
     def on_unasked(self, data: bytes) -> None:
-        """Take bytes that came without a question."""
+        """Process unsolicited bytes."""
 
     def overdue(self, error: DeviceTimeout) -> DeviceError:
-        """Return the error that a missing answer means."""
+        """Return the error to raise for a missing answer."""
         return error
 
-    # -------------------------------------------------------------------------------- questions
+    # -------------------------------------------------------------------------------- requests
     @contextlib.contextmanager
     def held(self, patience: float = 0.0) -> Iterator[None]:
-        """Use the line exclusively.
+        """Lock the line.
 
         Raises:
             NotConnected: The device is not connected.
-            DeviceError: What the connection was lost by.
-            Refused: The line is in use for `patience` s, by default 4 answer times.
+            DeviceError: The connection was lost by this error.
+            Refused: The line stays locked for `patience` s, by default 4 answer timeouts.
         """
         self.check()
         with self.line.held(patience):
@@ -66,7 +66,7 @@ class LineDevice(Connected):
             yield
 
     def check(self) -> None:
-        """Return while the device is observed. Raises NotConnected, or what the connection was lost by."""
+        """Check that the device is observed. Raises NotConnected, or the error by which the connection was lost."""
         try:
             self.observing.check()
         except ConnectionLost as error:
@@ -77,7 +77,7 @@ class LineDevice(Connected):
             raise loss
 
     def ask(self, question: bytes, answer: Callable[[bytes], T | None], name: str, timeout: float = 0.0) -> T:
-        """Send a question and return what `answer` makes of all bytes that came since; see `Line.ask`."""
+        """Send a request and return the decoded answer; see `Line.ask`."""
         with self.line.held():
             if data := self.line.waiting():
                 self.on_unasked(data)
@@ -95,7 +95,7 @@ class LineDevice(Connected):
         super().connect(timeout)
 
     def disconnect(self) -> None:
-        """Stop observing and close; does nothing when closed. A question has a moment to end."""
+        """Stop observing and close the line. A request in progress may end first."""
         with contextlib.suppress(DeviceError), self.line.held(LAST_ANSWER):
             pass
         self._ending = True
@@ -122,13 +122,13 @@ class LineDevice(Connected):
         self.line.close()
 
     def watch(self, stopping: threading.Event) -> None:
-        """Poll the device, and take what comes unasked."""
+        """Poll the device and process unsolicited data."""
         try:
             self._poll_until(stopping)
         except DeviceError:
             if not self._ending:
                 raise
-            stopping.wait(CLOSED_BY_US)  # we closed the line: that is no loss
+            stopping.wait(CLOSED_BY_US)  # not a loss: we closed the line
 
     def _poll_until(self, stopping: threading.Event) -> None:
         polled = time.monotonic()
@@ -143,5 +143,5 @@ class LineDevice(Connected):
                     polled = time.monotonic()
 
     def on_lost(self, error: DeviceError) -> None:
-        """Remember what the connection was lost by."""
+        """Break the line with the error by which the connection was lost."""
         self.line.broken(error)

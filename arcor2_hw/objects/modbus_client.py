@@ -1,4 +1,4 @@
-"""pymodbus's clients with what a driver needs of them: an exact time limit, and no polling of a serial port."""
+"""Clients of pymodbus with an exact time limit and without polling of the serial port."""
 
 import io
 import logging
@@ -18,97 +18,97 @@ from pymodbus.pdu.register_message import ReadHoldingRegistersResponse
 __all__ = ["Client", "ConnectionException", "ModbusException", "ModbusPDU", "SerialClient", "TcpClient"]
 
 LONGEST_FRAME: Final = 4096
-"""Bytes taken at once; a frame has 260 at most."""
+"""Maximum number of bytes of one read. A frame has at most 260."""
 GRAIN: Final = 0.002
-"""s by which a TCP answer may come too late: the kernel's limit is set anew only when it is wrong by more than this."""
+"""Tolerance of the time limit of a TCP answer, s. The socket option is set again only for a larger difference."""
 WAKE_WITHIN: Final = 0.05
-"""Time within which a thread that waits on a serial port notices that it is being closed, s."""
-BITS_OF_A_CHARACTER: Final = 11
-"""Modbus over serial line 1.02, 2.5.1: start, eight, parity or a second stop bit, stop."""
+"""Time in which a thread that waits for a serial port notices that it is being closed, s."""
+BITS_PER_CHARACTER: Final = 11
+"""Start bit, eight data bits, parity or second stop bit, stop bit (Modbus over serial line 1.02, 2.5.1)."""
 SILENCE: Final = 3.5
-"""Characters of silence between two frames (Modbus over serial line 1.02, 2.5.1.1)."""
+"""Silence between two frames, characters (Modbus over serial line 1.02, 2.5.1.1)."""
 SHORTEST_SILENCE: Final = 0.00175
-"""s; the same place fixes it so beyond 19200 bit/s."""
+"""Silence between two frames above 19200 bit/s, s (Modbus over serial line 1.02, 2.5.1.1)."""
 
-# pymodbus logs every failure as an error. Each reaches the caller typed; a device that is off would fill the log.
+# pymodbus logs every failure as an error. Callers get typed errors, and a device that is off would fill the log.
 logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)
 
 
 class _HoldingRegisters(ReadHoldingRegistersResponse):
-    """An answer of registers, taken apart in one step instead of one by one."""
+    """An answer with registers, decoded in one step for speed."""
 
     def decode(self, data: bytes) -> None:
-        """Take the answer apart after its function code. Raises ModbusIOException, which the decoder makes of it."""
+        """Decode the answer after its function code. Raises ModbusIOException."""
         count, odd = divmod(data[0], 2)
         if odd or len(data) < 1 + data[0]:
             raise ModbusIOException(f"{len(data) - 1} bytes came where {data[0]} were announced")
         self.registers = struct.unpack_from(f">{count}H", data, 1)
 
     def __str__(self) -> str:
-        """Give a name; the library asks for it at every answer, and throws it away unless it logs all."""
+        """Return a short description: pymodbus formats each answer for its log, even if it does not log it."""
         return f"answer {self.transaction_id} of {self.dev_id}"
 
 
 class _InputRegisters(_HoldingRegisters):
-    """As above, function 4."""
+    """The same for input registers (function 4)."""
 
     function_code = 4
 
 
 class _Exchange(ModbusBaseSyncClient):
-    """One request, one answer, one time limit: no retries, no state from one request to the next but its number."""
+    """Send one request and receive its answer within one time limit, without retries."""
 
     deadline = 0.0
-    """When waiting for an answer ends, however it dribbles in (monotonic, s)."""
+    """Time limit of the complete answer (monotonic, s)."""
     received = False
-    """Whether anything has come since the request was sent."""
+    """Whether any byte was received since the request was sent."""
     _number = 0
 
-    def know(self) -> None:
-        """Have answers of registers decoded by the classes above."""
+    def register_answers(self) -> None:
+        """Register the classes above for answers with registers."""
         self.register(_HoldingRegisters)
         self.register(_InputRegisters)
 
     def execute(self, no_response_expected: bool, request: ModbusPDU) -> ModbusPDU:
-        """Give the answer of this very request. Raises ModbusException without one, ConnectionException, OSError."""
+        """Return the answer of a request. Raises ModbusException without an answer, ConnectionException, OSError."""
         self._number = self._number % 0xFFFF + 1
-        # A serial line knows no numbers; its framer gives 0, which the comparison lets pass.
+        # RTU frames have no transaction id; the framer returns 0, which is accepted.
         request.transaction_id = self._number
         self.send(self.framer.buildFrame(request))
-        came = b""
+        received = b""
         while data := self.recv(None):
-            came += data
-            used, answer = self.framer.handleFrame(came, request.dev_id, self._number)
+            received += data
+            used, answer = self.framer.handleFrame(received, request.dev_id, self._number)
             if answer is not None:
                 return answer
-            came = came[used:]
+            received = received[used:]
         raise ModbusIOException("no answer in time")
 
 
 class TcpClient(_Exchange, ModbusTcpClient):
-    """Modbus TCP."""
+    """A client for Modbus TCP."""
 
     def __init__(self, host: str, port: int, timeout: float) -> None:
         super().__init__(host, port=port, timeout=timeout, retries=0)
         self._armed = 0.0
-        self.know()
+        self.register_answers()
 
     def connect(self) -> bool:
-        """Connect within the time-out; tell whether that went well."""
+        """Connect within the timeout. Return whether it succeeded."""
         if self.socket is not None:
             return True
         super().connect()  # type: ignore[no-untyped-call]
         socket: sockets.socket | None = self.socket
         if socket is None:
             return False
-        # Blocking, with the limits kept by the kernel: one call each for sending and receiving instead of two or three.
+        # Blocking with time limits in the kernel: this saves the system calls of `select`.
         socket.settimeout(None)
         socket.setsockopt(sockets.SOL_SOCKET, sockets.SO_SNDTIMEO, _timeval(self.comm_params.timeout_connect))
         self._armed = 0.0
         return True
 
     def recv(self, size: int | None) -> bytes:
-        """Give what is there, nothing when the deadline has passed. Raises ConnectionException, OSError."""
+        """Return the received bytes, or nothing after the deadline. Raises ConnectionException, OSError."""
         socket = self.socket
         if socket is None:
             raise ConnectionException("closed meanwhile")
@@ -127,13 +127,13 @@ class TcpClient(_Exchange, ModbusTcpClient):
         return data
 
     def wake(self) -> None:
-        """Let a thread that waits for an answer fail."""
+        """Make a thread that waits for an answer fail."""
         if (socket := self.socket) is not None:
             socket.shutdown(2)
 
 
 class SerialClient(_Exchange, ModbusSerialClient):
-    """Modbus RTU with eight data bits. Waits for bytes instead of asking each millisecond whether there are any."""
+    """A client for Modbus RTU with eight data bits. It waits for bytes instead of polling every millisecond."""
 
     def __init__(self, port: str, baudrate: int, parity: str, stopbits: int, timeout: float) -> None:
         super().__init__(
@@ -145,45 +145,45 @@ class SerialClient(_Exchange, ModbusSerialClient):
             timeout=timeout,
             retries=0,
         )
-        self._silence = max(SILENCE * BITS_OF_A_CHARACTER / baudrate, SHORTEST_SILENCE)
+        self._silence = max(SILENCE * BITS_PER_CHARACTER / baudrate, SHORTEST_SILENCE)
         self._last_byte = 0.0
         self._ended = False
-        self.know()
+        self.register_answers()
 
     def send(self, request: bytes, addr: tuple[str, int] | None = None) -> int:
-        """Send a frame, after the silence that parts it from the last."""
+        """Send a frame after the required silence since the last frame."""
         if (early := self._last_byte + self._silence - time.monotonic()) > 0.0:
             time.sleep(early)
         return super().send(request, addr)
 
     def recv(self, size: int | None) -> bytes:
-        """Give what is there, nothing when the deadline has passed. Raises ConnectionException, OSError."""
+        """Return the received bytes, or nothing after the deadline. Raises ConnectionException, OSError."""
         port = self.socket
         if port is None:
             raise ConnectionException("closed meanwhile")
         try:
             waiting = select.poll()
             waiting.register(port.fileno(), select.POLLIN)
-        except (AttributeError, io.UnsupportedOperation):  # a port that is no file
+        except (AttributeError, io.UnsupportedOperation):  # a port without a file descriptor
             return bytes(super().recv(size))
         while not waiting.poll(1e3 * min(max(self.deadline - time.monotonic(), 0.0), WAKE_WITHIN)):
             if self._ended:
                 raise ConnectionException("closed meanwhile")
             if time.monotonic() >= self.deadline:
                 return b""
-        # A port that was unplugged is readable and has nothing: pyserial tells so.
+        # An unplugged port is readable without data; pyserial raises an error then.
         data = bytes(port.read(port.in_waiting or 1))
         self._last_byte = time.monotonic()
         self.received = self.received or bool(data)
         return data
 
     def wake(self) -> None:
-        """Let a thread that waits for an answer fail."""
+        """Make a thread that waits for an answer fail."""
         self._ended = True
 
 
 def _timeval(seconds: float) -> bytes:
-    """Give a `struct timeval`; never zero, which would mean to wait for ever."""
+    """Return a `struct timeval`. It is never zero, which would mean no time limit."""
     return struct.pack("@ll", int(seconds), max(1, int(seconds % 1.0 * 1e6)))
 
 

@@ -1,4 +1,4 @@
-"""ModbusDevice: a device that is read and commanded over Modbus TCP or RTU. A mixin of object types."""
+"""ModbusDevice: a device on Modbus TCP or RTU. A mixin of object types."""
 
 import time
 from typing import Final, TypeVar
@@ -11,14 +11,15 @@ from arcor2_hw.objects.state_observer import Snapshot
 T = TypeVar("T")
 
 REQUESTS_TO_OPEN: Final = 4
-"""Requests that have to fit into the time for connecting: two readings, each repeated once."""
+"""Number of requests within the time limit of connecting: two readings, each repeated once."""
 SHORTEST_REQUEST: Final = 0.02
+"""Shortest time limit of a request, s."""
 LAST_REQUEST: Final = 0.3
-"""Time for a request that releases control while we disconnect, s; disconnecting may take one second."""
+"""Time limit of a request that releases control during disconnecting, s, which may take 1 s."""
 
 
 class ModbusDevice(PolledControl[T]):
-    """A device on Modbus: `self.use_link(self.link)` in `__init__`, `read_state` reads by `self.link`."""
+    """A device on Modbus. A driver calls `self.use_link(self.link)` in `__init__`; `read_state` uses `self.link`."""
 
     link: ModbusLink
 
@@ -36,6 +37,6 @@ class ModbusDevice(PolledControl[T]):
         return self.link.identify()
 
     def leave(self) -> None:
-        """Release control because we disconnect."""
+        """Release control during disconnecting."""
         with self.link.limited(LAST_REQUEST):
             super().leave()

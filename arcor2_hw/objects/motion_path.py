@@ -1,4 +1,4 @@
-"""MotionPath: what a robot follows, as planned by `SafeMoves`."""
+"""MotionPath: a path of a robot, planned by `SafeMoves`."""
 
 import dataclasses
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Observing: the life cycle of a driver's connection on a thread of its own: open, watch, lose, come back."""
+"""Observing: the life cycle of a driver's connection on its own thread: open, watch, reconnect after a loss."""
 
 import contextlib
 import logging
@@ -11,48 +11,48 @@ from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import Cancelled, ConnectionLost, DeviceError, DeviceTimeout, NotConnected
 
 GoOn = Callable[[], None]
-"""A check that returns while work may go on; it raises Cancelled or ConnectionLost when it may not."""
+"""A check that returns while work may continue, and otherwise raises Cancelled or ConnectionLost."""
 
 ATTEMPT_TIMEOUT: Final = 2.0
-"""Time an attempt to reconnect may take, s: a device on a local network answers in one."""
+"""Time limit of an attempt to reconnect, s. A device on a local network answers within 1 s."""
 FIRST_PAUSE: Final = 0.1
-"""Pause before the first attempt, s: a device that resets a connection accepts the next at once."""
+"""Pause before the first attempt, s. A device that reset a connection accepts the next one at once."""
 LONGEST_PAUSE: Final = 2.0
-"""Longest pause between attempts, s: short enough that operators see a device soon after they switch it on."""
+"""Longest pause between attempts, s, so that a device is online soon after it was switched on."""
 STEADY: Final = 0.5
-"""Time a connection has to last before the pauses start from the shortest again, s."""
+"""Time after which a connection counts as stable, s. The next pause then starts from FIRST_PAUSE again."""
 BREATH: Final = 0.005
-"""Pause between two calls of a watch that returns by itself, s."""
+"""Pause between two calls of a `watch` that returns, s."""
 STOP_WITHIN: Final = 0.9
-"""Time `stop` waits for the thread, s; disconnect may take one."""
+"""Time that `stop` waits for the thread, s, because `disconnect` must return within 1 s."""
 
 log = logging.getLogger(__name__)
-_made_here = threading.local()
+_created_here = threading.local()
 
 
 @contextlib.contextmanager
 def listening(changed: "Callable[[Observing], None]") -> Iterator[None]:
-    """Call `changed` whenever the state of a connection changes that was created on this thread in this context.
+    """Call `changed` after every state change of the connections that this thread creates in this context.
 
-    It is called on the thread that changed the state, right after the change; it must neither raise nor wait.
+    It is called on the thread that changed the state, and must neither raise nor wait.
     """
-    before = getattr(_made_here, "changed", None)
-    _made_here.changed = changed
+    before = getattr(_created_here, "changed", None)
+    _created_here.changed = changed
     try:
         yield
     finally:
-        _made_here.changed = before
+        _created_here.changed = before
 
 
 class Observing:
-    """Keeps a connection that only observes. It never takes control back after a loss.
+    """Keep a connection for observation open. It never takes control again after a loss.
 
     Args:
         what: Name and address of the device, for errors.
-        open_: Opens the connection within the time given (s); raises DeviceError.
-        watch: Blocks while all is well, returns soon after its event is set, raises DeviceError after a loss.
+        open_: Opens the connection within a time limit, s. Raises DeviceError.
+        watch: Blocks while the connection works, returns soon after its event is set, raises DeviceError after a loss.
         close: Closes the connection; does nothing when it is closed.
-        lost: Called with the error once per loss, before the connection is closed.
+        lost: Called once per loss with the error, before the connection is closed.
     """
 
     def __init__(
@@ -65,45 +65,45 @@ class Observing:
     ) -> None:
         self.what = what
         self.losses = 0
-        """How often the connection was lost: work that started before a loss is over, even after a reconnect."""
+        """Number of losses. Work that started before a loss must not continue, even after a reconnect."""
         self._loss: DeviceError | None = None
         self._cancelled = 0
-        self._open, self._watch, self._close, self._tell_lost = open_, watch, close, lost
+        self._open, self._watch, self._close, self._notify_lost = open_, watch, close, lost
         self._life = threading.Lock()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._ending: threading.Thread | None = None
         self._state = Connection.OFFLINE
         self._reason: DeviceError | None = None
-        self._turn = threading.Lock()
+        self._state_lock = threading.Lock()
         self._pause = FIRST_PAUSE
-        self._listener: Callable[[Observing], None] | None = getattr(_made_here, "changed", None)
+        self._listener: Callable[[Observing], None] | None = getattr(_created_here, "changed", None)
 
     @property
     def reason(self) -> str:
-        """Return why the connection is lost or failed; empty when it is neither."""
+        """Return why the connection is lost or failed; empty in other states."""
         return str(self._reason or "") if self._state in (Connection.LOST, Connection.FAILED) else ""
 
     @property
     def state(self) -> Connection:
-        """Return the state of the connection; it stays "back" until `settled` is called."""
+        """Return the state of the connection. It remains "back" after a reconnect until `settled` is called."""
         return self._state
 
     @property
     def online(self) -> bool:
-        """Return whether the device is observed now."""
+        """Return whether the device is being observed."""
         return self._state in (Connection.ONLINE, Connection.BACK)
 
     def settled(self) -> None:
-        """Change the state from "back" to "online": a client has noticed the reconnect."""
-        with self._turn:
+        """Change the state from "back" to "online", because a client has noticed the reconnect."""
+        with self._state_lock:
             if self._state is not Connection.BACK:
                 return
             self._state = Connection.ONLINE
-        self._tell_changed()
+        self._notify_changed()
 
     def check(self) -> None:
-        """Return while the device is observed. Raises NotConnected, or ConnectionLost with its cause."""
+        """Check that the device is observed. Raises NotConnected, or ConnectionLost with its cause."""
         if self.online:
             return
         if self._state is Connection.LOST:
@@ -111,7 +111,7 @@ class Observing:
         raise NotConnected("{what} is not connected", str(self._reason or ""), what=self.what)
 
     def begin(self, what: str) -> GoOn:
-        """Return the check for work that starts now: it raises Cancelled after `cancel`, ConnectionLost after a loss.
+        """Return a check for new work: it raises Cancelled after `cancel` and ConnectionLost after a loss.
 
         Args:
             what: Name of the work, for errors.
@@ -126,11 +126,11 @@ class Observing:
         return check
 
     def cancel(self) -> None:
-        """End with Cancelled the work that has started."""
+        """Cancel the work in progress."""
         self._cancelled += 1
 
     def check_unbroken(self, losses: int) -> None:
-        """Return while the device is observed and was since `losses` was read. Raises ConnectionLost, NotConnected."""
+        """Check that the device has been observed since `losses` was read. Raises ConnectionLost, NotConnected."""
         if self.losses != losses:
             raise ConnectionLost(
                 "{what}: the connection was lost", str(self._loss or ""), what=self.what
@@ -138,13 +138,13 @@ class Observing:
         self.check()
 
     def start(self, timeout: float) -> None:
-        """Open within `timeout` s and watch from then on; does nothing when started. Raises what `open_` raises."""
+        """Open the connection within `timeout` s and watch it. It does nothing when started. Raises as `open_`."""
         with self._life:
             if self._thread is not None:
                 self.check()
                 return
             deadline = time.monotonic() + timeout
-            self._await_former(timeout)
+            self._await_previous(timeout)
             self._enter(Connection.CONNECTING)
             try:
                 self._open(max(deadline - time.monotonic(), 0.001))
@@ -163,7 +163,7 @@ class Observing:
             self._thread.start()
 
     def stop(self) -> None:
-        """Close the connection; does nothing when it is closed. A thread that does not end in time ends by itself."""
+        """Close the connection. It does nothing when closed. A thread that does not end in time ends later."""
         with self._life:
             thread, self._thread = self._thread, None
             self._stopping.set()
@@ -173,21 +173,21 @@ class Observing:
             self._enter(Connection.OFFLINE)
 
     def _enter(self, state: Connection, stopping: threading.Event | None = None) -> bool:
-        """Change the state unless `stopping` is set. Return whether it was not set."""
-        with self._turn:
+        """Change the state and return true, unless `stopping` is set."""
+        with self._state_lock:
             if stopping is not None and stopping.is_set():
                 return False
             changes, self._state = self._state is not state, state
         if changes:
-            self._tell_changed()
+            self._notify_changed()
         return True
 
-    def _tell_changed(self) -> None:
+    def _notify_changed(self) -> None:
         if self._listener is not None:
             self._listener(self)
 
-    def _await_former(self, timeout: float) -> None:
-        """Wait for a thread that `stop` did not wait for: it closes the former connection when it ends."""
+    def _await_previous(self, timeout: float) -> None:
+        """Wait until the thread of the previous connection has closed it, if `stop` did not wait for it."""
         if self._ending is not None:
             self._ending.join(timeout)
             if self._ending.is_alive():
@@ -200,34 +200,34 @@ class Observing:
                 since = time.monotonic()
                 loss = self._attempt(lambda: self._watch(stopping))
                 if loss is None:
-                    stopping.wait(BREATH)  # a watch that returns at once must not keep a processor busy
+                    stopping.wait(BREATH)  # a watch that returns at once must not use a whole processor core
                     continue
                 if time.monotonic() - since >= STEADY:
                     self._pause = FIRST_PAUSE
-                self._come_back(stopping, loss)
+                self._reconnect(stopping, loss)
         finally:
             self._close()
 
     def _attempt(self, work: Callable[[], object]) -> DeviceError | None:
-        """Call a function of the driver and return its error. A programming error counts as a loss: nothing watches."""
+        """Call a function of the driver and return its error. A programming error counts as a connection loss."""
         try:
             work()
         except DeviceError as e:
             return e
         except Exception as e:
-            if self._state is not Connection.LOST:  # else it is in the log already, and attempts go on
+            if self._state is not Connection.LOST:  # otherwise it is in the log already
                 log.exception("%s: an error inside the driver", self.what)
             return ConnectionLost("{what}: an error inside the driver", f"{type(e).__name__}: {e}", what=self.what)
         return None
 
-    def _come_back(self, stopping: threading.Event, loss: DeviceError) -> None:
+    def _reconnect(self, stopping: threading.Event, loss: DeviceError) -> None:
         self._reason = loss
         if not self._enter(Connection.LOST, stopping):
             return
-        log.warning("%s lost: %s", self.what, loss)
+        log.warning("The connection to %s is lost: %s", self.what, loss)
         self._loss = loss
         self.losses += 1
-        self._attempt(lambda: self._tell_lost(loss))
+        self._attempt(lambda: self._notify_lost(loss))
         since = time.monotonic()
         while True:
             self._close()
@@ -238,5 +238,5 @@ class Observing:
                 self._reason = error
                 continue
             if self._enter(Connection.BACK, stopping):
-                log.warning("%s back after %.1f s", self.what, time.monotonic() - since)
+                log.warning("The connection to %s is restored after %.1f s", self.what, time.monotonic() - since)
             return

@@ -1,4 +1,4 @@
-"""The obstacles around a robot at one moment, and the collision world made of them.
+"""Snapshot of the obstacles around a robot, and the collision world built from it.
 
 Pinocchio and coal come with the extra `kinematics` and are imported on first use.
 """
@@ -80,9 +80,9 @@ class ObstacleSnapshot:
         return ObstacleSnapshot(self.obstacles, robots)
 
     def changed_since(self, before: "ObstacleSnapshot", robot: str) -> "ObstacleSnapshot":
-        """Return the part of this snapshot that `robot` could newly collide with, and what it holds itself.
+        """Return what appeared or moved since `before`, and what `robot` holds.
 
-        That is what appeared or moved since `before`. When the robot holds something new, it is everything.
+        If the robot holds something new, return the whole snapshot, because the part may collide with anything.
         """
         obstacles = {name: one for name, one in self.obstacles.items() if before.obstacles.get(name) != one}
         if any(one.attachment is not None and one.attachment.robot == robot for one in obstacles.values()):
@@ -103,7 +103,7 @@ class ObstacleSnapshot:
 
     @property
     def empty(self) -> bool:
-        """Return whether it contains nothing."""
+        """Return whether there are no obstacles and robots."""
         return not self.obstacles and not self.robots
 
 
@@ -147,8 +147,8 @@ def _attach(world: "CollisionWorld", name: str, shape: "Shape", attachment: Atta
             name=name,
             robot=attachment.robot,
         )
-    standing = world.robot(attachment.robot)
-    frames = standing.link_frames(standing.q)
+    holder = world.robot(attachment.robot)
+    frames = holder.link_frames(holder.q)
     if attachment.link not in frames:
         raise Refused(
             "{name} is attached to {link}, which is no link of {robot}",
@@ -178,8 +178,10 @@ def _require_all_joints(robot: Robot, model: "RobotModel", joints: Sequence[Join
 
 
 def _copied(pose: Pose) -> Pose:
-    at, turn = pose.position, pose.orientation
-    return Pose(Position(at.x, at.y, at.z), Orientation(turn.x, turn.y, turn.z, turn.w))
+    position, rotation = pose.position, pose.orientation
+    return Pose(
+        Position(position.x, position.y, position.z), Orientation(rotation.x, rotation.y, rotation.z, rotation.w)
+    )
 
 
 def _differ(one: Sequence[Joint], other: Sequence[Joint]) -> bool:

@@ -21,17 +21,17 @@ PERIOD: Final = 0.04
 """Time between two checks of the surroundings, s."""
 RESOLUTION: Final = 0.005
 """Maximum travel of any point of the robot between two checked configurations, m."""
-JOIN_WITHIN: Final = 2.0
+JOIN_TIMEOUT: Final = 2.0
 """Time that the end of a move waits for a check in progress, s."""
 
 log = logging.getLogger(__name__)
 
 
 class PlannedPath(NamedTuple):
-    """A path that was free when it was planned, and what it was planned with.
+    """A path that was free of collisions when it was planned, and the data of its planning.
 
     Attributes:
-        tools: Models and shapes; they stay on the planning thread, which waits while the robot moves.
+        tools: Models and shapes. The planning thread does not use them while the robot moves.
         arm: The joints that move.
         points: Waypoints, joint values of the arm.
         around: The surroundings during planning.
@@ -46,10 +46,10 @@ class PlannedPath(NamedTuple):
 
 
 class PathMonitor:
-    """Context manager around a motion: checks the rest of the path whenever the surroundings change.
+    """Context manager for a motion: checks the rest of the path whenever the surroundings change.
 
-    An obstacle in the rest of the path stops the robot at once, however far away it is. Only what changed since
-    planning counts. On leaving, PathBlocked names the obstacle, and tells whether the robot came to a stop before it.
+    An obstacle in the rest of the path stops the robot at once, at any distance. Only changes since planning count. The
+    exit raises PathBlocked, whose message names the obstacle and tells whether the robot stopped before it.
     """
 
     def __init__(self, robot: Robot, path: PlannedPath, take_snapshot: Callable[[Others], ObstacleSnapshot]) -> None:
@@ -71,12 +71,12 @@ class PathMonitor:
     ) -> None:
         with self._stopping:  # a stop that was sent must not reach the next motion
             self._over.set()
-        self._thread.join(JOIN_WITHIN)
+        self._thread.join(JOIN_TIMEOUT)
         blocked = self._contact is not None or self._problem is not None
         if blocked and (error is None or isinstance(error, Cancelled)):
             raise PathBlocked(self._message()) from error
 
-    # -------------------------------------------------------------------------------- watching
+    # -------------------------------------------------------------------------------- monitoring
     def _run(self) -> None:
         seen = self._path.around
         while True:
@@ -97,7 +97,7 @@ class PathMonitor:
                 return
 
     def _snapshot(self, before: ObstacleSnapshot) -> ObstacleSnapshot:
-        """Return the present surroundings; a robot that does not answer keeps its last known joints."""
+        """Return the present surroundings. For a robot that does not answer, use its last known joints."""
         if self._others is None:
             try:
                 others = other_robots(self._robot)
@@ -117,7 +117,7 @@ class PathMonitor:
         if around.empty:
             return None
         joints = self._robot.robot_joints()
-        # Half of the margin, because an obstacle that is measured repeatedly moves a little each time.
+        # Half of the margin, because repeated measurements of an obstacle differ slightly.
         self._world = build_world(self._robot, path.tools, joints, around, path.margin / 2.0)
         sweep = Sweep(self._world, name, path.arm, RESOLUTION)
         hit = sweep.first_contact(rest_of(path.points, path.arm.values(joints), sweep.levers))
@@ -129,7 +129,7 @@ class PathMonitor:
         return found[0] if found else Contact(name, "an obstacle", 0.0)
 
     def _with_surroundings(self, contacts: "Iterable[Contact]") -> "list[Contact]":
-        """Remove contacts of the robot with itself."""
+        """Remove contacts of the robot with itself or its held parts."""
         name, world = self._robot.name, self._world
         assert world is not None
         held = world.robot(name).held
@@ -167,7 +167,7 @@ class PathMonitor:
         )
 
     def _touched(self) -> "Contact | None":
-        """Return what the robot touches at standstill."""
+        """Return a contact of the robot at standstill, or None."""
         world, tools = self._world, self._path.tools
         assert world is not None
         try:
@@ -179,7 +179,7 @@ class PathMonitor:
 
 
 def rest_of(points: "Sequence[Array]", q: "Array", levers: "Array") -> "list[Array]":
-    """Return the rest of a path: from joint values on it, or near it, to its end.
+    """Return the rest of a path, from joint values on or near it to its end.
 
     Args:
         points: Waypoints of the whole path.

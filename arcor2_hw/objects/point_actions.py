@@ -14,11 +14,11 @@ from arcor2_hw.objects.small import IOPoint, PointKind
 LONGEST_WAIT: Final = 600.0
 """Longest time a program may wait for a point in one call, s."""
 MARGIN: Final = 20.0
-"""Time beyond it for requests that are repeated, behind another request, s."""
+"""Additional time of the action for repeated requests after another request, s."""
 
 
 class PointActions(abc.ABC):
-    """Reads, writes and observes points by name; a driver sets `io_points` in `__init__`."""
+    """Read, write and observe points by name. A driver sets `io_points` in `__init__`."""
 
     DYNAMIC_PARAMS: ClassVar[dict[str, tuple[str, set[str]]]] = {"name": ("point_names", set())}
     who: str
@@ -34,7 +34,7 @@ class PointActions(abc.ABC):
         return list(self.io_points)
 
     def require_point(self, name: str, kind: PointKind | None = None) -> IOPoint:
-        """Return the point of a name. Raises OutOfRange when there is none, Refused when it is of another kind."""
+        """Return a point. Raises OutOfRange if it does not exist, Refused if it is of another kind."""
         point = self.io_points.get(name)
         if point is None:
             raise OutOfRange(
@@ -53,7 +53,7 @@ class PointActions(abc.ABC):
         return point
 
     def point_label(self, name: str) -> str:
-        """Return what a point is, for errors: its kind, or its terminal."""
+        """Return the kind of a point, or its terminal, for errors."""
         return "digital" if self.io_points[name].kind is PointKind.DIGITAL else "analogue"
 
     @abc.abstractmethod
@@ -66,13 +66,13 @@ class PointActions(abc.ABC):
 
     @abc.abstractmethod
     def await_point(self, name: str, value: bool, timeout: float) -> None:
-        """Return when a digital point has the value. Raises DeviceTimeout after `timeout` s, Cancelled."""
+        """Wait until a digital point has the value. Raises DeviceTimeout after `timeout` s, Cancelled."""
 
     def subscribe(self, name: str, listener: Callable[[Edge], None]) -> Callable[[], None]:
-        """Call `listener` with each edge of a digital point, on the observing thread; it has to be quick.
+        """Call `listener` with each edge of a digital point, and return the function that ends the subscription.
 
-        Returns the function that ends the subscription. The subscription outlasts a loss of the connection; changes
-        during the loss cause no edge.
+        The listener runs on the observing thread and must return quickly. The subscription continues after a connection
+        loss; changes during the loss do not count as edges.
         """
         self.require_point(name, PointKind.DIGITAL)
         return self.edge_listeners.add(name, listener)
@@ -138,7 +138,7 @@ class PointActions(abc.ABC):
 
         :param name: name of the point
         :param value: on or off
-        :param timeout: how long at most, s
+        :param timeout: time limit, s
         """
         assert 0.0 <= timeout <= 600.0
 

@@ -1,4 +1,4 @@
-"""Named points in a setting: `name=DI... debounce=0.02`, `name=AO... scale=0.01 unit=m/s on_loss=hold`."""
+"""Parser of named points in a setting: `name=DI... debounce=0.02`, `name=AO... scale=0.01 unit=m/s on_loss=hold`."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ LONGEST_DEBOUNCE: Final = 10.0
 
 
 def entries(text: str, separator: str, parameter: str) -> dict[str, list[str]]:
-    """Return the words of each `name=word word ...`, by name. Raises OutOfRange naming the parameter."""
+    """Split a list of `name=word word ...` into words by name. Raises OutOfRange."""
     found: dict[str, list[str]] = {}
     for entry in filter(None, (part.strip() for part in text.split(separator))):
         name, sign, rest = entry.partition("=")
@@ -49,14 +49,14 @@ def io_point(
     Args:
         name: Name of the point.
         kind: DI, DO, AI or AO.
-        words: The options, as `scale=0.001`.
+        words: The options, such as `scale=0.001`.
         parameter: Name of the setting, for errors.
         debounce: Whether inputs may be debounced.
-        safe_states: What an output may do when the device loses us.
-        default_on_loss: What an output does unless the option says otherwise.
+        safe_states: Permitted reactions of outputs to a connection loss.
+        default_on_loss: Reaction of an output without the option `on_loss`.
 
     Raises:
-        OutOfRange: An option is wrong; the error names the parameter and the point.
+        OutOfRange: An option is not valid.
     """
     known = [option for option in OPTIONS[kind] if debounce or option != "debounce"]
     options: dict[str, str] = {}

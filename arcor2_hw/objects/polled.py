@@ -1,4 +1,4 @@
-"""Polled: a StateObserver made of functions, for drivers of released packages. New ones derive from StateObserver."""
+"""Polled: a StateObserver made of functions, for drivers in released packages. New ones derive from StateObserver."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 class Polled(StateObserver[T]):
-    """A StateObserver whose hooks are functions; see there for what each does."""
+    """A StateObserver whose hooks are functions; see there."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""PolledControl: connection, control, work and stop of a device whose state is read periodically. A mixin."""
+"""PolledControl: connection, control, actions and stop of a device whose state is read periodically. A mixin."""
 
 import contextlib
 import threading
@@ -19,29 +19,29 @@ T = TypeVar("T")
 US: Final = "us"
 NOBODY: Final = "nobody has control"
 STANDS_WITHIN: Final = 1.0
-"""Time from a stop to standstill, s."""
+"""Time limit from a stop to standstill, s."""
 
 
 class Link(Protocol):
-    """What a driver needs of a connection: ModbusLink, Line, or a class of its own."""
+    """Interface of a connection, such as ModbusLink, Line, or a class of the driver."""
 
     who: str
     """Name and address, for errors."""
 
     def open(self, timeout: float) -> None:
-        """Open within `timeout` s. Raises DeviceError."""
+        """Open the connection within `timeout` s. Raises DeviceError."""
 
     def close(self) -> None:
-        """Close; does nothing when closed. A request that waits for its answer fails at once."""
+        """Close the connection. It does nothing when closed. A request that waits for its answer fails at once."""
 
 
 class PolledControl(Connected, typing.Generic[T]):
-    """A device that is read periodically, and commanded after `take_control`; call `use_link` in `__init__`.
+    """A device that is read periodically and commanded after `take_control`.
 
-    `class Press(Machine, PolledControl[list[int]], Generic)` overrides `read_state`, and where the device has such a
-    thing `arm` and `disarm` (what taking and releasing control writes), `send_stop`, `is_busy`, `owner_of` and
-    `fault_of` (read from a state). All may raise DeviceError. Control ends when the connection is lost, and when the
-    device reports another owner.
+    For example `class Press(Machine, PolledControl[list[int]], Generic)`. A driver calls `use_link` in `__init__` and
+    overrides `read_state`. If the device has these features, it overrides `arm` and `disarm` (write what takes and
+    releases control), `send_stop`, and `is_busy`, `owner_of` and `fault_of` (decode a state). All may raise
+    DeviceError. Control ends when the connection is lost, or when the device reports another owner.
     """
 
     period: float = 0.1
@@ -50,14 +50,14 @@ class PolledControl(Connected, typing.Generic[T]):
     answers_within: float = 3.0
     """See StateObserver."""
     stands_within: float = STANDS_WITHIN
-    """Time from a stop to standstill, s."""
+    """Time limit from a stop to standstill, s."""
     in_control: bool = False
     why_not: str = NOBODY
-    """Why we have no control."""
+    """Why control was not taken or has ended."""
     _link: Link
 
     def use_link(self, link: Link, observer: StateObserver[T] | None = None) -> None:
-        """Read the state over `link`, or by an observer of the driver's own."""
+        """Read the state over `link`, or by a custom observer."""
         self._link = link
         self._polled = observer or _Observer(self, link.who)
         self.keep_connection(link.who, self._polled.observing)
@@ -67,7 +67,7 @@ class PolledControl(Connected, typing.Generic[T]):
         self._doing = ""
 
     def observe_by(self, link: Link, read: Callable[[], T], *, period: float = 0.1, fresh: float = 0.5) -> None:
-        """Read the state with a function; for drivers written before `read_state`."""
+        """Read the state with a function, for drivers written before `read_state` existed."""
         self.period, self.busy_period, self.fresh_for = period, min(period, 0.02), fresh
         self._read = read
         self.use_link(link)
@@ -87,57 +87,60 @@ class PolledControl(Connected, typing.Generic[T]):
         self._link.close()
 
     def on_state(self, snapshot: Snapshot[T]) -> None:
-        """Take a new state before others see it."""
+        """Process a new state before other threads get it."""
 
     def after_reading(self) -> None:
-        """Do what follows each reading, such as keeping a watchdog quiet."""
+        """Do what is necessary after each reading, such as feeding a watchdog."""
 
     # -------------------------------------------------------------------------------- hooks: control
     def arm(self) -> None:
-        """Take control at the device: set the time it may go on without us, write who we are."""
+        """Take control at the device, for example set its watchdog time and write the owner."""
 
     def disarm(self) -> None:
         """Release control at the device."""
 
     def send_stop(self) -> None:
-        """Send the command that stops."""
+        """Send the stop command."""
 
     def is_busy(self, state: T) -> bool:
-        """Return whether the device works."""
+        """Return whether the device is executing a command."""
         return False
 
     def owner_of(self, state: T) -> str | None:
-        """Return who has control as the device reports it: "us", another's name, or None."""
+        """Return the owner of control in a state: "us", the name of another client, or None."""
         return US if self.in_control else None
 
     def why_control_ended(self, state: T) -> str:
-        """Return why the device does not obey us any more, asked while we have control; empty while it does."""
+        """Return why our control has ended according to a state; empty if it has not."""
         owner = self.owner_of(state)
         return "" if owner == US else f"{owner} has control" if owner else NOBODY
 
     def fault_of(self, state: T) -> int:
-        """Return the number of the fault that the device reports; 0: none."""
+        """Return the number of the fault in a state; 0 for none."""
         return 0
 
     # -------------------------------------------------------------------------------- states and commands
     def newest(self) -> T | None:
-        """Return the newest state however old; None before the first."""
+        """Return the newest state of any age; None before the first."""
         return self._polled.newest()
 
     def current(self) -> T:
-        """Return the newest state. Raises NotConnected, ConnectionLost, or Stale when it is too old."""
+        """Return the newest state. Raises NotConnected, ConnectionLost, or Stale if it is too old."""
         return self._polled.current().value
 
     def fresh(self) -> T:
-        """Return a state that was asked for after this call. Raises DeviceTimeout, NotConnected, ConnectionLost."""
+        """Return a state requested after this call. Raises DeviceTimeout, NotConnected, ConnectionLost."""
         return self._polled.fresh().value
 
     def wait(self, holds: Callable[[T], bool], timeout: float, what: str, go_on: GoOn | None = None) -> T:
-        """Return the first state asked for from now on for which `holds` is true. Raises Cancelled, DeviceTimeout."""
+        """Return the first state requested from now on for which `holds` is true. Raises Cancelled, DeviceTimeout."""
         return self._polled.wait(holds, timeout, what, go_on).value
 
     def require_control(self, what: str) -> None:
-        """Return when the device may be commanded. Raises NotConnected, ConnectionLost, NotInControl naming `what`."""
+        """Check that the device may be commanded. Raises NotConnected, ConnectionLost, NotInControl.
+
+        what: name of the command, for errors.
+        """
         self.observing.check()
         if not self.in_control:
             owner = self.control_owner()
@@ -145,7 +148,13 @@ class PolledControl(Connected, typing.Generic[T]):
             raise NotInControl("{device}: {what} is refused: {reason}", device=self.who, what=what, reason=why)
 
     def send(self, what: str, write: Callable[[], None], go_on: GoOn | None = None) -> None:
-        """Send a command, unless a stop or a loss came first. Raises NotInControl naming `what`."""
+        """Send a command unless a stop or a connection loss came first. Raises NotInControl.
+
+        Args:
+            what: Name of the command, for errors.
+            write: Sends the command.
+            go_on: Check of the work that the command belongs to, from `act`.
+        """
         with self._sending:
             if go_on is not None:
                 go_on()
@@ -154,7 +163,7 @@ class PolledControl(Connected, typing.Generic[T]):
 
     @contextlib.contextmanager
     def act(self, what: str) -> Iterator[GoOn]:
-        """Do work that takes its time; the value is for `send` and `wait`. Raises Refused while other work runs."""
+        """Do longer work in this context. The value is the check for `send` and `wait`. Raises Refused while busy."""
         if not self._acting.acquire(blocking=False):
             raise Refused(
                 "{device} is busy ({doing}): {what} has to wait", device=self.who, doing=self._doing, what=what
@@ -166,31 +175,31 @@ class PolledControl(Connected, typing.Generic[T]):
             self._acting.release()
 
     def finish(self, what: str, timeout: float, go_on: GoOn) -> T:
-        """Wait until the device does not work any more. Raises DeviceFault when it reports a fault then."""
+        """Wait until the device is no longer busy and return its state. Raises DeviceFault if it reports a fault."""
         end = self.wait(lambda state: not self.is_busy(state), timeout, what, go_on)
         if fault := self.fault_of(end):
             raise DeviceFault("{device}: {what} failed", fault_code=fault, device=self.who, what=what)
         return end
 
     def stop_waiting(self) -> None:
-        """End with Cancelled the work that has started."""
+        """Cancel the work in progress."""
         self._polled.stop_waiting()
 
     # -------------------------------------------------------------------------------- connection
     def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
-        """Start to observe within `timeout` s; nothing is written. Raises NotConnected, DeviceTimeout, DeviceFault."""
+        """Start observing within `timeout` s. Raises NotConnected, DeviceTimeout, DeviceFault."""
         self._polled.connect(timeout)
 
     def disconnect(self) -> None:
-        """Release control when it is ours, and close; does nothing when closed. Work that runs ends with an error."""
+        """Release control if we have it, and close the connection. Work in progress ends with an error."""
         if self.in_control and self.observing.online:
-            with contextlib.suppress(DeviceError):  # the device's own supervision does it then
+            with contextlib.suppress(DeviceError):  # the watchdog of the device releases control instead
                 self.leave()
         self.drop_control()
         self._polled.disconnect()
 
     def leave(self) -> None:
-        """Release control because we disconnect; takes at most half a second."""
+        """Release control during disconnecting, within 0.5 s."""
         PolledControl.release_control(self)
 
     def condition(self) -> Health:
@@ -200,7 +209,7 @@ class PolledControl(Connected, typing.Generic[T]):
 
     # -------------------------------------------------------------------------------- control
     def take_control(self) -> None:
-        """Take control; does nothing when it is ours. Raises NotInControl naming who has it."""
+        """Take control. It does nothing when we have control. Raises NotInControl if another client has it."""
         with self._taking_control:
             owner = self.owner_of(self.fresh())
             if owner not in (None, US):
@@ -220,7 +229,7 @@ class PolledControl(Connected, typing.Generic[T]):
             self.observing.settled()
 
     def release_control(self) -> None:
-        """Stop what runs and release control; does nothing when it is not ours."""
+        """Stop the device and release control. It does nothing without control."""
         with self._sending:
             if not self.in_control:
                 return
@@ -232,29 +241,29 @@ class PolledControl(Connected, typing.Generic[T]):
             self.disarm()
 
     def control_owner(self) -> str | None:
-        """Return who has control: "us", another's name, or None."""
+        """Return the owner of control: "us", the name of another client, or None."""
         if self.in_control:
             return US
         newest = self.newest()
         owner = None if newest is None else self.owner_of(newest)
-        return None if owner == US else owner  # an earlier session of ours, which the device still remembers
+        return None if owner == US else owner  # the device still reports an earlier session of this driver
 
     def drop_control(self, why: str = NOBODY) -> None:
-        """Note that we have no control any more; nothing is sent."""
+        """Record that we no longer have control. Nothing is sent."""
         self.in_control, self.why_not = False, why
 
     def on_lost(self, error: DeviceError) -> None:
-        """End control: a loss of the connection ends it."""
+        """End control, because the connection is lost."""
         self.drop_control("control ended when the connection was lost")
 
     def check_control(self, snapshot: Snapshot[T]) -> None:
-        """End control when a state asked for since it was taken says that the device does not obey us."""
+        """End control if a state requested after it was taken shows that the device no longer obeys us."""
         if self.in_control and snapshot.asked > self._control_since and (why := self.why_control_ended(snapshot.value)):
             self.drop_control(why)
 
     # -------------------------------------------------------------------------------- stop
     def stop(self) -> None:
-        """Stop what runs, and return at standstill. Raises DeviceTimeout when the device does not stop."""
+        """Stop the device and return at standstill. Raises DeviceTimeout if the device does not stop."""
         with self._sending:
             self.stop_waiting()
             self.observing.check()
@@ -265,7 +274,7 @@ class PolledControl(Connected, typing.Generic[T]):
 
 
 class _Observer(StateObserver[T]):
-    """Observes the state by the hooks of a device."""
+    """Observe the state with the hooks of a device."""
 
     def __init__(self, device: PolledControl[T], who: str) -> None:
         self._device = device

@@ -1,4 +1,4 @@
-"""PolledMachine: a machine with the states of PackML whose state is read periodically. A mixin."""
+"""PolledMachine: a machine with PackML states that is read periodically. A mixin of object types."""
 
 import abc
 from typing import TypeVar
@@ -12,11 +12,14 @@ T = TypeVar("T")
 
 
 class PolledMachine(PolledControl[T], Machine):
-    """`class Press(PolledMachine[list[int]], Generic)`: a driver overrides `state_of` and `write_command`."""
+    """A machine such as `class Press(PolledMachine[list[int]], Generic)`.
+
+    A driver overrides `state_of` and `write_command`.
+    """
 
     @abc.abstractmethod
     def state_of(self, state: T) -> MachineState:
-        """Return the state of PackML that the device reported."""
+        """Return the PackML state in a state of the device."""
 
     @abc.abstractmethod
     def write_command(self, command: MachineCommand, *arguments: int) -> None:
@@ -27,13 +30,15 @@ class PolledMachine(PolledControl[T], Machine):
         return self.state_of(self.current())
 
     def command(self, command: MachineCommand) -> None:
-        """Send a command. Raises Refused naming command and state, NotInControl."""
+        """Send a command. Raises Refused, NotInControl."""
         self._command(command)
 
     def run(self, timeout: float, go_on: GoOn, *arguments: int) -> T:
-        """Reset where necessary, start, and return what is read when the unit is complete. Called within an `act`.
+        """Reset if necessary, start, and return the state of the device at the end. Call it within `act`.
 
-        Raises DeviceFault when it ends in another state than Complete or Idle, DeviceTimeout after `timeout` s.
+        Raises:
+            DeviceFault: The unit did not end in Complete or Idle.
+            DeviceTimeout: Resetting or running took longer than `timeout` s.
         """
         if self.state_of(self.fresh()) in ALLOWED[MachineCommand.RESET]:
             self._command(MachineCommand.RESET, go_on=go_on)
@@ -48,11 +53,11 @@ class PolledMachine(PolledControl[T], Machine):
 
     # -------------------------------------------------------------------------------- hooks of PolledControl
     def is_busy(self, state: T) -> bool:
-        """Return whether the unit does something: true in any state that it leaves by itself."""
+        """Return whether the unit is in a state that it leaves by itself."""
         return self.state_of(state) not in _STAYS
 
     def send_stop(self) -> None:
-        """Send the command `stop`."""
+        """Send the command STOP."""
         self.write_command(MachineCommand.STOP)
 
     def _command(self, command: MachineCommand, *arguments: int, go_on: GoOn | None = None) -> None:

@@ -22,8 +22,8 @@ class RobotException(DeviceError):
 class Robot(GenericWithPose):
     """A robot with one arm.
 
-    Poses of end effectors are in the world, joint values in rad (m where prismatic), `speed` is 0 to 1 of the
-    configured maxima. A method whose body only raises Arcor2NotImplemented counts as not implemented.
+    Poses of end effectors are in the world, joint values in rad (prismatic: m). `speed` is a fraction of the configured
+    maximum. A method whose body only raises Arcor2NotImplemented counts as not implemented.
     """
 
     category: ClassVar[str] = "Robots"
@@ -41,13 +41,13 @@ class Robot(GenericWithPose):
     def surround(self, surroundings: Surroundings) -> None:
         """Receive the surroundings of the robot; called once between `__init__` and `connect`.
 
-        Load here what takes time, such as a model, because nothing is controlled yet.
+        An override may load a model here, which takes time, because no device is controlled yet.
         """
         self._around = surroundings
 
     @property
     def surroundings(self) -> Surroundings:
-        """Return the surroundings of the robot; empty when none were set."""
+        """Return the surroundings of the robot; empty if none were set."""
         return self.__dict__.get("_around") or Nothing()
 
     # -------------------------------------------------------------------------------- held parts
@@ -57,12 +57,12 @@ class Robot(GenericWithPose):
         return dict(self.__dict__.get("_parts", {}))
 
     def hold_part(self, part: HeldPart) -> None:
-        """Attach a part to the robot, replacing one of the same name; safe moves keep it clear of obstacles."""
+        """Attach a part to the robot, replacing one of the same name. Safe moves keep it clear of obstacles."""
         self._parts = self.parts | {part.name: part}
         self._notify_parts()
 
     def drop_part(self, name: str) -> HeldPart | None:
-        """Detach a part and return it; None when the robot does not hold it."""
+        """Detach a part and return it, or return None if the robot does not hold it."""
         parts = self.parts
         part = parts.pop(name, None)
         if part is not None:
@@ -81,7 +81,7 @@ class Robot(GenericWithPose):
 
     @property
     def move_in_progress(self) -> bool:
-        """Return whether a motion that we commanded is in progress."""
+        """Return whether a motion commanded by this driver is in progress."""
         return self._move_lock.locked()
 
     def check_if_ready_to_move(self) -> None:
@@ -95,7 +95,7 @@ class Robot(GenericWithPose):
             raise Refused("{name} is moving already", name=self.name)
 
     def move_to_calibration_pose(self) -> None:
-        """Move to a pose in which a camera sees the robot well."""
+        """Move to a pose in which a camera sees most of the robot."""
         raise Arcor2NotImplemented("move_to_calibration_pose")
 
     # -------------------------------------------------------------------------------- mandatory
@@ -127,7 +127,7 @@ class Robot(GenericWithPose):
     def suctions(self) -> set[str]:
         """Return the names of the suction cups."""
 
-    # -------------------------------------------------------------------------------- optional, of the protocol
+    # -------------------------------------------------------------------------------- optional, in the protocol
     def move_to_pose(
         self, end_effector_id: str, target_pose: Pose, speed: float, safe: bool = True, linear: bool = True
     ) -> None:
@@ -171,7 +171,7 @@ class Robot(GenericWithPose):
         """Enable or disable moving the arm by hand."""
         raise Arcor2NotImplemented("set_hand_teaching_mode")
 
-    # -------------------------------------------------------------------------------- optional, ours
+    # -------------------------------------------------------------------------------- optional, additional
     def state(self) -> RobotState:
         """Return the complete state of the robot."""
         raise Arcor2NotImplemented("state")
@@ -213,7 +213,7 @@ class Robot(GenericWithPose):
         valid_for: float = 0.2,
         end_effector_id: str | None = None,
     ) -> None:
-        """Move with a velocity that ends by itself after `valid_for`. It returns at once.
+        """Start to move with a velocity, which ends by itself after `valid_for`, and return at once.
 
         It is called repeatedly during the motion, each time with the velocity from then on. It is not a move in
         progress, and is not refused because of itself. The caller keeps the speed of the end effector at or below 0.25
@@ -234,7 +234,7 @@ class Robot(GenericWithPose):
 
         It returns at once, also during jogging.
 
-        For types that can be jogged and whose `forward_kinematics` queries the controller, which takes time.
+        Implement it if the robot can be jogged and its `forward_kinematics` queries the controller, which takes time.
         """
         raise Arcor2NotImplemented("tcp_speed")
 
@@ -264,11 +264,11 @@ class Robot(GenericWithPose):
         raise Arcor2NotImplemented("set_tool")
 
     def power_on(self) -> None:
-        """Switch the drives on; brakes stay closed."""
+        """Switch the drives on. The brakes remain closed."""
         raise Arcor2NotImplemented("power_on")
 
     def release_brakes(self) -> None:
-        """Release the brakes; nothing moves."""
+        """Release the brakes without moving."""
         raise Arcor2NotImplemented("release_brakes")
 
     def home(self) -> None:

@@ -26,7 +26,7 @@ class RobotTools:
     """Model, arms and meshes of a robot, and models of other robots.
 
     Attributes:
-        made_of: Settings, package and calibration; the object is created again when they change.
+        made_of: Settings, package and calibration. When they change, a new object is created.
 
     Raises:
         Refused: There is no package, or the extra `kinematics` is not installed.
@@ -70,7 +70,7 @@ class RobotTools:
         return self._inverse[end_effector]
 
     def other(self, robot: Robot) -> "RobotModel | None":
-        """Return the model of another robot, None when it has none."""
+        """Return the model of another robot, or None if it has none."""
         settings, calibration = settings_of(robot), self._surroundings.calibration(robot.id)
         known = self._others.get(robot.name)
         if known is None or known[0] != (settings, calibration):
@@ -133,8 +133,8 @@ def package_of(robot: Robot) -> Path | None:
         module = sys.modules.get(base.__module__)
         if module is None or not module.__file__:
             return None
-        beside = Path(module.__file__).parent / "urdf"
-        return next((path for path in (beside / name.removesuffix(".zip"), beside / name) if path.exists()), None)
+        folder = Path(module.__file__).parent / "urdf"
+        return next((path for path in (folder / name.removesuffix(".zip"), folder / name) if path.exists()), None)
     return None
 
 

@@ -28,16 +28,15 @@ if TYPE_CHECKING:
     from arcor2_hw.planning.timing import Trajectory
 
 MARGIN: Final = 0.005
-"""Distance that a path keeps from obstacles, m.
+"""Distance of a path from obstacles, m.
 
-It is half of the resolution, so that no collision is missed between two
-
-checks. Where the start or the goal is nearer than that, the path has to be free without it.
+It is half of the resolution, so that no collision between two checks is missed. If the start or the goal is nearer to
+an obstacle, the path is checked without a margin.
 """
 RESOLUTION: Final = 0.01
 """Maximum travel of any point of the robot between two checked configurations, m."""
 WITHIN: Final = 2.0
-"""Maximum time of planning, s."""
+"""Time limit of planning, s."""
 TCP_RAMP: Final = 4.0
 """Acceleration along a line divided by the speed along it, 1/s."""
 
@@ -47,7 +46,7 @@ Stopped = Callable[[], bool]
 T = TypeVar("T")
 
 
-Way = MotionPath  # name used by object types of older packages
+Way = MotionPath  # object types in older packages use this name
 
 
 class Tool(NamedTuple):
@@ -79,13 +78,13 @@ class SafeMoves:
         self._robot = robot
         self.tool = tool
         self._settings = settings or (lambda: settings_of(robot))
-        self._here = threading.local()
+        self._local = threading.local()
 
     def prepare(self) -> None:
-        """Import and load everything needed on this thread. Errors are raised later, where they matter.
+        """Import the libraries and load the models on this thread. Errors are only logged; moves raise them again.
 
-        Call it before control is taken of any device: other threads of this process wait for some tenths of a second,
-        also those that feed a watchdog.
+        Call it before any device is controlled, because it blocks other threads for some tenths of a second, also those
+        that feed watchdogs.
         """
         try:
             from arcor2_hw.planning import planner  # noqa: F401
@@ -128,7 +127,7 @@ class SafeMoves:
         Args:
             end_effector: The end effector.
             pose: The pose.
-            near: Joint values to stay near to.
+            near: Joint values to which the solution is nearest.
             avoid_collisions: Whether solutions in collision are skipped.
 
         Raises:
@@ -136,7 +135,7 @@ class SafeMoves:
             NotFound: There is no such end effector.
             InvalidData: A value is not finite.
         """
-        with self._named():
+        with self._own_errors():
             tools = self._tools()
             arm, target = tools.arm(end_effector), self._target(pose)
             if not avoid_collisions:
@@ -149,7 +148,7 @@ class SafeMoves:
 
             return self._with_margin(near, solved)
 
-    # -------------------------------------------------------------------------------- ways
+    # -------------------------------------------------------------------------------- paths
     def to_joints(
         self,
         now: Sequence[Joint],
@@ -159,12 +158,12 @@ class SafeMoves:
         safe: bool = True,
         stopped: Stopped | None = None,
     ) -> MotionPath:
-        """Plan a path to joint values: straight in joint space where that is free, otherwise around obstacles.
+        """Plan a path to joint values: straight in joint space if that is free, otherwise around obstacles.
 
         Args:
             now: Present joint values.
             goal: Joint values at the end.
-            speed: Fraction of the maxima.
+            speed: Fraction of the maximum joint velocities.
             safe: Whether obstacles are considered.
             stopped: Returns whether planning is to be cancelled.
 
@@ -174,8 +173,8 @@ class SafeMoves:
             Refused: The surroundings are unknown.
             Cancelled: `stopped` returned true.
         """
-        with self._named():
-            arm = self._widest(goal)
+        with self._own_errors():
+            arm = self._arm_with_most(goal)
             if not safe:
                 return self._way(arm, [arm.values(now), arm.values(goal)], speed)
 
@@ -196,8 +195,8 @@ class SafeMoves:
         safe: bool = True,
         stopped: Stopped | None = None,
     ) -> MotionPath:
-        """Plan a path to a pose, to whichever joint values give the shortest. Raises as `to_joints`, also NotFound."""
-        with self._named():
+        """Plan the shortest path to any joint values of a pose. Raises as `to_joints`, also NotFound."""
+        with self._own_errors():
             tools = self._tools()
             arm, target = tools.arm(end_effector), self._target(pose)
             start = arm.values(now)
@@ -219,7 +218,7 @@ class SafeMoves:
             KinematicsException: The line is interrupted or, with `safe`, in collision; the message says where.
             NotFound: There is no such end effector.
         """
-        with self._named():
+        with self._own_errors():
             from arcor2_hw.kinematics.errors import StartInCollision
             from arcor2_hw.planning.paths import require_free, straight_line
 
@@ -236,16 +235,16 @@ class SafeMoves:
             return self._with_margin(now, checked) if safe else self._way(arm, way, speed, line=True)
 
     def contacts(self, joints: Sequence[Joint]) -> list[str]:
-        """Return the contacts that the robot would have at joint values, as pairs of names."""
-        with self._named():
+        """Return the contacts of the robot at joint values, as pairs of names."""
+        with self._own_errors():
             world = build_world(self._robot, self._tools(), joints, self._snapshot(), 0.0)
             return [str(contact) for contact in world.contacts(self._robot.name, self._q(joints))]
 
     @contextlib.contextmanager
     def monitored(self, way: MotionPath) -> Iterator[None]:
-        """Monitor the surroundings while the robot follows a safe path, and stop it when they block it.
+        """Monitor the surroundings while the robot follows a safe path, and stop the robot if they block the path.
 
-        The robot's `stop` is called, after which the motion in the context has to raise Cancelled.
+        After `stop` of the robot, the motion in this context has to raise Cancelled.
 
         Raises:
             PathBlocked: The robot was stopped. The message names the obstacle.
@@ -257,7 +256,7 @@ class SafeMoves:
         with PathMonitor(self._robot, way._planned, lambda others: self._take_snapshot(tools, others)):
             yield
 
-    # -------------------------------------------------------------------------------- what is held
+    # -------------------------------------------------------------------------------- held parts
     def hold(self, name: str, link: str, joints: Sequence[Joint]) -> None:
         """Attach a collision object of the scene to a link of the robot at their present poses.
 
@@ -320,10 +319,10 @@ class SafeMoves:
         Args:
             arm: The arm.
             points: Waypoints.
-            speed: Fraction of the maxima.
-            around: Surroundings that it was checked against, None for an unsafe path.
+            speed: Fraction of the maximum joint velocities.
+            around: Surroundings for which the path was checked; None for an unsafe path.
             margin: Margin of the check, m.
-            line: Whether it is a straight line.
+            line: Whether the path is a straight line.
         """
 
         def timed(tcp_speed: float | None) -> "Trajectory":
@@ -351,15 +350,15 @@ class SafeMoves:
 
         return Sweep(world, self._robot.name, arm, RESOLUTION)
 
-    def _with_margin(self, now: Sequence[Joint], ask: "Callable[[CollisionWorld, ObstacleSnapshot], T]") -> T:
-        """Plan with the margin; without it where the start or the goal is too near to an obstacle."""
+    def _with_margin(self, now: Sequence[Joint], plan: "Callable[[CollisionWorld, ObstacleSnapshot], T]") -> T:
+        """Plan with the margin, or without it if the start or the goal is too near to an obstacle."""
         from arcor2_hw.kinematics.errors import GoalInCollision, OnlyInCollision, StartInCollision
 
         around, tools = self._snapshot(), self._tools()
         try:
-            return ask(build_world(self._robot, tools, now, around, MARGIN), around)
+            return plan(build_world(self._robot, tools, now, around, MARGIN), around)
         except (GoalInCollision, OnlyInCollision, StartInCollision):
-            return ask(build_world(self._robot, tools, now, around, 0.0), around)
+            return plan(build_world(self._robot, tools, now, around, 0.0), around)
 
     def _snapshot(self) -> ObstacleSnapshot:
         return self._take_snapshot(self._tools(), other_robots(self._robot))
@@ -372,7 +371,7 @@ class SafeMoves:
         model = self._tools().model
         return model.values(joints, model.neutral())
 
-    def _widest(self, goal: Sequence[Joint]) -> "Arm":
+    def _arm_with_most(self, goal: Sequence[Joint]) -> "Arm":
         """Return the chain that contains most of the joints."""
         tools = self._tools()
         names = {joint.name for joint in goal}
@@ -384,8 +383,8 @@ class SafeMoves:
         return target
 
     @contextlib.contextmanager
-    def _named(self) -> Iterator[None]:
-        """Convert errors of kinematics to the robot's own class."""
+    def _own_errors(self) -> Iterator[None]:
+        """Convert kinematics errors to the KinematicsException of the robot."""
         try:
             yield
         except KinematicsError as error:
@@ -394,17 +393,17 @@ class SafeMoves:
             raise self._robot.KinematicsException(str(error), error.detail or error.code) from error
 
     def _tools(self) -> RobotTools:
-        """Return the models of the present thread; reload them when settings, package or calibration changed."""
+        """Return the models of this thread. Load them again if settings, package or calibration have changed."""
         robot = self._robot
         made_of = dict(self._settings()), package_of(robot), robot.surroundings.calibration(robot.id)
-        found: RobotTools | None = getattr(self._here, "tools", None)
+        found: RobotTools | None = getattr(self._local, "tools", None)
         if found is None or found.made_of != made_of:
-            found = self._here.tools = RobotTools(robot, *made_of)
+            found = self._local.tools = RobotTools(robot, *made_of)
         return found
 
 
 def _tool_of(robot: Robot) -> Obstacle | None:
-    """Return the tool of a robot that its model does not contain."""
+    """Return the tool of a robot that its model does not contain, or None."""
     moves = getattr(robot, "safe_moves", None)
     tool = moves.tool() if isinstance(moves, SafeMoves) else None
     if tool is None:

@@ -1,7 +1,7 @@
 """Settings of an object type: a dataclass, filled from the scene object's parameters.
 
-Users set the parameters, and the cell host acts on them with the rights of the server. A setting that names a port, a
-URL or a file therefore goes through the checks in this module; each raises OutOfRange with the setting's name.
+Users set the parameters, and the cell host uses them with the rights of the server. Check settings with a port, a URL
+or a file by the functions of this module, which raise OutOfRange.
 """
 
 import dataclasses
@@ -43,15 +43,15 @@ def within(name: str, value: float, low: float, high: float, unit: str = "") -> 
 class Settings:
     """Base class of settings: a dataclass with fields of type bool, int, float, str or an enumeration.
 
-    The range of a number is declared in its type (see Range) and checked when the settings are made. A class that
-    checks more overrides `__post_init__` and calls `super().__post_init__()` in it.
+    The range of a number is declared in its type (see Range) and checked when the settings are created. A class with
+    further checks overrides `__post_init__` and calls `super().__post_init__()` in it.
 
-    A secret is declared by its metadata: `password: str = field(default="", repr=False, metadata={"secret": True})`.
+    Declare a secret by its metadata: `password: str = field(default="", repr=False, metadata={"secret": True})`.
     The server stores its value separately and never sends it to clients. A str whose name indicates a secret
     (`password`, `token`, `api_key`, ...) is treated the same unless its metadata has `"secret": False`.
 
     A stored secret is sent only to the address that it was entered for. A str whose name indicates an address (`host`,
-    `url`, `address`, `port`, ...) is part of it; metadata `"address": True` or `False` overrides that.
+    `url`, `address`, `port`, ...) is part of that address; metadata `"address": True` or `False` overrides this.
     """
 
     def __post_init__(self) -> None:

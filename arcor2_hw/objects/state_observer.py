@@ -1,4 +1,4 @@
-"""StateObserver: one thread reads the state of a device periodically; others read it, or wait for a change."""
+"""StateObserver: reads the state of a device periodically; other threads get the state or wait for a change."""
 
 import threading
 import time
@@ -13,11 +13,11 @@ from arcor2_hw.objects.observing import GoOn, Observing
 T = TypeVar("T")
 
 CLOSED_BY_US = 0.5
-"""Time the thread waits for its end when reading fails because we close the connection, s."""
+"""Time that the thread waits for its end after a read that failed because we closed the connection, s."""
 
 
 class Snapshot(NamedTuple, Generic[T]):
-    """A state, and when it was asked for: on the monotonic clock (s) and in UTC."""
+    """A state and the time at which it was requested: on the monotonic clock (s) and in UTC."""
 
     value: T
     asked: float
@@ -25,27 +25,27 @@ class Snapshot(NamedTuple, Generic[T]):
 
     @classmethod
     def by(cls, read: Callable[[], T]) -> "Snapshot[T]":
-        """Return a snapshot of what `read` returns, asked for now."""
+        """Call `read` and return its result as a snapshot requested now."""
         asked, stamp = time.monotonic(), now()
         return cls(read(), asked, stamp)
 
 
 class StateObserver(Generic[T]):
-    """Keeps the newest state of a device.
+    """Keep the newest state of a device.
 
-    A driver overrides `open`, `read` and `close`, and where needed `on_state`, `after_reading`, `on_lost` and
-    `interrupt`. All of them run on the observing thread, except the first `open`, `interrupt` and states that come
-    unasked (`put`). They raise DeviceError.
+    A driver overrides `open`, `read` and `close`, and if needed `on_state`, `after_reading`, `on_lost` and `interrupt`.
+    They run on the observing thread, except the first `open`, `interrupt`, and `on_state` of unsolicited states
+    (`put`). They raise DeviceError.
     """
 
     period: float = 0.1
-    """Time between readings while nobody waits, s."""
+    """Time between readings while no thread waits for a state, s."""
     busy_period: float = 0.02
-    """Time between readings while somebody waits, s."""
+    """Time between readings while a thread waits for a state, s."""
     fresh_for: float = 0.5
-    """Age up to which a state counts as current, s."""
+    """Maximum age of a current state, s."""
     answers_within: float = 3.0
-    """Time within which a reading that was asked for is there, s: repeated, and behind another request."""
+    """Time limit of `fresh`, s: long enough for a repeated reading after another request."""
 
     def __init__(self, who: str) -> None:
         self.who = who
@@ -62,32 +62,32 @@ class StateObserver(Generic[T]):
         raise NotImplementedError
 
     def read(self) -> T | None:
-        """Read the state; None when there is none to take because states come unasked."""
+        """Read the state. Return None if the device sends its states unsolicited."""
         raise NotImplementedError
 
     def close(self) -> None:
-        """Close the connection; does nothing when it is closed."""
+        """Close the connection. It does nothing when the connection is closed."""
 
     def interrupt(self) -> None:
-        """End a reading that waits for its answer, because we disconnect."""
+        """End a reading in progress, because the device is being disconnected."""
 
     def on_state(self, snapshot: Snapshot[T]) -> None:
-        """Take a new state before others see it; nobody else gets a state meanwhile."""
+        """Process a new state before other threads get it."""
 
     def after_reading(self) -> None:
-        """Do what follows each reading, such as keeping a watchdog quiet."""
+        """Do what is necessary after each reading, such as feeding a watchdog."""
 
     def on_lost(self, error: DeviceError) -> None:
-        """Do what a loss of the connection requires; called once per loss."""
+        """Handle a connection loss. It is called once per loss."""
 
     # -------------------------------------------------------------------------------- life
     def connect(self, timeout: float) -> None:
-        """Start to observe; does nothing when started. Raises NotConnected, DeviceTimeout, DeviceFault."""
+        """Start observing. It does nothing when started. Raises NotConnected, DeviceTimeout, DeviceFault."""
         self._ending = False
         self.observing.start(timeout)
 
     def disconnect(self) -> None:
-        """Stop observing; does nothing when stopped. Whoever waits gets NotConnected."""
+        """Stop observing. It does nothing when stopped. Waiting threads get NotConnected."""
         self._ending = True
         self.interrupt()
         self._hurry.set()
@@ -97,27 +97,27 @@ class StateObserver(Generic[T]):
 
     @property
     def ending(self) -> bool:
-        """Return whether we are disconnecting, so that a failure of the connection is expected."""
+        """Return whether the device is being disconnected, so that errors of the connection are expected."""
         return self._ending
 
     @property
     def losses(self) -> int:
-        """Return how often the connection was lost; see `check_unbroken`."""
+        """Return the number of connection losses; see `check_unbroken`."""
         return self.observing.losses
 
     @property
     def taking(self) -> threading.Condition:
-        """Return what is locked while a state is taken: no `on_state` runs while another thread holds it."""
+        """Return the lock of the state. `on_state` does not run while another thread holds it."""
         return self._changed
 
     # -------------------------------------------------------------------------------- states
     def newest(self) -> T | None:
-        """Return the newest state however old; None before the first."""
+        """Return the newest state of any age; None before the first."""
         newest = self._newest
         return None if newest is None else newest.value
 
     def current(self) -> Snapshot[T]:
-        """Return the newest state; wait a moment for one that is not older than `fresh_for`.
+        """Return the newest state. Wait up to BUSY_FOR for one that is not older than `fresh_for`.
 
         Raises:
             NotConnected, ConnectionLost: The device is not observed.
@@ -141,20 +141,20 @@ class StateObserver(Generic[T]):
         return float("inf") if newest is None else time.monotonic() - newest.asked
 
     def fresh(self) -> Snapshot[T]:
-        """Return a state that was asked for after this call. Raises DeviceTimeout, NotConnected, ConnectionLost."""
+        """Return a state requested after this call. Raises DeviceTimeout, NotConnected, ConnectionLost."""
         return self.wait(lambda _: True, self.answers_within, "reporting its state")
 
     def wait(self, holds: Callable[[T], bool], timeout: float, what: str, go_on: GoOn | None = None) -> Snapshot[T]:
-        """Return the first state asked for from now on for which `holds` is true.
+        """Return the first state requested from now on for which `holds` is true.
 
         Args:
-            holds: Tells whether the state is the awaited one. It may raise DeviceError.
+            holds: Returns whether a state is the awaited one. It may raise DeviceError.
             timeout: Longest time to wait, s.
-            what: Name of what is awaited, for errors.
-            go_on: What `begin` returned to the work that waits.
+            what: Name of the operation, for errors.
+            go_on: Check of the work that waits, from `begin`.
 
         Raises:
-            DeviceTimeout: No such state came in time.
+            DeviceTimeout: There was no such state in time.
             ConnectionLost: The connection was lost.
             Cancelled: The work was stopped.
         """
@@ -182,11 +182,11 @@ class StateObserver(Generic[T]):
                 self._waiting -= 1
 
     def put(self, value: T, asked: float) -> None:
-        """Take a state that came unasked; it holds since `asked` (monotonic, s)."""
+        """Store an unsolicited state, valid since `asked` (monotonic, s)."""
         self._set(Snapshot(value, asked, now()))
 
     def wake(self) -> None:
-        """Let everybody who waits check again."""
+        """Make all waiting threads check again."""
         with self._changed:
             self._changed.notify_all()
 
@@ -196,16 +196,16 @@ class StateObserver(Generic[T]):
 
     # -------------------------------------------------------------------------------- stopping
     def begin(self, what: str) -> GoOn:
-        """Return the check for work that starts now: it raises after a stop, and after a loss even if reconnected."""
+        """Return a check for new work: it raises after a stop, and after a loss even if reconnected."""
         return self.observing.begin(what)
 
     def stop_waiting(self) -> None:
-        """End with Cancelled the work that has started."""
+        """Cancel the work in progress."""
         self.observing.cancel()
         self.wake()
 
     def check_unbroken(self, losses: int) -> None:
-        """Return while the device is observed and was since `losses` was read from here."""
+        """Check that the device has been observed since `losses` was read. Raises ConnectionLost, NotConnected."""
         self.observing.check_unbroken(losses)
 
     # -------------------------------------------------------------------------------- on the observing thread
@@ -224,7 +224,7 @@ class StateObserver(Generic[T]):
             except DeviceError:
                 if not self._ending:
                     raise
-                stopping.wait(CLOSED_BY_US)  # we closed it: that is no loss
+                stopping.wait(CLOSED_BY_US)  # not a loss: we closed the connection
 
     def _take(self) -> None:
         asked, stamp = time.monotonic(), now()

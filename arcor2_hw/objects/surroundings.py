@@ -31,7 +31,7 @@ class HeldPart(Data, frozen=True):
 
 
 class Surroundings(Protocol):
-    """The surroundings of a robot. They are queried for every motion, on the thread that calls the robot."""
+    """Interface of the surroundings of a robot. The thread of the robot queries them for every motion."""
 
     def obstacles(self) -> list[Obstacle]:
         """Return the obstacles."""

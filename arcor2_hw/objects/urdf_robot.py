@@ -1,14 +1,14 @@
 """UrdfRobot: a robot whose controller only drives joints; everything else is computed from its URDF."""
 
 import abc
-import contextlib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Final
 
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
-from arcor2_hw.exceptions import Cancelled, InvalidData, NotFound, OutOfRange, Refused
+from arcor2_hw.exceptions import Cancelled, NotFound, OutOfRange
+from arcor2_hw.objects.arm import exclusive_motion, joint_values
 from arcor2_hw.objects.motion_path import MotionPath
 from arcor2_hw.objects.robot import Robot
 from arcor2_hw.objects.safe_moves import SafeMoves, Stopped
@@ -40,13 +40,13 @@ class UrdfRobot(Robot):
         super().surround(surroundings)
         self.safe_moves.prepare()
 
-    # -------------------------------------------------------------------------------- to be written for each robot
+    # -------------------------------------------------------------------------------- for each driver
     @abc.abstractmethod
     def follow(self, way: MotionPath) -> None:
         """Drive the joints along a path, and return when the robot is at standstill at its end.
 
-        Move point to point from waypoint to waypoint so that all joints arrive together, or as `way.timed` says. It is
-        called while `move_in_progress`.
+        Move from waypoint to waypoint so that all joints arrive together, or as `way.timed` defines. It is called while
+        `move_in_progress`.
 
         Raises:
             Cancelled: `stop` was called.
@@ -55,10 +55,10 @@ class UrdfRobot(Robot):
 
     @abc.abstractmethod
     def stop(self) -> None:
-        """Stop at once. An override calls `super().stop()` first, so that no planned motion starts afterwards."""
+        """Stop at once. An override calls `super().stop()` first, so that a move being planned does not start."""
         self._stops += 1
 
-    # -------------------------------------------------------------------------------- what is where
+    # -------------------------------------------------------------------------------- poses and kinematics
     def get_end_effectors_ids(self) -> set[str]:
         """Return the end effectors of the URDF."""
         return set(self.safe_moves.end_effectors())
@@ -116,10 +116,10 @@ class UrdfRobot(Robot):
     def move_to_pose(
         self, end_effector_id: str, target_pose: Pose, speed: float, safe: bool = True, linear: bool = True
     ) -> None:
-        """Move an end effector to a pose in the world, in a line or on any path.
+        """Move an end effector to a pose in the world, in a straight line or on any path.
 
-        With `safe`, a line through an obstacle is refused, and other paths lead around obstacles. The robot stops when
-        an obstacle comes into its path.
+        With `safe`, a line through an obstacle is refused, and other paths avoid obstacles. The robot stops when an
+        obstacle comes into its path.
 
         Raises:
             KinematicsException: There is no path; the message says why.
@@ -139,8 +139,8 @@ class UrdfRobot(Robot):
         self._go(way, speed)
 
     def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
-        """Move to joint values; with `safe` around obstacles. Raises as `move_to_pose`."""
-        self._check_joints(target_joints)
+        """Move to joint values, with `safe` around obstacles. Raises as `move_to_pose`."""
+        joint_values(self.name, target_joints, self.joint_limits(), SLACK)
 
         def way(now: list[Joint], stopped: Stopped) -> MotionPath:
             return self.safe_moves.to_joints(now, target_joints, speed, safe=safe, stopped=stopped)
@@ -152,22 +152,13 @@ class UrdfRobot(Robot):
             raise OutOfRange("{name}: speed must be above 0 and at most 1, not {speed!r}", name=self.name, speed=speed)
         stops = self._stops
         self.check_if_ready_to_move()
-        with self._moving():
+        with exclusive_motion(self._move_lock, self.name):
             way = plan(self.robot_joints(), lambda: self._stops != stops)
             if self._stops != stops:
                 raise Cancelled("The move of {name} was stopped before it started.", name=self.name)
             way.require_begin(self.name, self.robot_joints())
             with self.safe_moves.monitored(way):
                 self.follow(way)
-
-    @contextlib.contextmanager
-    def _moving(self) -> Iterator[None]:
-        if not self._move_lock.acquire(blocking=False):
-            raise Refused("{name} is moving already", name=self.name)
-        try:
-            yield
-        finally:
-            self._move_lock.release()
 
     # -------------------------------------------------------------------------------- checks
     def _check_end_effector(self, end_effector: str) -> None:
@@ -178,25 +169,3 @@ class UrdfRobot(Robot):
                 end_effector=end_effector,
                 known=", ".join(known),
             )
-
-    def _check_joints(self, joints: list[Joint]) -> None:
-        limits = self.joint_limits()
-        given = {joint.name: joint.value for joint in joints}
-        if len(given) != len(joints) or given.keys() != limits.keys():
-            raise InvalidData(
-                "{name} has the joints {limits}, not {given}",
-                name=self.name,
-                limits=", ".join(limits),
-                given=", ".join(given),
-            )
-        for name, value in given.items():
-            low, high = limits[name]
-            if not low - SLACK <= value <= high + SLACK:
-                raise OutOfRange(
-                    "{name} of {owner} must be {low:.3f} to {high:.3f}, not {value!r}",
-                    name=name,
-                    owner=self.name,
-                    low=low,
-                    high=high,
-                    value=value,
-                )

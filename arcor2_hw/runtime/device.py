@@ -102,7 +102,7 @@ class Device:
         with listening(self._connection_changed):
             self.instance = instance = self._make()
             if isinstance(instance, CollisionObject):
-                instance.tell_enabled(lambda: self._changed(self))
+                instance.on_enabled_changed(lambda: self._changed(self))
             if self._find is not None:
                 instance.attach(self._find)
                 if isinstance(instance, HoldsParts) and self._find_robot is not None:

@@ -11,7 +11,7 @@ class LogicActions(Generic):
     icon = "logic"
     _ABSTRACT = False
 
-    # ------------------------------------------------------------------------------------ numbers with a fraction
+    # ------------------------------------------------------------------------------------ numbers
     @action
     def equals(self, value: float, other: float, tolerance: float = 1e-9, *, an: str | None = None) -> bool:
         """Return whether two numbers are equal.
@@ -50,7 +50,7 @@ class LogicActions(Generic):
         """
         return minimum <= value <= maximum
 
-    # ------------------------------------------------------------------------------------ whole numbers
+    # ------------------------------------------------------------------------------------ integers
     @action
     def integer_equals(self, value: int, other: int, *, an: str | None = None) -> bool:
         """Return whether two integers are equal.
@@ -107,7 +107,7 @@ class LogicActions(Generic):
         """
         return part in text
 
-    # ------------------------------------------------------------------------------------ truths
+    # ------------------------------------------------------------------------------------ booleans
     @action
     def logical_and(self, first: bool, second: bool, *, an: str | None = None) -> bool:
         """Return whether both values are true.

@@ -180,7 +180,7 @@ def test_a_late_answer_to_a_write(relay: Relay, make: Callable[..., RemoteIO], f
     block.connect()
     block.take_control()
     relay.delay_next(WRITE_COIL, 0.4)
-    with pytest.raises(DeviceTimeout, match=f"^block at {relay.address}: .*coil 4 on.* it may have been obeyed$"):
+    with pytest.raises(DeviceTimeout, match=f"^block at {relay.address}: .*coil 4 on.* it may have been executed$"):
         block.write_digital("lamp", True)
     assert relay.requests[WRITE_COIL] == 1
     assert fake.truth()["outputs"][4] is True  # it was
