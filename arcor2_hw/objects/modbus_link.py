@@ -219,10 +219,10 @@ class ModbusLink:
         words = self._read_items(method, address, count, timeout).registers
         if len(words) != count:
             raise DeviceFault(
-                "{device} sent {count} of {other_count} {items}",
+                "{device} sent {count} of {expected} {items}",
                 device=self.who,
                 count=len(words),
-                other_count=count,
+                expected=count,
                 items=_ITEMS[method],
             )
         return list(words)
@@ -231,10 +231,10 @@ class ModbusLink:
         bits = self._read_items(method, address, count, timeout).bits
         if not count <= len(bits) <= count + 7:  # whole bytes are sent
             raise DeviceFault(
-                "{device} sent {count} of {other_count} {items}",
+                "{device} sent {count} of {expected} {items}",
                 device=self.who,
                 count=len(bits),
-                other_count=count,
+                expected=count,
                 items=_ITEMS[method],
             )
         return list(bits[:count])
@@ -284,7 +284,7 @@ class ModbusLink:
         if answer.isError():
             code = int(getattr(answer, "exception_code", 0))
             raise DeviceFault(
-                "{device} refused {what}: {code} (exception {other_code})",
+                "{device} refused {what}: {meaning} (exception {code})",
                 fault_code=code,
                 device=self.who,
                 what=what,
