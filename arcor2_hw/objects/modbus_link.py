@@ -288,8 +288,8 @@ class ModbusLink:
                 fault_code=code,
                 device=self.who,
                 what=what,
-                code=self._exceptions.get(code, "exception"),
-                other_code=code,
+                meaning=self._exceptions.get(code, "exception"),
+                code=code,
             )
         return answer
 
