@@ -1,5 +1,5 @@
 # Two commands: `make run` and `make test`. Both do all the set-up; the second time they start at once.
-.PHONY: run test bench bench-compare bench-long bench-editor lint types layers check-editor check lock clean
+.PHONY: run test bench bench-compare bench-long bench-editor mutation lint types layers check-editor check lock clean
 .DEFAULT_GOAL := run
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
@@ -41,6 +41,11 @@ bench-long: .make/dev
 # Measure loading, drawing and event latency of the editor, in Chromium with software rendering.
 bench-editor: .make/dev .make/editor .make/browser
 	$(BIN)/python -m benchmarks.editor $(ARGS)
+
+# Change the journal, the lock table and the lane of a device in small ways, and count what the tests notice. In a crash
+# or on a loaded server, a fault there loses data or moves a device. Takes about half an hour.
+mutation: .make/mutation
+	$(BIN)/python -m tests.mutation $(ARGS)
 
 check: lint types layers check-editor
 
@@ -86,6 +91,10 @@ LIBRARIES := libEGL.so.1:libegl1 libGL.so.1:libgl1 libusb-1.0.so.0:libusb-1.0-0 
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 
+.make/mutation: requirements/mutation.txt | .make/dev
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements/mutation.txt
+	@touch $@
+
 # Node.js: the machine's, or the one from PyPI where it is missing or too old.
 .make/node: editor/node.txt editor/build.py | .make/venv
 	@mkdir -p .make
@@ -114,6 +123,7 @@ COMPILE := pip-compile --quiet --upgrade --generate-hashes --allow-unsafe --stri
 lock:
 	$(COMPILE) $(TESTED) --extra build --extra dev --output-file requirements/dev.txt pyproject.toml
 	$(COMPILE) $(FAMILIES) --extra build --constraint requirements/dev.txt --output-file requirements/run.txt pyproject.toml
+	echo cosmic-ray | $(COMPILE) --constraint requirements/dev.txt --output-file requirements/mutation.txt -
 
 clean:
 	rm -rf $(VENV) .make editor/node_modules server/arcor2_server/editor_files .mypy_cache .ruff_cache .pytest_cache

@@ -160,3 +160,114 @@ def test_a_call_ends_once() -> None:
             thread.join()
         assert sorted(wins) == [False, False, True]
     assert len(ends) == 200
+
+
+def test_a_driver_can_check_whether_its_call_is_still_wanted(lane: Lane) -> None:
+    lane.check_wanted()  # outside of a call it has nothing to check
+    begun, gate = threading.Event(), threading.Event()
+
+    def act(*, wait: bool) -> str:
+        if wait:
+            begun.set()
+            gate.wait(5)
+        lane.check_wanted()
+        return "acted"
+
+    assert lane.call("act", act, keywords={"wait": False}) == "acted"
+
+    stopped = Job("act", act, keywords={"wait": True})
+    lane.submit(stopped)
+    assert begun.wait(5)
+    lane.interrupt()
+    gate.set()
+    assert stopped.wait(5)
+    with pytest.raises(Cancelled, match=r"act was stopped before it began"):
+        stopped.outcome()
+
+
+def test_a_call_that_was_given_up_is_not_wanted_either(lane: Lane) -> None:
+    gate = threading.Event()
+    reactions: list[BaseException] = []
+
+    def act() -> None:
+        gate.wait(5)
+        try:
+            lane.check_wanted()
+        except Cancelled as error:
+            reactions.append(error)
+
+    with pytest.raises(DeviceTimeout):
+        lane.call("act", act, deadline=0.02)
+    gate.set()
+    while lane.hung:
+        time.sleep(0.001)
+    assert len(reactions) == 1
+
+
+def test_the_running_method_is_known(lane: Lane) -> None:
+    assert lane.busy_with == ""
+    assert lane.call("act", lambda: lane.busy_with) == "act"
+    assert lane.call("act", lambda: lane.current and lane.current.method) == "act"
+    assert lane.current is None
+
+
+def test_calls_behind_a_hung_one_fail_at_once_and_say_since_when_it_hangs(lane: Lane) -> None:
+    gate = threading.Event()
+    hanging, waiting = Job("slow", lambda: gate.wait(5)), Job("next", lambda: 1)
+    lane.submit(hanging)
+    while lane.current is not hanging:
+        time.sleep(0.001)
+    lane.submit(waiting)
+    lane.expire(hanging, 0.5)
+    try:
+        assert waiting.wait(5)
+        assert isinstance(waiting.error, DeviceTimeout)
+        assert float(waiting.error.detail.split()[2]) < 60
+    finally:
+        gate.set()
+
+
+def test_giving_up_returns_whether_it_ended_the_call() -> None:
+    job = Job("act", lambda: None)
+    assert job.give_up(DeviceTimeout("late"))
+    assert job.given_up
+    ended = Job("act", lambda: None)
+    assert ended.finish(1)
+    assert not ended.give_up(DeviceTimeout("late"))
+    assert not ended.given_up
+    assert ended.outcome() == 1
+
+
+def test_a_stop_after_closing_does_not_keep_the_thread_alive() -> None:
+    lane, gate = Lane("arm"), threading.Event()
+    running = Job("act", lambda: gate.wait(5))
+    lane.submit(running)
+    while lane.current is not running:
+        time.sleep(0.001)
+    lane.close()
+    lane.cancel_waiting()
+    assert not lane.join(0)
+    gate.set()
+    assert lane.join(5)
+
+
+@pytest.mark.parametrize(("error", "detail"), [(None, ""), (ValueError("bad"), "ValueError('bad')")])
+def test_a_stopped_call_names_the_error_that_the_driver_raised(
+    lane: Lane, error: Exception | None, detail: str
+) -> None:
+    begun, gate = threading.Event(), threading.Event()
+
+    def act() -> None:
+        begun.set()
+        gate.wait(5)
+        if error is not None:
+            raise error
+
+    job = Job("act", act)
+    lane.submit(job)
+    assert begun.wait(5)
+    lane.interrupt()
+    gate.set()
+    assert job.wait(5)
+    assert isinstance(job.error, Cancelled)
+    assert job.error.detail == detail

@@ -94,8 +94,8 @@ class LockTable:
     def require_held(self, user: str, item: str, *, tree: bool = False) -> None:
         """Raise Locked unless the user holds the write lock of an id (`held(x)`); with `tree`, of its tree."""
         if not self.holds(user, item, tree=tree):
-            what = "tree of " if tree else ""
-            raise Locked("{user} does not hold the write lock of the {what}{item!r}.", user=user, what=what, item=item)
+            what = "the tree of " if tree else ""
+            raise Locked("{user} does not hold the write lock of {what}{item!r}.", user=user, what=what, item=item)
 
     def holds_read(self, user: str, item: str) -> bool:
         """Return whether the user holds a read lock of an id."""

@@ -327,3 +327,201 @@ async def test_waiting_for_something_that_is_removed_ends(locks: Locks, tree: Tr
     with pytest.raises(NotFound):
         async with locks.auto("bob", "robot"):
             pass
+
+
+async def test_the_table_lists_who_holds_what(locks: Locks) -> None:
+    await locks.write_lock("ann", "ap2", tree=True)
+    await locks.write_lock("bob", "robot")
+    await locks.read_lock("bob", "free")
+    await locks.read_lock("bob", "free")
+    assert locks.write_locked_by("ann") == ["ap2"]
+    assert locks.write_locked_by("eve") == []
+    assert locks.read_locked_by("bob") == ["free"]
+    assert locks.read_locked_by("ann") == []
+    assert locks.owners() == ["ann", "bob"]
+    assert locks.announced() == {"ann": sorted(WHOLE), "bob": ["robot"]}
+    assert locks.locked_roots() == ["box", "robot", "free"]
+    assert locks.locked_roots(excluding=["box"]) == ["robot", "free"]
+    assert locks.write_locked_roots() == ["box", "robot"]
+    assert locks.write_locked_roots(excluding=["robot"]) == ["box"]
+    assert locks.locked_at("ann", "ap2") <= locks.locked_at("bob", "free")
+    assert [locks.writer_of(item) for item in ("act", "robot", "free", "ori2")] == ["ann", "bob", None, None]
+    assert [locks.holders_of(item) for item in ("act", "robot", "free", "ori2")] == [{"ann"}, {"bob"}, {"bob"}, set()]
+    assert locks.holds_read("bob", "free")
+    assert not locks.holds_read("ann", "free")
+    await locks.read_unlock("bob", "free")
+    assert locks.holds_read("bob", "free")
+    assert locks.locked_at("bob", "free")
+    await locks.read_unlock("bob", "free")
+    assert not locks.holds_read("bob", "free")
+    assert locks.locked_roots() == ["box", "robot"]
+    with pytest.raises(KeyError):
+        locks.locked_at("bob", "free")
+    locks.clear()
+    assert locks.owners() == []
+    assert locks.locked_roots() == []
+    assert not locks.holds("ann", "ap2")
+    with pytest.raises(KeyError):
+        locks.locked_at("ann", "ap2")
+
+
+async def test_a_refusal_names_the_holders(locks: Locks) -> None:
+    await locks.read_lock("eve", "ap1")
+    await locks.read_lock("bob", "ap1")
+    with pytest.raises(Locked, match=r"'ap1' is locked by bob, eve"):
+        await locks.write_lock("ann", "ap1")
+    with pytest.raises(Locked, match=r"in the tree of 'ap2' is locked by bob, eve"):
+        await locks.write_lock("ann", "ap2", tree=True)
+    await locks.write_lock("ann", "act")
+    with pytest.raises(Locked, match=r"'act' is locked by ann"):
+        await locks.read_lock("bob", "act")
+    with pytest.raises(Locked, match=r"in the tree of 'ap2' is locked by ann"):
+        await locks.write_lock("bob", "ap2", tree=True)
+    await locks.write_lock("ann", "free", tree=True)
+    with pytest.raises(Locked, match=r"'ori2' is locked by ann"):
+        await locks.read_lock("bob", "ori2")
+    with pytest.raises(Locked, match=r"'robot' is locked by ann"):
+        async with locks.auto("ann", "robot"), locks.auto("bob", "robot"):
+            pass
+    with pytest.raises(Locked, match=r"bob does not hold the write lock"):
+        locks.require_held("bob", "act")
+    with pytest.raises(Locked, match=r"tree of 'act'"):
+        locks.require_held("ann", "act", tree=True)
+    locks.require_held("ann", "act")
+    locks.require_held("ann", "ori2", tree=True)
+
+
+async def test_removing_a_locked_item_frees_the_rest_of_its_tree(locks: Locks, tree: Tree) -> None:
+    await locks.write_lock("ann", "ap2", tree=True)
+    await locks.read_lock("bob", "robot")
+    await locks.write_lock("bob", "free")
+    for item in ("ap2", "act"):
+        del tree.parents[item]
+    assert locks.drop(["ap2", "act"]) == {"ann": ["ap1", "box", "ori"]}
+    with pytest.raises(KeyError):
+        locks.locked_at("ann", "ap2")
+    assert await locks.write_lock("bob", "box", tree=True) == ["ap1", "box", "ori"]
+    del tree.parents["robot"]
+    assert locks.drop(["robot"]) == {}
+    assert locks.read_locked_by("bob") == []
+    with pytest.raises(KeyError):
+        locks.locked_at("bob", "robot")
+    assert locks.write_locked_by("bob") == ["free", "box"]
+    assert locks.locked_roots() == ["free", "box"]
+
+
+async def test_removing_an_item_of_a_locked_tree_keeps_the_lock_of_the_rest(locks: Locks, tree: Tree) -> None:
+    await locks.write_lock("ann", "ap1", tree=True)
+    del tree.parents["act"]
+    assert locks.drop(["act"]) == {}
+    assert locks.announced() == {"ann": ["ap1", "ap2", "box", "ori"]}
+    assert locks.holds("ann", "ap2", tree=True)
+    assert locks.release_announced("ann", ["ap1"]) == ["ap1", "ap2", "box", "ori"]
+
+
+async def test_removing_one_writer_leaves_the_others(locks: Locks, tree: Tree) -> None:
+    await locks.write_lock("ann", "ap1")
+    await locks.write_lock("bob", "act")
+    await locks.read_lock("eve", "ori")
+    del tree.parents["act"]
+    assert locks.drop(["act"]) == {}
+    assert locks.holds("ann", "ap1")
+    assert locks.holds_read("eve", "ori")
+    assert not locks.holds("bob", "act")
+    assert locks.locked_roots() == ["box"]
+
+
+async def test_a_moved_reader_keeps_its_lock(locks: Locks, tree: Tree) -> None:
+    await locks.read_lock("ann", "free")
+    await locks.write_lock("bob", "ori2")
+    tree.parents["free"] = "box"
+    locks.move_root(["free", "ori2", "unlocked"], "box")
+    assert locks.locked_roots() == ["box"]
+    assert locks.holds_read("ann", "free")
+    assert locks.holds("bob", "ori2")
+    assert not locks.holds("bob", "ori2", tree=True)
+    with pytest.raises(Locked):
+        await locks.write_lock("ann", "ap1", tree=True)
+    locks.move_root(["free"], "box")
+    assert locks.holds_read("ann", "free")
+
+
+async def test_a_moved_tree_lock_covers_the_new_tree_only_while_it_is_alone_there(locks: Locks, tree: Tree) -> None:
+    await locks.write_lock("ann", "free", tree=True)
+    tree.parents["free"] = "box"
+    locks.move_root(["free", "ori2"], "box")
+    assert locks.holds("ann", "act", tree=True)
+    locks.clear()
+
+    tree.parents["free"] = ""
+    await locks.write_lock("ann", "free", tree=True)
+    await locks.write_lock("bob", "act")
+    tree.parents["free"] = "box"
+    locks.move_root(["free", "ori2"], "box")
+    assert locks.holds("ann", "free")
+    assert not locks.holds("ann", "ap1")
+    assert locks.holds("bob", "act")
+    locks.clear()
+
+    tree.parents["free"] = ""
+    await locks.write_lock("ann", "free", tree=True)
+    await locks.read_lock("bob", "act")
+    tree.parents["free"] = "box"
+    locks.move_root(["free", "ori2"], "box")
+    assert not locks.holds("ann", "ap1")
+
+
+async def test_a_tree_that_several_users_write_belongs_to_none(locks: Locks) -> None:
+    await locks.write_lock("ann", "ap1")
+    await locks.write_lock("bob", "ap2")
+    assert not locks.holds("ann", "ap2")
+    assert locks.writer_of("act") is None
+    assert not locks.could_lock_tree("ann", "ap1")
+    locks.release_announced("bob", ["ap2"])
+    assert locks.could_lock_tree("ann", "ap1")
+    assert not locks.could_lock_tree("ann", "ap2")
+    await locks.read_lock("bob", "ap2")
+    assert not locks.could_lock_tree("ann", "ap1")
+    locks.clear()
+    await locks.write_lock("ann", "ap1", tree=True)
+    assert locks.could_lock_tree("ann", "act")
+    assert not locks.could_lock_tree("bob", "act")
+
+
+async def test_a_refused_set_of_locks_takes_none_of_them(locks: Locks) -> None:
+    await locks.write_lock("ann", "robot")
+    with pytest.raises(Locked):
+        async with locks.auto("bob", "act", "robot"):
+            pass
+    assert locks.locked_roots() == ["robot"]
+    with pytest.raises(Locked):
+        async with locks.read("bob", "act", "robot"):
+            pass
+    assert locks.locked_roots() == ["robot"]
+    async with locks.auto("bob", "act", "ori"):
+        assert locks.writer_of("act") == locks.writer_of("ori") == "bob"
+        assert locks.owners() == ["ann"]
+    assert locks.locked_roots() == ["robot"]
+
+
+async def test_a_tree_lock_that_a_request_holds_is_announced_when_its_client_asks(locks: Locks) -> None:
+    await locks.write_lock("ann", "ap1", tree=True)
+    assert await locks.write_lock("ann", "act") == []
+    await locks.acquire("bob", "free")
+    with pytest.raises(Locked):
+        await locks.write_lock("bob", "free")
+    locks.release("bob", "free", "robot")
+    assert await locks.write_lock("bob", "free") == ["free"]
+    assert locks.release_all("bob") == ["free"]
+    assert locks.release_all("bob") == []
+
+
+async def test_without_a_document_only_fixed_and_stored_ids_can_be_locked() -> None:
+    locks = Locks(retries=1, retry_wait=0.01)
+    with pytest.raises(NotFound, match="'box' is not known"):
+        await locks.write_lock("ann", "box")
+    assert await locks.write_lock("ann", "SCENE", tree=True) == ["SCENE"]
+    assert not locks.holds("ann", "box")
+    assert locks.writer_of("box") is None
+    assert locks.holders_of("box") == set()
+    assert locks.could_lock_tree("ann", "box")
