@@ -1,5 +1,6 @@
 """Checks of objects, actions, scenes and projects: pure functions over data and object types."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Protocol
 
@@ -34,7 +35,7 @@ from arcor2_server.documents.reparenting import check_parent
 
 
 class Types(Protocol):
-    """The object types, as far as the checks need them (arcor2_server.object_types.registry.ObjectTypes)."""
+    """Access to the object types (arcor2_server.object_types.registry.ObjectTypes)."""
 
     def meta(self, name: str) -> ObjectTypeMeta:
         """Return one type. Raise NotFound if there is none."""
@@ -43,14 +44,14 @@ class Types(Protocol):
         """Return one action. Raise NotFound if there is none."""
 
     def robot_meta(self, name: str) -> RobotMeta:
-        """Return the features of a robot type; raise NotFound when it is none."""
+        """Return the features of a robot type. Raise NotFound if the type is not a robot."""
 
 
 def check_name(name: str, what: str) -> None:
-    """Refuse what cannot become a name in a program; `what` says what it names ("action point")."""
+    """Raise InvalidData for a name that is not valid in a program; `what` is what it names ("action point")."""
     if not is_valid_name(name):
         raise InvalidData(
-            "{name!r} cannot name {item}: use letters, digits and _, no digit first, no Python word.",
+            "{name!r} cannot name {item}: use letters, digits and _, no digit first, no Python keyword.",
             name=name,
             item=f"an {what}" if what[0] in "aeiou" else f"a {what}",
         )
@@ -58,14 +59,14 @@ def check_name(name: str, what: str) -> None:
 
 # ---------------------------------------------------------------------------------------------- scene
 def object_problems(obj: SceneObject, types: Types) -> list[str]:
-    """Return what is wrong with an object of a scene, empty when all is well."""
+    """Return the problems of an object of a scene."""
     problems = []
     if not is_valid_name(obj.name):
-        problems.append(f"{obj.name!r} is no valid name for an object.")
+        problems.append(f"{obj.name!r} is not a valid name for an object.")
     try:
         meta = types.meta(obj.type)
     except NotFound:
-        return [*problems, f"{obj.name}: the object type {obj.type} is not known."]
+        return [*problems, f"{obj.name}: the object type {obj.type} does not exist."]
     if meta.disabled:
         why = "" if isinstance(meta.problem, Unset) else f" ({meta.problem})"
         return [*problems, f"{obj.name}: the object type {obj.type} cannot be used{why}."]
@@ -79,7 +80,7 @@ def object_problems(obj: SceneObject, types: Types) -> list[str]:
 
 
 def settings_problems(name: str, given: Iterable[Parameter], meta: ObjectTypeMeta) -> list[str]:
-    """Return what is wrong with the settings of the object `name`."""
+    """Return the problems of the settings of the object `name`."""
     known = {setting.name: setting for setting in meta.settings}
     problems = []
     seen = set()
@@ -99,7 +100,7 @@ def settings_problems(name: str, given: Iterable[Parameter], meta: ObjectTypeMet
 
 
 def check_setting(parameter: Parameter, meta: ParameterMeta) -> None:
-    """Refuse a setting of a wrong type or value."""
+    """Raise InvalidData for a setting with a wrong type or value."""
     if (kind := PARAMETER_TYPES.get(meta.type)) is not None:
         kind.check(parameter, meta)
     elif parameter.type != meta.type:
@@ -112,32 +113,26 @@ def check_setting(parameter: Parameter, meta: ParameterMeta) -> None:
 
 
 def scene_problems(scene: Scene, types: Types) -> list[str]:
-    """Return what is wrong with a scene."""
+    """Return the problems of a scene."""
     return [problem for _, problem in scene_findings(scene, types)]
 
 
 def scene_findings(scene: Scene, types: Types) -> Iterator[tuple[str, str]]:
-    """Return what is wrong with a scene, each with the entry of the document that is at fault: `objects[2]`."""
+    """Return the problems of a scene, each with the faulty entry, such as `objects[2]`."""
     for index, obj in enumerate(scene.objects):
         for problem in object_problems(obj, types):
             yield f"objects[{index}]", problem
-    for problem in _twice((obj.name for obj in scene.objects), "object"):
+    for problem in _duplicates((obj.name for obj in scene.objects), "object"):
         yield "objects", problem
 
 
-def _twice(names: Iterable[str], what: str) -> list[str]:
-    seen: set[str] = set()
-    twice: dict[str, None] = {}
-    for name in names:
-        if name in seen:
-            twice[name] = None
-        seen.add(name)
-    return [f"The name {name} is given to more than one {what}." for name in twice]
+def _duplicates(names: Iterable[str], what: str) -> list[str]:
+    return [f"More than one {what} is named {name}." for name, count in Counter(names).items() if count > 1]
 
 
 # ---------------------------------------------------------------------------------------------- actions
 class _Unparented:
-    """A lookup without the parents of action points, which do not matter for the existence of references."""
+    """A lookup without the parents of action points, which are not needed to check references."""
 
     def __init__(self, lookup: ProjectLookup) -> None:
         self._lookup = lookup
@@ -158,7 +153,12 @@ class _Unparented:
 
 
 def action_meta(action: Action, lookup: ProjectLookup, types: Types) -> ObjectAction:
-    """Return the action of the object type that an action calls; InvalidData, NotFound say what is wrong."""
+    """Return the metadata of an action.
+
+    Raises:
+        InvalidData: The action is malformed or disabled.
+        NotFound: Its object or method does not exist.
+    """
     try:
         object_id, method = action.parse_type()
     except ValueError as error:
@@ -172,7 +172,7 @@ def action_meta(action: Action, lookup: ProjectLookup, types: Types) -> ObjectAc
 
 
 def check_flows(action: Action, meta: ObjectAction) -> None:
-    """Refuse flows that do not fit what the action returns."""
+    """Raise InvalidData for flows that do not fit the results of the action."""
     flows: list[Flow] = action.flows
     if [flow.type for flow in flows] != [FlowTypes.DEFAULT]:
         raise InvalidData("{name}: exactly one flow is needed, of type default.", name=action.name)
@@ -190,7 +190,7 @@ def check_flows(action: Action, meta: ObjectAction) -> None:
 
 
 def check_outputs_unique(document: Document, action: Action) -> None:
-    """Refuse names of results that another action of the project uses: they become variables of one program."""
+    """Raise InvalidData for a result name that another action uses, since results become variables of one program."""
     for output in action.outputs():
         other = document.named("output", output)
         if other is not None and other != action.id:
@@ -202,7 +202,11 @@ def check_outputs_unique(document: Document, action: Action) -> None:
 
 
 def complete_parameters(action: Action, meta: ObjectAction) -> Action:
-    """Return the action with present names, and what is missing filled in from the defaults of the method."""
+    """Return the action with present names, and with default values for missing parameters.
+
+    Raises:
+        InvalidData: A parameter is unknown, duplicate, or missing without a default.
+    """
     action = with_present_name(action, meta)
     given = {parameter.name: parameter for parameter in action.parameters}
     if len(given) != len(action.parameters):
@@ -227,7 +231,7 @@ def complete_parameters(action: Action, meta: ObjectAction) -> Action:
 
 
 def check_parameters(action: Action, meta: ObjectAction, lookup: ProjectLookup, types: Types) -> None:
-    """Refuse parameters that the method cannot take. All of them have to be there (see complete_parameters)."""
+    """Raise InvalidData for parameters that do not fit the method. None may be missing (see complete_parameters)."""
     declared = {parameter.name: parameter for parameter in meta.parameters}
     robot_id = action.parse_type()[0]
     unparented = _Unparented(lookup)
@@ -300,7 +304,7 @@ def _check_link(
 
 # ---------------------------------------------------------------------------------------------- project
 def check_project_parameter(parameter: ProjectParameter) -> None:
-    """Refuse a project parameter with a bad name, or a value that is not JSON of a bool, number or string."""
+    """Raise InvalidData for a project parameter with an invalid name, or a value other than bool, number or string."""
     check_name(parameter.name, "project parameter")
     expected = {"boolean": bool, "integer": int, "double": float, "string": str}.get(parameter.type)
     try:
@@ -321,14 +325,14 @@ def check_project_parameter(parameter: ProjectParameter) -> None:
 
 
 def project_problems(scene: Scene, project: Project, types: Types) -> list[str]:
-    """Return what is wrong with a project on its scene. The cost grows with their size, not with its square."""
+    """Return the problems of a project on its scene. The cost is linear in their size."""
     return [problem for _, problem in project_findings(scene, project, types)]
 
 
 def project_findings(scene: Scene, project: Project, types: Types) -> Iterator[tuple[str, str]]:
-    """Return what is wrong with a project on its scene, each with the entry at fault.
+    """Return the problems of a project on its scene, each with the faulty entry.
 
-    `scene.objects[2]` or `project.action_points[0].actions[1]`.
+    An entry is a path such as `scene.objects[2]` or `project.action_points[0].actions[1]`.
     """
     if project.scene_id != scene.id:
         yield "project.scene_id", f"The project {project.name} belongs to another scene than {scene.name}."
@@ -343,21 +347,21 @@ def project_findings(scene: Scene, project: Project, types: Types) -> Iterator[t
     for index, point in enumerate(project.action_points):
         at = f"project.action_points[{index}]"
         if not is_valid_name(point.name):
-            yield at, f"{point.name!r} is no valid name for an action point."
+            yield at, f"{point.name!r} is not a valid name for an action point."
         for number, joints in enumerate(point.robot_joints):
             for problem in _problem(_check_joints, point.name, joints, document, types):
                 yield f"{at}.robot_joints[{number}]", problem
         for number, action in enumerate(point.actions):
             for problem in _problem(check_action, action, document, types):
                 yield f"{at}.actions[{number}]", problem
-    for problem in _twice((point.name for point in project.action_points), "action point"):
+    for problem in _duplicates((point.name for point in project.action_points), "action point"):
         yield "project.action_points", problem
-    for problem in _twice((a.name for point in project.action_points for a in point.actions), "action"):
+    for problem in _duplicates((a.name for point in project.action_points for a in point.actions), "action"):
         yield "project.action_points", problem
 
 
 def check_action(action: Action, lookup: ProjectLookup, types: Types) -> None:
-    """Refuse an action that is not complete and right; whether its names are free is left to the caller."""
+    """Raise InvalidData or NotFound for an invalid action. Whether its names are free is not checked."""
     meta = action_meta(action, lookup, types)
     check_flows(action, meta)
     complete = complete_parameters(action, meta)
@@ -368,7 +372,7 @@ def _problem(check: Callable[..., None], *args: Any) -> list[str]:
     try:
         check(*args)
     except Arcor2Error as error:
-        # A lookup that fails does not know who asked.
+        # The error of a failed look-up does not name the item that refers to the missing one.
         name = next((arg.name for arg in args if isinstance(arg, Action | ProjectParameter)), "")
         text = str(error)
         return [text if not name or text.startswith(name) else f"{name}: {text}"]
@@ -387,13 +391,13 @@ def _check_joints(point: str, joints: ProjectRobotJoints, lookup: ProjectLookup,
 def _parent_problems(document: Document, project: Project) -> Iterator[tuple[str, str]]:
     parents = {point.id: point for point in project.action_points}
     places = {point.id: f"project.action_points[{index}]" for index, point in enumerate(project.action_points)}
-    sound: set[str] = set()
+    checked: set[str] = set()
     for point in project.action_points:
         path: dict[str, None] = {}
         at = point
-        while at.id not in sound:
+        while at.id not in checked:
             if at.id in path:
-                yield places[at.id], f"The action point {at.name} hangs on itself."
+                yield places[at.id], f"The action point {at.name} is its own ancestor."
                 break
             path[at.id] = None
             if isinstance(at.parent, Unset):
@@ -403,4 +407,4 @@ def _parent_problems(document: Document, project: Project) -> Iterator[tuple[str
                     yield places[at.id], problem
                 break
             at = above
-        sound.update(path)
+        checked.update(path)

@@ -38,7 +38,7 @@ CLOSED_LIMIT: Final = 100
 
 
 class ClosedHistory(msgspec.Struct, frozen=True):
-    """The edits of a closed document, and its content after the last one."""
+    """The edits of a closed document, and its items after the last edit."""
 
     document: str
     items: list[Item]
@@ -68,10 +68,10 @@ class ClosedHistories:
         self._directory = directory
         self._damage = damage
         self._latest: ClosedHistory | None = None
-        """The document that was closed last: often the one that is opened next, as by "Save and run"."""
+        """The history of the document closed last, which is often opened next, as by "Save and run"."""
 
     async def store(self, document: Document, history: History, unsaved: Unsaved) -> None:
-        """Store the history of a document that is about to be closed, as far as it leads to what is saved."""
+        """Store the history of a document that is about to be closed, up to the saved version."""
         item = next((item for kind in (Kind.PROJECT, Kind.SCENE) for item in document.of_kind(kind)), None)
         if item is None:
             return
@@ -87,7 +87,7 @@ class ClosedHistories:
             log.warning("undo history is not stored", document=item.id, reason=str(error))
 
     async def reopen(self, scene: Scene, project: Project | None) -> tuple[Document, list[Edit]]:
-        """Return the document of a scene or project, and its history, which is empty where none leads to it."""
+        """Return the document of a scene or project with its history, which is empty if no stored one leads to it."""
         opened = project or scene
         closed = self._latest
         if closed is None or closed.document != opened.id:
@@ -126,7 +126,7 @@ class ClosedHistories:
 
 
 def _read(path: Path) -> ClosedHistory:
-    """Read a stored history. Raises OSError, and zlib.error or ValueError when the file is damaged."""
+    """Read a stored history. Raise OSError, or zlib.error or ValueError if the file is damaged."""
     stored = msgspec.json.decode(zlib.decompress(path.read_bytes()), type=_Stored)
     edits = [
         Edit(row.number, row.time, row.user, decode_changes(row.changes), row.request, row.kind, row.target)
@@ -137,9 +137,9 @@ def _read(path: Path) -> ClosedHistory:
 
 # ---------------------------------------------------------------------------------------------- closing
 def history_to_close(key: str, document: Document, history: History, unsaved: Unsaved) -> ClosedHistory | None:
-    """Return the history up to what is saved, None when no revision in it is the saved one.
+    """Return the history up to the saved version, None if no revision equals it.
 
-    Edits after the newest revision that equals the saved document are dropped: closing discards them.
+    Later edits are dropped, since closing discards them.
     """
     edits, unsaved, discarded = list(history), unsaved.copy(), list[Change]()
     while edits and (unsaved.scene or unsaved.project):
@@ -158,23 +158,23 @@ def history_to_close(key: str, document: Document, history: History, unsaved: Un
 def continue_history(
     closed: ClosedHistory, scene: Scene, project: Project | None
 ) -> tuple[Document, list[Edit]] | None:
-    """Return the document as it is saved now and its history; None when the history does not lead to it.
+    """Return the saved document and its history; None if the history does not lead to it.
 
-    What was changed outside the editor since the document was closed is an edit without a user at the end.
+    Changes that were made outside the editor since the document was closed become a last edit without a user.
     """
-    # Only the items are needed here: a second document with its lookups would double the time.
+    # Only the items are needed: a second document with its indexes would double the time.
     saved = [
         Item(change.kind, change.id, change.parent, change.rank, change.after)
         for change in Document().changes_to_fill(scene, project)
     ]
     of_scene = project is None
-    # The scene of a project has a history of its own: it is taken as it is now.
+    # The scene of a project has its own history, so its present items are used.
     items = [item for item in closed.items if (item.kind in OF_SCENE) is of_scene]
     items += [item for item in saved if (item.kind in OF_SCENE) is not of_scene]
     document = Document(items)
     changes = differences(document, saved)
     document.apply(changes)
-    # The order and the owner of an item are no part of a change.
+    # Changes do not cover the order and the action point of items, so these may still differ.
     untimed = replace(scene, **UNTIMED), project and replace(project, **UNTIMED)
     if (document.scene, document.project) != untimed:
         return None
@@ -185,7 +185,7 @@ def continue_history(
 
 
 def differences(document: Document, wanted: Iterable[Item]) -> list[Change]:
-    """Return the changes that make other items of a document."""
+    """Return the changes that turn the items of a document into the wanted ones."""
     changes, found = [], set()
     for item in wanted:
         found.add((item.kind, item.id))
@@ -194,5 +194,5 @@ def differences(document: Document, wanted: Iterable[Item]) -> list[Change]:
             changes.append(document.add(item.kind, item.id, item.value, item.parent))
         elif present.value != item.value:
             changes.append(document.update(item.kind, item.id, item.value))
-    gone = [item for item in document.items() if (item.kind, item.id) not in found]
-    return [document.remove(item.kind, item.id) for item in reversed(gone)] + changes
+    removed = [item for item in document.items() if (item.kind, item.id) not in found]
+    return [document.remove(item.kind, item.id) for item in reversed(removed)] + changes

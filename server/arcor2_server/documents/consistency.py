@@ -1,4 +1,4 @@
-"""Checks that a document is consistent after an undo. Only what the changes touch is checked."""
+"""Checks whether a document stays consistent after an undo. Only items that the changes affect are checked."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -17,7 +17,7 @@ _NAMED_IN_POINT = (Kind.ORIENTATION, Kind.JOINTS)
 _NAMED = (Kind.OBJECT, Kind.POINT, Kind.ACTION, Kind.PARAMETER, *_NAMED_IN_POINT)
 
 
-class Unsound(InvalidData):
+class Inconsistent(InvalidData):
     """The document would become inconsistent; `ids` are the conflicting items."""
 
     code = "unsound"
@@ -27,43 +27,46 @@ class Unsound(InvalidData):
         self.ids = set(ids)
 
 
-def check_sound(document: Document, changes: Sequence[Change], types: Types) -> None:
-    """Check that the document holds together once the changes are made; it is left as it is. Raises Unsound."""
+def check_consistent(document: Document, changes: Sequence[Change], types: Types) -> None:
+    """Check that the document is consistent with the changes applied, and leave it unchanged.
+
+    Raises:
+        Inconsistent: It would not be.
+    """
     document.apply(changes)
     try:
         for change in changes:
             if change.after is None:
-                _check_unneeded(document, change)
+                _check_unused(document, change)
             else:
                 _check_name(document, change)
-                _CHECKS.get(change.kind, _nothing)(document, change, types)
+                if (check := _CHECKS.get(change.kind)) is not None:
+                    check(document, change, types)
         _check_loops(document, [c.after for c in changes if c.kind is Kind.LOGIC and c.after is not None])
     finally:
         document.apply([change.inverse() for change in reversed(changes)])
 
 
 def title(change: Change) -> str:
-    """Return what people call the thing that a change is about."""
+    """Return the name and kind of the changed item, as users know it: `home (action point)`."""
     value = change.before if change.after is None else change.after
     name = getattr(value, "name", "")
     what = {Kind.LOGIC: "step of the logic", Kind.OVERRIDE: "override"}.get(change.kind, change.kind.replace("_", " "))
     return f"{name} ({what})" if name else f"a {what}"
 
 
-# ---------------------------------------------------------------------------------------------- what goes
-def _check_unneeded(document: Document, change: Change) -> None:
+def _check_unused(document: Document, change: Change) -> None:
     key = change.id
-    needing: list[str] = [user.id for user in document.users_of(key)]
+    users: list[str] = [user.id for user in document.users_of(key)]
     if change.kind is Kind.POINT:
-        needing += [point.id for point in document.points_of(key)]
-        needing += [item.id for kind in OWNED for item in document.owned(key, kind)]
+        users += [point.id for point in document.points_of(key)]
+        users += [item.id for kind in OWNED for item in document.owned(key, kind)]
     if change.kind is Kind.ACTION:
-        needing += [item.id for item in (*document.outgoing(key), *document.incoming(key))]
-    if needing:
-        raise Unsound("{change} is needed by what was made since.", needing, change=title(change))
+        users += [item.id for item in (*document.outgoing(key), *document.incoming(key))]
+    if users:
+        raise Inconsistent("{change} is needed by what was made since.", users, change=title(change))
 
 
-# ---------------------------------------------------------------------------------------------- what comes or changes
 def _check_name(document: Document, change: Change) -> None:
     if change.kind not in _NAMED:
         return
@@ -74,16 +77,12 @@ def _check_name(document: Document, change: Change) -> None:
     for kind, name in names:
         other = document.named(kind, name, parent)
         if other is not None and other != change.id:
-            raise Unsound("The name {name} is taken.", [other], name=name)
-
-
-def _nothing(document: Document, change: Change, types: Types) -> None:
-    pass
+            raise Inconsistent("The name {name} is taken.", [other], name=name)
 
 
 def _object(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
     if problems := object_problems(change.after, types):
-        raise Unsound(" ".join(problems), [])
+        raise Inconsistent(" ".join(problems), [])
 
 
 def _point(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
@@ -95,12 +94,12 @@ def _point(document: Document, change: Change, types: Types) -> None:  # noqa: A
         check_no_loop(document, point, point.parent)
     except Arcor2Error as error:
         above = {point.parent, *(each.id for each in document.descendants(point.id))}
-        raise Unsound(error.message, above) from None
+        raise Inconsistent(error.message, above) from None
 
 
 def _owned(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
     if document.find(Kind.POINT, change.parent) is None:
-        raise Unsound("The action point of {change} is gone.", [change.parent], change=title(change))
+        raise Inconsistent("The action point of {change} is gone.", [change.parent], change=title(change))
 
 
 def _action(document: Document, change: Change, types: Types) -> None:
@@ -118,13 +117,13 @@ def _check_action(document: Document, action: Action, types: Types, blamed: str 
         check_action(action, document, types)
     except Arcor2Error as error:
         targets = {reference(parameter.type, parameter.value) for parameter in action.parameters}
-        raise Unsound(error.message, [blamed] if blamed else [target for target in targets if target]) from None
+        raise Inconsistent(error.message, [blamed] if blamed else [target for target in targets if target]) from None
 
 
 def _logic(document: Document, change: Change, types: Types) -> None:
     project = next((item for item in document.of_kind(Kind.PROJECT)), None)
     if project is not None and not project.value.has_logic:
-        raise Unsound("The project {name} has no logic any more.", [project.id], name=project.value.name)
+        raise Inconsistent("The project {name} has no logic any more.", [project.id], name=project.value.name)
     _check_step(document, change.after, types)
 
 
@@ -137,21 +136,21 @@ def _check_step(document: Document, item: LogicItem, types: Types) -> None:
         siblings = {other.id for other in document.outgoing(action_of(item.start))} - {item.id}
         if not isinstance(item.condition, Unset):
             places.add(action_of(item.condition.what))
-        raise Unsound(error.message, places | siblings) from None
+        raise Inconsistent(error.message, places | siblings) from None
 
 
 def _check_loops(document: Document, steps: list[LogicItem]) -> None:
     try:
         check_no_loops(document, steps)
     except InvalidData as error:
-        # Which of the other steps closes it: whichever was made last.
+        # Any of the other steps may close the loop; the caller blames the latest edit.
         own = {step.id for step in steps}
-        raise Unsound(error.message, {item.id for item in document.of_kind(Kind.LOGIC)} - own) from None
+        raise Inconsistent(error.message, {item.id for item in document.of_kind(Kind.LOGIC)} - own) from None
 
 
 def _project(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
     if not change.after.has_logic and document.count(Kind.LOGIC):
-        raise Unsound(
+        raise Inconsistent(
             "{name} has steps of its logic.", [item.id for item in document.of_kind(Kind.LOGIC)], name=change.after.name
         )
 

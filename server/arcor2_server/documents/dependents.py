@@ -19,14 +19,23 @@ VIRTUAL = "VirtualCollisionObject"
 
 
 def project_after(scene: Scene, project: Project, removed: Iterable[str], moved: Iterable[str]) -> Project:
-    """Give a project as it is when objects of its scene were removed and others moved; itself when nothing changes.
+    """Update a project after objects of its scene were removed or moved.
 
-    `scene` is the scene as it was. Points at removed objects stay where they are in the world.
+    Action points of removed objects keep their pose in the world.
+
+    Args:
+        scene: The scene before the change.
+        project: The project.
+        removed: The ids of removed objects.
+        moved: The ids of moved objects.
+
+    Returns:
+        The updated project, or `project` itself if nothing changes.
     """
     document = Document.of(scene, project)
     changes: list[Change] = []
 
-    def make(new: list[Change]) -> None:
+    def apply(new: list[Change]) -> None:
         document.apply(new)
         changes.extend(new)
 
@@ -34,15 +43,15 @@ def project_after(scene: Scene, project: Project, removed: Iterable[str], moved:
         for point in document.descendants(object_id):
             for item in document.owned(point.id, Kind.JOINTS):
                 if item.value.is_valid:
-                    make([document.update(Kind.JOINTS, item.id, replace(item.value, is_valid=False))])
+                    apply([document.update(Kind.JOINTS, item.id, replace(item.value, is_valid=False))])
     for object_id in removed:
         for point in document.points_of(object_id):
-            make(changes_for_parent(document, point.id, "")[0])
+            apply(changes_for_parent(document, point.id, "")[0])
         for item in document.of_kind(Kind.ACTION):
             if item.value.type.partition("/")[0] == object_id:
-                make(_without_action(document, item.value))
+                apply(_without_action(document, item.value))
         if document.find(Kind.OVERRIDE, object_id) is not None:
-            make([document.remove(Kind.OVERRIDE, object_id)])
+            apply([document.remove(Kind.OVERRIDE, object_id)])
     result = document.project
     return project if not changes or result is None else replace(result, created=project.created)
 
@@ -78,16 +87,16 @@ class Dependents:
             before = await self._storage.scene(scene.id)
         except NotFound:
             before = replace(scene, objects=[])
-        gone_types = self._session.removed_types | {obj.type for obj in before.objects}
+        used_types = self._session.removed_types | {obj.type for obj in before.objects}
         await save()
         await self._update_projects(before, scene)
         self._session.removed_types.clear()
-        return await self.forget_unused_types(gone_types - {obj.type for obj in scene.objects})
+        return await self.delete_unused_types(used_types - {obj.type for obj in scene.objects})
 
     async def _update_projects(self, before: Scene, after: Scene) -> None:
-        kept = {obj.id: obj for obj in after.objects}
-        removed = [obj.id for obj in before.objects if obj.id not in kept]
-        moved = [obj.id for obj in before.objects if obj.id in kept and kept[obj.id].pose != obj.pose]
+        present = {obj.id: obj for obj in after.objects}
+        removed = [obj.id for obj in before.objects if obj.id not in present]
+        moved = [obj.id for obj in before.objects if obj.id in present and present[obj.id].pose != obj.pose]
         if not removed and not moved:
             return
         for project_id in await self._storage.projects_with_scene(after.id):
@@ -96,7 +105,7 @@ class Dependents:
             if changed is not project:
                 await self._storage.put_project(changed)
 
-    async def forget_unused_types(self, candidates: Iterable[str]) -> list[ObjectTypeMeta]:
+    async def delete_unused_types(self, candidates: Iterable[str]) -> list[ObjectTypeMeta]:
         """Delete the candidates that are virtual collision objects and used in no scene; return them."""
         types = self._types
         virtual = {
@@ -113,7 +122,7 @@ class Dependents:
         return [await types.remove(name) for name in sorted(virtual)]
 
     async def uses_object(self, object_id: str) -> set[str]:
-        """Return the projects of the open scene that use an object: the saved ones, and the open one as it is now."""
+        """Return the saved projects of the open scene, and the open project, that use an object."""
         session = self._session
         scene, opened = session.require_scene(), session.project
         found = set()

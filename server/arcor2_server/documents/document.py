@@ -1,4 +1,4 @@
-"""The open scene and project as indexed items, so that an edit costs the same at any size."""
+"""The open scene and project as indexed items: the cost of an edit does not depend on their size."""
 
 import operator
 from collections.abc import Iterable, Iterator
@@ -32,21 +32,21 @@ ROOTS: Final = (Kind.OBJECT, Kind.PARAMETER, Kind.SCENE, Kind.PROJECT)
 """Kinds of items that are roots of lock trees, in addition to action points without a parent."""
 
 REFERRING: Final = frozenset({"pose", "position", "joints", *ActionParameterType})
-"""Types of action parameter whose value is the id of something in the project."""
+"""Types of action parameter whose value is the id of an item of the project."""
 
 UNTIMED: Final = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
-"""When a document was saved is no part of what is edited: undoing an edit must not change it."""
+"""Resets the times of a scene or project, since an undo must not change them."""
 
 _by_rank = operator.attrgetter("rank")
 
 
 def action_of(end: str) -> str:
-    """Return the action id (or START, END) of the start or end of a logic item: it may carry the name of the flow."""
+    """Return the action id, START or END of one side of a logic item, without the name of the flow."""
     return end.partition("/")[0]
 
 
 def reference(kind: str, value: str) -> str | None:
-    """Return the id that an action parameter refers to, None when it is a plain literal or makes no sense."""
+    """Return the id that an action parameter refers to, None if it is a literal or malformed."""
     if kind not in REFERRING:
         return None
     try:
@@ -57,9 +57,9 @@ def reference(kind: str, value: str) -> str | None:
 
 
 class Document:
-    """Items by kind and id. `apply` is the only way to change it; the value of an item is replaced, never modified.
+    """Items by kind and id. Only `apply` changes them. Values are replaced, never modified.
 
-    It implements `arcor2_hw.data.project_index.ProjectLookup`; the lookup of an unknown id raises NotFound.
+    Implements `arcor2_hw.data.project_index.ProjectLookup`. Look-ups of an unknown id raise NotFound.
     """
 
     def __init__(self, items: Iterable[Item] = ()) -> None:
@@ -80,7 +80,7 @@ class Document:
 
     @classmethod
     def of(cls, scene: Scene, project: Project | None = None) -> "Document":
-        """Create a document of a scene, and a project on it."""
+        """Create the document of a scene, or of a project on its scene."""
         document = cls()
         document.apply(document.changes_to_fill(scene, project))
         return document
@@ -104,9 +104,9 @@ class Document:
         changes += [add(Kind.OVERRIDE, o.id, o) for o in project.object_overrides]
         return changes
 
-    # ------------------------------------------------------------------------------------------ changing
+    # ------------------------------------------------------------------------------------------ changes
     def add(self, kind: Kind, item_id: str, value: Any, parent: str = "") -> Change:
-        """Give the change that adds an item at the end of its kind; nothing happens before `apply`."""
+        """Return the change that adds an item after the others of its kind."""
         self._check_open()
         self._next_rank += 1
         return Change(kind, item_id, parent, self._next_rank, None, value)
@@ -138,7 +138,7 @@ class Document:
             raise InvalidData("The scene or project was closed meanwhile: nothing was changed.")
 
     def apply(self, changes: Iterable[Change]) -> None:
-        """Make changes, in order."""
+        """Apply changes in order."""
         for change in changes:
             if change.before is not None:
                 self._forget(self._items[change.kind][change.id])
@@ -175,7 +175,7 @@ class Document:
                 del self._owned[item.parent]
 
     def _keys(self, item: Item) -> Iterator[tuple[dict[Any, dict[str, None]], Any]]:
-        """Return each index with the key under which it lists the item; a key comes at most once."""
+        """Return each index with the key under which it lists the item, each key at most once."""
         value = item.value
         match item.kind:
             case Kind.OBJECT | Kind.PARAMETER:
@@ -201,7 +201,7 @@ class Document:
 
     # ------------------------------------------------------------------------------------------ whole documents
     def of_kind(self, kind: Kind) -> list[Item]:
-        """Give the items of a kind in their order."""
+        """Return the items of a kind in their order."""
         if kind in self._unordered:
             ordered = sorted(self._items[kind].values(), key=_by_rank)
             self._items[kind] = {item.id: item for item in ordered}
@@ -213,19 +213,19 @@ class Document:
         return [item for kind in Kind for item in self.of_kind(kind)]
 
     def count(self, kind: Kind) -> int:
-        """Return how many items of a kind there are."""
+        """Return the number of items of a kind."""
         return len(self._items[kind])
 
     @property
     def scene(self) -> Scene | None:
-        """The scene, None when the document is empty."""
+        """The scene, None if the document is empty."""
         if self._scene is None and (base := self._bare(Kind.SCENE)) is not None:
             self._scene = replace(base, objects=[item.value for item in self.of_kind(Kind.OBJECT)])
         return self._scene
 
     @property
     def project(self) -> Project | None:
-        """The project, None when none is open."""
+        """The project, None if the document has none."""
         if self._project is None and (base := self._bare(Kind.PROJECT)) is not None:
             values = {kind: [item.value for item in self.of_kind(kind)] for kind in Kind if kind not in OWNED}
             self._project = replace(
@@ -267,12 +267,12 @@ class Document:
         return value
 
     def action_point(self, action_point_id: str) -> BareActionPoint:
-        """Give an action point without its lists."""
+        """Return an action point without its lists."""
         value: BareActionPoint = self._get(Kind.POINT, action_point_id, "action point").value
         return value
 
     def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
-        """Give an orientation with its action point."""
+        """Return an orientation with its action point."""
         item = self._get(Kind.ORIENTATION, orientation_id, "orientation")
         return self.action_point(item.parent), item.value
 
@@ -282,7 +282,7 @@ class Document:
         return self.action_point(item.parent), item.value
 
     def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
-        """Give an action with its action point."""
+        """Return an action with its action point."""
         item = self._get(Kind.ACTION, action_id, "action")
         return self.action_point(item.parent), item.value
 
@@ -303,7 +303,7 @@ class Document:
 
     # ------------------------------------------------------------------------------------------ relations
     def owned(self, point_id: str, kind: Kind) -> list[Item]:
-        """Return what belongs to an action point, in its order."""
+        """Return the items of a kind that belong to an action point, in their order."""
         ids = self._owned.get(point_id, {}).get(kind, {})
         return sorted((self._items[kind][i] for i in ids), key=_by_rank)
 
@@ -325,8 +325,8 @@ class Document:
     def named(self, kind: Kind | str, name: str, parent: str = "") -> str | None:
         """Return the id of the item with a name, None if the name is free.
 
-        Names are unique per kind, those of orientations and joints within their action point. Kind "output": the
-        action whose result has that name.
+        Names are unique per kind, those of orientations and joints within their action point. For the kind "output"
+        the item is the action whose result has the name.
         """
         scope = parent + kind if parent else kind
         return next(iter(self._names.get((scope, name), ())), None)
@@ -340,10 +340,10 @@ class Document:
         return [self._items[Kind.LOGIC][i].value for i in self._arriving.get(end, ())]
 
     def leads_to(self, origin: str, target: str, without: str = "") -> bool:
-        """Return whether the logic leads from one action to another when the item `without` is left out.
+        """Return whether the logic, without the item `without`, leads from one action to another.
 
-        Searched from both ends in turns: it is over when the shorter side is, which where a step is added at the
-        beginning or the end of a long program is at once.
+        Alternates between a forward and a backward search and ends with the shorter one. So it is fast when a step is
+        added at the start or end of a long program.
         """
         items = self._items[Kind.LOGIC]
         seen, other_seen = {origin}, {target}
@@ -372,7 +372,7 @@ class Document:
         return [(actions.get(i) or logic[i]).value for i in self._users.get(target_id, ())]
 
     def root_of(self, item: str) -> str:
-        """Return the root of the tree that an id belongs to (protocol, section 6); raise NotFound for an unknown id."""
+        """Return the root of the lock tree that an id belongs to (protocol, section 6). Raise NotFound if unknown."""
         for kind in OWNED:
             if (owned := self._items[kind].get(item)) is not None:
                 item = owned.parent
@@ -384,7 +384,7 @@ class Document:
             item = point.value.parent
         if item in points or any(item in self._items[kind] for kind in ROOTS):
             return item
-        raise NotFound("{item!r} is not part of what is open.", item=item)
+        raise NotFound("The open scene or project has no item {item!r}.", item=item)
 
     def tree_of(self, root: str) -> list[str]:
         """Return the ids below a root: its action points with their items; empty if it is not a root."""
@@ -394,5 +394,5 @@ class Document:
 
 
 def bare_point(point: BareActionPoint) -> BareActionPoint:
-    """Give an action point without its lists."""
+    """Return an action point without its lists."""
     return BareActionPoint(**{name: getattr(point, name) for name in BareActionPoint.__struct_fields__})

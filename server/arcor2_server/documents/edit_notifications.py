@@ -13,7 +13,7 @@ from arcor2_server.documents.history import History
 from arcor2_server.events import Connection, EventHub, encode, make_event
 
 DELAY: Final = 0.005
-"""Delay after an edit, s: its answer and own events are sent first, and successive edits are notified once."""
+"""Delay after an edit, s. Its answer and events are sent first, and successive edits cause one notification."""
 AT_LATEST: Final = 0.1
 """Maximum delay while further edits arrive, s."""
 NAME: Final = "HistoryChanged"
@@ -24,9 +24,9 @@ class EditNotifications:
 
     def __init__(self, hub: EventHub, session: Session) -> None:
         self.on_edit: list[Callable[[Sequence[Change]], None]] = []
-        """Called with the changes of each edit at once."""
+        """Called at once with the changes of each edit."""
         self.on_pause: list[Callable[[Sequence[Change]], None]] = []
-        """Called with all changes since the last call, when their own events are out."""
+        """Called with all changes since the last call, after their own events were sent."""
         self._hub = hub
         self._session = session
         self._changes: list[Change] = []
@@ -41,7 +41,7 @@ class EditNotifications:
         return self._history(client.user)
 
     def close(self) -> None:
-        """Stop when the server ends."""
+        """Cancel the pending notification."""
         if self._timer is not None:
             self._timer.cancel()
 
@@ -59,8 +59,8 @@ class EditNotifications:
 
     def _publish(self) -> None:
         loop = asyncio.get_running_loop()
-        under_way = self._session.revision != self._stored_revision or loop.time() < self._last + DELAY
-        if under_way and loop.time() < self._since + AT_LATEST:
+        busy = self._session.revision != self._stored_revision or loop.time() < self._last + DELAY
+        if busy and loop.time() < self._since + AT_LATEST:
             self._timer = loop.call_later(DELAY, self._publish)
             return
         self._timer = None
@@ -91,26 +91,15 @@ _WORDS: Final = {
     Kind.OBJECT: "the object",
     Kind.PROJECT: "the project",
     Kind.POINT: "the action point",
-    Kind.ORIENTATION: "the orientation",
-    Kind.JOINTS: "the joints",
     Kind.ACTION: "the action",
     Kind.PARAMETER: "the parameter",
+    Kind.ORIENTATION: "the orientation",
+    Kind.JOINTS: "the joints",
     Kind.LOGIC: "a connection",
     Kind.OVERRIDE: "an override",
 }
-_BY_IMPORTANCE: Final = (
-    Kind.SCENE,
-    Kind.OBJECT,
-    Kind.PROJECT,
-    Kind.POINT,
-    Kind.ACTION,
-    Kind.PARAMETER,
-    Kind.ORIENTATION,
-    Kind.JOINTS,
-    Kind.LOGIC,
-    Kind.OVERRIDE,
-)
-"""What an edit is named after, if it changes items of several kinds."""
+"""Kinds of item by importance: an edit of several kinds is named after the first of them."""
+_BY_IMPORTANCE: Final = tuple(_WORDS)
 
 
 def _original(edit: Edit, history: History) -> Edit:
@@ -121,16 +110,16 @@ def _original(edit: Edit, history: History) -> Edit:
 
 
 def sentence(edit: Edit) -> str:
-    """Return what an edit did, as it follows `Undo` on a button: `moving the object gripper`.
+    """Describe an edit as text after `Undo` on a button: `moving the object gripper`.
 
-    Of an undo, what was taken back: that is what Redo would do again.
+    An undo is described by the edit that it reverted, which Redo would make again.
     """
     if edit.kind is EditKind.RESTORE:
         return f"going back to revision {edit.target}"
     changes = [change.inverse() for change in edit.changes] if edit.kind is EditKind.UNDO else edit.changes
     if not changes:
         return edit.request
-    # What else changes follows from it: joints of a moved point become invalid, its actions go with it.
+    # Changes of less important kinds are consequences: joints of a moved action point become invalid.
     kind = min((change.kind for change in changes), key=_BY_IMPORTANCE.index)
     of_kind = [change for change in changes if change.kind is kind]
     first = of_kind[0]
@@ -149,5 +138,5 @@ def sentence(edit: Edit) -> str:
     else:
         text = f"changing {what}"
     others = len({change.id for change in of_kind}) - 1
-    # Points below a point follow it.
+    # Action points below an action point move with it.
     return text + (f" and {others} more" if others and kind is not Kind.POINT else "")

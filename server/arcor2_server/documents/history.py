@@ -1,5 +1,6 @@
 """The latest edits of the open document, and which of them each user can undo."""
 
+import itertools
 from collections import defaultdict, deque
 from collections.abc import Iterator
 
@@ -7,7 +8,7 @@ from arcor2_server.documents.changes import Edit, EditKind
 
 
 class History:
-    """Edits with consecutive numbers, oldest first. The oldest is dropped if there are more than `limit`.
+    """Edits with consecutive numbers, oldest first. The oldest are dropped if there are more than `limit`.
 
     An undo is an edit that reverts another one; a redo is an edit that reverts an undo.
     """
@@ -16,7 +17,7 @@ class History:
         self._edits: deque[Edit] = deque(maxlen=limit)
         self._undoable: defaultdict[str, deque[int]] = defaultdict(deque)
         self._redoable: defaultdict[str, deque[int]] = defaultdict(deque)
-        self._taken_back: set[int] = set()
+        self._reverted: set[int] = set()
 
     def __iter__(self) -> Iterator[Edit]:
         return iter(self._edits)
@@ -27,34 +28,15 @@ class History:
     def __len__(self) -> int:
         return len(self._edits)
 
-    # ------------------------------------------------------------------------------------------ what is kept
+    # ------------------------------------------------------------------------------------------ changes
     def append(self, edit: Edit) -> None:
-        """Take in the next edit."""
+        """Append the next edit."""
         if self._edits and len(self._edits) == self._edits.maxlen:
-            self._forget(self._edits[0])
+            self._remove_from_lists(self._edits[0])
         self._edits.append(edit)
-        self._note(edit)
-
-    def pop(self) -> Edit:
-        """Remove the newest edit, which could not be stored."""
-        edit = self._edits.pop()
-        kept = list(self._edits)
-        self.clear()
-        for one in kept:
-            self.append(one)
-        return edit
-
-    def clear(self) -> None:
-        """Forget all: another document is opened."""
-        self._edits.clear()
-        self._undoable.clear()
-        self._redoable.clear()
-        self._taken_back.clear()
-
-    def _note(self, edit: Edit) -> None:
         undoable, redoable = self._undoable[edit.user], self._redoable[edit.user]
         if edit.kind in (EditKind.UNDO, EditKind.REDO):
-            self._taken_back.add(edit.target)
+            self._reverted.add(edit.target)
             source, target = (undoable, redoable) if edit.kind is EditKind.UNDO else (redoable, undoable)
             if edit.target in source:
                 source.remove(edit.target)
@@ -63,55 +45,63 @@ class History:
             undoable.append(edit.number)
             redoable.clear()
 
-    def _forget(self, edit: Edit) -> None:
-        self._taken_back.discard(edit.number)
+    def pop(self) -> Edit:
+        """Remove and return the newest edit."""
+        edit = self._edits.pop()
+        edits = list(self._edits)
+        self.clear()
+        for remaining in edits:
+            self.append(remaining)
+        return edit
+
+    def clear(self) -> None:
+        """Remove all edits."""
+        self._edits.clear()
+        self._undoable.clear()
+        self._redoable.clear()
+        self._reverted.clear()
+
+    def _remove_from_lists(self, edit: Edit) -> None:
+        self._reverted.discard(edit.number)
         for numbers in (self._undoable[edit.user], self._redoable[edit.user]):
             if edit.number in numbers:
                 numbers.remove(edit.number)
 
-    # ------------------------------------------------------------------------------------------ what is asked
+    # ------------------------------------------------------------------------------------------ queries
     def find(self, number: int) -> Edit | None:
         """Return an edit, None if it is not stored."""
         index = number - self._edits[0].number if self._edits else -1
         return self._edits[index] if 0 <= index < len(self._edits) else None
 
     def in_force(self, edit: Edit) -> bool:
-        """Return whether an edit was not taken back."""
-        return edit.number not in self._taken_back
+        """Return whether an edit is not reverted."""
+        return edit.number not in self._reverted
 
     def undoable(self, user: str) -> Edit | None:
-        """Return the latest edit of a user that is in force, and no undo itself."""
+        """Return the latest edit of a user that is in force and is not an undo."""
         numbers = self._undoable.get(user)
         return self.find(numbers[-1]) if numbers else None
 
     def redoable(self, user: str) -> Edit | None:
-        """Return the latest undo of a user, if the user made no other edit after it."""
+        """Return the latest undo of a user, unless the user made another edit after it."""
         numbers = self._redoable.get(user)
         return self.find(numbers[-1]) if numbers else None
 
     def can_undo(self, user: str, number: int) -> bool:
-        """Return whether an edit is one of the user's that are in force, and no undo itself."""
+        """Return whether an edit of the user is in force and is not an undo."""
         return number in self._undoable.get(user, ())
 
     def can_redo(self, user: str, number: int) -> bool:
-        """Return whether an edit is an undo of the user without a later edit of the user."""
+        """Return whether an edit is an undo of the user, who made no other edit after it."""
         return number in self._redoable.get(user, ())
 
     def since(self, number: int) -> list[Edit]:
-        """Return the edits after one, oldest first."""
-        found = []
-        for edit in reversed(self._edits):
-            if edit.number <= number:
-                break
-            found.append(edit)
-        return found[::-1]
+        """Return the edits with a higher number, oldest first."""
+        later = itertools.takewhile(lambda edit: edit.number > number, reversed(self._edits))
+        return list(later)[::-1]
 
     def last_change_of(self, ids: set[str], *, after: int, user: str) -> Edit | None:
         """Return the latest edit after number `after` that changed any of the ids, preferably by another user."""
-        own = None
-        for edit in reversed(self.since(after)):
-            if any(change.id in ids for change in edit.changes):
-                if edit.user != user:
-                    return edit
-                own = own or edit
-        return own
+        found = [edit for edit in self.since(after) if any(change.id in ids for change in edit.changes)]
+        of_others = [edit for edit in found if edit.user != user]
+        return next(reversed(of_others or found), None)

@@ -17,9 +17,15 @@ def check_logic_item(
 ) -> None:
     """Check an item that is to be added, or to replace the one with its id.
 
-    Raise InvalidData or NotFound if that is impossible.
+    Args:
+        document: The open document.
+        meta_of: Returns the metadata of an action.
+        item: The item.
+        loops: Also check that the item closes no loop. `check_no_loops` does so for many items at once.
 
-    Without `loops` it is left to `check_no_loops`, which looks at many items at once.
+    Raises:
+        InvalidData: The item violates a rule.
+        NotFound: An action does not exist.
     """
     start, end = _place(item.start, START), _place(item.end, END)
     if start == START and end == END:
@@ -71,15 +77,12 @@ def _is_json(condition: ProjectLogicIf) -> bool:
 
 
 def check_no_loops(document: Document, items: Iterable[LogicItem]) -> None:
-    """Check that none of the items, all of which are in the document, is part of a loop.
-
-    Raise InvalidData if that is impossible.
-    """
+    """Raise InvalidData if one of these items of the document is part of a loop."""
     done: set[str] = set()
     for item in items:
         path = [action_of(item.start)]
         on_path = set(path)
-        # What is still to be followed from each place of the path.
+        # The items still to be followed from each action on the path.
         waiting = [document.outgoing(path[0])] if path[0] not in done else []
         while waiting:
             if not waiting[-1]:

@@ -10,15 +10,14 @@ from arcor2_hw.data.project import END, START, Action, LogicItem, Project, Proje
 from arcor2_hw.exceptions import InvalidProject
 
 END_NODE: Final = -1
-"""Stands for the end of a cycle among the numbers of actions."""
-
+"""The number of END, next to the numbers of actions."""
 
 BRANCHABLE: Final[dict[str, type]] = {"boolean": bool, "integer": int, "integer_enum": int, "string_enum": str}
-"""The types of results that may be branched on, and what they are compared with (docs/protocol.md)."""
+"""The types of results that conditions can test, with the type of the compared value (docs/protocol.md)."""
 
 
 class Condition(NamedTuple):
-    """Holds when output `output` of action number `action` equals `value`."""
+    """True if result number `output` of action number `action` equals `value`."""
 
     action: int
     output: int
@@ -26,7 +25,7 @@ class Condition(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """A connection to action number `target` (or END_NODE): conditional, unconditional, or the default."""
+    """A connection to action number `target` (or END_NODE). Without a condition it is the only or the default one."""
 
     target: int
     condition: Condition | None
@@ -34,10 +33,9 @@ class Edge(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """The reachable actions of a cycle, numbered so that every edge leads to a higher number; 0 is the first.
+    """The reachable actions in topological order: every edge leads to a higher number, 0 is the first.
 
-    `edges[n]`: one unconditional edge, or several of which exactly one applies if they are tried in order: the last one
-    applies if no other does.
+    `edges[n]` is one unconditional edge, or several that are tested in order. The last one applies if no other does.
     """
 
     actions: list[Action]
@@ -68,60 +66,60 @@ def _condition(
         ) from None
     if action_id not in known or flow != "default":
         raise InvalidProject(
-            "action {name!r}: a condition asks for {what!r}, which does not exist",
+            "action {name!r}: a condition refers to {what!r}, which does not exist",
             name=source.name,
             what=condition.what,
         )
     if not isinstance(value, bool | int | str):
         raise InvalidProject(
-            "action {name!r}: only true, false, integers and texts can be branched on, not {value}",
+            "action {name!r}: a condition compares with true, false, an integer or a text, not with {value}",
             name=source.name,
             value=condition.value,
         )
-    asked = actions[known[action_id]]
-    if output >= len(asked.outputs()):
+    tested = actions[known[action_id]]
+    if output >= len(tested.outputs()):
         raise InvalidProject(
-            "action {name!r}: a condition asks for a result that {asked_name!r} does not name",
+            "action {name!r}: a condition refers to a result that {tested_name!r} does not name",
             name=source.name,
-            asked_name=asked.name,
+            tested_name=tested.name,
         )
     return Condition(known[action_id], output, value)
 
 
 def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tuple[Edge, ...]:
-    """Check that exactly one edge is taken whatever the results are.
+    """Check that exactly one edge applies for any results, and sort the edges.
 
-    Puts true before false where two are opposite, and the one without a condition last.
+    Of two opposite conditions, true comes first. The edge without a condition comes last.
     """
     if not edges:
-        raise InvalidProject("action {name!r}: nothing follows it", name=source.name)
-    plain = [edge for edge in edges if edge.condition is None]
-    if plain and len(edges) == 1:
+        raise InvalidProject("action {name!r}: no action follows it", name=source.name)
+    unconditional = [edge for edge in edges if edge.condition is None]
+    if unconditional and len(edges) == 1:
         return tuple(edges)
-    asked = [edge for edge in edges if edge.condition is not None]
-    if len(plain) > 1 or (plain and any(_is_boolean(edge.condition) for edge in asked)):
-        raise InvalidProject("action {name!r}: one of the ways on has no condition", name=source.name)
-    tried: set[Condition] = set()
-    settled = False
-    for edge in asked:
+    conditional = [edge for edge in edges if edge.condition is not None]
+    if len(unconditional) > 1 or (unconditional and any(_is_boolean(edge.condition) for edge in conditional)):
+        raise InvalidProject("action {name!r}: one of its connections has no condition", name=source.name)
+    tested: set[Condition] = set()
+    covered = False
+    for edge in conditional:
         assert edge.condition is not None
-        if settled or edge.condition in tried:
+        if covered or edge.condition in tested:
             where = "the end" if edge.target == END_NODE else repr(actions[edge.target].name)
             raise InvalidProject(
-                "action {name!r}: the way on to {place} can never be taken", name=source.name, place=where
+                "action {name!r}: the connection to {place} is never taken", name=source.name, place=where
             )
-        tried.add(edge.condition)
-        settled = _is_boolean(edge.condition) and edge.condition._replace(value=not edge.condition.value) in tried
-    if not settled and not plain:
-        [one, *more] = tried
+        tested.add(edge.condition)
+        covered = _is_boolean(edge.condition) and edge.condition._replace(value=not edge.condition.value) in tested
+    if not covered and not unconditional:
+        [one, *more] = tested
         result = actions[one.action].outputs()[one.output]
         when = "no condition holds" if more else f"{result} is not {_shown(one.value)}"
         if not more and isinstance(one.value, bool):
             when = f"{result} is {_shown(not one.value)}"
-        raise InvalidProject("action {name!r}: nothing follows it when {when}", name=source.name, when=when)
-    if len(asked) == 2 and not plain:
-        asked.sort(key=lambda edge: _is_boolean(edge.condition) and edge.condition.value is False)
-    return (*asked, *plain)
+        raise InvalidProject("action {name!r}: no action follows it when {when}", name=source.name, when=when)
+    if len(conditional) == 2 and not unconditional:
+        conditional.sort(key=lambda edge: _is_boolean(edge.condition) and edge.condition.value is False)
+    return (*conditional, *unconditional)
 
 
 def _is_boolean(condition: Condition | None) -> TypeGuard[Condition]:
@@ -133,7 +131,7 @@ def _shown(value: bool | int | str) -> str:
 
 
 def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> list[int]:
-    """Return what can be reached from `first`, each before what follows it, branches in their order."""
+    """Return the actions reachable from `first` in topological order, branches in their order."""
     done: list[int] = []
     open_, closed = 1, 2
     state = [0] * len(edges)
@@ -145,7 +143,7 @@ def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> li
             if target == END_NODE or state[target] == closed:
                 continue
             if state[target] == open_:
-                raise InvalidProject("action {name!r}: the logic leads back to it", name=actions[target].name)
+                raise InvalidProject("action {name!r}: the logic forms a loop through it", name=actions[target].name)
             state[target] = open_
             stack.append((target, iter(reversed(edges[target]))))
             break
@@ -167,28 +165,28 @@ def read(project: Project) -> Flow:
         target = END_NODE if item.end == END else _node(item.end, item, known)
         if item.start == START:
             if target == END_NODE:
-                raise InvalidProject("the logic leads from START to END: there is nothing to do")
+                raise InvalidProject("the logic leads from START to END without an action")
             starts.append(target)
         else:
             items[_node(item.start, item, known)].append((target, item))
     if not starts:
-        raise InvalidProject("the logic has no START: no action is the first one")
+        raise InvalidProject("the logic has no first action: no connection leaves START")
     if len(starts) > 1:
         names = ", ".join(repr(actions[start].name) for start in starts)
         raise InvalidProject("the logic has more than one first action: {names}", names=names)
 
-    order = _number(starts[0], [[target for target, _ in ways] for ways in items], actions)
-    place = {action: number for number, action in enumerate(order)}
+    order = _number(starts[0], [[target for target, _ in targets] for targets in items], actions)
+    new_numbers = {old: number for number, old in enumerate(order)}
     reached = [actions[number] for number in order]
     reached_ids = {action.id: number for number, action in enumerate(reached)}
     edges: list[tuple[Edge, ...]] = []
     for old, source in zip(order, reached, strict=True):
-        ways = [
+        outgoing = [
             Edge(
-                END_NODE if target == END_NODE else place[target],
+                END_NODE if target == END_NODE else new_numbers[target],
                 None if isinstance(item.condition, Unset) else _condition(item.condition, source, reached, reached_ids),
             )
             for target, item in items[old]
         ]
-        edges.append(_ordered(ways, source, reached))
+        edges.append(_ordered(outgoing, source, reached))
     return Flow(reached, edges)

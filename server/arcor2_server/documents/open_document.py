@@ -34,64 +34,64 @@ class OpenDocument:
 
     @property
     def scene(self) -> Scene | None:
-        """The open scene as it is now, None if there is none."""
+        """The open scene with unsaved changes, None if none is open."""
         if self._scene is None and (scene := self.document.scene) is not None:
             self._scene = replace(scene, **self._scene_times.fields())
         return self._scene
 
     @property
     def project(self) -> Project | None:
-        """The open project as it is now, None if there is none."""
+        """The open project with unsaved changes, None if none is open."""
         if self._project is None and (project := self.document.project) is not None:
             self._project = replace(project, **self._project_times.fields())
         return self._project
 
     def require_scene(self) -> Scene:
-        """Return the open scene; raise RequestRefused when there is none."""
+        """Return the open scene. Raise RequestRefused if none is open."""
         if (scene := self.scene) is None:
             raise RequestRefused("No scene is open: open one first.")
         return scene
 
     def require_project(self) -> Project:
-        """Return the open project; raise RequestRefused when there is none."""
+        """Return the open project. Raise RequestRefused if none is open."""
         self.require_project_open()
         assert self.project is not None
         return self.project
 
     def require_scene_open(self) -> Document:
-        """Return the document when a scene is open, with or without a project; else RequestRefused."""
+        """Return the document if a scene is open, with or without a project, else raise RequestRefused."""
         if not self.document.count(Kind.SCENE):
             raise RequestRefused("No scene is open: open one first.")
         return self.document
 
     def require_scene_alone(self) -> Document:
-        """Return the document when a scene is open and no project; else RequestRefused."""
+        """Return the document if a scene is open without a project, else raise RequestRefused."""
         document = self.require_scene_open()
         if document.count(Kind.PROJECT):
             raise RequestRefused("The scene cannot be changed while a project is open: close the project first.")
         return document
 
     def require_project_open(self) -> Document:
-        """Return the document when a project is open; else RequestRefused."""
+        """Return the document if a project is open, else raise RequestRefused."""
         self.require_scene_open()
         if not self.document.count(Kind.PROJECT):
             raise RequestRefused("No project is open: open one first.")
         return self.document
 
     def require_nothing_open(self) -> None:
-        """Raise RequestRefused when a scene or project is open."""
+        """Raise RequestRefused if a scene or project is open."""
         if self.document.count(Kind.PROJECT):
             raise RequestRefused("The project {name} is open: close it first.", name=self._name(Kind.PROJECT))
         if self.document.count(Kind.SCENE):
             raise RequestRefused("The scene {name} is open: close it first.", name=self._name(Kind.SCENE))
 
     def bare_scene(self) -> BareScene:
-        """Give the open scene without its objects."""
+        """Return the open scene without its objects."""
         value = self.document.of_kind(Kind.SCENE)[0].value
         return BareScene(name=value.name, description=value.description, id=value.id, **self._scene_times.fields())
 
     def bare_project(self) -> BareProject:
-        """Give the open project without its content."""
+        """Return the open project without its content."""
         value = self.document.of_kind(Kind.PROJECT)[0].value
         return BareProject(
             name=value.name,
@@ -114,7 +114,7 @@ class OpenDocument:
 
     @property
     def has_changes(self) -> bool:
-        """Whether closing would lose something."""
+        """Whether closing would lose unsaved changes."""
         return self.scene_changed or self.project_changed
 
     def greeting(self, state: SceneStateEnum) -> list[Event]:

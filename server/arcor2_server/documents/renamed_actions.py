@@ -11,14 +11,14 @@ from arcor2_hw.exceptions import NotFound
 
 
 class Types(Protocol):
-    """The object types, as far as renamed actions need them."""
+    """Access to the actions of object types."""
 
     def action(self, type_name: str, name: str) -> ObjectAction:
         """Return the action that has a name or had it formerly. Raise NotFound if there is none."""
 
 
 def with_present_name(action: Action, meta: ObjectAction) -> Action:
-    """Return an action that calls its method, and names its parameters, as its object type does now."""
+    """Return an action with the present names of its method and parameters."""
     object_id, _, method = action.type.partition("/")
     parameters = [replace(each, name=meta.present_name(each.name)) for each in action.parameters]
     if parameters != action.parameters:

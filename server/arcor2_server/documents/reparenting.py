@@ -13,13 +13,15 @@ from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.document import Document
 
 SAME_ROTATION: Final = 1e-9
-"""Angle in rad below which two frames count as turned alike, so that what hangs on them need not be rewritten."""
+"""Angle below which the orientations of two frames count as equal, so that descendants need no update, rad."""
 
 
 def check_parent(lookup: ProjectLookup, parent_id: str, name: str) -> None:
     """Check that an object or action point can be the parent of the action point `name`.
 
-    Raise InvalidData or NotFound if that is impossible.
+    Raises:
+        InvalidData: The object has no pose.
+        NotFound: There is no such object or action point.
     """
     try:
         lookup.action_point(parent_id)
@@ -42,20 +44,29 @@ def check_parent(lookup: ProjectLookup, parent_id: str, name: str) -> None:
 
 
 def changes_for_parent(document: Document, point_id: str, new_parent: str) -> tuple[list[Change], list[str]]:
-    """Give the changes that hang an action point on another parent ("" = none), and the points that change.
+    """Return the changes that set the parent of an action point, and the ids of the changed action points.
 
-    Positions and orientations are restated so that nothing moves; those of descendants too when the frame is
-    turned. Raises InvalidData for a parent that cannot be one, or hangs on the point itself.
+    Positions and orientations are converted to the new frame, so that nothing moves. If the frames are turned to each
+    other, those of descendants are converted, too.
+
+    Args:
+        document: The open document.
+        point_id: The action point.
+        new_parent: The id of an object or action point; empty for none.
+
+    Raises:
+        InvalidData: The parent has no pose, or is the action point itself or one of its descendants.
+        NotFound: The parent does not exist.
     """
     point = document.action_point(point_id)
     moved = replace(point, parent=new_parent or UNSET)
     if new_parent:
         check_parent(document, new_parent, point.name)
         check_no_loop(document, point, new_parent)
-    here = relative_pose(document, moved, global_pose(document, point))
-    changes = [document.update(Kind.POINT, point_id, replace(moved, position=here.position))]
-    # The point's own pose has no rotation, so what is left in `here` is the turn between the two frames.
-    turn = here.orientation
+    pose = relative_pose(document, moved, global_pose(document, point))
+    changes = [document.update(Kind.POINT, point_id, replace(moved, position=pose.position))]
+    # The pose of an action point has no rotation, so this is the rotation between the two frames.
+    turn = pose.orientation
     if turn.angle_to(Orientation()) <= SAME_ROTATION:
         return changes, [point_id]
     changes += _turned(document, point_id, turn)
@@ -76,13 +87,10 @@ def _turned(document: Document, point_id: str, turn: Orientation) -> list[Change
 
 
 def check_no_loop(document: Document, point: BareActionPoint, new_parent: str) -> None:
-    """Check that a parent is neither the action point itself nor hangs on it.
-
-    Raise InvalidData if that is impossible.
-    """
+    """Raise InvalidData if a parent is the action point itself or one of its descendants."""
     at: str | Unset = new_parent
     while not isinstance(at, Unset):
         if at == point.id:
-            raise InvalidData("{name} cannot hang on itself: choose a parent that is not below it.", name=point.name)
+            raise InvalidData("{name} cannot be its own ancestor: choose a parent that is not below it.", name=point.name)
         item = document.find(Kind.POINT, at)
         at = UNSET if item is None else item.value.parent

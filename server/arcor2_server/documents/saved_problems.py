@@ -20,14 +20,14 @@ from arcor2_server.storage import Storage
 log = structlog.get_logger(__name__)
 
 _CHECKS: Final = Path(__file__).parent
-"""The code whose change makes stored problems outdated."""
+"""The directory of the checks. Stored problems are outdated when its code changes."""
 
 
 class Checked(Data, frozen=True, array_like=True):
     """The problems of a document.
 
     Attributes:
-        sources: What they depend on: when the document and its scene were modified, and the digest of the types.
+        sources: When the document and its scene were modified, and the digest of the types.
         problems: In the order found; empty if the document can be opened.
     """
 
@@ -36,7 +36,7 @@ class Checked(Data, frozen=True, array_like=True):
 
 
 class Stored(Data, frozen=True):
-    """The file for the next process: all problems by document id, and a digest of the sources of the checks."""
+    """The content of the file: all problems by document id, and a digest of the code of the checks."""
 
     code: str
     scenes: dict[str, Checked]
@@ -96,7 +96,7 @@ class SavedProblems:
         return lambda projects: {project.id: check(project) for project in projects}
 
     def _read(self) -> Stored:
-        """Return what an earlier process stored; nothing if the file is missing, damaged or of other code."""
+        """Return the stored problems; none if the file is missing, damaged or written by other code."""
         code = code_digest(_CHECKS)
         try:
             stored = msgspec.msgpack.decode(self._file.read_bytes(), type=Stored)
@@ -128,7 +128,7 @@ def _outdated(sources: Mapping[str, tuple[str, ...]], checked: Mapping[str, Chec
 def _merged(
     sources: Mapping[str, tuple[str, ...]], checked: Mapping[str, Checked], fresh: Mapping[str, list[str]]
 ) -> dict[str, Checked]:
-    """Return the problems known now; a document that was deleted before it could be read has none."""
+    """Merge stored and new problems; a document that was deleted before it could be read has none."""
     return {
         key: Checked(source, fresh[key] if key in fresh else checked[key].problems if key in checked else [])
         for key, source in sources.items()

@@ -1,4 +1,4 @@
-"""The owner of the open scene or project. Every edit passes through it to memory and to the journal."""
+"""The open scene or project and its history. Every edit is applied in memory and written to the journal."""
 
 import asyncio
 import functools
@@ -10,10 +10,7 @@ import structlog
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import now
-from arcor2_hw.data.project import (
-    BareProject,
-    Project,
-)
+from arcor2_hw.data.project import BareProject, Project
 from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_hw.exceptions import NotFound, StorageError
 from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Kind
@@ -66,17 +63,19 @@ class Session(OpenDocument):
         self.on_change: list[Callable[[Edit | None], None]] = []
         """Called with each edit when it is on disk, and with None when another document is opened."""
         self._limit = settings.history_limit
-        self._journal = Journal(settings.journal_database, self._take_back, functools.partial(hide_in_journal, secrets))
+        convert = functools.partial(hide_in_journal, secrets)
+        self._journal = Journal(settings.journal_database, self._revert_pending, convert)
         self._closed = ClosedHistories(settings.history_dir, damage)
         self._number = 0
         self._based_on = 0
         self._pending: deque[_Pending] = deque()
 
-    # ------------------------------------------------------------------------------------------ life
+    # ------------------------------------------------------------------------------------------ start and stop
     async def open(self) -> None:
-        """Go on with what the journal holds. Raises StorageError when it cannot be written.
+        """Reopen the document in the journal, and report what a damaged journal lost.
 
-        What a damaged journal lost is reported.
+        Raises:
+            StorageError: The journal cannot be read or written.
         """
         recovered = await self._journal.open()
         if recovered is not None:
@@ -88,18 +87,18 @@ class Session(OpenDocument):
             notice = str(loss)
             if loss.incomplete and await self._superseded():
                 await self.discard()
-                notice += " What was saved is newer than the rest of the journal: open it again."
+                notice += " The saved version is newer than the rest of the journal: open it again."
             self._damage.report(notice)
         if scene := self._name(Kind.SCENE):
             project = self._name(Kind.PROJECT)
             log.info("reopened", scene=scene, project=project, edits=len(self.history), unsaved=self.has_changes)
 
     async def close(self) -> None:
-        """Write what waits. What is open stays open for the next start."""
+        """Write the waiting edits. The document stays in the journal for the next start."""
         await self._journal.close()
 
     async def _with_history(self, recovered: Recovered) -> Recovered:
-        """Add the history that led to a document if the server ended before it was in the journal (see `show`)."""
+        """Add the history of a document if the server stopped before `show` had written it to the journal."""
         document = Document(recovered.items)
         if (scene := document.scene) is not None:
             _, edits = await self._closed.reopen(scene, document.project)
@@ -111,7 +110,7 @@ class Session(OpenDocument):
         return recovered
 
     async def _superseded(self) -> bool:
-        """Whether the open document is older than what is saved: it was recovered from a damaged journal."""
+        """Return whether the document recovered from a damaged journal is older than the saved version."""
         newest = max((edit.time for edit in self.history), default="")
         times = self._scene_times if self.project is None else self._project_times
         return bool(times.modified) and newest < times.modified
@@ -126,7 +125,7 @@ class Session(OpenDocument):
                 self._apply(edit)
 
     async def _find_unsaved(self) -> None:
-        """Compare with what is saved: the journal need not know of the last save, nor what was changed since when."""
+        """Find the unsaved changes by comparing with the saved version, since the journal may lack the last save."""
         storage, scene, project = self._storage, self.require_scene(), self.project
         saved, saved_project = Scene(name="", id=scene.id), None
         try:
@@ -136,9 +135,9 @@ class Session(OpenDocument):
                 saved_project = with_present_names(saved, await storage.project(project.id), self._types)
                 self._project_times = replace(Times.of(saved_project), changed=self._project_times.changed)
         except NotFound:
-            pass  # it was never saved, or is deleted
+            pass  # never saved, or deleted
         except StorageError as error:
-            log.warning("what is open cannot be compared with what is saved", reason=str(error))
+            log.warning("open document cannot be compared with the saved version", reason=str(error))
         self._unsaved = Unsaved.between(Document.of(saved, saved_project), self.document)
         self._scene_times = self._scene_times.after_comparison(differs=self._unsaved.scene)
         self._project_times = self._project_times.after_comparison(differs=self._unsaved.project)
@@ -152,15 +151,23 @@ class Session(OpenDocument):
 
     @property
     def oldest_revision(self) -> int:
-        """The oldest revision that the stored edits lead back to."""
+        """The oldest revision that can be restored from the stored edits."""
         return self._number - len(self.history)
 
     async def commit(
         self, user: str, changes: Sequence[Change], request: str = "", kind: EditKind = EditKind.EDIT, target: int = 0
     ) -> None:
-        """Apply changes as one edit; return when they are on disk. `request`, `kind`, `target`: see Edit.
+        """Apply changes as one edit; return when they are on disk. Other requests see them at once.
 
-        Other requests see them at once. Raise StorageError if they cannot be stored; they are reverted then.
+        Args:
+            user: Who makes the edit.
+            changes: The changes.
+            request: See `Edit`.
+            kind: See `Edit`.
+            target: See `Edit`.
+
+        Raises:
+            StorageError: The changes cannot be stored, and are reverted.
         """
         edit = Edit(self._number + 1, now(), user, list(changes), request, kind, target)
         stored = self._journal.append(edit)
@@ -170,8 +177,7 @@ class Session(OpenDocument):
         self.history.append(edit)
         if self._number - self._based_on >= self._limit:
             self._shorten()
-        # A caller who goes away does not take the edit with him.
-        await asyncio.shield(stored)
+        await asyncio.shield(stored)  # the edit is valid even if the caller is cancelled
 
     def _apply(self, edit: Edit) -> None:
         self.document.apply(edit.changes)
@@ -191,8 +197,8 @@ class Session(OpenDocument):
             for notify in self.on_change:
                 notify(edit)
 
-    def _take_back(self) -> None:
-        """Undo all that is not on the disk: the journal cannot be written."""
+    def _revert_pending(self) -> None:
+        """Revert all edits that are not on disk, since the journal cannot be written."""
         while self._pending:
             pending = self._pending.pop()
             inverse = [change.inverse() for change in reversed(pending.edit.changes)]
@@ -207,7 +213,7 @@ class Session(OpenDocument):
         self._journal.next_epoch()
 
     def _shorten(self) -> None:
-        """Let the journal begin at the present document, so that it and the next start stay short."""
+        """Write the present document to the journal, so that the file stays small and the next start fast."""
         self._rebase(forget=self._number - self._limit).add_done_callback(lambda future: future.exception())
 
     def _rebase(self, forget: int) -> "asyncio.Future[None]":
@@ -216,12 +222,12 @@ class Session(OpenDocument):
         return self._journal.rebase(base)
 
     def _journal_history(self, base: Base) -> None:
-        """Write the edits that led to a document which the journal holds without them."""
+        """Write a document to the journal together with the edits that led to it."""
         self._journal.rebase(base).add_done_callback(lambda future: future.exception())
 
     # ------------------------------------------------------------------------------------------ opening, saving
     async def show(self, scene: Scene, project: Project | None = None) -> None:
-        """Open a scene, or a project on its scene, in place of what is open; its history is continued."""
+        """Open a scene, or a project on its scene, with its history; close the open document."""
         with self.document.retiring():
             document, edits = await self._closed.reopen(scene, project)
             await self._closed.store(self.document, self.history, self._unsaved)
@@ -230,14 +236,14 @@ class Session(OpenDocument):
             base = Base(document.items(), edits[-1].number if edits else 0, scene_times, project_times, ALL)
             await self._journal.rebase(base)
             if edits:
-                # Not waited for: a long history takes longer than the document. Later edits are written after it.
+                # Not awaited, since a long history takes longer than the document. Later edits are written after it.
                 self._journal_history(replace(base, forget=0, edits=edits))
-        # Before observers are called, which read the times.
+        # Set before `_replace` calls observers, which read the times.
         self._scene_times, self._project_times = scene_times, project_times
         self._replace(document, edits)
 
     async def discard(self) -> None:
-        """Close what is open; what is not saved is lost."""
+        """Close the document and discard its unsaved changes."""
         with self.document.retiring():
             await self._closed.store(self.document, self.history, self._unsaved)
             await self._journal.clear()
@@ -249,10 +255,12 @@ class Session(OpenDocument):
         await self._closed.forget(document)
 
     def set_aside(self) -> Callable[[], None]:
-        """Hide what is open and return the function that shows it again, as it was with its unsaved changes.
+        """Hide the document and return the function that shows it again with its unsaved changes.
 
-        Nothing else may be opened meanwhile. The journal is not changed: after a restart the document is open.
-        Raises RequestRefused while an edit is on its way to the disk.
+        No other document may be opened meanwhile. The document stays in the journal, so it is open after a restart.
+
+        Raises:
+            RequestRefused: An edit is being written.
         """
         if self._pending:
             raise RequestRefused("Something is being changed. Try again.")
@@ -285,7 +293,7 @@ class Session(OpenDocument):
             notify(None)
 
     async def save(self) -> None:
-        """Save what has changes: the scene, the project, or both. Raise StorageError if that is impossible."""
+        """Save the scene, the project, or both, as far as they have changes. Raise StorageError on failure."""
         storage = self._storage
         if self.scene_changed:
             saved = await self._save(storage.put_scene(self.require_scene()), scene=True)
@@ -295,11 +303,11 @@ class Session(OpenDocument):
             saved = await self._save(storage.put_project(self.require_project()), scene=False)
             self._project_times = self._project_times.after_comparison(differs=self._unsaved.project, saved=saved)
             self._forget_snapshots()
-        # Not waited for: what a restart finds saved is compared with what the journal leads to.
+        # Not awaited, since a restart compares the journal with the saved version.
         self._shorten()
 
     async def _save(self, put: Awaitable[BareScene | BareProject], *, scene: bool) -> BareScene | BareProject:
-        # An edit that comes while the storage is writing is not saved yet.
+        # Edits that arrive while the storage is writing are not saved yet.
         unsaved = self._unsaved
         before = unsaved.begin_saving(scene=scene)
         try:
@@ -310,5 +318,5 @@ class Session(OpenDocument):
 
     # ------------------------------------------------------------------------------------------ problems
     def scene_problems(self, scene: Scene) -> list[str]:
-        """Return what is wrong with a scene, empty when it can be opened."""
+        """Return the problems of a scene, empty if it can be opened."""
         return scene_problems(scene, self._types)

@@ -1,4 +1,4 @@
-"""The changes, locks and role that an undo needs, and the later edits that prevent it."""
+"""Determines the changes, locks and role that an undo needs, and the later edits that prevent it."""
 
 from collections.abc import Iterable, Sequence
 from typing import Final
@@ -8,21 +8,25 @@ from arcor2_hw.data.project import END, START
 from arcor2_hw.data.role import Role
 from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Kind, net
 from arcor2_server.documents.checks import Types
-from arcor2_server.documents.consistency import Unsound, check_sound, title
-from arcor2_server.documents.document import Document, action_of
+from arcor2_server.documents.consistency import Inconsistent, check_consistent, title
+from arcor2_server.documents.document import OWNED, ROOTS, Document, action_of
 from arcor2_server.documents.history import History
 from arcor2_server.errors import RequestRefused
 
 
-def changes_back(edits: Iterable[Edit]) -> list[Change]:
-    """Return the changes that take back edits, which are given oldest first and follow each other."""
+def inverse_changes(edits: Iterable[Edit]) -> list[Change]:
+    """Return the changes that revert consecutive edits, given oldest first."""
     return [change.inverse() for change in net(change for edit in edits for change in edit.changes)]
 
 
-def require_possible(
+def require_applicable(
     document: Document, changes: Sequence[Change], types: Types, history: History, after: int, user: str
 ) -> None:
-    """Refuse changes that conflict with edits after number `after`; name their author."""
+    """Refuse changes that conflict with edits after number `after`.
+
+    Raises:
+        RequestRefused: There is a conflict; the message names the author of the later edit.
+    """
     for change in changes:
         item = document.find(change.kind, change.id)
         if (None if item is None else item.value) != change.before:
@@ -34,8 +38,8 @@ def require_possible(
                 by=_by(history, {change.id}, after, user),
             )
     try:
-        check_sound(document, changes, types)
-    except Unsound as error:
+        check_consistent(document, changes, types)
+    except Inconsistent as error:
         raise RequestRefused(
             "{reason}{by}", reason=error, by=_by(history, error.ids, after, user, " That was made")
         ) from None
@@ -52,11 +56,8 @@ def _by(history: History, ids: set[str], after: int, user: str, opening: str = "
 
 
 def role_for(changes: Iterable[Change]) -> Role:
-    """Return the least role that may make such changes by the ordinary requests."""
-    needed = Role.STANDARD_USER
-    for change in changes:
-        needed = max(needed, _role_for(change))
-    return needed
+    """Return the lowest role that may make such changes with the ordinary requests."""
+    return max(map(_role_for, changes), default=Role.STANDARD_USER)
 
 
 def _role_for(change: Change) -> Role:
@@ -73,25 +74,19 @@ def _role_for(change: Change) -> Role:
 
 # ---------------------------------------------------------------------------------------------- locks
 def ids_to_lock(document: Document, changes: Iterable[Change]) -> list[str]:
-    """Return the ids on which the ordinary requests for such changes take locks, as far as they exist."""
-    found: dict[str, None] = {}
-    for change in changes:
-        found.update(dict.fromkeys(_places(change)))
-    return [key for key in found if key in _OWN or _is_there(document, key)]
+    """Return the existing ids that the ordinary requests for such changes lock."""
+    found = dict.fromkeys(key for change in changes for key in _locked_ids(change))
+    return [key for key in found if key in _OWN or any(document.find(kind, key) is not None for kind in _LOCKABLE)]
 
 
 SCENE: Final = "SCENE"
 PROJECT: Final = "PROJECT"
 """Ids that are locked while a scene or project as a whole is opened or closed (protocol, section 6)."""
 _OWN = frozenset({SCENE, PROJECT, START, END})
-_LOCKABLE = (Kind.SCENE, Kind.OBJECT, Kind.PROJECT, Kind.POINT, Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
+_LOCKABLE = (*OWNED, *ROOTS, Kind.POINT)
 
 
-def _is_there(document: Document, key: str) -> bool:
-    return any(document.find(kind, key) is not None for kind in (*_LOCKABLE, Kind.PARAMETER))
-
-
-def _places(change: Change) -> list[str]:
+def _locked_ids(change: Change) -> list[str]:
     values = [value for value in (change.before, change.after) if value is not None]
     match change.kind:
         case Kind.OBJECT:
@@ -116,8 +111,8 @@ def _parent_changes(change: Change) -> bool:
     return bool(change.before.parent != change.after.parent)
 
 
-def ids_that_move(document: Document, changes: Iterable[Change]) -> list[str]:
-    """Return the ids of all that hangs on action points that are moved, or hung elsewhere, by the changes."""
+def moved_ids(document: Document, changes: Iterable[Change]) -> list[str]:
+    """Return the ids of all items below action points whose position or parent the changes modify."""
     found: dict[str, None] = {}
     for change in changes:
         if change.kind is not Kind.POINT or change.before is None or change.after is None:

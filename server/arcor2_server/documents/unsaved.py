@@ -48,7 +48,7 @@ class Unsaved:
         return bool(self._of_project)
 
     def note(self, change: Change) -> None:
-        """Take in a change that is made."""
+        """Note a change that is applied."""
         values, key = self._of(change.kind), (change.kind, change.id)
         if key not in values:
             values[key] = change.before
@@ -56,7 +56,7 @@ class Unsaved:
             del values[key]
 
     def begin_saving(self, *, scene: bool) -> _Values:
-        """Count from now on what differs from the present state, which is being saved; return what differed before."""
+        """Compare with the present state from now on, since it is being saved; return the earlier differences."""
         if scene:
             before, self._of_scene = self._of_scene, {}
         else:
@@ -64,7 +64,7 @@ class Unsaved:
         return before
 
     def saving_failed(self, before: _Values, document: Document) -> None:
-        """Count again from what was saved earlier: `before` is what `begin_saving` gave."""
+        """Compare with the earlier saved version again; `before` was returned by `begin_saving`."""
         for (kind, key), saved in before.items():
             values, now = self._of(kind), document.find(kind, key)
             values[kind, key] = saved

@@ -22,10 +22,10 @@ from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Ki
 from arcor2_server.documents.dependents import Dependents
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.undo import (
-    changes_back,
-    ids_that_move,
     ids_to_lock,
-    require_possible,
+    inverse_changes,
+    moved_ids,
+    require_applicable,
     role_for,
 )
 from arcor2_server.errors import RequestRefused
@@ -114,7 +114,7 @@ class HistoryRequests:
                     oldest_revision=session.oldest_revision,
                     at=at,
                 )
-            changes = changes_back(session.history.since(args.revision))
+            changes = inverse_changes(session.history.since(args.revision))
             if not changes:
                 raise RequestRefused("The document is as it was in revision {revision}.", revision=args.revision)
             async with self._locked(context, changes):
@@ -127,7 +127,7 @@ class HistoryRequests:
         self._session.require_scene_open()
         while True:
             edit = self._chosen(context, number, how)
-            changes = changes_back([edit])
+            changes = inverse_changes([edit])
             async with self._locked(context, changes):
                 # Another request of the same user may have been faster.
                 if self._chosen(context, number, how) is edit:
@@ -156,7 +156,7 @@ class HistoryRequests:
         """Hold the locks that ordinary requests for such changes take."""
         user = context.user
         async with self._locks.auto_skip_held(user, *ids_to_lock(self._session.document, changes)):
-            for item in ids_that_move(self._session.document, changes):
+            for item in moved_ids(self._session.document, changes):
                 if others := self._locks.holders_of(item) - {user}:
                     raise Locked(
                         "{item!r}, which would move along, is locked by {others}.",
@@ -173,14 +173,14 @@ class HistoryRequests:
         if context.client.role < needed:
             raise RequestRefused("What would change needs the role {name} or a higher one.", name=needed.name.lower())
         self._require_state(context, changes)
-        require_possible(document, changes, self._types, session.history, after, user)
+        require_applicable(document, changes, self._types, session.history, after, user)
         await self._require_outside(context, changes)
         if not context.dry_run:
             await self._move_live(context, changes)
         if session.document is not document:
             raise RequestRefused("The scene or project was closed meanwhile: nothing was changed.")
         # Others may have been busy meanwhile.
-        require_possible(document, changes, self._types, session.history, after, user)
+        require_applicable(document, changes, self._types, session.history, after, user)
         if context.dry_run:
             return session.revision
         revision = session.revision + 1

@@ -177,7 +177,7 @@ class SceneRequests:
                 return
             await self._storage.delete_scene(args.id)
             context.emit("SceneChanged", bare(scene), ChangeType.REMOVE)
-            if removed := await self._dependents.forget_unused_types({obj.type for obj in scene.objects}):
+            if removed := await self._dependents.delete_unused_types({obj.type for obj in scene.objects}):
                 context.emit("ChangedObjectTypes", removed, ChangeType.REMOVE)
 
     @rpc("SceneObjectUsage")

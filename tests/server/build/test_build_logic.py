@@ -299,12 +299,12 @@ def _linked_to_itself() -> Draft:
     [
         (Draft().chain("a", END), "START"),
         (Draft().chain(START, "a", END).chain(START, "b", END), "more than one first action"),
-        (Draft().way(START, END), "nothing to do"),
-        (Draft().chain(START, "first", "second"), "'second': nothing follows"),
-        (Draft().chain(START, "a", "b", "c", "b"), "'b': the logic leads back"),
+        (Draft().way(START, END), "without an action"),
+        (Draft().chain(START, "first", "second"), "'second': no action follows"),
+        (Draft().chain(START, "a", "b", "c", "b"), "'b': the logic forms a loop"),
         (Draft().action("a", "x").chain(START, "a").way("a", "b", ("a", "x", True)).chain("b", END), "x is false"),
-        (_no_condition(), "'a': one of the ways on has no condition"),
-        (_never_taken(), "'a': the way on to 'd' can never be taken"),
+        (_no_condition(), "'a': one of its connections has no condition"),
+        (_never_taken(), "'a': the connection to 'd' is never taken"),
         (_linked_from_a_branch(), "'d' uses a result of 'b', which has not always run before"),
         (_linked_to_itself(), "'a' uses a result of 'a'"),
     ],
@@ -373,11 +373,11 @@ def test_otherwise_something_more() -> None:
 @pytest.mark.parametrize(
     ("draft", "text"),
     [
-        (choosing(0, 1), "nothing follows it when no condition holds"),
-        (choosing(0, None, None), "one of the ways on has no condition"),
-        (choosing(0, 0, None), "can never be taken"),
+        (choosing(0, 1), "no action follows it when no condition holds"),
+        (choosing(0, None, None), "one of its connections has no condition"),
+        (choosing(0, 0, None), "is never taken"),
         (choosing(0, "low", None), "only integers can be branched on, not 'low'"),
-        (choosing(0, True, None), "one of the ways on has no condition"),
+        (choosing(0, True, None), "one of its connections has no condition"),
         (choosing("low", 1, None), "only texts can be branched on, not 1"),
         (choosing(0, 1.5, None), "only true, false, integers and texts"),  # type: ignore[arg-type]
     ],
@@ -391,7 +391,7 @@ def test_choices_that_are_refused(draft: Draft, text: str) -> None:
 
 def test_a_truth_value_has_no_otherwise() -> None:
     draft = Draft().action("a", "r").way(START, "a").action("b").way("a", "b", ("a", "r", True)).way("a", END)
-    with pytest.raises(InvalidProject, match="one of the ways on has no condition"):
+    with pytest.raises(InvalidProject, match="one of its connections has no condition"):
         draft.chain("b", END).script()
 
 

@@ -455,7 +455,7 @@ BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
     "a type that is nowhere": (
         "data/scene.json",
         lambda scene: scene["objects"][0].update(type="Barrel"),
-        "data/scene.json: objects[0] (crate): crate: the object type Barrel is not known",
+        "data/scene.json: objects[0] (crate): crate: the object type Barrel does not exist",
     ),
     "a setting that is missing": (
         "data/scene.json",
@@ -472,10 +472,10 @@ BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
         lambda project: project["action_points"][0]["actions"][0].update(parameters=[]),
         "data/project.json: action_points[0].actions[0] (open_the_lid): open_the_lid: the parameter angle is missing",
     ),
-    "a point that hangs on itself": (
+    "a point that is its own ancestor": (
         "data/project.json",
         lambda project: project["action_points"][0].update(parent=project["action_points"][0]["id"]),
-        "data/project.json: action_points[0] (lid): The action point lid hangs on itself",
+        "data/project.json: action_points[0] (lid): The action point lid is its own ancestor",
     ),
     "a step to nowhere": (
         "data/project.json",

@@ -420,7 +420,7 @@ async def test_a_project_with_problems_is_not_opened(desk: Desk, work: Work, ali
     await alice.ask("CloseProject")
     meta = desk.types._metas.pop("TimeActions")
     desk.types.revision += 1
-    with pytest.raises(Refused, match="TimeActions is not known"):
+    with pytest.raises(Refused, match="TimeActions does not exist"):
         await alice.ask("OpenProject", id=project)
     listed = await alice.ask("ListProjects")
     assert any("TimeActions" in problem for problem in listed[0]["problems"])
