@@ -271,7 +271,7 @@ class PackageImport:
     async def _write(self, given: Imported, plan: _Plan) -> None:
         """Save all documents in one transaction. Clients are notified of the types soon after."""
         storage = self._storage
-        async with storage.together():
+        async with storage.transaction():
             for one in plan.types:
                 await storage.put_object_type(one)
             if plan.scene:

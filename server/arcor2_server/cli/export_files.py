@@ -23,7 +23,7 @@ from arcor2_server.cli.server_connection import Failed, Server, printable
 from arcor2_server.cli.tables import console
 from arcor2_server.exchange import archive as archives
 from arcor2_server.exchange.archive import Archive, Kind
-from arcor2_server.exchange.differences import Difference, differences, names_of, told
+from arcor2_server.exchange.differences import Difference, describe, differences, names_of
 from arcor2_server.exchange.export import Source
 from arcor2_server.exchange.import_ import Part, Target, renamed
 from arcor2_server.exchange.validation import Known, find
@@ -198,7 +198,7 @@ async def compare(
 
 
 def _show(one: Difference, names: dict[str, str]) -> None:
-    old, new = (("" if value is msgspec.UNSET else told(value, names)) for value in (one.old, one.new))
+    old, new = (("" if value is msgspec.UNSET else describe(value, names)) for value in (one.old, one.new))
     values = ""
     if not isinstance(one.text, Unset):
         values = ":"

@@ -14,15 +14,15 @@ from arcor2_server.errors import RequestRefused
 from arcor2_server.events import Connection, EventHub, encode, make_event
 from arcor2_server.storage.shared_data import SharedData
 
-LARGEST_VALUE: Final = 64 * 1024
-LARGEST_VIEW: Final = 1024 * 1024
+MAX_VALUE: Final = 64 * 1024
+MAX_VIEW: Final = 1024 * 1024
 """Bytes of all values of one document and scope."""
-MOST_KEYS: Final = 1000
-MOST_DOCUMENTS: Final = 200
+MAX_KEYS: Final = 1000
+MAX_DOCUMENTS: Final = 200
 """Maximum number of documents per user with stored views."""
-MOST_SHARED: Final = 10_000
+MAX_SHARED: Final = 10_000
 """Maximum number of documents with stored shared views."""
-IN_MEMORY: Final = 64
+MAX_CACHED: Final = 64
 
 
 class ViewStates:
@@ -54,11 +54,11 @@ class ViewStates:
         async with self._turn:
             before = await self._view(owner, document)
             after = {key: value for key, value in (before | encoded).items() if value is not None}
-            if len(after) > max(MOST_KEYS, len(before)):
-                raise RequestRefused("More than {most_keys} keys are not kept for one document.", most_keys=MOST_KEYS)
-            if sum(map(len, after.values())) > max(LARGEST_VIEW, sum(map(len, before.values()))):
+            if len(after) > max(MAX_KEYS, len(before)):
+                raise RequestRefused("More than {most_keys} keys are not kept for one document.", most_keys=MAX_KEYS)
+            if sum(map(len, after.values())) > max(MAX_VIEW, sum(map(len, before.values()))):
                 raise RequestRefused(
-                    "More than {largest_view} bytes are not kept for one document.", largest_view=LARGEST_VIEW
+                    "More than {largest_view} bytes are not kept for one document.", largest_view=MAX_VIEW
                 )
             revision = max(await self._now() + 1, time.time_ns() // 1_000_000)
             await self._data.put_view(owner, document, encoded, revision)
@@ -74,7 +74,7 @@ class ViewStates:
     async def forget(self, document: str) -> None:
         """Delete all views of a deleted document. Raise StorageError if that is impossible."""
         async with self._turn:
-            await self._data.forget_document(document)
+            await self._data.delete_document(document)
             for key in [key for key in self._views if key[1] == document]:
                 del self._views[key]
 
@@ -83,7 +83,7 @@ class ViewStates:
         key = owner, document
         if (view := self._views.get(key)) is None:
             view = self._views[key] = await self._data.view(owner, document)
-            if len(self._views) > IN_MEMORY:
+            if len(self._views) > MAX_CACHED:
                 self._views.popitem(last=False)
         self._views.move_to_end(key)
         return view
@@ -94,9 +94,9 @@ class ViewStates:
         return self._revision
 
     async def _drop_oldest(self, owner: str) -> None:
-        oldest = await self._data.oldest_views(owner, MOST_DOCUMENTS if owner else MOST_SHARED)
+        oldest = await self._data.oldest_views(owner, MAX_DOCUMENTS if owner else MAX_SHARED)
         if oldest:
-            await self._data.forget_views(owner, oldest)
+            await self._data.delete_views(owner, oldest)
             for document in oldest:
                 self._views.pop((owner, document), None)
 
@@ -119,8 +119,8 @@ def _encoded(key: str, value: Any) -> bytes | None:
         encoded = msgspec.json.encode(value)
     except (RecursionError, UnicodeEncodeError, OverflowError) as error:
         raise RequestRefused("The value of {key!r} cannot be kept: {reason}.", key=key, reason=error) from None
-    if len(encoded) > LARGEST_VALUE:
+    if len(encoded) > MAX_VALUE:
         raise RequestRefused(
-            "The value of {key!r} has more than {largest_value} bytes.", key=key, largest_value=LARGEST_VALUE
+            "The value of {key!r} has more than {largest_value} bytes.", key=key, largest_value=MAX_VALUE
         )
     return encoded

@@ -91,6 +91,6 @@ def check_no_loop(document: Document, point: BareActionPoint, new_parent: str) -
     at: str | Unset = new_parent
     while not isinstance(at, Unset):
         if at == point.id:
-            raise InvalidData("{name} cannot be its own ancestor: choose a parent that is not below it.", name=point.name)
+            raise InvalidData("{name} cannot be its own ancestor: choose another parent.", name=point.name)
         item = document.find(Kind.POINT, at)
         at = UNSET if item is None else item.value.parent

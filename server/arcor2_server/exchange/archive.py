@@ -28,7 +28,7 @@ PROJECT: Final = "data/project.json"
 SCRIPT: Final = "script.py"
 PARAMETERS: Final = "data/parameters.json"
 OVERRIDES: Final = "data/object_parameters.json"
-LARGEST: Final = 512 * 1024 * 1024
+MAX_SIZE: Final = 512 * 1024 * 1024
 """Bytes of all that is read of a file: meshes are large, and a zip may lie."""
 
 
@@ -215,7 +215,7 @@ def read(path: Path) -> Archive:
     """
     if not path.is_file():
         raise NotFound("There is no file {path}.", path=path)
-    files = package.from_zip(path, _wanted, LARGEST)
+    files = package.from_zip(path, _wanted, MAX_SIZE)
     if HEAD not in files:
         if {SCRIPT, PROJECT} <= files.keys():
             return _from_package(path)

@@ -142,14 +142,14 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def told(value: Any, names: Mapping[str, str]) -> str:
+def describe(value: Any, names: Mapping[str, str]) -> str:
     """Return a value in a few words, with names where it has ids."""
     match value:
         case dict() if frozenset(value) in WHOLE:
             return f"({', '.join(f'{float(one):g}' for one in value.values())})"
         case dict():
             kind = value.get("type")
-            return told(kind, names) if isinstance(kind, str) else ""
+            return describe(kind, names) if isinstance(kind, str) else ""
         case list():
             return f"{len(value)} entries"
         case str():

@@ -20,7 +20,7 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, Conflict, DeviceTimeout, InvalidPackage
 from arcor2_server.exchange.archive import Archive, AssetFile, with_needed
 from arcor2_server.exchange.export import Source
-from arcor2_server.exchange.rollback import Undoing
+from arcor2_server.exchange.rollback import Rollback
 from arcor2_server.exchange.validation import Known, find
 
 Part = Literal["all", "scene", "project", "types", "assets"]
@@ -28,7 +28,7 @@ Part = Literal["all", "scene", "project", "types", "assets"]
 Verb = Literal["new", "replaced", "same"]
 SHADOWS: Final = "takes the place of the installed type until it is removed"
 _UNTIMED: Final[dict[str, Any]] = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
-FIRST_WORD: Final = 5.0
+GREETING_TIMEOUT: Final = 5.0
 """Time limit for the greeting of the server, which tells what is open, s."""
 
 
@@ -150,12 +150,12 @@ class Target:
             self._conflicts.append(f"Another {kind} is named {given.name}: bring this one in with --name.")
         same = old is not None and replace(old, **_UNTIMED) == replace(given, **_UNTIMED)
         if kind == "project" and same:
-            same = await self._same_beside(given.id)
+            same = await self._same_attachments(given.id)
         if old is not None and not same:
             self._may(kind, f"The {kind} {old.name}")
         self._note(kind, given.name, same, old is None)
 
-    async def _same_beside(self, key: str) -> bool:
+    async def _same_attachments(self, key: str) -> bool:
         """Return whether the script, parameters and overrides of the project are equal, too."""
         archive, rest = self._archive, self._rest
         if archive.script is not None:
@@ -171,7 +171,7 @@ class Target:
     async def _check_open(self) -> None:
         """Refuse to change an open document: saving it later would silently undo the import."""
         try:
-            greeting = await self._client.next_event(timeout=FIRST_WORD)
+            greeting = await self._client.next_event(timeout=GREETING_TIMEOUT)
         except DeviceTimeout:
             return
         opened: list[Scene | Project] = []
@@ -190,86 +190,86 @@ class Target:
 
         The error names what was undone, and what could not be.
         """
-        undoing = Undoing()
+        rollback = Rollback()
         try:
             with tempfile.TemporaryDirectory(prefix="arcor2-import-") as directory:
                 try:
-                    await self._carry_out(undoing, Path(directory))
+                    await self._carry_out(rollback, Path(directory))
                 except BaseException as error:
-                    told = await undoing.take_back()
+                    told = await rollback.run()
                     if isinstance(error, Arcor2Error) and told:
                         Arcor2Error.__init__(error, f"{error} {told}", error.detail)
                     raise
         finally:
             self._work.clear()
 
-    async def _carry_out(self, undoing: Undoing, directory: Path) -> None:
+    async def _carry_out(self, rollback: Rollback, directory: Path) -> None:
         archive = self._archive
         work = {(step.kind, step.name) for step in self._work}
         there = {asset.id: asset for asset in await self._rest.assets()}
         for number, (key, asset) in enumerate(archive.assets.items()):
             if ("asset", key) in work:
-                await self._put_asset(undoing, key, asset, there.get(key), directory / str(number))
+                await self._put_asset(rollback, key, asset, there.get(key), directory / str(number))
         for name in _bases_first(archive.types):
             if ("object type", name) in work:
-                await self._put_type(undoing, archive.types[name])
+                await self._put_type(rollback, archive.types[name])
         scene, project = archive.scene, archive.project
         if scene is not None and ("scene", scene.name) in work:
-            await self._put_scene(undoing, scene)
+            await self._put_scene(rollback, scene)
         if project is not None and ("project", project.name) in work:
-            await self._put_project(undoing, project)
+            await self._put_project(rollback, project)
 
-    async def _put_asset(self, undoing: Undoing, key: str, asset: AssetFile, old: Asset | None, kept: Path) -> None:
+    async def _put_asset(self, rollback: Rollback, key: str, asset: AssetFile, old: Asset | None, kept: Path) -> None:
         rest = self._rest
         if old is None:
-            undoing.about_to(f"asset {key}", lambda: rest.delete_asset(key))
+            rollback.before_step(f"asset {key}", lambda: rest.delete_asset(key))
         else:
             await rest.download_asset(key, kept)
             name = key if isinstance(old.file_name, Unset) else old.file_name
-            undoing.about_to(f"asset {key}", lambda: rest.upload_asset(key, kept, file_name=name, replace=True))
+            rollback.before_step(f"asset {key}", lambda: rest.upload_asset(key, kept, file_name=name, replace=True))
         await rest.upload_asset(key, asset.content, file_name=asset.file_name or key, replace=True)
 
-    async def _put_type(self, undoing: Undoing, one: ObjectTypeSource) -> None:
+    async def _put_type(self, rollback: Rollback, one: ObjectTypeSource) -> None:
         rest, name = self._rest, one.id
         old = (await self._source.uploaded()).get(name)
         what = f"object type {name}"
         model, old_model = _model(one), None if old is None else _model(old)
         if model is not None:
             if old_model is None:
-                undoing.about_to(what, lambda: rest.delete_model(name))
+                rollback.before_step(what, lambda: rest.delete_model(name))
             else:
-                undoing.about_to(what, lambda: rest.put_model(old_model))
+                rollback.before_step(what, lambda: rest.put_model(old_model))
             await rest.put_model(model)
         if old is None:
-            undoing.about_to(what, lambda: rest.delete_object_type(name))
+            rollback.before_step(what, lambda: rest.delete_object_type(name))
         else:
-            undoing.about_to(what, lambda: rest.put_object_type(name, old.source, old_model))
+            rollback.before_step(what, lambda: rest.put_object_type(name, old.source, old_model))
         await rest.put_object_type(name, one.source, model)
 
-    async def _put_scene(self, undoing: Undoing, scene: Scene) -> None:
+    async def _put_scene(self, rollback: Rollback, scene: Scene) -> None:
         rest, old = self._rest, self._old_scene
         if old is None:
-            undoing.about_to(f"scene {scene.name}", lambda: rest.delete_scene(scene.id))
+            rollback.before_step(f"scene {scene.name}", lambda: rest.delete_scene(scene.id))
         else:
-            undoing.about_to(f"scene {old.name}", lambda: rest.put_scene(old))
+            rollback.before_step(f"scene {old.name}", lambda: rest.put_scene(old))
         await rest.put_scene(scene)
 
-    async def _put_project(self, undoing: Undoing, project: Project) -> None:
+    async def _put_project(self, rollback: Rollback, project: Project) -> None:
         archive, rest, old, key = self._archive, self._rest, self._old_project, project.id
         script = None
         if old is None:
-            undoing.about_to(f"project {project.name}", lambda: rest.delete_project(key))
+            rollback.before_step(f"project {project.name}", lambda: rest.delete_project(key))
         else:
             what = f"project {old.name}"
             parameters, overrides = await rest.kept_parameters(key), await rest.kept_overrides(key)
             with contextlib.suppress(NothingThere):
                 script = await rest.project_script(key)
-            undoing.about_to(what, lambda: rest.put_kept_overrides(key, overrides))
-            undoing.about_to(what, lambda: rest.put_kept_parameters(key, parameters))
+            rollback.before_step(what, lambda: rest.put_kept_overrides(key, overrides))
+            rollback.before_step(what, lambda: rest.put_kept_parameters(key, parameters))
             if script is not None:
                 before = script
-                undoing.about_to(what, lambda: rest.put_project_script(key, before))
-            undoing.about_to(what, lambda: rest.put_project(old))
+                rollback.before_step(what, lambda: rest.put_project_script(key, before))
+            rollback.before_step(what, lambda: rest.put_project(old))
         await rest.put_project(project)
         if archive.script is not None:
             await rest.put_project_script(key, archive.script)

@@ -7,17 +7,17 @@ from arcor2_hw.client import NothingThere
 from arcor2_hw.exceptions import Arcor2Error
 
 
-class Undoing:
+class Rollback:
     """Each thing that is about to be done, with what takes it back; where it was not done, that does nothing."""
 
     def __init__(self) -> None:
         self._done: list[tuple[str, Callable[[], Awaitable[Any]]]] = []
 
-    def about_to(self, what: str, undo: Callable[[], Awaitable[Any]]) -> None:
+    def before_step(self, what: str, undo: Callable[[], Awaitable[Any]]) -> None:
         """Note the next step, since its outcome is unknown if its answer is lost."""
         self._done.append((what, undo))
 
-    async def take_back(self) -> str:
+    async def run(self) -> str:
         """Undo all steps in reverse order; return a sentence that names what was undone, and what could not be."""
         undone: list[str] = []
         left: list[str] = []

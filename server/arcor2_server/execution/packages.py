@@ -33,7 +33,7 @@ class PackageLibrary(abc.ABC):
     async def take(self, package_id: str, content: IO[bytes]) -> PackageSummary:
         """Take a package as a zip, in place of one of the same id."""
         self._require_not_used(package_id)
-        return await asyncio.to_thread(self.packages.take, package_id, content)
+        return await asyncio.to_thread(self.packages.put_zip, package_id, content)
 
     async def delete(self, package_id: str) -> PackageSummary:
         """Delete a package that does not run."""

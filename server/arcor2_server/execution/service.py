@@ -229,7 +229,7 @@ class Execution(PackageLibrary):
             if not isinstance(project, Unset):
                 of = {"project_id": project.id, "project_name": project.name, "project_modified": project.modified}
             self._runs.describe(number, package_name=summary.package_meta.name, **of)
-            directory = self.packages.checked(package_id)
+            directory = self.packages.path_of(package_id)
             for difference in await asyncio.to_thread(check_versions, directory):
                 log.warning("package was built with another version", package=package_id, difference=difference)
         except Arcor2Error as error:

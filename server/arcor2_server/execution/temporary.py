@@ -99,7 +99,7 @@ class _Run:
         """Delete the package without an event, since no client knows of it."""
         if self._package:
             with contextlib.suppress(Arcor2Error):
-                await asyncio.to_thread(self._execution.packages.forget_temporary, self._package)
+                await asyncio.to_thread(self._execution.packages.delete_temporary, self._package)
 
     def _publish(self, event: Event) -> None:
         self._hub.broadcast(event)
@@ -116,7 +116,7 @@ class _Run:
             raise RequestRefused("The scene is {value}: wait until that is over.", value=self._scene.state.value)
         name = f"Temporary package for project '{project.name}'."
         self._package = new_id("pkg")
-        await asyncio.to_thread(self._execution.packages.note_temporary, self._package, project.id)
+        await asyncio.to_thread(self._execution.packages.mark_temporary, self._package, project.id)
         with self._tasks.running(TaskKind.BUILD, f"Building {project.name} to run it", self._how.by):
             await self._runs.builder.build(project.id, name, self._package)
         return project
@@ -208,7 +208,7 @@ class TemporaryRuns:
     async def recover(self) -> None:
         """After a crash: delete the package of a project that was being run, and open the project again."""
         try:
-            projects = await asyncio.to_thread(self.execution.packages.sweep)
+            projects = await asyncio.to_thread(self.execution.packages.remove_leftovers)
             if self.session.scene is None and len(projects) == 1:
                 await self.open(projects[0])
         except Arcor2Error as error:

@@ -33,7 +33,7 @@ class TypeNotifications:
 
     async def uploaded(self) -> None:
         """Take over the object types that were written to the storage; notify the clients when uploads pause."""
-        await self._types.take_in()
+        await self._types.update()
         if self._timer is not None:
             self._timer.cancel()
         self._timer = asyncio.get_running_loop().call_later(QUIET, self._start)

@@ -107,7 +107,7 @@ class ObjectTypes(TypeCatalog):
                 await self._read_uploaded()
             return self._pending.take()
 
-    async def take_in(self) -> None:
+    async def update(self) -> None:
         """Read object types that were written to the storage. The next refresh returns the changes."""
         async with self._reading:
             if self._stored_revision != self._read_at:

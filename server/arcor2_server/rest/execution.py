@@ -154,14 +154,14 @@ class ExecutionOperations:
     @operation("GET", "/packages/{id}", EXECUTION, Role.OPERATOR, media_type=ZIP)
     async def download_package(self, id: str) -> Binary:  # noqa: A002
         """Return a package as a zip."""
-        file = await asyncio.to_thread(self._execution.packages.zipped, id)
+        file = await asyncio.to_thread(self._execution.packages.to_zip, id)
         return Binary(_pieces(file), ZIP, f"{id}.zip", os.fstat(file.fileno()).st_size)
 
     @operation("DELETE", "/packages/{id}", EXECUTION, Role.ADVANCED_USER)
     async def delete_package(self, id: str) -> None:  # noqa: A002
         """Delete a package that does not run, with its breakpoints."""
         summary = await self._execution.delete(id)
-        await ProjectTables(self._storage).forget_breakpoints(id)
+        await ProjectTables(self._storage).delete_breakpoints(id)
         self._hub.broadcast(make_event("PackageChanged", summary, ChangeType.REMOVE))
 
     # ------------------------------------------------------------------------------------------------ the program

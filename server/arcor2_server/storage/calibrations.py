@@ -1,4 +1,4 @@
-"""Calibration records. The latest are stored, and always the latest of every object."""
+"""Stores the latest calibration records, and the latest one of every object and kind."""
 
 from typing import Final
 
@@ -9,10 +9,10 @@ from arcor2_hw.calibration.records import CalibrationKind, CalibrationRecord
 from arcor2_server.storage.models import CalibrationRow
 from arcor2_server.storage.store import Storage
 
-KEPT: Final = 10_000
-"""Records, beyond which the oldest go."""
-MOST: Final = 1000
-"""Records of one answer."""
+MAX_RECORDS: Final = 10_000
+"""Maximum number of stored records. Beyond it the oldest are deleted, but never the latest of an object and kind."""
+MAX_ANSWER: Final = 1000
+"""Maximum number of records in one answer."""
 
 _encode = msgspec.json.Encoder().encode
 _decode = msgspec.json.Decoder(CalibrationRecord).decode
@@ -21,12 +21,12 @@ _decode = msgspec.json.Decoder(CalibrationRecord).decode
 class Calibrations:
     """The calibration records. All methods may raise StorageError."""
 
-    def __init__(self, storage: Storage, kept: int = KEPT) -> None:
+    def __init__(self, storage: Storage, limit: int = MAX_RECORDS) -> None:
         self._storage = storage
-        self._kept = kept
+        self._limit = limit
 
     async def put(self, record: CalibrationRecord) -> None:
-        """Keep a record."""
+        """Store a record."""
         async with self._storage.writing() as session:
             await session.merge(
                 CalibrationRow(
@@ -39,13 +39,13 @@ class Calibrations:
             )
             await session.flush()
             count = await session.scalar(select(func.count()).select_from(CalibrationRow)) or 0
-            if count > self._kept:
+            if count > self._limit:
                 newest = select(func.max(CalibrationRow.date)).group_by(CalibrationRow.object_id, CalibrationRow.kind)
                 oldest = (
                     select(CalibrationRow.id)
                     .where(CalibrationRow.date.not_in(newest))
                     .order_by(CalibrationRow.date)
-                    .limit(count - self._kept)
+                    .limit(count - self._limit)
                 )
                 await session.execute(delete(CalibrationRow).where(CalibrationRow.id.in_(oldest)))
 
@@ -64,7 +64,9 @@ class Calibrations:
         limit: int = 100,
     ) -> list[CalibrationRecord]:
         """Return records, newest first: of an object, of a kind, older than a date."""
-        chosen = select(CalibrationRow.document).order_by(CalibrationRow.date.desc()).limit(min(max(limit, 0), MOST))
+        chosen = (
+            select(CalibrationRow.document).order_by(CalibrationRow.date.desc()).limit(min(max(limit, 0), MAX_ANSWER))
+        )
         if object_id is not None:
             chosen = chosen.where(CalibrationRow.object_id == object_id)
         if kind is not None:

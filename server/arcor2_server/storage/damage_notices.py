@@ -1,13 +1,14 @@
 """Notices about damaged files of the data directory, shown until a user has received them."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import msgspec
 import structlog
 
 from arcor2_hw.data.base import now
 from arcor2_hw.data.events import Event, NotificationData, NotificationLevel
+from arcor2_hw.exceptions import StorageError
 from arcor2_server.events import make_event
 from arcor2_server.files import aside, write_private
 
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
 log = structlog.get_logger(__name__)
 
 FILE: Final = "damage.json"
-"""Notices that no client has received yet."""
+"""File with the notices that no client has received yet."""
+
+T = TypeVar("T")
 
 
 class DataDamage:
@@ -31,7 +34,7 @@ class DataDamage:
 
     @property
     def notices(self) -> list[str]:
-        """What was found damaged, as sentences."""
+        """All notices, as sentences."""
         return list(self._notices)
 
     def load(self) -> None:
@@ -55,19 +58,42 @@ class DataDamage:
         except OSError as error:
             log.error("notices of damaged files cannot be stored", file=str(self._path), reason=str(error))
 
-    def set_aside(self, path: Path, what: str, reason: object) -> Path | None:
+    def read_json(self, path: Path, kind: type[T], loss: str) -> T | None:
+        """Read a JSON file; None if it is missing, or damaged, in which case it is renamed and reported.
+
+        Args:
+            path: The file.
+            kind: The type of its content.
+            loss: Sentences about what is lost if it is damaged, and what to do.
+
+        Raises:
+            StorageError: The file cannot be read.
+        """
+        try:
+            return msgspec.json.decode(path.read_bytes(), type=kind)
+        except FileNotFoundError:
+            return None
+        except msgspec.DecodeError as error:
+            self.set_aside(path, loss, error)
+            return None
+        except OSError as error:
+            raise StorageError("The file {path} cannot be read: {reason}.", path=path, reason=error) from error
+
+    def set_aside(self, path: Path, loss: str, reason: object) -> Path | None:
         """Rename a damaged file and report it; return the new name, None if it cannot be renamed.
 
-        what: sentences about what is lost and what to do.
+        Args:
+            path: The file.
+            loss: Sentences about what is lost, and what to do.
+            reason: The damage.
         """
-        target: Path | None = aside(path, now())
+        target: Path | None = None
         try:
-            path.rename(target)  # type: ignore[arg-type]
+            target = path.rename(aside(path, now()))
         except OSError as error:
             log.error("damaged file cannot be renamed", file=str(path), reason=str(error))
-            target = None
         stored = f"The damaged file is stored as {target}." if target else "The damaged file was left in place."
-        self.report(f"The file {path} is damaged: {str(reason).rstrip('.')}. {what} {stored}")
+        self.report(f"The file {path} is damaged: {str(reason).rstrip('.')}. {loss} {stored}")
         return target
 
     def greeting(self) -> list[Event]:

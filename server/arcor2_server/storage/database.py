@@ -13,13 +13,13 @@ from sqlalchemy.ext.asyncio import AsyncEngine, AsyncSession, async_sessionmaker
 
 from arcor2_hw.exceptions import NotFound, StorageError
 from arcor2_server.settings import ServerSettings
-from arcor2_server.storage.schema import bring_up_to_date
+from arcor2_server.storage.schema import create_or_migrate
 from arcor2_server.storage.sqlite import check_opens, prepare, purge
 
-_together: ContextVar[AsyncSession | None] = ContextVar("together", default=None)
+_transaction: ContextVar[AsyncSession | None] = ContextVar("transaction", default=None)
 """The session of the transaction that the present task is in."""
 _PER_QUERY: Final = 100
-"""Documents read by one query; each may have some hundred kilobytes."""
+"""Number of documents read by one query; each may have some hundred kilobytes."""
 
 
 class Database:
@@ -37,26 +37,26 @@ class Database:
 
     @classmethod
     async def open(cls, settings: ServerSettings) -> Self:
-        """Open, or create, the database. StorageError when it is damaged, not writable or of a newer version."""
+        """Open or create the database. Raise StorageError if it is damaged, not writable or of a newer version."""
         place = settings.database_url.rpartition("@")[2] or str(settings.documents_database)
         if settings.database_url:
             engine = create_async_engine(settings.database_url)
         else:
             check_opens(settings.documents_database)
-            # One connection: SQLite writes one at a time anyway, and each connection costs a thread.
+            # One connection, since SQLite allows one writer, and each connection needs a thread.
             engine = create_async_engine(
                 f"sqlite+aiosqlite:///{settings.documents_database}", pool_size=1, max_overflow=0
             )
             event.listen(engine.sync_engine, "connect", prepare)
         try:
-            await bring_up_to_date(engine, place)
+            await create_or_migrate(engine, place)
         except BaseException:
             await engine.dispose()
             raise
         return cls(engine, place)
 
     async def purge(self) -> None:
-        """Overwrite replaced and deleted data in the file of SQLite. Raise StorageError if that is impossible."""
+        """Overwrite replaced and deleted data in an SQLite file."""
         try:
             await purge(self._engine)
         except SQLAlchemyError as error:
@@ -66,28 +66,25 @@ class Database:
         """Close the database."""
         await self._engine.dispose()
 
-    # ------------------------------------------------------------------------------------------------ inside
+    # ------------------------------------------------------------------------------------------------ transactions
     @asynccontextmanager
-    async def together(self) -> AsyncIterator[None]:
-        """Combine all writes of the present task inside into one transaction.
-
-        Raise StorageError if the transaction fails.
-        """
+    async def transaction(self) -> AsyncIterator[None]:
+        """Combine all writes of the present task into one transaction."""
         before = self.types_revision
         async with self.writing() as session:
-            token = _together.set(session)
+            token = _transaction.set(session)
             try:
                 yield
             finally:
-                _together.reset(token)
+                _transaction.reset(token)
         if self.types_revision != before:
-            self.types_revision += 1  # only now they are there for others
+            self.types_revision += 1  # other tasks see the new types only now
 
     @asynccontextmanager
     async def reading(self) -> AsyncIterator[AsyncSession]:
-        """Return a session to read with; raise StorageError for whatever the database says."""
+        """Return a session for reading."""
         try:
-            if (session := _together.get()) is not None:
+            if (session := _transaction.get()) is not None:
                 yield session
                 return
             async with self._sessions() as session:
@@ -97,12 +94,12 @@ class Database:
 
     @asynccontextmanager
     async def writing(self, *, documents: bool = True) -> AsyncIterator[AsyncSession]:
-        """Return a session in a transaction, which is on disk when it is left; StorageError as above.
+        """Return a session in a transaction that is committed on exit.
 
-        `documents`: `revision` grows, since answers that are made from documents may be others now.
+        `documents`: increase `revision`, since cached answers that are made from documents may be outdated.
         """
         try:
-            if (session := _together.get()) is not None:
+            if (session := _transaction.get()) is not None:
                 yield session
                 await session.flush()
                 return
@@ -127,7 +124,7 @@ class Database:
         return row
 
     async def with_ids(self, table: type[Any], keys: Sequence[str], decode: Any) -> list[Any]:
-        """Return the decoded documents with these ids, decoded off the event loop, some at a time."""
+        """Return the documents with these ids, decoded off the event loop in batches."""
         found: list[Any] = []
         for begin in range(0, len(keys), _PER_QUERY):
             wanted = select(table.id, table.document).where(table.id.in_(keys[begin : begin + _PER_QUERY]))

@@ -35,7 +35,7 @@ _TEMPORARY: Final = ".temporary-"
 """Prefix of the file that marks a temporary package; its content is the id of the project."""
 _UNFINISHED: Final = (".new-", ".old-", ".pkg_")
 """Begin the names of directories that are being written or deleted."""
-_NEVER_BUILT: Final = PackageMeta("N/A", "1970-01-01T00:00:00+00:00")
+_NO_META: Final = PackageMeta("N/A", "1970-01-01T00:00:00+00:00")
 
 
 class Packages:
@@ -46,7 +46,7 @@ class Packages:
         self._hide_secrets = hide_secrets
         """Replaces secrets in the documents of a package by references."""
 
-    def checked(self, package_id: str) -> Path:
+    def path_of(self, package_id: str) -> Path:
         """Return the path for a package id. Raise InvalidPackage for an invalid id."""
         if not _ID.fullmatch(package_id):
             raise InvalidPackage("{package_id!r} is no id of a package.", package_id=package_id[:80])
@@ -54,7 +54,7 @@ class Packages:
 
     def directory(self, package_id: str) -> Path:
         """Return the directory of a package; raise NotFound when there is none."""
-        path = self.checked(package_id)
+        path = self.path_of(package_id)
         if not (path / "script.py").is_file():
             raise NotFound("There is no package {package_id}.", package_id=package_id)
         return path
@@ -76,7 +76,7 @@ class Packages:
         try:
             meta = msgspec.json.decode((path / "package.json").read_bytes(), type=PackageMeta)
         except (OSError, msgspec.MsgspecError):
-            meta = _NEVER_BUILT
+            meta = _NO_META
         return PackageSummary(package_id, meta, _project_meta(path / "data" / "project.json"))
 
     def rename(self, package_id: str, name: str) -> PackageSummary:
@@ -106,7 +106,7 @@ class Packages:
         except (OSError, msgspec.MsgspecError):
             known = None
         if not isinstance(known, dict):
-            known = msgspec.to_builtins(_NEVER_BUILT)
+            known = msgspec.to_builtins(_NO_META)
         try:
             replace_file(path, msgspec.json.format(msgspec.json.encode(known | values), indent=2), mode=0o666)
         except OSError as error:
@@ -119,48 +119,48 @@ class Packages:
         summary = self.summary(package_id)
         try:
             self._discard(self.directory(package_id))
-            self._mark(package_id).unlink(missing_ok=True)
+            self._marker(package_id).unlink(missing_ok=True)
         except OSError as error:
             raise StorageError(
                 "The package {package_id} cannot be deleted: {reason}.", package_id=package_id, reason=error.strerror
             ) from error
         return summary
 
-    def note_temporary(self, package_id: str, project_id: str) -> None:
-        """Note that a package will be there for one run of a project: after a crash `sweep` takes it.
+    def mark_temporary(self, package_id: str, project_id: str) -> None:
+        """Note that a package will be there for one run of a project: after a crash `remove_leftovers` takes it.
 
         Raise StorageError if that is impossible.
         """
         try:
             self._root.mkdir(parents=True, exist_ok=True)
-            replace_file(self._mark(package_id), project_id.encode(), mode=0o666)
+            replace_file(self._marker(package_id), project_id.encode(), mode=0o666)
         except OSError as error:
             raise StorageError("Packages cannot be written: {reason}.", reason=error.strerror) from error
 
-    def forget_temporary(self, package_id: str) -> None:
-        """Take back `note_temporary`; the package, if there is one, is deleted.
+    def delete_temporary(self, package_id: str) -> None:
+        """Take back `mark_temporary`; the package, if there is one, is deleted.
 
         Raise StorageError if that is impossible.
         """
         try:
-            if (path := self.checked(package_id)).exists():
+            if (path := self.path_of(package_id)).exists():
                 self._discard(path)
-            self._mark(package_id).unlink(missing_ok=True)
+            self._marker(package_id).unlink(missing_ok=True)
         except OSError as error:
             raise StorageError(
                 "The package {package_id} cannot be deleted: {reason}.", package_id=package_id, reason=error.strerror
             ) from error
 
-    def sweep(self) -> list[str]:
+    def remove_leftovers(self) -> list[str]:
         """Delete the remains of a crash at the start; return the projects that were running.
 
         Raise StorageError if that is impossible.
         """
         projects: list[str] = []
         try:
-            for mark in sorted(self._root.glob(f"{_TEMPORARY}*")):
-                projects.append(mark.read_text(errors="replace"))
-                self.forget_temporary(mark.name.removeprefix(_TEMPORARY))
+            for marker in sorted(self._root.glob(f"{_TEMPORARY}*")):
+                projects.append(marker.read_text(errors="replace"))
+                self.delete_temporary(marker.name.removeprefix(_TEMPORARY))
             for path in self._root.glob(".*"):
                 if path.is_dir() and path.name.startswith(_UNFINISHED):
                     shutil.rmtree(path, ignore_errors=True)
@@ -178,10 +178,10 @@ class Packages:
         except OSError as error:
             raise StorageError("Packages cannot be written: {reason}.", reason=error.strerror) from error
 
-    def _mark(self, package_id: str) -> Path:
+    def _marker(self, package_id: str) -> Path:
         return self._root / f"{_TEMPORARY}{package_id}"
 
-    def zipped(self, package_id: str) -> IO[bytes]:
+    def to_zip(self, package_id: str) -> IO[bytes]:
         """Return a package as a zip, in a file that is deleted when it is closed.
 
         Raise NotFound or StorageError if that is impossible.
@@ -212,16 +212,16 @@ class Packages:
 
         Raise StorageError if that is impossible.
         """
-        self.checked(package_id)
+        self.path_of(package_id)
         try:
             content = base64.b64decode(data, validate=True)
         except (binascii.Error, ValueError) as error:
             raise InvalidPackage("The package is not base64: {reason}.", reason=error) from error
-        return self.take(package_id, BytesIO(content))
+        return self.put_zip(package_id, BytesIO(content))
 
-    def take(self, package_id: str, content: IO[bytes]) -> PackageSummary:
+    def put_zip(self, package_id: str, content: IO[bytes]) -> PackageSummary:
         """Put a zip in the place of a package, as `upload` does."""
-        target = self.checked(package_id)
+        target = self.path_of(package_id)
         try:
             self._root.mkdir(parents=True, exist_ok=True)
             temporary = Path(tempfile.mkdtemp(prefix=".new-", dir=self._root))

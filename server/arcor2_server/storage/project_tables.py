@@ -1,4 +1,4 @@
-"""Tables that REST keeps next to the documents: project parameters, tokens and breakpoints."""
+"""Tables of the REST APIs next to the documents: project parameters, tokens and breakpoints."""
 
 from collections.abc import Iterable
 from typing import Any, Literal
@@ -80,7 +80,7 @@ class ProjectTables:
             return ExecutionToken(row.id, row.name, row.access)
 
     async def put_token(self, token: ExecutionToken) -> None:
-        """Keep a token."""
+        """Store a token."""
         async with self._storage.writing() as session:
             await session.merge(ExecutionTokenRow(**msgspec.structs.asdict(token)))
 
@@ -97,13 +97,13 @@ class ProjectTables:
             return [] if row is None else msgspec.json.decode(row.ids, type=list[str])
 
     async def put_breakpoints(self, package_id: str, ids: Iterable[str]) -> None:
-        """Keep the breakpoints of a package, in place of those before."""
+        """Replace the breakpoints of a package."""
         async with self._storage.writing() as session:
             await session.merge(
                 BreakpointsRow(package_id=package_id, ids=msgspec.json.encode(list(dict.fromkeys(ids))))
             )
 
-    async def forget_breakpoints(self, package_id: str) -> None:
+    async def delete_breakpoints(self, package_id: str) -> None:
         """Delete the breakpoints of a deleted package."""
         async with self._storage.writing() as session:
             await session.execute(delete(BreakpointsRow).where(BreakpointsRow.package_id == package_id))

@@ -17,11 +17,19 @@ KNOWN: Final = frozenset({"0001", "0002", "0003", REVISION})
 """All revisions from which a database can be migrated."""
 MIGRATIONS: Final = Path(__file__).parent / "migrations"
 CHECKED_SIZE: Final = 64 * 1024 * 1024
-"""Bytes up to which a database in a file is read through at start to find damage."""
+"""Maximum size of an SQLite database that is checked for damage at start, bytes."""
 
 
-async def bring_up_to_date(engine: AsyncEngine, place: str) -> None:
-    """Create or migrate the schema. StorageError names `place`: damaged, not writable, of a newer version."""
+async def create_or_migrate(engine: AsyncEngine, place: str) -> None:
+    """Create or migrate the schema.
+
+    Args:
+        engine: The engine of the database.
+        place: The path or address of the database for messages.
+
+    Raises:
+        StorageError: The database is damaged, not writable or of a newer version.
+    """
     try:
         async with engine.begin() as connection:
             found = await connection.run_sync(_examine)
@@ -32,7 +40,7 @@ async def bring_up_to_date(engine: AsyncEngine, place: str) -> None:
             return
         if found not in KNOWN:
             raise StorageError(
-                "the database {place} has the schema {found!r}, which this version does not know",
+                "The database {place} has the schema {found!r}, which this version does not know. Update arcor2-hw.",
                 place=place,
                 found=found,
             )
@@ -51,7 +59,7 @@ def _reason(error: SQLAlchemyError) -> str:
 
 
 def _examine(connection: Connection) -> str | None:
-    """Return the revision of the schema, None when the database is empty; check file databases for damage."""
+    """Return the revision of the schema, None if the database is empty; check an SQLite file for damage."""
     if connection.dialect.name == "sqlite":
         pages = connection.scalar(text("PRAGMA page_count")) or 0
         size = connection.scalar(text("PRAGMA page_size")) or 0
@@ -59,7 +67,7 @@ def _examine(connection: Connection) -> str | None:
             verdict = connection.scalar(text("PRAGMA quick_check(1)"))
             if verdict != "ok":
                 raise sqlalchemy.exc.DatabaseError("quick_check", None, Exception(f"damaged: {verdict}"))
-        # Reading alone would not show that the file, or its directory, cannot be written.
+        # A write shows whether the file and its directory are writable.
         connection.execute(text("PRAGMA user_version = 1"))
     tables = inspect(connection).get_table_names()
     if "alembic_version" not in tables:
@@ -70,7 +78,7 @@ def _examine(connection: Connection) -> str | None:
 
 
 def _create(connection: Connection) -> None:
-    # Not through the migrations, whose tool takes 0.3 s to import; a test holds both ways to the same schema.
+    # Migrations are not used, since Alembic takes 0.3 s to import. A test checks that they create the same schema.
     Base.metadata.create_all(connection)
     connection.execute(text("CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL PRIMARY KEY)"))
     connection.execute(text("INSERT INTO alembic_version VALUES (:revision)"), {"revision": REVISION})

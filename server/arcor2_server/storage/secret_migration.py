@@ -1,4 +1,4 @@
-"""Moves secrets that saved documents and packages contain in clear into the secret store."""
+"""Moves secrets that saved documents and packages contain in plain text to the secret store."""
 
 import asyncio
 from typing import TYPE_CHECKING, TypeVar
@@ -21,11 +21,12 @@ T = TypeVar("T")
 
 
 async def hide_stored(storage: "Storage", secrets: SettingSecrets) -> int:
-    """Replace secrets in all saved documents by references; return how many documents held one.
+    """Replace secrets in all saved documents by references; return the number of changed documents.
 
-    Raise StorageError if that is impossible.
+    Unreadable documents are left unchanged.
 
-    Documents that cannot be read are left as they are.
+    Raises:
+        StorageError: A document or the secret store cannot be written.
     """
     changed = 0
     async with storage.writing() as session:
@@ -45,10 +46,10 @@ async def hide_stored(storage: "Storage", secrets: SettingSecrets) -> int:
             if overrides != project.object_overrides:
                 fresh = msgspec.structs.replace(project, object_overrides=overrides)
                 project_row.document, changed = msgspec.json.encode(fresh), changed + 1
-        for beside_row in await session.scalars(select(ProjectTablesRow)):
-            given = _decoded(beside_row.object_parameters, list[SceneObjectOverride])
+        for tables_row in await session.scalars(select(ProjectTablesRow)):
+            given = _decoded(tables_row.object_parameters, list[SceneObjectOverride])
             if given and (overrides := secrets.hide_in_overrides(given, objects)) != given:
-                beside_row.object_parameters, changed = msgspec.json.encode(overrides), changed + 1
+                tables_row.object_parameters, changed = msgspec.json.encode(overrides), changed + 1
         await secrets.store.flush()  # before the documents lose the values
     if changed:
         await storage.purge()
@@ -63,10 +64,10 @@ def _decoded(content: bytes, kind: type[T]) -> T | None:
 
 
 async def migrate_secrets(storage: "Storage", packages: Packages, secrets: SettingSecrets) -> None:
-    """Move the secrets. Search documents once, and again when object types declare further secret settings.
+    """Move the secrets. Documents are searched once, and again when object types declare further secret settings.
 
     Raises:
-        StorageError: a document or the secret store cannot be written.
+        StorageError: A document or the secret store cannot be written.
     """
     store, declared = secrets.store, secrets.declared()
     if store.scanned is not None and declared <= store.scanned:
@@ -76,4 +77,4 @@ async def migrate_secrets(storage: "Storage", packages: Packages, secrets: Setti
     store.note_scanned(declared | (store.scanned or set()))
     await store.flush()
     if found:
-        log.info("secrets moved out of documents", documents=found)
+        log.info("secrets moved to the secret store", documents=found)

@@ -16,7 +16,11 @@ from arcor2_server.storage.damage_notices import DataDamage
 class Secret(Data, frozen=True):
     """One secret value with its object type and setting.
 
-    address: hosts that the value may be sent to; None in files of older versions until the value is used.
+    Attributes:
+        type: The object type.
+        setting: The name of the setting.
+        value: The secret.
+        address: Hosts that the value may be sent to; None in files of older versions until the value is used.
     """
 
     type: str
@@ -43,18 +47,10 @@ class SecretStore:
         """All values, to hide them in texts."""
 
     def load(self, damage: DataDamage) -> None:
-        """Read the file; a damaged one is set aside and reported. StorageError when it cannot be read."""
-        try:
-            self._content = msgspec.json.decode(self._path.read_bytes(), type=_Content)
-            self.values = frozenset(secret.value for secret in self._content.secrets.values())
-        except FileNotFoundError:
-            return
-        except msgspec.DecodeError as error:
-            damage.set_aside(self._path, "The passwords of devices are lost: enter them again.", error)
-        except OSError as error:
-            raise StorageError(
-                "The secrets in {path} cannot be read: {reason}", path=self._path, reason=error
-            ) from error
+        """Read the file; report a damaged one. Raise StorageError if it cannot be read."""
+        loss = "The passwords of devices are lost: enter them again."
+        self._content = damage.read_json(self._path, _Content, loss) or _Content()
+        self.values = frozenset(secret.value for secret in self._content.secrets.values())
 
     @property
     def scanned(self) -> set[tuple[str, str]] | None:

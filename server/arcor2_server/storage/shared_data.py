@@ -1,4 +1,4 @@
-"""What clients share, and the history of runs, in the database."""
+"""Stores view values, shared breakpoints and the history of runs in the database."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -19,7 +19,7 @@ class SharedData:
 
     # ------------------------------------------------------------------------------------------------ view state
     async def newest_revision(self) -> int:
-        """Return the highest revision of a view value, 0 when there is none."""
+        """Return the highest revision of a view value, 0 if there is none."""
         async with self._storage.reading() as session:
             return await session.scalar(select(func.max(ViewValueRow.revision))) or 0
 
@@ -31,33 +31,33 @@ class SharedData:
             return {row.key: row.value for row in rows}
 
     async def put_view(self, user: str, document: str, values: Mapping[str, bytes | None], revision: int) -> None:
-        """Write values, None: take them away."""
-        gone = [key for key, value in values.items() if value is None]
+        """Write values; None deletes a value."""
+        deleted = [key for key, value in values.items() if value is None]
         async with self._storage.writing(documents=False) as session:
             for key, value in values.items():
                 if value is not None:
                     row = ViewValueRow(user=user, document=document, key=key, value=value, revision=revision)
                     await session.merge(row)
-            if gone:
-                where = (ViewValueRow.user == user, ViewValueRow.document == document, ViewValueRow.key.in_(gone))
+            if deleted:
+                where = (ViewValueRow.user == user, ViewValueRow.document == document, ViewValueRow.key.in_(deleted))
                 await session.execute(delete(ViewValueRow).where(*where))
 
     async def oldest_views(self, user: str, beyond: int) -> list[str]:
-        """Return the documents of a user's views but the `beyond` ones that were written last."""
+        """Return the documents of a user's views, latest first, without the `beyond` ones that were written last."""
         written = func.max(ViewValueRow.revision)
         query = select(ViewValueRow.document).where(ViewValueRow.user == user)
         async with self._storage.reading() as session:
             rows = await session.scalars(query.group_by(ViewValueRow.document).order_by(written.desc()).offset(beyond))
             return list(rows)
 
-    async def forget_views(self, user: str, documents: Iterable[str]) -> None:
-        """Drop a user's views of documents."""
+    async def delete_views(self, user: str, documents: Iterable[str]) -> None:
+        """Delete a user's views of documents."""
         where = (ViewValueRow.user == user, ViewValueRow.document.in_(list(documents)))
         async with self._storage.writing(documents=False) as session:
             await session.execute(delete(ViewValueRow).where(*where))
 
-    async def forget_document(self, document: str) -> None:
-        """Delete the views of all users of a deleted document, and its breakpoints."""
+    async def delete_document(self, document: str) -> None:
+        """Delete all views of a deleted document, and its breakpoints."""
         async with self._storage.writing(documents=False) as session:
             await session.execute(delete(ViewValueRow).where(ViewValueRow.document == document))
             await session.execute(delete(SharedBreakpointsRow).where(SharedBreakpointsRow.project_id == document))
@@ -70,7 +70,7 @@ class SharedData:
             return (set(), "") if row is None else (msgspec.json.decode(row.ids, type=set[str]), row.user)
 
     async def put_breakpoints(self, project_id: str, ids: set[str], user: str) -> None:
-        """Keep the breakpoints of a project, in place of those before."""
+        """Replace the breakpoints of a project."""
         async with self._storage.writing(documents=False) as session:
             await session.merge(
                 SharedBreakpointsRow(project_id=project_id, ids=msgspec.json.encode(sorted(ids)), user=user)
@@ -85,7 +85,7 @@ class SharedData:
         return [run for run in reversed(found) if run is not None]
 
     async def put_run(self, run: Run, oldest: int) -> None:
-        """Keep a run, and forget those with a number below `oldest`."""
+        """Store a run, and delete those with a number below `oldest`."""
         async with self._storage.writing(documents=False) as session:
             await session.merge(RunRow(number=run.number, document=msgspec.json.encode(run)))
             await session.execute(delete(RunRow).where(RunRow.number < oldest))

@@ -28,18 +28,18 @@ from arcor2_server.storage.assets import Asset
 
 log = structlog.get_logger(__name__)
 
-TOLD_AFTER: Final = 1.0
+SHOWN_AFTER: Final = 1.0
 """Time after which a conversion is shown as a task, s."""
-MOST_KEPT: Final = 1024 * 1024 * 1024
+MAX_SIZE: Final = 1024 * 1024 * 1024
 """Maximum size on disk, bytes; beyond, the least recently used files are deleted."""
-MOST_REFUSALS: Final = 1000
+MAX_REFUSALS: Final = 1000
 _GZIP_LEVEL: Final = 6
 _WORTH: Final = 0.9
 """A compressed copy is stored if it is smaller than this fraction of the original."""
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class DisplayModel:
     """A converted asset: the file, and a compressed copy if it is smaller. etag: identifies the content."""
 
     etag: str
@@ -55,10 +55,10 @@ class DisplayModels:
         self._compute = compute
         self._tasks = tasks
         self._directory = directory
-        self._making: dict[str, asyncio.Task[Shown]] = {}
+        self._making: dict[str, asyncio.Task[DisplayModel]] = {}
         self._refusals: dict[tuple[str, str], Arcor2Error] = {}
 
-    async def get(self, key: str) -> Shown:
+    async def get(self, key: str) -> DisplayModel:
         """Return a converted asset. It is converted once for any number of callers.
 
         Raise NotFound, InvalidData if it is neither a mesh nor a robot, ComputeStopped, ComputeTimeout, ComputeBusy,
@@ -89,12 +89,12 @@ class DisplayModels:
         await asyncio.gather(*making, return_exceptions=True)
 
     # ------------------------------------------------------------------------------------------------ inside
-    def _made(self, name_on_disk: str, done: asyncio.Task[Shown]) -> None:
+    def _made(self, name_on_disk: str, done: asyncio.Task[DisplayModel]) -> None:
         self._making.pop(name_on_disk, None)
         if not done.cancelled():
             done.exception()  # who asked may have gone
 
-    async def _make(self, name_on_disk: str, key: str, name: str) -> Shown:
+    async def _make(self, name_on_disk: str, key: str, name: str) -> DisplayModel:
         task = PrepareAsset(StoredFile(str(self._assets.file(key)), name))
         try:
             with _ShownTask(self._tasks, name) as on_progress:
@@ -102,7 +102,7 @@ class DisplayModels:
         except InvalidData as error:
             if await asyncio.to_thread(Path(task.file.path).is_file):  # else it is the asset that went meanwhile
                 self._refusals[name_on_disk, name] = error
-            while len(self._refusals) > MOST_REFUSALS:
+            while len(self._refusals) > MAX_REFUSALS:
                 del self._refusals[next(iter(self._refusals))]
             raise
         log.info(
@@ -115,15 +115,15 @@ class DisplayModels:
             text = f"cannot keep what was prepared in {self._directory}: {error.strerror}"
             raise StorageError(text, detail=str(error)) from error
 
-    def _find(self, name_on_disk: str) -> Shown | None:
+    def _find(self, name_on_disk: str) -> DisplayModel | None:
         plain, packed = self._directory / f"{name_on_disk}.glb", self._directory / f"{name_on_disk}.glb.gz"
         try:
             os.utime(plain)  # asked for now
         except OSError:
             return None
-        return Shown(f'"{name_on_disk}"', plain, packed if packed.is_file() else None)
+        return DisplayModel(f'"{name_on_disk}"', plain, packed if packed.is_file() else None)
 
-    def _store(self, name_on_disk: str, made: PreparedAsset) -> Shown:
+    def _store(self, name_on_disk: str, made: PreparedAsset) -> DisplayModel:
         self._directory.mkdir(parents=True, exist_ok=True)
         self._make_room(len(made.content))
         half = self._directory / f"half.{CONVERSION}"  # an incomplete file is never used, and a lost one is made again
@@ -146,7 +146,7 @@ class DisplayModels:
                 files.append((file.stat().st_mtime, file.stat().st_size, file))
         total = needed + sum(size for _, size, _ in files)
         for _, size, file in sorted(files):
-            if total <= MOST_KEPT:
+            if total <= MAX_SIZE:
                 break
             file.unlink(missing_ok=True)
             file.with_name(f"{file.name}.gz").unlink(missing_ok=True)
@@ -166,7 +166,7 @@ class _ShownTask(contextlib.AbstractContextManager[Callable[[float, str], None]]
         self._name = name
         self._task: Task | None = None
         self._last: tuple[float, str] = (0.0, "")
-        self._timer = asyncio.get_running_loop().call_later(TOLD_AFTER, self._begin)
+        self._timer = asyncio.get_running_loop().call_later(SHOWN_AFTER, self._begin)
 
     def _begin(self) -> None:
         self._task = self._tasks.begin(TaskKind.COMPUTATION, f"Preparing {self._name} for the editor")

@@ -25,29 +25,23 @@ class Markers:
 
     @property
     def configuration(self) -> CalibrationConfiguration:
-        """Return what is in force."""
+        """Return the configuration in use."""
         return self._stored if self._given is None else self._given
 
     def load(self, damage: DataDamage) -> None:
-        """Read what is stored; a damaged file is set aside and reported. StorageError when it cannot be read."""
-        try:
-            self._stored = msgspec.json.decode(self._path.read_bytes(), type=CalibrationConfiguration)
-        except FileNotFoundError:
-            return
-        except msgspec.DecodeError as error:
-            damage.set_aside(self._path, "The positions of the markers are lost: set them again.", error)
-        except OSError as error:
-            raise StorageError(
-                "The markers in {path} cannot be read: {reason}", path=self._path, reason=error
-            ) from error
+        """Read the stored configuration; report a damaged file. Raise StorageError if it cannot be read."""
+        loss = "The positions of the markers are lost: set them again."
+        self._stored = damage.read_json(self._path, CalibrationConfiguration, loss) or CalibrationConfiguration()
 
     async def set(self, configuration: CalibrationConfiguration) -> None:
-        """Keep another configuration. Conflict when the server was given a file.
+        """Use and store another configuration.
 
-        Raise StorageError if that is impossible.
+        Raises:
+            Conflict: The server was started with a configuration file.
+            StorageError: The file cannot be written.
         """
         if self._given is not None:
-            raise Conflict("The server was started with a file of markers: change them there.")
+            raise Conflict("The server was started with a marker file: change the markers there.")
         async with self._changing:
             try:
                 await asyncio.to_thread(
@@ -55,7 +49,7 @@ class Markers:
                 )
             except OSError as error:
                 raise StorageError(
-                    "The markers cannot be kept in {path}: {reason}", path=self._path, reason=error.strerror
+                    "The markers cannot be stored in {path}: {reason}.", path=self._path, reason=error.strerror
                 ) from error
             self._stored = configuration
         log.info("markers set", markers=len(configuration.markers), boards=len(configuration.boards))

@@ -7,11 +7,11 @@ from arcor2_hw.data.base import Data
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import InvalidData
 
-FEWEST: Final = 3
+MIN_POINTS: Final = 3
 """Points that determine a pose, if they are not in one line."""
-THINNEST: Final = 0.02
+MIN_WIDTH_RATIO: Final = 0.02
 """Minimum extent of the points across their line, as a fraction of its length, to determine the roll."""
-NEAREST: Final = 1e-4
+MIN_DISTANCE: Final = 1e-4
 """The least distance that is taken for one, m."""
 
 
@@ -26,15 +26,15 @@ def check_points(points: Sequence[Position], what: str) -> None:
     """Raise InvalidData unless the points determine a pose: three of them at least, and not in one line."""
     import numpy as np  # 0.1 s that the server's start does without
 
-    if len(points) < FEWEST:
+    if len(points) < MIN_POINTS:
         raise InvalidData(
-            "{what}: at least {fewest} points are needed, not {count}.", what=what, fewest=FEWEST, count=len(points)
+            "{what}: at least {fewest} points are needed, not {count}.", what=what, fewest=MIN_POINTS, count=len(points)
         )
     array = np.array([tuple(point) for point in points])
     if not np.isfinite(array).all():
         raise InvalidData("{what}: a point is nowhere, and does not determine a pose.", what=what)
     extent = np.linalg.svd(array - array.mean(axis=0), compute_uv=False)
-    if extent[0] < NEAREST or extent[1] < max(NEAREST, THINNEST * extent[0]):
+    if extent[0] < MIN_DISTANCE or extent[1] < max(MIN_DISTANCE, MIN_WIDTH_RATIO * extent[0]):
         raise InvalidData(
             "{what}: the points lie in one line, or in one place, and do not determine a pose.", what=what
         )

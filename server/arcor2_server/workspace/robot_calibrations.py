@@ -20,7 +20,7 @@ from arcor2_hw.data.device import Connection
 from arcor2_hw.data.events import NotificationData, NotificationLevel
 from arcor2_hw.data.robot import KinematicCalibration
 from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
-from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
+from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_server.compute.workers import Compute
 from arcor2_server.documents import Session
 from arcor2_server.events import EventHub, make_event
@@ -33,7 +33,7 @@ from arcor2_server.workspace.robots import SceneRobots
 
 log = structlog.get_logger(__name__)
 
-MOST: Final = 1000
+MAX_CALIBRATIONS: Final = 1000
 """Maximum number of stored calibrations; the oldest are dropped."""
 _THERE: Final = (Connection.ONLINE, Connection.BACK)
 
@@ -101,19 +101,9 @@ class RobotCalibrations:
         return bool(self._stored)
 
     def load(self) -> None:
-        """Read what is stored; a damaged file is set aside and reported. StorageError when it cannot be read."""
-        try:
-            stored = msgspec.json.decode(self._path.read_bytes(), type=list[RobotCalibration])
-        except FileNotFoundError:
-            return
-        except msgspec.DecodeError as error:
-            what = "Kinematics are nominal until each robot is connected again."
-            self._damage.set_aside(self._path, what, error)
-            return
-        except OSError as error:
-            raise StorageError(
-                "The calibrations in {path} cannot be read: {reason}", path=self._path, reason=error
-            ) from error
+        """Read the stored calibrations; report a damaged file. Raise StorageError if it cannot be read."""
+        loss = "Kinematics are nominal until each robot is connected again."
+        stored = self._damage.read_json(self._path, list[RobotCalibration], loss) or []
         self._stored = {each.object_id: each for each in stored}
 
     def stored(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> RobotCalibration | None:
@@ -191,7 +181,7 @@ class RobotCalibrations:
         same = before is not None and (before.calibration, before.refused) == (calibration, refused)
         self._stored.pop(robot.id, None)
         self._stored[robot.id] = found
-        while len(self._stored) > MOST:
+        while len(self._stored) > MAX_CALIBRATIONS:
             del self._stored[next(iter(self._stored))]
         log.info("kinematics read", robot=robot.name, checksum=calibration.checksum, refused=refused, same=same)
         await self._save()

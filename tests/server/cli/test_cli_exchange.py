@@ -569,7 +569,7 @@ def _link(archive: zipfile.ZipFile) -> None:
 def test_a_file_from_outside_is_not_trusted(
     cli: Any, exported: Path, spoil: Any, told: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("arcor2_server.exchange.archive.LARGEST", 2 << 20)
+    monkeypatch.setattr("arcor2_server.exchange.archive.MAX_SIZE", 2 << 20)
     Path("evil.zip").write_bytes(exported.read_bytes())
     with zipfile.ZipFile("evil.zip", "a") as archive:
         spoil(archive)

@@ -493,7 +493,7 @@ async def test_a_huge_source_is_parsed_by_another_process(
     assert not meta.disabled
     assert len(types.actions("Huge")) == 1000
     await put_lamps(storage)
-    await types.take_in()
+    await types.update()
     assert "Lamp" in types.names()
     assert len(types.type_code("Huge").source) == len(HUGE)
     assert not [length for length in parsed if length > worker.HUGE]
@@ -511,7 +511,7 @@ async def test_a_huge_source_that_takes_too_long_is_disabled(
     assert meta.disabled
     assert "not analysed within 0 s. Split the source" in str(meta.problem)
     await put_lamps(storage)
-    await types.take_in()
+    await types.update()
     assert not types.meta("Lamp").disabled
     assert stored.read_bytes() == before, "what failed once is tried again at the next start"
     assert not [length for length in parsed if length > worker.HUGE]

@@ -197,7 +197,7 @@ async def test_records_are_listed_and_checked(http: httpx.AsyncClient) -> None:
 
 
 async def test_the_oldest_records_go_but_the_last_of_an_object_stays(services: Server) -> None:
-    records = Calibrations(services.storage, kept=5)
+    records = Calibrations(services.storage, limit=5)
 
     def record(name: str, number: int) -> CalibrationRecord:
         date = f"2026-01-01T00:00:{number:02d}.000000+00:00"
@@ -257,7 +257,7 @@ async def test_markers_of_a_file_win(tmp_path: Path) -> None:
     given = CalibrationConfiguration(markers=[Marker(1, Pose())])
     markers = Markers(tmp_path / "markers.json", given)
     markers.load(damage(tmp_path))
-    with pytest.raises(Conflict, match="file of markers"):
+    with pytest.raises(Conflict, match="marker file"):
         await markers.set(CalibrationConfiguration())
     assert markers.configuration == given
     away = Markers(tmp_path / "none" / "markers.json")

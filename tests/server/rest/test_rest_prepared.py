@@ -123,10 +123,10 @@ async def test_what_takes_long_is_told_as_a_task(
 
     monkeypatch.setattr(services.tasks, "begin", noted)
     await put(http, "quick.stl", no_digest(BALL, b"quick"), "quick one.stl")
-    monkeypatch.setattr(prepared_module, "TOLD_AFTER", 60.0)
+    monkeypatch.setattr(prepared_module, "SHOWN_AFTER", 60.0)
     await http.get(SHOWN.format("quick.stl"))
     assert began == []
-    monkeypatch.setattr(prepared_module, "TOLD_AFTER", 0.0)
+    monkeypatch.setattr(prepared_module, "SHOWN_AFTER", 0.0)
     await put(http, "slow.stl", no_digest(BALL, b"slow"), "slow one.stl")
     await http.get(SHOWN.format("slow.stl"))
     assert began == ["Preparing slow one.stl for the editor"]
@@ -171,7 +171,7 @@ async def test_what_older_makers_made_and_what_nobody_asks_for_goes(
     os.utime(first.plain, (1, 1))
     kept = {file for file in folder.glob("*.glb") if file not in (first.plain, old)}
     room = sum(file.stat().st_size for file in (*kept, first.plain))
-    monkeypatch.setattr(prepared_module, "MOST_KEPT", room + 1000)
+    monkeypatch.setattr(prepared_module, "MAX_SIZE", room + 1000)
     await put(http, "second.stl", no_digest(BALL, b"second"))
     second = await services.display_models.get("second.stl")
     assert set(folder.glob("*.glb")) == kept | {second.plain}

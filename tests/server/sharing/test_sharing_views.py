@@ -67,14 +67,14 @@ async def test_what_is_refused(monkeypatch: pytest.MonkeyPatch, alice: Person, s
     with pytest.raises(Refused, match="length"):
         await alice.ask("SetViewState", scope="user", values={"k" * 201: 1})
     with pytest.raises(Refused, match=r"'a'.*bytes"):
-        await alice.ask("SetViewState", scope="user", values={"b": 1, "a": "x" * view_states.LARGEST_VALUE})
+        await alice.ask("SetViewState", scope="user", values={"b": 1, "a": "x" * view_states.MAX_VALUE})
     assert (await view(alice))["values"] == {}  # nothing of a refused request is kept
-    monkeypatch.setattr(view_states, "MOST_KEYS", 3)
+    monkeypatch.setattr(view_states, "MAX_KEYS", 3)
     await alice.ask("SetViewState", scope="user", values={"a": 1, "b": 2, "c": 3})
     with pytest.raises(Refused, match="keys"):
         await alice.ask("SetViewState", scope="user", values={"d": 4})
     await alice.ask("SetViewState", scope="user", values={"d": 4, "a": None})
-    monkeypatch.setattr(view_states, "LARGEST_VIEW", 100)
+    monkeypatch.setattr(view_states, "MAX_VIEW", 100)
     with pytest.raises(Refused, match="bytes"):
         await alice.ask("SetViewState", scope="user", values={"b": "x" * 100})
     assert (await view(alice))["values"] == {"b": 2, "c": 3, "d": 4}
@@ -90,8 +90,8 @@ async def test_an_operator_keeps_a_view_of_his_own_but_changes_none_of_all(alice
 
 
 async def test_only_the_newest_documents_are_kept(monkeypatch: pytest.MonkeyPatch, alice: Person) -> None:
-    monkeypatch.setattr(view_states, "MOST_DOCUMENTS", 3)
-    monkeypatch.setattr(view_states, "IN_MEMORY", 2)
+    monkeypatch.setattr(view_states, "MAX_DOCUMENTS", 3)
+    monkeypatch.setattr(view_states, "MAX_CACHED", 2)
     for number in range(3):
         await alice.ask("SetViewState", scope="user", document=f"pro_{number}", values={"a": number})
     await alice.ask("SetViewState", scope="user", document="pro_0", values={"b": 1})
