@@ -1,7 +1,7 @@
-"""Assets (meshes, robot descriptions): files by the hash of their content, with a record by the hash of their id.
+"""Assets (meshes, robot descriptions): files named by the hash of their content, records by the hash of their id.
 
-Nothing that comes from outside ever becomes part of a path. Each file is written beside its place, flushed, and then
-put there in one step; a crash leaves either the old asset or the new one.
+Paths contain no part of an id or file name. Files are written to a temporary path, flushed and renamed, so a crash
+leaves either the old asset or the new one.
 """
 
 import asyncio
@@ -24,10 +24,11 @@ from arcor2_server.files import replace_file, sync_directory
 log = structlog.get_logger(__name__)
 
 MAX_ASSET: Final = 256 * 1024 * 1024
-"""Bytes of one asset; the meshes of a whole robot have some tens of MiB."""
+"""Maximum size of one asset, bytes. The meshes of a robot have some tens of MiB."""
 MAX_ID: Final = 255
+"""Maximum length of an id, characters."""
 CHUNK: Final = 256 * 1024
-"""Bytes that are read from a file at once."""
+"""Size of a chunk that is read from a file, bytes."""
 
 
 class TooLarge(InvalidData):
@@ -67,7 +68,7 @@ class AssetStore:
 
     @classmethod
     async def open(cls, directory: Path, limit: int = MAX_ASSET) -> Self:
-        """Open or create the store. Files left incomplete by a crash are removed."""
+        """Open or create the store. Delete incomplete files of a crash."""
         store = cls(directory, limit)
         with store._storage_errors("use"):
             store._assets = await asyncio.to_thread(store._load)
@@ -109,14 +110,11 @@ class AssetStore:
         return found
 
     def file(self, key: str) -> Path:
-        """Return the file of an asset's present content. It never changes and is deleted with the asset.
-
-        Raise NotFound if there is none.
-        """
+        """Return the file with the present content of an asset. Raise NotFound if there is no such asset."""
         return self._path(self.info(key).digest).absolute()
 
     async def read(self, asset: Asset) -> AsyncIterator[bytes]:
-        """Return the content of an asset in chunks, of the version that `info` returned."""
+        """Return the content of the version of an asset that `info` returned, in chunks."""
         with self._storage_errors("read"):
             file = await asyncio.to_thread(self._path(asset.digest).open, "rb")
         with file:
@@ -137,9 +135,19 @@ class AssetStore:
         description: str | Unset = UNSET,
         upsert: bool = False,
     ) -> Asset:
-        """Store an asset from a stream; without `key` it gets a new id.
+        """Store an asset from a stream.
 
-        Conflict when there is one of that id, unless `upsert`; raise InvalidData for an impossible id; TooLarge.
+        Args:
+            content: The stream.
+            key: The id; None for a new one.
+            file_name: The name of the uploaded file.
+            description: A text for users.
+            upsert: Replace an asset with this id.
+
+        Raises:
+            Conflict: There is an asset with this id.
+            InvalidData: The id is invalid.
+            TooLarge: The content is larger than allowed.
         """
         key = new_id("asset") if key is None else _checked(key)
         self._refuse_known(key, upsert)
@@ -160,14 +168,14 @@ class AssetStore:
                     await self._drop_unused(old.digest)
         finally:
             os.close(descriptor)
-            with contextlib.suppress(FileNotFoundError):  # it is in its place
-                os.unlink(name)  # noqa: PTH108 - at once, not on a thread that a cancelled task would not wait for
+            with contextlib.suppress(FileNotFoundError):  # renamed by _place
+                os.unlink(name)  # noqa: PTH108 - not on a thread, for which a cancelled task would not wait
         return asset
 
     async def offer(self, key: str, content: bytes, description: str | Unset = UNSET) -> None:
         """Offer an asset of an installed distribution until the store is closed.
 
-        An uploaded asset with the same id hides it. It can be removed only with its distribution.
+        An uploaded asset with the same id hides it. Clients cannot delete it.
         """
         key, digest = _checked(key), hashlib.sha256(content).hexdigest()
         async with self._changing:
@@ -178,9 +186,11 @@ class AssetStore:
             self.revision += 1
 
     async def delete(self, key: str) -> None:
-        """Delete an asset. Raise NotFound if there is none. Running downloads are completed.
+        """Delete an asset. Running downloads are completed.
 
-        Raise Conflict if it belongs to an installed distribution.
+        Raises:
+            NotFound: There is no such asset.
+            Conflict: It belongs to an installed distribution.
         """
         async with self._changing:
             asset = self.info(key)
@@ -193,7 +203,7 @@ class AssetStore:
             self.revision += 1
             await self._drop_unused(asset.digest)
 
-    # ------------------------------------------------------------------------------------------------ inside
+    # ------------------------------------------------------------------------------------------------ internals
     def _refuse_known(self, key: str, upsert: bool) -> None:
         if self.exists(key) and not upsert:
             raise Conflict("There is an asset {key!r} already.", key=key)
@@ -204,7 +214,7 @@ class AssetStore:
         async for chunk in content:
             size += len(chunk)
             if size > self.limit:
-                raise TooLarge("An asset has at most {limit} bytes.", limit=self.limit)
+                raise TooLarge("The asset is larger than {limit} bytes.", limit=self.limit)
             with self._storage_errors("write"):
                 await asyncio.to_thread(_append, descriptor, chunk, hashed)
         with self._storage_errors("write"):

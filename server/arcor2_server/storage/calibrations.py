@@ -63,10 +63,9 @@ class Calibrations:
         before: str | None = None,
         limit: int = 100,
     ) -> list[CalibrationRecord]:
-        """Return records, newest first: of an object, of a kind, older than a date."""
-        chosen = (
-            select(CalibrationRow.document).order_by(CalibrationRow.date.desc()).limit(min(max(limit, 0), MAX_ANSWER))
-        )
+        """Return records, newest first. Arguments other than None select an object, a kind, or older records."""
+        limit = min(max(limit, 0), MAX_ANSWER)
+        chosen = select(CalibrationRow.document).order_by(CalibrationRow.date.desc()).limit(limit)
         if object_id is not None:
             chosen = chosen.where(CalibrationRow.object_id == object_id)
         if kind is not None:

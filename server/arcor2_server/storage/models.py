@@ -1,11 +1,11 @@
-"""The database tables. A document is stored as JSON; columns hold what lists and look-ups need."""
+"""The database tables. Documents are stored as JSON; columns contain the fields for lists and look-ups."""
 
 from sqlalchemy import BigInteger, Boolean, ForeignKey, Integer, LargeBinary, String, Text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 
 class Base(DeclarativeBase):
-    """The metadata that migrations are compared with."""
+    """Base of all tables."""
 
 
 class SceneRow(Base):
@@ -46,7 +46,7 @@ class ProjectSourceRow(Base):
 
 
 class ObjectTypeRow(Base):
-    """An uploaded object type: its whole module. `model_kind` tells that the model of the same id belongs to it."""
+    """An uploaded object type: its module. `model_kind` is set if it has a collision model, of the same id."""
 
     __tablename__ = "object_type"
 

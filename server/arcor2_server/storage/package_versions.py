@@ -1,4 +1,4 @@
-"""Versions of what a package does not contain: Python, this library, and distributions that drivers import."""
+"""Versions of the software that a package needs: Python, this library, and distributions that drivers import."""
 
 import importlib.metadata
 import inspect
@@ -19,7 +19,7 @@ from arcor2_hw.data.older_names import OLDER_PACKAGES
 FILE: Final = "versions.json"
 _OURS: Final = "arcor2-hw"
 _SEPARATORS: Final = re.compile(r"[-_.]+")
-"""Names of distributions that differ in these alone are the same (PEP 503)."""
+"""Characters that are equivalent in names of distributions (PEP 503)."""
 
 
 class Versions(Data, frozen=True):
@@ -34,7 +34,7 @@ class Versions(Data, frozen=True):
 def _distributions() -> dict[str, str]:
     """Return the distribution of each importable name.
 
-    importlib.metadata.packages_distributions of Python 3.11 does not see top-level compiled modules.
+    importlib.metadata.packages_distributions of Python 3.11 does not list top-level compiled modules.
     """
     found: dict[str, str] = {}
     for distribution in importlib.metadata.distributions():
@@ -48,10 +48,10 @@ def _distributions() -> dict[str, str]:
 
 
 def present(imported: Iterable[str]) -> Versions:
-    """Return the versions in use here, of the distributions that give the packages `imported`."""
-    # What sources import from ARCOR2 is ours when they run, whatever is installed.
+    """Return the installed versions of the distributions that provide the packages `imported`."""
+    # Imports of older ARCOR2 packages are redirected to this library when sources run.
     foreign = set(imported) - sys.stdlib_module_names - {"arcor2_hw"} - OLDER_PACKAGES
-    # Reading what is installed takes 0.1 s the first time, and many packages need none of it.
+    # Listing the distributions takes 0.1 s the first time, so it is done only if needed.
     known = _distributions() if foreign else {}
     wanted = {known[name] for name in foreign if name in known} - {_OURS}
     return Versions(
@@ -75,13 +75,13 @@ def check_versions(package: Path) -> list[str]:
     differences = []
     here = platform.python_version()
     if built.python.split(".")[:2] != here.split(".")[:2]:
-        differences.append(f"The package was built for Python {built.python}, here is {here}.")
+        differences.append(f"The package was built for Python {built.python}, but {here} is installed.")
     for name, version in {_OURS: built.arcor2_hw, **built.distributions}.items():
         try:
             found = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
-            differences.append(f"The package was built with {name} {version}, which is not installed here.")
+            differences.append(f"The package was built with {name} {version}, which is not installed.")
             continue
         if found != version:
-            differences.append(f"The package was built with {name} {version}, here is {found}.")
+            differences.append(f"The package was built with {name} {version}, but {found} is installed.")
     return differences

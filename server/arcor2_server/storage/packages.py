@@ -1,4 +1,4 @@
-"""Packages on disk, one directory each. Uploads are checked before they are put in place."""
+"""Packages on disk, one directory each. Uploads are checked before they replace a package."""
 
 import base64
 import binascii
@@ -25,21 +25,22 @@ from arcor2_server.files import replace_file
 log = structlog.get_logger(__name__)
 
 MAX_FILES: Final = 10_000
+"""Maximum number of files in an upload."""
 MAX_SIZE: Final = 512 * 1024 * 1024
-"""Bytes that all files of an upload may have when unpacked, counted while unpacking: a zip may lie about it."""
+"""Maximum size of an unpacked upload, bytes. It is counted while unpacking, since a zip may state wrong sizes."""
 MAX_UPLOAD: Final = 128 * 1024 * 1024
-"""Bytes of a zip that is sent as a file."""
+"""Maximum size of a zip that is sent as a file, bytes."""
 _CHUNK: Final = 1 << 20
 _ID: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,127}")
 _TEMPORARY: Final = ".temporary-"
 """Prefix of the file that marks a temporary package; its content is the id of the project."""
 _UNFINISHED: Final = (".new-", ".old-", ".pkg_")
-"""Begin the names of directories that are being written or deleted."""
+"""Prefixes of directories that are being written or deleted."""
 _NO_META: Final = PackageMeta("N/A", "1970-01-01T00:00:00+00:00")
 
 
 class Packages:
-    """The directory of packages. All methods read or write files: call them in a thread."""
+    """The directory of packages. Methods access files, so call them in a thread. All may raise StorageError."""
 
     def __init__(self, root: Path, hide_secrets: Callable[[Path], bool] = lambda _: False) -> None:
         self._root = root
@@ -49,11 +50,11 @@ class Packages:
     def path_of(self, package_id: str) -> Path:
         """Return the path for a package id. Raise InvalidPackage for an invalid id."""
         if not _ID.fullmatch(package_id):
-            raise InvalidPackage("{package_id!r} is no id of a package.", package_id=package_id[:80])
+            raise InvalidPackage("{package_id!r} is not a valid package id.", package_id=package_id[:80])
         return self._root / package_id
 
     def directory(self, package_id: str) -> Path:
-        """Return the directory of a package; raise NotFound when there is none."""
+        """Return the directory of a package. Raise NotFound if there is none."""
         path = self.path_of(package_id)
         if not (path / "script.py").is_file():
             raise NotFound("There is no package {package_id}.", package_id=package_id)
@@ -80,22 +81,25 @@ class Packages:
         return PackageSummary(package_id, meta, _project_meta(path / "data" / "project.json"))
 
     def rename(self, package_id: str, name: str) -> PackageSummary:
-        """Rename a package. Raise NotFound, InvalidPackage for an empty name, or StorageError."""
+        """Rename a package.
+
+        Raises:
+            NotFound: There is no such package.
+            InvalidPackage: The name is empty.
+            StorageError: The package cannot be written.
+        """
         if not name:
             raise InvalidPackage("A package needs a name.")
         self._set(package_id, name=name)
         return self.summary(package_id)
 
     def mark_executed(self, package_id: str) -> PackageSummary:
-        """Note that a package was run now; return it. Raise NotFound or StorageError if that is impossible."""
+        """Store the present time as the last run of a package; return the package."""
         self._set(package_id, executed=now())
         return self.summary(package_id)
 
     def project_id(self, package_id: str) -> str:
-        """Return the id of the project that a package was built from, empty if it is unknown.
-
-        Raise NotFound if there is none.
-        """
+        """Return the id of the project that a package was built from, empty if unknown."""
         project = _project_meta(self.directory(package_id) / "data" / "project.json")
         return "" if isinstance(project, Unset) else project.id
 
@@ -115,22 +119,13 @@ class Packages:
             ) from error
 
     def delete(self, package_id: str) -> PackageSummary:
-        """Delete a package; return its summary. Raise NotFound or StorageError if that is impossible."""
+        """Delete a package; return its summary. Raise NotFound if there is none."""
         summary = self.summary(package_id)
-        try:
-            self._discard(self.directory(package_id))
-            self._marker(package_id).unlink(missing_ok=True)
-        except OSError as error:
-            raise StorageError(
-                "The package {package_id} cannot be deleted: {reason}.", package_id=package_id, reason=error.strerror
-            ) from error
+        self.delete_temporary(package_id)
         return summary
 
     def mark_temporary(self, package_id: str, project_id: str) -> None:
-        """Note that a package will be there for one run of a project: after a crash `remove_leftovers` takes it.
-
-        Raise StorageError if that is impossible.
-        """
+        """Mark a package that will be created for one run, so that `remove_leftovers` deletes it after a crash."""
         try:
             self._root.mkdir(parents=True, exist_ok=True)
             replace_file(self._marker(package_id), project_id.encode(), mode=0o666)
@@ -138,10 +133,7 @@ class Packages:
             raise StorageError("Packages cannot be written: {reason}.", reason=error.strerror) from error
 
     def delete_temporary(self, package_id: str) -> None:
-        """Take back `mark_temporary`; the package, if there is one, is deleted.
-
-        Raise StorageError if that is impossible.
-        """
+        """Delete a package, if it exists, and its mark."""
         try:
             if (path := self.path_of(package_id)).exists():
                 self._discard(path)
@@ -152,10 +144,7 @@ class Packages:
             ) from error
 
     def remove_leftovers(self) -> list[str]:
-        """Delete the remains of a crash at the start; return the projects that were running.
-
-        Raise StorageError if that is impossible.
-        """
+        """Delete the remains of a crash; return the ids of the projects that were running."""
         projects: list[str] = []
         try:
             for marker in sorted(self._root.glob(f"{_TEMPORARY}*")):
@@ -169,10 +158,7 @@ class Packages:
         return projects
 
     def hide_secrets(self) -> int:
-        """Replace secrets in all packages by references; return how many packages held one.
-
-        Raise StorageError if that is impossible.
-        """
+        """Replace secrets in all packages by references; return the number of changed packages."""
         try:
             return sum(self._hide_secrets(self.directory(summary.id)) for summary in self.all())
         except OSError as error:
@@ -182,10 +168,7 @@ class Packages:
         return self._root / f"{_TEMPORARY}{package_id}"
 
     def to_zip(self, package_id: str) -> IO[bytes]:
-        """Return a package as a zip, in a file that is deleted when it is closed.
-
-        Raise NotFound or StorageError if that is impossible.
-        """
+        """Return a package as a zip, in a file that is deleted when it is closed. Raise NotFound if there is none."""
         directory = self.directory(package_id)
         file = tempfile.TemporaryFile()  # noqa: SIM115 - the caller reads it
         try:
@@ -202,16 +185,13 @@ class Packages:
         return file
 
     def _discard(self, path: Path) -> None:
-        """Take a directory away at once, and its files after that."""
-        grave = Path(tempfile.mkdtemp(prefix=".old-", dir=self._root))
-        path.rename(grave / path.name)
-        shutil.rmtree(grave, ignore_errors=True)
+        """Delete a directory. It is renamed first, so that a crash leaves no incomplete package."""
+        temporary = Path(tempfile.mkdtemp(prefix=".old-", dir=self._root))
+        path.rename(temporary / path.name)
+        shutil.rmtree(temporary, ignore_errors=True)
 
     def upload(self, package_id: str, data: str) -> PackageSummary:
-        """Replace a package by a zip (base64). Raise InvalidPackage if it is invalid.
-
-        Raise StorageError if that is impossible.
-        """
+        """Create or replace a package from a zip in base64. Raise InvalidPackage if it is invalid."""
         self.path_of(package_id)
         try:
             content = base64.b64decode(data, validate=True)
@@ -220,7 +200,7 @@ class Packages:
         return self.put_zip(package_id, BytesIO(content))
 
     def put_zip(self, package_id: str, content: IO[bytes]) -> PackageSummary:
-        """Put a zip in the place of a package, as `upload` does."""
+        """Create or replace a package from a zip. Raise InvalidPackage if it is invalid."""
         target = self.path_of(package_id)
         try:
             self._root.mkdir(parents=True, exist_ok=True)
@@ -243,8 +223,8 @@ class Packages:
 
 
 def unpack(content: IO[bytes], directory: Path) -> None:
-    """Unpack a zip into an empty directory. InvalidPackage when it is damaged, leads outside, or is too large."""
-    left = MAX_SIZE
+    """Unpack a zip into an empty directory. Raise InvalidPackage if it is damaged, unsafe or too large."""
+    remaining = MAX_SIZE
     try:
         with zipfile.ZipFile(content) as archive:
             entries = archive.infolist()
@@ -258,29 +238,29 @@ def unpack(content: IO[bytes], directory: Path) -> None:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 with archive.open(entry) as source, target.open("xb") as file:
                     while chunk := source.read(_CHUNK):
-                        left -= len(chunk)
-                        if left < 0:
+                        remaining -= len(chunk)
+                        if remaining < 0:
                             raise InvalidPackage(
                                 "The package is larger than {max_size} bytes when unpacked.", max_size=MAX_SIZE
                             )
                         file.write(chunk)
     except FileExistsError as error:
-        raise InvalidPackage("The package has one file twice.") from error
+        raise InvalidPackage("The package contains a file twice.") from error
     except NotADirectoryError as error:
-        raise InvalidPackage("The package has a file inside of a file.") from error
+        raise InvalidPackage("The package contains a path below a file.") from error
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
-        raise InvalidPackage("The package is no usable zip: {reason}.", reason=error) from error
+        raise InvalidPackage("The package is not a valid zip file: {reason}.", reason=error) from error
 
 
 def inside(entry: zipfile.ZipInfo) -> PurePosixPath:
-    """Return the path of a file in a package. Raise InvalidPackage if it leads outside, or is a link or a device."""
+    """Return the path of a file in a package. Raise InvalidPackage for a link, a device or a path outside of it."""
     name = entry.filename
     path = PurePosixPath(name)
     kind = stat.S_IFMT(entry.external_attr >> 16)
     if not path.parts or path.is_absolute() or ".." in path.parts or "\\" in name or ":" in path.parts[0]:
-        raise InvalidPackage("The package has a file outside of itself: {name!r}.", name=name[:80])
+        raise InvalidPackage("The package contains a path that leads outside of it: {name!r}.", name=name[:80])
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
-        raise InvalidPackage("The package has something that is no file: {name!r}.", name=name[:80])
+        raise InvalidPackage("The package contains an entry that is not a file: {name!r}.", name=name[:80])
     return path
 
 

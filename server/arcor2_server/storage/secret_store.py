@@ -54,7 +54,7 @@ class SecretStore:
 
     @property
     def scanned(self) -> set[tuple[str, str]] | None:
-        """The secret settings that stored documents were searched for, None when they never were."""
+        """The secret settings that stored documents were searched for; None: never."""
         return self._content.scanned
 
     def note_scanned(self, settings: set[tuple[str, str]]) -> None:
@@ -64,11 +64,11 @@ class SecretStore:
             self._changed = True
 
     def find(self, reference: str) -> Secret | None:
-        """Return a secret, None when it is not stored."""
+        """Return a secret, None if it is not stored."""
         return self._content.secrets.get(reference)
 
     def bind(self, reference: str, address: str) -> Secret | None:
-        """Note the address of a secret that has none yet; return the secret, None when it is not stored."""
+        """Set the address of a secret that has none; return the secret, None if it is not stored."""
         with self._lock:
             secret = self._content.secrets.get(reference)
             if secret is not None and secret.address is None:
@@ -77,7 +77,7 @@ class SecretStore:
             return secret
 
     def add(self, secret: Secret, *, reuse: bool = False) -> str:
-        """Store a secret; return the reference to it. `reuse`: the same one for an equal secret."""
+        """Store a secret; return its reference. `reuse`: return the reference of an equal secret, if there is one."""
         with self._lock:
             if reuse:
                 for reference, stored in self._content.secrets.items():
@@ -90,7 +90,7 @@ class SecretStore:
         return reference
 
     def save(self) -> None:
-        """Write added values. Raise StorageError if that is impossible."""
+        """Write added values. Raise StorageError if the file cannot be written."""
         with self._lock:
             if not self._changed:
                 return
@@ -103,6 +103,6 @@ class SecretStore:
             self._changed = False
 
     async def flush(self) -> None:
-        """Write added values without blocking the event loop. Raise StorageError if that is impossible."""
+        """Write added values without blocking the event loop. Raise StorageError if the file cannot be written."""
         if self._changed:
             await asyncio.to_thread(self.save)

@@ -1,8 +1,8 @@
-"""Takes secret settings out of documents that enter the server, and puts them back for the cell host.
+"""Replaces secret settings in documents by references, and resolves references for the cell host.
 
-Scenes, projects, packages and the journal hold a reference in place of each secret. They can be shown, logged and
-exported as they are. A reference is valid only together with the address that its value was entered for: a user who
-changes the host in the settings of a device cannot have the password sent to another machine.
+Scenes, projects, packages and the journal contain a reference in place of each secret, so they can be shown, logged and
+exported. A reference is valid only with the address that its value was entered for: a user who changes the host in the
+settings of a device cannot have the password sent to another machine.
 """
 
 import contextlib
@@ -33,7 +33,7 @@ _UNKNOWN: Final = SceneObject("", "")
 
 
 class Types(Protocol):
-    """The object types, as far as secrets need them."""
+    """Access to the metadata of object types."""
 
     def meta(self, name: str) -> ObjectTypeMeta:
         """Return the metadata of a type. Raise NotFound if there is none."""
@@ -53,7 +53,7 @@ class SettingSecrets:
 
     @contextlib.contextmanager
     def migrating(self) -> Iterator[None]:
-        """Use one reference for all equal values of a setting: stored documents stay equal to each other."""
+        """Use one reference for all equal values of a setting, so that equal stored documents stay equal."""
         self._reuse = True
         try:
             yield
@@ -70,7 +70,7 @@ class SettingSecrets:
         }
 
     def is_secret(self, type_name: str, setting: str) -> bool:
-        """Return whether a setting is secret; of an unknown type, or an unknown setting, its name decides."""
+        """Return whether a setting is secret. For an unknown type or setting, the name decides."""
         found = next((each for each in self._settings(type_name) if each.name == setting), None)
         return is_secret_name(setting) if found is None else found.secret is True
 
@@ -81,7 +81,7 @@ class SettingSecrets:
             return []
 
     def address(self, name: str, type_name: str, parameters: Iterable[Parameter]) -> str:
-        """Return the hosts that an object connects to with these settings, those of the cell file included."""
+        """Return the hosts that an object connects to with these settings and those of the cell file."""
         settings = self._settings(type_name)
         texts = {each.name: _text(each.default_value) for each in settings if not isinstance(each.default_value, Unset)}
         texts |= {each.name: _text(each.value) for each in parameters}
@@ -104,19 +104,19 @@ class SettingSecrets:
         below: Iterable[Parameter] = (),
         check: bool = False,
     ) -> list[Parameter]:
-        """Return settings of an object with references in place of secrets; the values are stored by `flush`.
+        """Return settings of an object with references in place of secrets. `flush` of the store writes the values.
 
         Args:
-            type_name: the object's type.
-            given: all its settings, or all its overrides.
-            before: the same as they are stored. `***` keeps what is stored, else the driver's default counts.
-            name: the object's name.
-            below: for overrides, the settings of the object in the scene.
-            check: refuse a reference to a secret that was entered for another address.
+            type_name: The object's type.
+            given: All its settings, or all its overrides.
+            before: The stored settings or overrides. The value `***` keeps the stored secret, if there is one.
+            name: The object's name.
+            below: For overrides, the settings of the object in the scene.
+            check: Refuse a reference to a secret that was entered for another address.
 
         Raises:
-            InvalidData: a reference is to the secret of another setting.
-            AddressChanged: a reference is to a secret for another address.
+            InvalidData: A reference belongs to the secret of another setting.
+            AddressChanged: A reference belongs to a secret for another address.
         """
         given, before, below = list(given), list(before), list(below)
         stored = {parameter.name: _text(parameter.value) for parameter in before}
@@ -154,20 +154,19 @@ class SettingSecrets:
         return found
 
     def hide_in_object(self, obj: SceneObject, before: SceneObject | None = None) -> SceneObject:
-        """Return an object of a scene without secrets; the same one when it has none.
+        """Return an object of a scene without secrets; `obj` itself if it has none.
 
-        Raises AddressChanged when it has another address than `before`, and a secret for that one.
+        Raises:
+            AddressChanged: The object has another address than `before`, and a secret for the old one.
         """
         given = list(obj.parameters)
         stored = [] if before is None else before.parameters
-        moved = before is not None and self.address(obj.name, obj.type, given) != self.address(
-            obj.name, obj.type, stored
-        )
-        hidden = self.hide(obj.type, given, stored, name=obj.name, check=moved)
+        old, new = (self.address(obj.name, obj.type, settings) for settings in (stored, given))
+        hidden = self.hide(obj.type, given, stored, name=obj.name, check=before is not None and old != new)
         return obj if hidden == given else replace(obj, parameters=hidden)
 
     def hide_in_scene(self, scene: Scene, before: Scene | None = None) -> Scene:
-        """Return a scene without secrets; `before` is how it is stored. Raises AddressChanged."""
+        """Return a scene without secrets. `before` is the stored scene. Raise AddressChanged as `hide_in_object`."""
         stored = {} if before is None else objects_of(before)
         objects = [self.hide_in_object(obj, stored.get(obj.id)) for obj in scene.objects]
         return scene if objects == scene.objects else replace(scene, objects=objects)
@@ -178,7 +177,7 @@ class SettingSecrets:
         objects: Mapping[str, SceneObject],
         before: Iterable[SceneObjectOverride] = (),
     ) -> list[SceneObjectOverride]:
-        """Return overrides without secrets; `objects` are those of the scene by id."""
+        """Return overrides without secrets. `objects`: the objects of the scene by id."""
         stored = {override.id: override.parameters for override in before}
         found = []
         for each in overrides:
@@ -187,20 +186,14 @@ class SettingSecrets:
             found.append(replace(each, parameters=hidden))
         return found
 
-    async def take_from_scene(self, scene: Scene, before: Scene | None) -> Scene:
-        """Return a scene without secrets, which are on disk then; `before` is how it is stored.
-
-        Raise StorageError if that is impossible.
-        """
+    async def extract_from_scene(self, scene: Scene, before: Scene | None) -> Scene:
+        """Store the secrets of a scene on disk and return the scene without them. `before` is the stored scene."""
         hidden = self.hide_in_scene(scene, before)
         await self.store.flush()
         return hidden
 
-    async def take_from_project(self, project: Project, scene: Scene, before: Project | None) -> Project:
-        """Return a project on a scene without secrets, which are on disk then.
-
-        Raise StorageError if that is impossible.
-        """
+    async def extract_from_project(self, project: Project, scene: Scene, before: Project | None) -> Project:
+        """Store the secrets of a project on disk and return the project without them."""
         stored = [] if before is None else before.object_overrides
         hidden = self.hide_in_overrides(project.object_overrides, objects_of(scene), stored)
         await self.store.flush()
@@ -209,9 +202,10 @@ class SettingSecrets:
     def hide_in_package(self, directory: Path) -> bool:
         """Replace secrets in the documents of a package on disk; return whether there were any.
 
-        Raise OSError if that is impossible.
+        Unreadable documents are left unchanged. Such a package does not run.
 
-        What cannot be read is left: the package does not run then.
+        Raises:
+            OSError: A document cannot be written.
         """
         documents: dict[str, Any] = {}
         for name in PACKAGED:
@@ -243,10 +237,10 @@ class SettingSecrets:
 
     # ------------------------------------------------------------------------------------------ references to values
     def values_for(self, scene: Scene, overrides: Iterable[SceneObjectOverride] = ()) -> dict[str, ObjectSecrets]:
-        """Return the secrets of objects by id, as far as they are stored and were entered for the object's address.
+        """Return the stored secrets that were entered for the addresses of the objects, by object id.
 
-        Objects that share an id get none: the cell host could not tell their secrets apart.
-        Call `flush` of the store afterwards: this may note the address of a secret.
+        Objects that share an id are omitted, since the cell host cannot distinguish their secrets.
+        Call `flush` of the store afterwards, since this may set the address of a secret.
         """
         overrides = list(overrides)
         count = Counter(obj.id for obj in scene.objects)
@@ -271,7 +265,7 @@ class SettingSecrets:
         return ObjectSecrets(values, problem) if values or problem else None
 
     def values_for_package(self, directory: Path) -> dict[str, ObjectSecrets]:
-        """Return the secrets of a package, none when it is damaged. Reads and writes files: call it in a thread."""
+        """Return the secrets of a package; empty if it is damaged. Accesses files, so call it in a thread."""
         try:
             scene = read_document(directory / "data" / PACKAGED[0], Scene)
             project = read_document(directory / "data" / PACKAGED[1], Project)
@@ -295,7 +289,7 @@ def objects_of(scene: Scene) -> dict[str, SceneObject]:
 
 
 def _text(value: str) -> str:
-    """Return the encoded value of a setting that is a text, else an empty one."""
+    """Return the decoded value of a setting if it is a text, else an empty text."""
     try:
         return msgspec.json.decode(value, type=str)
     except msgspec.DecodeError:

@@ -13,9 +13,9 @@ from arcor2_server.files import ensure_private
 
 
 def check_opens(path: Path) -> None:
-    """Create the file, readable by its owner alone; StorageError where it cannot be opened.
+    """Create the file, readable only by its owner, and check that it can be opened. Raise StorageError if not.
 
-    aiosqlite leaves a thread to itself after an open that failed, which then speaks to a loop that may be closed.
+    aiosqlite itself must not fail to open it, since its thread would then call an event loop that may be closed.
     """
     try:
         ensure_private(path)
@@ -28,16 +28,16 @@ def check_opens(path: Path) -> None:
 
 
 def prepare(connection: Any, _record: Any) -> None:
-    """Set up a connection that was just made."""
+    """Set up a new connection."""
     cursor = connection.cursor()
-    # FULL: in WAL mode only then is every commit flushed before it returns.
+    # In WAL mode, only FULL flushes every commit to the disk.
     for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000"):
         cursor.execute(f"PRAGMA {pragma}")
     cursor.close()
 
 
 async def purge(engine: AsyncEngine) -> None:
-    """Overwrite replaced and deleted data; other databases do that themselves. Raise SQLAlchemyError if that fails."""
+    """Overwrite replaced and deleted data of an SQLite database."""
     if engine.dialect.name != "sqlite":
         return
     async with engine.connect() as plain:

@@ -1,4 +1,4 @@
-"""Saved documents: scenes, projects, object types and models; written data is on disk when a method returns."""
+"""Saved scenes, projects, object types and models. Written data is on disk when a method returns."""
 
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Final
@@ -49,7 +49,7 @@ class Storage(Database):
             return [BareScene(**row) for row in rows.mappings()]
 
     async def scenes_with_ids(self, keys: Sequence[str]) -> list[Scene]:
-        """Return the saved scenes with these ids, in no particular order; ids without a scene are left out."""
+        """Return the saved scenes with these ids in any order, without ids that do not exist."""
         return await self.with_ids(SceneRow, keys, _decode_scene)
 
     async def scene(self, key: str) -> Scene:
@@ -59,7 +59,7 @@ class Storage(Database):
         return scene
 
     async def put_scene(self, scene: Scene) -> Scene:
-        """Save a scene; return it as saved: with `created` and `modified`, without `int_modified`."""
+        """Save a scene; return it with the new `created` and `modified`, without `int_modified`."""
         stamp = now()
         async with self.writing() as session:
             row = await session.get(SceneRow, scene.id)
@@ -68,7 +68,7 @@ class Storage(Database):
             )
             if self.secrets is not None:
                 before = None if row is None else self.decoded(_decode_scene, row)
-                saved = await self.secrets.take_from_scene(saved, before)
+                saved = await self.secrets.extract_from_scene(saved, before)
             await session.merge(
                 SceneRow(
                     id=saved.id,
@@ -82,11 +82,11 @@ class Storage(Database):
         return saved
 
     async def delete_scene(self, key: str) -> None:
-        """Delete the document. Raise NotFound if there is none."""
+        """Delete a scene. Raise NotFound if there is none."""
         async with self.writing() as session:
             await session.delete(await self.one(session, SceneRow, key, "scene"))
-        for tell in self.on_deleted:
-            await tell(key)
+        for notify in self.on_deleted:
+            await notify(key)
 
     # ------------------------------------------------------------------------------------------------ projects
     async def projects(self) -> list[BareProject]:
@@ -105,7 +105,7 @@ class Storage(Database):
             return [BareProject(**row) for row in rows.mappings()]
 
     async def projects_with_ids(self, keys: Sequence[str]) -> list[Project]:
-        """Return the saved projects with these ids, in no particular order; ids without a project are left out."""
+        """Return the saved projects with these ids in any order, without ids that do not exist."""
         return await self.with_ids(ProjectRow, keys, _decode_project)
 
     async def project(self, key: str) -> Project:
@@ -115,7 +115,7 @@ class Storage(Database):
         return project
 
     async def put_project(self, project: Project) -> Project:
-        """Save; return the project as saved (like put_scene). NotFound when its scene is not saved."""
+        """Save a project; return it as `put_scene` does. Raise NotFound if its scene is not saved."""
         stamp = now()
         async with self.writing() as session:
             scene = await self.one(session, SceneRow, project.scene_id, "scene")
@@ -125,7 +125,7 @@ class Storage(Database):
             )
             if self.secrets is not None and saved.object_overrides:
                 before = None if row is None else self.decoded(_decode_project, row)
-                saved = await self.secrets.take_from_project(saved, self.decoded(_decode_scene, scene), before)
+                saved = await self.secrets.extract_from_project(saved, self.decoded(_decode_scene, scene), before)
             await session.merge(
                 ProjectRow(
                     id=saved.id,
@@ -146,8 +146,8 @@ class Storage(Database):
             row = await self.one(session, ProjectRow, key, "project")
             await session.execute(delete(ProjectSourceRow).where(ProjectSourceRow.id == key))
             await session.delete(row)
-        for tell in self.on_deleted:
-            await tell(key)
+        for notify in self.on_deleted:
+            await notify(key)
 
     async def projects_with_scene(self, scene_id: str) -> list[str]:
         """Return the ids of the saved projects of a scene."""
@@ -168,7 +168,7 @@ class Storage(Database):
 
     # ------------------------------------------------------------------------------------------------ object types
     async def object_type_stamps(self) -> dict[str, str]:
-        """Return the ids of all uploaded object types with when each was modified."""
+        """Return the times at which uploaded object types were modified, by id."""
         async with self.reading() as session:
             rows = await session.execute(select(ObjectTypeRow.id, ObjectTypeRow.modified))
             return {key: modified for key, modified in rows}  # noqa: C416 - rows are no tuples to mypy
@@ -193,7 +193,7 @@ class Storage(Database):
             return set(await session.scalars(wanted.where(ObjectTypeRow.id.not_in(select(ModelRow.id)))))
 
     async def put_object_type(self, object_type: ObjectTypeSource) -> ObjectTypeSource:
-        """Save, with its model when it has one; return it as saved (like put_scene)."""
+        """Save an object type with its model; return it as `put_scene` does."""
         stamp = now()
         async with self.writing() as session:
             row = await session.get(ObjectTypeRow, object_type.id)
@@ -234,7 +234,7 @@ class Storage(Database):
             return self._model(await self.one(session, ModelRow, key, "model"))
 
     async def put_model(self, model: Models) -> None:
-        """Save a collision model in place of one with that id, of whatever kind."""
+        """Create or replace a collision model."""
         async with self.writing() as session:
             await session.merge(_model_row(model))
             if (row := await session.get(ObjectTypeRow, model.id)) is not None and row.model_kind is not None:
@@ -243,7 +243,7 @@ class Storage(Database):
         self.types_revision += 1
 
     async def delete_model(self, key: str) -> None:
-        """Delete the document. Raise NotFound if there is none."""
+        """Delete a collision model. Raise NotFound if there is none."""
         async with self.writing() as session:
             await session.delete(await self.one(session, ModelRow, key, "model"))
         self.types_revision += 1

@@ -1,4 +1,4 @@
-"""Run by Alembic: applies the migrations over the connection that it is given (storage/schema.py)."""
+"""Alembic environment: applies the migrations over the connection given by storage/schema.py."""
 
 from alembic import context
 

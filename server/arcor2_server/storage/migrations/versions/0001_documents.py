@@ -1,4 +1,4 @@
-"""The first schema: scenes, projects, sources, object types, collision models."""
+"""First schema: tables for scenes, projects, sources, object types and collision models."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -8,7 +8,7 @@ down_revision = None
 
 
 def upgrade() -> None:
-    """Go to this revision."""
+    """Migrate to this revision."""
     op.create_table(
         "scene",
         sa.Column("id", sa.String(255), primary_key=True),
@@ -55,6 +55,6 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Go back to the one before."""
+    """Migrate back to the previous revision."""
     for table in ("model", "object_type", "project_source", "project", "scene"):
         op.drop_table(table)

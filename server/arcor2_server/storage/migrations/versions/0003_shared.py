@@ -1,4 +1,4 @@
-"""What clients share through the server: view state, breakpoints of projects; and the history of runs."""
+"""Tables for view values, shared breakpoints and runs."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -8,7 +8,7 @@ down_revision = "0002"
 
 
 def upgrade() -> None:
-    """Go to this revision."""
+    """Migrate to this revision."""
     op.create_table(
         "view_value",
         sa.Column("user", sa.String(255), primary_key=True),
@@ -32,6 +32,6 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Go back to the one before."""
+    """Migrate back to the previous revision."""
     for table in ("run", "shared_breakpoints", "view_value"):
         op.drop_table(table)

@@ -1,4 +1,4 @@
-"""Records of calibrations."""
+"""Table for calibration records."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -8,7 +8,7 @@ down_revision = "0003"
 
 
 def upgrade() -> None:
-    """Go to this revision."""
+    """Migrate to this revision."""
     op.create_table(
         "calibration",
         sa.Column("id", sa.String(255), primary_key=True),
@@ -22,5 +22,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Go back to the one before."""
+    """Migrate back to the previous revision."""
     op.drop_table("calibration")

@@ -1,4 +1,4 @@
-"""What REST keeps beside the documents: parameters of projects, tokens and breakpoints of the Execution service."""
+"""Tables for project parameters, tokens and breakpoints of the REST APIs."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -8,7 +8,7 @@ down_revision = "0001"
 
 
 def upgrade() -> None:
-    """Go to this revision."""
+    """Migrate to this revision."""
     op.create_table(
         "project_beside",
         sa.Column("id", sa.String(255), sa.ForeignKey("project.id", ondelete="CASCADE"), primary_key=True),
@@ -29,6 +29,6 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Go back to the one before."""
+    """Migrate back to the previous revision."""
     for table in ("breakpoints", "execution_token", "project_beside"):
         op.drop_table(table)
