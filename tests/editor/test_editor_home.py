@@ -330,8 +330,8 @@ async def test_problems_are_shown_on_tiles_and_fixed_from_there(
             # All problems are listed without a reload; the project refers to its scene.
             card = screen.page.locator(".card").filter(has=screen.page.get_by_role("heading", name="lighting"))
             await card.get_by_text("2 problems").click()
-            await card.get_by_text("lamp: the object type Lamp is not known.").wait_for()
-            await card.get_by_text("torch: the object type Torch is not known.").wait_for()
+            await card.get_by_text("lamp: the object type Lamp does not exist.").wait_for()
+            await card.get_by_text("torch: the object type Torch does not exist.").wait_for()
             await expect(card.get_by_role("button", name="Open lighting")).to_have_attribute("aria-disabled", "true")
             assert await screen.faults() == []
             await screen.picture("home problems")

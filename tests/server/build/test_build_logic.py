@@ -379,7 +379,7 @@ def test_otherwise_something_more() -> None:
         (choosing(0, "low", None), "only integers can be branched on, not 'low'"),
         (choosing(0, True, None), "one of its connections has no condition"),
         (choosing("low", 1, None), "only texts can be branched on, not 1"),
-        (choosing(0, 1.5, None), "only true, false, integers and texts"),  # type: ignore[arg-type]
+        (choosing(0, 1.5, None), "compares with true, false, an integer or a text"),  # type: ignore[arg-type]
     ],
 )
 def test_choices_that_are_refused(draft: Draft, text: str) -> None:

@@ -184,7 +184,7 @@ SCENE = Scene("s", id="scn", objects=[TIME, RANDOM, ROBOT])
 @pytest.mark.parametrize(
     ("obj", "problem"),
     [
-        (SceneObject("x", "Nothing", UNSET, [], "o"), "not known"),
+        (SceneObject("x", "Nothing", UNSET, [], "o"), "does not exist"),
         (SceneObject("x y", "TimeActions", UNSET, [], "o"), "valid name"),
         (SceneObject("x", "Robot", Pose(), [], "o"), "abstract"),
         (SceneObject("x", "TimeActions", Pose(), [], "o"), "no pose"),
@@ -204,7 +204,7 @@ def test_problems_of_scenes(types: RecordedTypes, obj: SceneObject, problem: str
     [
         (project(replace(ActionPoint("p", Position(), "nowhere", id="a"))), "neither"),
         (project(ActionPoint("p", Position(), "obj_t", id="a")), "has no pose"),
-        (project(ActionPoint("p", Position(), "b", id="a"), ActionPoint("q", Position(), "a", id="b")), "itself"),
+        (project(ActionPoint("p", Position(), "b", id="a"), ActionPoint("q", Position(), "a", id="b")), "ancestor"),
         (project(parameters=[ProjectParameter("n", "double", "[1]", id="x")]), "truth value"),
         (project(ActionPoint("p", Position(), id="a", actions=[pick("x", type="gone/sleep")])), "gone"),
         (project(ActionPoint("p", Position(), id="a", actions=[pick("x", type="obj_t/run")])), "run"),
@@ -212,7 +212,7 @@ def test_problems_of_scenes(types: RecordedTypes, obj: SceneObject, problem: str
         (project(ActionPoint("p", Position(), id="a", actions=[pick("x", flows=[])])), "one flow"),
         (project(ActionPoint("p", Position(), id="a", actions=[pick("x", flows=[Flow(outputs=["r"])])])), "returns 0"),
         (project(ActionPoint("p", Position(), id="a", actions=[pick("x", parameters=[])])), "seconds is missing"),
-        (project(ActionPoint("p", Position(), id="a", actions=[pick("x"), pick("x", id="y")])), "more than one"),
+        (project(ActionPoint("p", Position(), id="a", actions=[pick("x"), pick("x", id="y")])), "More than one"),
         (replace(project(), scene_id="other"), "another scene"),
     ],
 )
@@ -382,7 +382,7 @@ def test_a_parent_that_hangs_below_is_refused() -> None:
     points = [ActionPoint("p", Position(), id="a"), ActionPoint("q", Position(), "a", id="b")]
     document = Document.of(Scene("s", id="scn"), project(*points))
     for parent in ("a", "b"):
-        with pytest.raises(InvalidData, match="itself"):
+        with pytest.raises(InvalidData, match="ancestor"):
             changes_for_parent(document, "a", parent)
 
 
