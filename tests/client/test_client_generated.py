@@ -7,7 +7,7 @@ import msgspec
 import pytest
 from msgspec import UNSET
 
-from arcor2_hw.client import generating
+from arcor2_hw.client import generating, signatures
 from arcor2_hw.client.connection import READING
 from arcor2_hw.client.requests import Requests
 from arcor2_hw.data.events import EVENTS
@@ -36,14 +36,14 @@ def test_the_file_is_what_the_structs_say() -> None:
 
 def test_there_is_a_method_for_every_request_and_no_other() -> None:
     methods = {name for name, _ in inspect.getmembers(Requests, inspect.iscoroutinefunction)} - {"call"}
-    assert methods == {generating.snake(name) for name in RPCS}
-    assert generating.snake("AddApUsingRobot") == "add_ap_using_robot"
+    assert methods == {signatures.method_name(name) for name in RPCS}
+    assert signatures.method_name("AddApUsingRobot") == "add_ap_using_robot"
 
 
 @pytest.mark.parametrize("rpc", RPCS.values(), ids=lambda rpc: rpc.name)
 async def test_arguments_arrive_and_what_is_left_out_is_as_the_struct_has_it(rpc: Any) -> None:
     client = Recorder()
-    method = getattr(client, generating.snake(rpc.name))
+    method = getattr(client, signatures.method_name(rpc.name))
     given: dict[str, Any] = {}
     is_struct = isinstance(rpc.args, type) and issubclass(rpc.args, msgspec.Struct)
     if is_struct:
@@ -69,7 +69,7 @@ async def test_every_argument_reaches_the_field_of_its_name() -> None:
             f.name: [object()] if f.default_factory is list else {object()} if f.default_factory is set else object()
             for f in fields
         }
-        await getattr(client, generating.snake(rpc.name))(**given)
+        await getattr(client, signatures.method_name(rpc.name))(**given)
         assert client.sent[-1][1] == rpc.args(**given), rpc.name
     assert "AddAction" in {name for name, *_ in client.sent}
 
@@ -97,7 +97,7 @@ def test_a_struct_that_cannot_be_written_is_refused() -> None:
         field: dict[str, str] = msgspec.field(default_factory=dict)
 
     with pytest.raises(TypeError, match=r"Odd\.field"):
-        generating._fields(names, Odd)
+        signatures._fields(Odd)
     assert names.of(list[Action] | None) == "list[Action] | None"
     assert names.of(dict[str, Project | Any]) == "dict[str, Project | Any]"
     assert generating._default(names, UNSET) == "UNSET"
