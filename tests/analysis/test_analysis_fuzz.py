@@ -1,4 +1,4 @@
-"""Whatever stands in a source: the analysis answers, names a place, and its answer can be sent."""
+"""Any source: the analysis answers, reports problems with their place, and its result can be sent."""
 
 import string
 import tokenize
@@ -175,13 +175,13 @@ EXAMPLES = settings(max_examples=150, deadline=None, suppress_health_check=[Heal
 
 @EXAMPLES
 @given(st.one_of(st.text(max_size=200), st.binary(max_size=200), st.text(string.printable, max_size=300)))
-def test_anything(source: str | bytes) -> None:
+def test_any_source_gets_an_answer(source: str | bytes) -> None:
     sound(source)
 
 
 @EXAMPLES
 @given(modules())
-def test_anything_in_place_of_any_expression(source: str) -> None:
+def test_any_expression_may_be_replaced_by_anything(source: str) -> None:
     sound(source)
 
 
@@ -196,7 +196,7 @@ PLACES = [
 @given(
     st.lists(st.tuples(st.integers(0, len(TOKENS) - 1), st.sampled_from([*sorted(set(TOKENS)), "\x00"])), max_size=3)
 )
-def test_a_sound_source_with_some_tokens_exchanged(changes: list[tuple[int, str]]) -> None:
+def test_a_valid_source_with_some_tokens_replaced(changes: list[tuple[int, str]]) -> None:
     source = WHOLE
     for index, replacement in sorted(changes, reverse=True):
         start = PLACES[index]
@@ -204,7 +204,7 @@ def test_a_sound_source_with_some_tokens_exchanged(changes: list[tuple[int, str]
     sound(source)
 
 
-def test_the_source_that_is_exchanged_is_sound() -> None:
+def test_the_original_source_is_valid() -> None:
     lib = Library([SourceFile("T", "t", WHOLE),
                    SourceFile("Other", "other", OTHER)])  # fmt: skip
     found = lib.analyse("T")

@@ -107,7 +107,7 @@ def test_an_uploaded_type_may_derive_from_an_installed_one(distribution: Path) -
 
 
 @pytest.mark.parametrize(("name", "text"), [("Gone", "vendor_cell.arm.gone"), ("Nowhere", "no_such_package_at_all")])
-def test_an_entry_point_that_leads_nowhere_is_a_problem(distribution: Path, name: str, text: str) -> None:
+def test_an_entry_point_without_target_is_a_problem(distribution: Path, name: str, text: str) -> None:
     (found,) = [each for each in installed_types() if each.name == name]
     assert found.file is None
     assert found.problem is not None
@@ -124,7 +124,7 @@ def test_a_file_that_changed_is_read_again(distribution: Path) -> None:
     assert first.source != second.source == b"class Arm: ...\n"
 
 
-def test_all_that_is_installed_is_sound() -> None:
+def test_all_installed_types_are_valid() -> None:
     found = installed_types()
     library = Library(each.file for each in found if each.file is not None)
     assert {"CounterActions", "FlowActions", "LogicActions", "RandomActions", "TimeActions"} <= {e.name for e in found}
@@ -135,7 +135,7 @@ def test_all_that_is_installed_is_sound() -> None:
         assert not [(a.name, a.problem) for a in analysis.actions if a.disabled], each.name
 
 
-def test_what_can_be_jogged_and_acknowledged_is_known_of_the_robots_that_are_installed() -> None:
+def test_jog_and_acknowledge_features_of_installed_robots() -> None:
     library = Library([found.file for found in installed_types() if found.file is not None])
     features = {name: library.analyse(name).robot for name in ("UR5e", "YuMi")}
     assert features["UR5e"] is not None

@@ -1,4 +1,4 @@
-"""What the analysis tells of object types, over files, spellings and everything that may be wrong."""
+"""Results of the analysis of object types, across files and spellings, and for invalid sources."""
 
 import json
 import re
@@ -72,7 +72,7 @@ def without_texts(value: object) -> object:
     return [without_texts(each) for each in value] if isinstance(value, list) else value
 
 
-def test_the_built_in_types_are_those_of_the_protocol() -> None:
+def test_built_in_types_match_the_protocol() -> None:
     stated = PROTOCOL["built_in_object_types"]
     empty = Library()
     assert sorted(stated) == sorted(BUILT_IN) == sorted(empty.names())
@@ -258,7 +258,7 @@ def recorded() -> dict[str, list]:
     return answers
 
 
-def test_types_of_a_recorded_session_come_out_as_recorded() -> None:
+def test_types_of_a_recorded_session_are_analysed_as_recorded() -> None:
     answers = recorded()
     lib = Library(SourceFile(name, module_name(name), textwrap.dedent(source)) for name, source in DOBOT.items())
     metas = {meta["type"]: meta for meta in answers["GetObjectTypes"]}
@@ -283,7 +283,7 @@ def test_types_of_a_recorded_session_come_out_as_recorded() -> None:
     assert "set_hand_teaching_mode" not in lib.analyse("DobotMagician").implemented
 
 
-def test_a_generated_type() -> None:
+def test_a_generated_type_is_analysed() -> None:
     found = Library(
         [
             SourceFile(
@@ -303,7 +303,7 @@ def test_a_generated_type() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ actions
-def test_every_parameter_type_is_announced() -> None:
+def test_every_parameter_type_is_described() -> None:
     action = the_action(
         """
         @action
@@ -358,7 +358,7 @@ def test_enumerations_of_other_files_and_of_the_class_itself() -> None:
     assert [file.name for file in found.modules] == ["Modes"]
 
 
-def test_defaults_that_are_no_literals_are_followed() -> None:
+def test_defaults_that_name_constants_are_resolved() -> None:
     action = the_action(
         """
         @action
@@ -384,14 +384,14 @@ def test_defaults_that_are_no_literals_are_followed() -> None:
         ("if q:\n        assert 0.0 <= p <= 1.0", None),
     ],
 )
-def test_ranges(statement: str, extra: str | None) -> None:
+def test_parameter_ranges_are_read(statement: str, extra: str | None) -> None:
     action = the_action(
         f"@action\ndef act(self, p: float, *, an: str | None = None) -> None:\n    q = p\n    {statement}\n"
     )
     assert action.parameters[0].extra == (msgspec.UNSET if extra is None else extra)
 
 
-def test_dynamic_values_and_cancelling() -> None:
+def test_dynamic_values_and_cancel_mappings_are_read() -> None:
     for attributes in (
         'DYNAMIC_PARAMS = {"item": ("items", {"store"})}\nCANCEL_MAPPING = {"act": "cancel"}',
         "def items(self, store: str) -> set[str]: ...\ndef cancel(self): ...\n"
@@ -433,7 +433,7 @@ def test_dynamic_values_and_cancelling() -> None:
         ),
     ],
 )
-def test_every_form_of_import_is_followed(imports: str, common: str, dynamic: str) -> None:
+def test_every_form_of_import_is_resolved(imports: str, common: str, dynamic: str) -> None:
     source = f"""{imports}
 import arcor2_object_types.abstract as bases
 import builtins as b
@@ -463,7 +463,7 @@ class T(bases.Generic):
     assert [p.dynamic_value for p in act.parameters] == [True, True, False, False]
 
 
-def test_former_names_of_actions_and_parameters() -> None:
+def test_former_names_of_actions_and_parameters_are_read() -> None:
     action = the_action(
         """
         @action(renamed={"low": "minimum", "least": "minimum", "high": "maximum"})
@@ -512,7 +512,7 @@ AN = "*, an: str | None = None"
         (f"@action(renamed={{'a': 'b'}})\ndef act(self, a: int, b: int, {AN}) -> None: ...", "act: `renamed` is"),
     ],
 )
-def test_what_disables_an_action_and_nothing_but_the_action(method: str, problem: str) -> None:
+def test_errors_that_disable_only_the_action(method: str, problem: str) -> None:
     head = "import enum\nclass E(StrEnum):\n    A = 'a'\nclass Empty(StrEnum): ...\nclass Odd(StrEnum):\n    A = 1\n"
     source = f"{head}\nclass T(Generic):\n    _ABSTRACT = False\n" + textwrap.indent(f"@action\n{method}\n", "    ")
     found = analyse(source + f"    @action\n    def fine(self, {AN}) -> None: ...\n")
@@ -527,7 +527,7 @@ def test_what_disables_an_action_and_nothing_but_the_action(method: str, problem
     assert line >= (9 if "Empty" in method or "Odd" in method else 13)  # where the fault is
 
 
-def test_inheritance_of_actions() -> None:
+def test_actions_are_inherited() -> None:
     lib = library(
         Base="""
         class Base(GenericWithPose):
@@ -584,7 +584,7 @@ def test_inheritance_of_actions() -> None:
     assert mixin.problem is None
 
 
-def test_offers_of_our_bases_become_actions_when_they_are_implemented() -> None:
+def test_optional_methods_of_bases_become_actions_when_implemented() -> None:
     found = analyse("""
         from PIL import Image
         class T(Camera):
@@ -601,7 +601,7 @@ def test_offers_of_our_bases_become_actions_when_they_are_implemented() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ types
-def test_abstract_types() -> None:
+def test_abstract_types_are_recognised() -> None:
     lib = library(
         A="class A(Generic):\n    pass\n",
         B="from .A import A\nclass B(A):\n    _ABSTRACT = False\n",
@@ -617,7 +617,7 @@ def test_abstract_types() -> None:
     }  # fmt: skip
 
 
-def test_settings_as_dataclasses_order_them() -> None:
+def test_settings_are_ordered_as_in_dataclasses() -> None:
     lib = library(
         Base="""
         from dataclasses import KW_ONLY, dataclass, field
@@ -663,7 +663,7 @@ def test_settings_as_dataclasses_order_them() -> None:
     assert lib.analyse("Heir").meta.settings == derived
 
 
-def test_secret_settings() -> None:
+def test_secret_settings_are_marked() -> None:
     lib = library(
         Bank="""
         from dataclasses import dataclass, field
@@ -738,7 +738,7 @@ class T(Robot):
         ("pass", "'float'", "False", {"stop"}),
     ],
 )
-def test_features_of_robots(stop: str, speed: str, safe: str, features: set[str]) -> None:
+def test_robot_features_are_detected(stop: str, speed: str, safe: str, features: set[str]) -> None:
     found = analyse(ROBOT.format(stop=stop, speed=speed, safe=safe))
     assert found.problem is None
     assert found.robot is not None
@@ -837,7 +837,7 @@ def test_a_problem_in_another_file_names_that_file() -> None:
     assert "does not exist" in str(lib.analyse("T").problem)
 
 
-def test_bases_in_a_circle_over_files() -> None:
+def test_circular_bases_across_files_are_reported() -> None:
     lib = library(
         One="from .two import Two\nclass One(Two): ...\n",
         Two="from .one import One\nclass Two(One): ...\n",
@@ -864,7 +864,7 @@ def test_bases_in_a_circle_over_files() -> None:
         "import t\nclass T(t.t.t.t): ...",
     ],
 )
-def test_hopeless_sources_are_told_and_do_no_harm(source: str | bytes) -> None:
+def test_unreadable_sources_are_reported(source: str | bytes) -> None:
     found = Library([SourceFile("T", "t", source)]).analyse("T")
     assert found.problem is not None
     assert found.problem.line >= 1
@@ -876,7 +876,7 @@ def test_a_file_in_another_encoding_is_read() -> None:
     assert Library([SourceFile("T", "t", source.encode("latin-1"))]).analyse("T").meta.description == "Wägt."
 
 
-def test_guarded_imports_may_fail() -> None:
+def test_imports_inside_try_may_fail() -> None:
     found = analyse("""
         from typing import TYPE_CHECKING
         if TYPE_CHECKING:
@@ -891,7 +891,7 @@ def test_guarded_imports_may_fail() -> None:
     assert found.problem is None
 
 
-def test_names_that_are_refused() -> None:
+def test_invalid_names_are_refused() -> None:
     with pytest.raises(InvalidData, match="Robot is built in"):
         Library([SourceFile("Robot", "robot", "")])
     with pytest.raises(NotFound, match="Nobody"):

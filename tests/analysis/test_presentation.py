@@ -1,4 +1,4 @@
-"""Category, icon and unit: what the editor shows, as the class and its docstrings say."""
+"""Category, icon and unit in the editor come from the class and its docstrings."""
 
 import json
 
@@ -86,7 +86,7 @@ def library() -> Library:
     )
 
 
-def test_types_and_actions_are_shown_as_the_class_says(library: Library) -> None:
+def test_category_and_icon_come_from_the_class(library: Library) -> None:
     oven, grill = library.analyse("Oven"), library.analyse("GrillOven")
     assert (oven.meta.category, oven.meta.icon) == ("Heat", "oven")
     assert (grill.meta.category, grill.meta.icon) == ("Heat", "grill")
@@ -99,7 +99,7 @@ def test_types_and_actions_are_shown_as_the_class_says(library: Library) -> None
     assert (robot.category, robot.icon) == ("Robots", "robot")
 
 
-def test_what_an_older_type_means_by_these_names_is_no_fault(library: Library) -> None:
+def test_older_types_may_use_these_names_otherwise(library: Library) -> None:
     old = library.analyse("Old")
     assert old.problem is None
     assert (old.meta.category, old.meta.icon) == (UNSET, UNSET)
@@ -160,11 +160,11 @@ def test_numbers_carry_their_unit(library: Library) -> None:
         ("in m", None),
     ],
 )
-def test_unit_of_a_description(text: str, unit: str | None) -> None:
+def test_unit_is_read_from_the_description(text: str, unit: str | None) -> None:
     assert unit_in(text) == unit
 
 
-def test_every_installed_type_has_a_heading_and_its_units_are_read() -> None:
+def test_every_installed_type_has_a_heading_and_units() -> None:
     installed = installed_types()
     library = Library(each.file for each in installed if each.file is not None)
     metas = [library.analyse(each.name).meta for each in installed]

@@ -1,4 +1,4 @@
-"""A stored analysis is used exactly as long as nothing that it was made from has changed."""
+"""A stored analysis is used until one of its sources changes."""
 
 import ast
 from collections.abc import Callable
@@ -68,7 +68,7 @@ def test_a_change_of_any_file_is_noticed(vendor: Path, change: Callable[[Path], 
     assert not snapshot.restore(library(vendor), stored)
 
 
-def test_a_further_source_is_noticed(vendor: Path) -> None:
+def test_an_added_source_is_noticed(vendor: Path) -> None:
     stored = snapshot.take(library(vendor))
     more = library(vendor)
     more.add(SourceFile("Late", "late", "class Late: ...\n"))
@@ -83,7 +83,7 @@ def test_damaged_bytes_are_refused(vendor: Path) -> None:
         assert [parameter.name for parameter in fresh.analyse("Arm").actions[0].parameters] == ["speed"]
 
 
-def test_text_and_bytes_stay_apart() -> None:
+def test_text_and_bytes_are_not_confused() -> None:
     source = "from object_types.helper import VALUE\nfrom arcor2_hw.objects import Generic\nclass A(Generic): ...\n"
     files = [SourceFile("A", "a", source.encode()), SourceFile("Helper", "helper", "VALUE = 1\nclass Helper: ...\n")]
     first, second = Library(files), Library(files)

@@ -1,4 +1,4 @@
-"""Records of calibrations: what they keep through storage, and what a later check against one says."""
+"""Calibration records: storage, and later checks against a record."""
 
 import hashlib
 import math
@@ -43,7 +43,7 @@ def test_a_record_survives_storage_and_two_have_different_ids() -> None:
     assert first.inputs[0].size == 7
 
 
-def test_a_pose_that_is_none_is_left_out_not_null() -> None:
+def test_an_unset_pose_is_omitted_instead_of_null() -> None:
     assert b'"after"' not in msgspec.json.encode(record(after=None))
 
 
@@ -51,7 +51,7 @@ def test_a_pose_that_is_none_is_left_out_not_null() -> None:
     ("move", "turn", "passed"),
     [(0.0, 0.0, True), (0.0019, 0.0, True), (0.0021, 0.0, False), (0.0, 0.19, True), (0.0, 0.21, False)],
 )
-def test_a_check_passes_within_both_limits_only(move: float, turn: float, passed: bool) -> None:
+def test_a_check_passes_only_within_both_limits(move: float, turn: float, passed: bool) -> None:
     turned = AFTER.orientation * Orientation.from_rotation_vector(0.0, math.radians(turn), 0.0)
     check = check_against(record(), Pose(AFTER.position + Position(0, move, 0), turned))
     assert check.passed is passed

@@ -1,4 +1,4 @@
-"""Poses of a camera on rendered pictures whose truth is known, and what has to be refused."""
+"""Camera poses from rendered pictures with known ground truth, and refusals."""
 
 import functools
 import math
@@ -83,7 +83,7 @@ def one_ahead() -> Grey:
 
 # ------------------------------------------------------------------------------------------------ poses
 @pytest.mark.parametrize(("method", "millimetres"), [("joint", 0.8), ("averaged", 3.0)])
-def test_the_pose_is_the_true_one(method: PoseMethod, millimetres: float) -> None:
+def test_camera_pose_matches_ground_truth(method: PoseMethod, millimetres: float) -> None:
     found = find_camera_pose([all_seen()], GIVEN, layout(PLACES), PoseOptions(method=method))
     distance, angle = off(found, ASLANT)
     assert distance < millimetres
@@ -95,8 +95,8 @@ def test_the_pose_is_the_true_one(method: PoseMethod, millimetres: float) -> Non
     assert "4 markers" in found.verdict
 
 
-def test_the_error_is_as_large_as_is_said() -> None:
-    """Over several views, errors in standard deviations have the size of standard deviations."""
+def test_errors_match_the_stated_deviation() -> None:
+    """Over several views, errors divided by the stated deviation have a standard deviation of about one."""
     squares = []
     for seed in range(8):
         random = np.random.default_rng(100 + seed)
@@ -119,7 +119,7 @@ def test_the_error_is_as_large_as_is_said() -> None:
     assert 0.3 < np.mean(squares) < 2.5
 
 
-def test_inverse_is_the_origin_in_the_camera() -> None:
+def test_inverse_gives_the_origin_in_camera_coordinates() -> None:
     found = find_camera_pose([all_seen()], GIVEN, layout(PLACES))
     there, back = found.estimated(), found.estimated(inverse=True)
     assert there.quality == back.quality == found.quality
@@ -129,21 +129,21 @@ def test_inverse_is_the_origin_in_the_camera() -> None:
 
 
 @pytest.mark.parametrize("kind", [".png", ".jpg", ".bmp", ".tiff", ".webp"])
-def test_files_of_all_kinds_are_read(kind: str) -> None:
+def test_all_image_formats_are_read(kind: str) -> None:
     found = find_camera_pose([file(all_seen(), kind)], GIVEN, layout(PLACES))
     assert off(found, ASLANT)[0] < 2.0
 
 
 @pytest.mark.parametrize("srgb", [True, False])
-def test_neither_tone_curve_makes_markers_look_smaller(srgb: bool) -> None:
-    """With the wrong curve a blurred marker seems smaller, and so a camera that sees one marker too far away."""
+def test_tone_curves_do_not_change_the_marker_size(srgb: bool) -> None:
+    """With the wrong tone curve a blurred marker looks smaller, and its camera seems farther away."""
     grey = picture(ASLANT, {17: flat(0, 0)}, Exposure(blur=1.3, srgb=srgb))
     found = find_camera_pose([grey], GIVEN, layout({17: flat(0, 0)}), PoseOptions(focal_deviation=1e-5))
     eye = np.array(tuple(found.pose.position))
     assert np.linalg.norm(eye) / np.linalg.norm(ASLANT[:3, 3]) == pytest.approx(1.0, abs=0.0015)
 
 
-def test_a_marker_that_was_moved_is_left_out_and_named() -> None:
+def test_a_moved_marker_is_excluded_and_named() -> None:
     said = PLACES | {42: flat(0.0, 0.09, 2.5)}
     found = find_camera_pose([all_seen()], GIVEN, layout(said))
     assert off(found, ASLANT)[0] < 1.0
@@ -164,7 +164,7 @@ def test_several_pictures_are_averaged() -> None:
     assert off(together, ASLANT)[0] < max(off(each, ASLANT)[0] for each in alone)
 
 
-def test_a_board_gives_the_pose() -> None:
+def test_pose_from_a_board() -> None:
     board = CharucoBoard(7, 5, 0.04, 0.03, pose=Pose.from_matrix(flat(0.02, 0.01, 0.3)))
     camera = rendering.looking_at(np.array([0.1, -0.25, 0.35]), ORIGIN, 0.2)
     plate = rendering.charuco(7, 5, 0.005, flat(0.02, 0.01, 0.3))
@@ -178,7 +178,7 @@ def test_a_board_gives_the_pose() -> None:
     assert cv2.imdecode(np.frombuffer(drawn, np.uint8), cv2.IMREAD_COLOR).shape[1] > 640
 
 
-def test_corners_of_all_markers_are_given_by_their_numbers() -> None:
+def test_corners_are_returned_by_marker_id() -> None:
     places = {7: flat(-0.1, 0), 3: flat(0.1, 0)}
     camera = rendering.looking_at(np.array([0.0, -1e-9, 0.6]), ORIGIN, 0.0)
     found = find_marker_corners(picture(camera, places), GIVEN)
@@ -199,7 +199,7 @@ def refused(act: Callable[[], object]) -> CalibrationRefused:
     return caught.value
 
 
-def test_one_marker_straight_ahead_is_refused_and_what_helps_helps() -> None:
+def test_a_single_frontal_marker_is_refused_with_working_advice() -> None:
     places = {3: flat(0, 0)}
     error = refused(lambda: find_camera_pose([one_ahead()], GIVEN, layout(places)))
     assert error.reason in {Reason.AMBIGUOUS, Reason.UNOBSERVABLE}
@@ -213,14 +213,14 @@ def test_one_marker_straight_ahead_is_refused_and_what_helps_helps() -> None:
     assert off(find_camera_pose([one_ahead()], GIVEN, layout(places), options), AHEAD)[0] < 8.0
 
 
-def test_markers_that_contradict_each_other_are_refused() -> None:
+def test_contradicting_markers_are_refused() -> None:
     said = {3: PLACES[3], 17: flat(0.12, 0.1)}
     error = refused(lambda: find_camera_pose([all_seen()], GIVEN, layout(said)))
     assert error.reason == Reason.IMPLAUSIBLE
     assert "marker 17 and marker 3" in str(error)
 
 
-def test_a_marker_that_is_there_twice_is_refused() -> None:
+def test_a_duplicate_marker_is_refused() -> None:
     grey = all_seen().copy()
     corners = find_marker_corners(grey, GIVEN)[0].corners
     left, top = (int(min(getattr(c, axis) for c in corners)) - 12 for axis in "xy")
@@ -239,7 +239,7 @@ def test_a_camera_that_moved_between_pictures_is_refused() -> None:
     assert "between picture 0 and picture 1" in str(error)
 
 
-def test_a_picture_without_the_markers_is_refused_and_names_others() -> None:
+def test_a_picture_without_configured_markers_is_refused_naming_others() -> None:
     error = refused(lambda: find_camera_pose([all_seen()], GIVEN, layout({5: flat(0, 0), 6: flat(1, 0)})))
     assert error.reason == Reason.NO_MARKER
     assert "marker 5, marker 6" in str(error)
@@ -247,8 +247,8 @@ def test_a_picture_without_the_markers_is_refused_and_names_others() -> None:
     assert refused(lambda: find_camera_pose([all_seen()], GIVEN, Layout())).reason == Reason.NO_MARKER
 
 
-def test_the_edges_of_another_marker_are_not_measured() -> None:
-    """What the detector takes for a marker by mistake does not count."""
+def test_edges_of_a_false_detection_are_not_measured() -> None:
+    """A false detection is not measured."""
     grey = all_seen()
     lens = measuring.Lens(GIVEN, 640, 480)
     (number, corners), *_ = detect(grey, "4x4_50")
@@ -258,7 +258,7 @@ def test_the_edges_of_another_marker_are_not_measured() -> None:
         assert measure(light, (0.0, 0.0), lens, chart_of(0, other), other, corners) is None
 
 
-def test_a_board_of_which_too_little_is_seen_is_refused() -> None:
+def test_a_board_that_is_mostly_hidden_is_refused() -> None:
     board = Layout(boards=[CharucoBoard(7, 5, 0.04, 0.03)])
     error = refused(lambda: find_camera_pose([one_ahead()], GIVEN, board))
     assert error.reason == Reason.NO_MARKER
@@ -272,7 +272,7 @@ def test_a_blurred_picture_is_refused() -> None:
     assert refused(lambda: find_camera_pose([grey], GIVEN, layout(PLACES))).reason == Reason.BLURRED
 
 
-def test_a_camera_below_where_it_can_be_is_refused() -> None:
+def test_a_camera_below_the_markers_is_refused() -> None:
     options = PoseOptions(lowest=0.8)
     assert refused(lambda: find_camera_pose([all_seen()], GIVEN, layout(PLACES), options)).reason == Reason.IMPLAUSIBLE
 
@@ -294,13 +294,13 @@ def with_parameters(**changes: object) -> CameraParameters:
         (with_parameters(dist_coefs=[-5.0, 8.0, 0.0, 0.0, 0.0]), "distortion"),
     ],
 )
-def test_parameters_that_are_none_are_named(parameters: CameraParameters, said: str) -> None:
+def test_invalid_camera_parameters_are_named(parameters: CameraParameters, said: str) -> None:
     with pytest.raises(InvalidData, match=said):
         find_camera_pose([all_seen()], parameters, layout(PLACES))
 
 
 @pytest.mark.parametrize("count", [0, 3, 6, 14])
-def test_a_wrong_number_of_coefficients_cannot_be_said(count: int) -> None:
+def test_a_wrong_number_of_distortion_coefficients_is_refused(count: int) -> None:
     with pytest.raises(ValueError, match=str(count)):
         with_parameters(dist_coefs=[0.0] * count)
 
@@ -323,7 +323,7 @@ def damaged() -> dict[str, object]:
 
 
 @pytest.mark.parametrize("kind", damaged())
-def test_a_picture_that_is_none_is_refused(kind: str) -> None:
+def test_data_that_is_not_a_picture_is_refused(kind: str) -> None:
     with pytest.raises(InvalidPicture):
         find_camera_pose([damaged()[kind]], GIVEN, layout(PLACES))  # type: ignore[list-item]
 
@@ -351,6 +351,6 @@ NOWHERE = Pose(Position(math.nan, 0.0, 0.0))
         (Layout(boards=[CharucoBoard(1, 5, 0.04, 0.03)]), InvalidData, "1 × 5"),
     ],
 )
-def test_a_layout_that_cannot_be_is_named(wrong: Layout, error: type[Arcor2Error], said: str) -> None:
+def test_an_invalid_marker_layout_is_named(wrong: Layout, error: type[Arcor2Error], said: str) -> None:
     with pytest.raises(error, match=said):
         find_camera_pose([all_seen()], GIVEN, wrong)

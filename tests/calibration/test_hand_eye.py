@@ -1,4 +1,4 @@
-"""Where a camera sits on a flange or beside a robot: closed forms, rendered pictures, and what has to be refused."""
+"""Hand-eye calibration: closed forms, rendered pictures, and refusals."""
 
 import functools
 import math
@@ -81,7 +81,7 @@ def in_hand() -> HandEye:
 
 # ------------------------------------------------------------------------------------------------ closed forms
 @pytest.mark.parametrize("name", METHODS)
-def test_closed_forms_solve_exact_motions_exactly(name: str) -> None:
+def test_closed_form_solvers_are_exact_for_exact_motions(name: str) -> None:
     method: Method = METHODS[name]
     random = np.random.default_rng(1)
     for _ in range(20):
@@ -101,7 +101,7 @@ def test_closed_forms_solve_exact_motions_exactly(name: str) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ pictures
-def test_eye_in_hand_is_found() -> None:
+def test_eye_in_hand_matches_ground_truth() -> None:
     found = in_hand()
     distance, angle = off(found.pose, FLANGE_FROM_CAMERA)
     assert distance < 0.0005
@@ -116,13 +116,13 @@ def test_eye_in_hand_is_found() -> None:
     assert picture.std() > 5
 
 
-def test_eye_to_hand_is_found() -> None:
+def test_eye_to_hand_matches_ground_truth() -> None:
     found = find_hand_eye(samples("eye_to_hand"), GIVEN, TARGET, "eye_to_hand")
     assert off(found.pose, BASE_FROM_CAMERA)[0] < 0.0005
     assert off(found.target, FLANGE_FROM_BOARD)[0] < 0.0005
 
 
-def test_an_inexact_robot_shows_in_the_residual_and_in_the_deviation() -> None:
+def test_an_inexact_robot_increases_residual_and_deviation() -> None:
     told: list[tuple[int, int]] = []
     found = find_hand_eye(
         samples("eye_in_hand", 0.001), GIVEN, TARGET, "eye_in_hand", progress=lambda done, of: told.append((done, of))
@@ -139,7 +139,7 @@ def test_an_inexact_robot_shows_in_the_residual_and_in_the_deviation() -> None:
     assert told == [(i + 1, COUNT) for i in range(COUNT)]
 
 
-def test_a_sample_taken_while_the_arm_moved_is_left_out() -> None:
+def test_a_sample_taken_during_motion_is_excluded() -> None:
     spoiled = samples("eye_in_hand")
     moved = spoiled[4].flange * Pose(Position(0.01, 0.0, 0.01))
     spoiled[4] = HandEyeSample(moved, spoiled[4].picture)
@@ -149,7 +149,7 @@ def test_a_sample_taken_while_the_arm_moved_is_left_out() -> None:
     assert off(found.pose, FLANGE_FROM_CAMERA)[0] < 0.0006
 
 
-def test_a_picture_without_the_target_is_left_out_and_told() -> None:
+def test_a_picture_without_the_target_is_excluded_and_reported() -> None:
     spoiled = samples("eye_in_hand")
     empty = cv2.imencode(".png", np.full((480, 640), 90, np.uint8))[1].tobytes()
     spoiled[0] = HandEyeSample(spoiled[0].flange, empty)
@@ -172,14 +172,14 @@ def test_rotations_about_one_axis_are_refused() -> None:
     assert refused(lambda: find_hand_eye(taken, GIVEN, TARGET, "eye_in_hand")).reason == Reason.DEGENERATE
 
 
-def test_a_flange_that_never_turned_is_refused() -> None:
+def test_poses_without_rotation_are_refused() -> None:
     taken = [HandEyeSample(Pose(Position(0.01 * i)), each) for i, each in enumerate(pictures())]
     error = refused(lambda: find_hand_eye(taken, GIVEN, TARGET, "eye_in_hand"))
     assert error.reason == Reason.DEGENERATE
     assert "hardly turned" in str(error)
 
 
-def test_poses_that_do_not_belong_to_the_pictures_are_refused() -> None:
+def test_poses_of_other_pictures_are_refused() -> None:
     """In another order, or with the other mounting."""
     good = samples("eye_in_hand")
     mixed = [HandEyeSample(good[(i + 3) % COUNT].flange, each.picture) for i, each in enumerate(good)]
@@ -196,7 +196,7 @@ def test_too_few_samples_are_refused() -> None:
     assert refused(lambda: find_hand_eye(taken, GIVEN, TARGET, "eye_in_hand")).reason == Reason.NO_MARKER
 
 
-def test_a_pose_that_is_not_finite_is_named() -> None:
+def test_a_pose_with_nan_is_named() -> None:
     taken = samples("eye_in_hand")
     taken[2] = HandEyeSample(Pose(Position(math.inf)), taken[2].picture)
     with pytest.raises(InvalidData, match="sample 2"):

@@ -1,4 +1,4 @@
-"""Intrinsics from pictures of a board: a lens that is known, and what has to be refused."""
+"""Intrinsics from pictures of a board through a known lens, and refusals."""
 
 import functools
 import math
@@ -56,7 +56,7 @@ def refused(act: Callable[[], object]) -> CalibrationRefused:
     return caught.value
 
 
-def test_the_lens_is_the_true_one() -> None:
+def test_intrinsics_match_ground_truth() -> None:
     p = found().parameters
     assert p.fx == pytest.approx(LENS.fx, abs=max(4 * found().deviations[0], 0.6))
     assert p.fy == pytest.approx(LENS.fy, abs=max(4 * found().deviations[1], 0.6))
@@ -69,8 +69,8 @@ def test_the_lens_is_the_true_one() -> None:
     assert "known to" in found().verdict
 
 
-def test_rays_are_the_true_ones_where_the_board_was() -> None:
-    """Coefficients may trade against each other; what counts is where a pixel looks."""
+def test_rays_match_ground_truth_where_the_board_was_seen() -> None:
+    """Coefficients may compensate each other; what matters is the ray of each pixel."""
     p = found().parameters
     matrix = np.array([[p.fx, 0, p.cx], [0, p.fy, p.cy], [0, 0, 1.0]])
     x, y = np.meshgrid(np.linspace(-0.4, 0.4, 9), np.linspace(-0.3, 0.3, 7))
@@ -84,13 +84,13 @@ def test_rays_are_the_true_ones_where_the_board_was() -> None:
 
 
 @pytest.mark.parametrize("coefficients", [4, 8])
-def test_other_lens_models_are_fitted(coefficients: int) -> None:
+def test_other_distortion_models_are_fitted(coefficients: int) -> None:
     other = find_intrinsics(tilted(), BOARD, IntrinsicsOptions(coefficients=coefficients))  # type: ignore[arg-type]
     assert len(other.parameters.dist_coefs) == coefficients
     assert other.parameters.fx == pytest.approx(LENS.fx, abs=4.0)
 
 
-def test_views_and_picture_are_told() -> None:
+def test_the_result_lists_views_and_picture_size() -> None:
     told: list[tuple[int, int]] = []
     blank = np.full((480, 640), 90, np.uint8)
     result = find_intrinsics([blank, *tilted()], BOARD, progress=lambda done, of: told.append((done, of)))
@@ -102,7 +102,7 @@ def test_views_and_picture_are_told() -> None:
     assert cv2.imdecode(np.frombuffer(result.picture, np.uint8), cv2.IMREAD_COLOR).std() > 5
 
 
-def test_a_view_that_does_not_fit_is_left_out() -> None:
+def test_an_outlier_view_is_excluded() -> None:
     wrong = tilted()[3]
     stretched = cv2.warpAffine(wrong, np.array([[1.0, 0.0, 0.0], [0.0, 1.06, -12.0]]), (640, 480)).astype(np.uint8)
     pictures = [*tilted()[:3], stretched, *tilted()[4:]]
@@ -111,7 +111,7 @@ def test_a_view_that_does_not_fit_is_left_out() -> None:
     assert result.parameters.fx == pytest.approx(LENS.fx, abs=2.0)
 
 
-def test_coverage_counts_fields() -> None:
+def test_coverage_counts_grid_cells() -> None:
     assert coverage_of([np.array([[10.0, 10.0], [20.0, 20.0], [630.0, 470.0]])], (640, 480)) == pytest.approx(2 / 48)
 
 
@@ -126,13 +126,13 @@ def test_too_few_views_are_refused() -> None:
         find_intrinsics([], BOARD)
 
 
-def test_views_that_are_alike_are_refused() -> None:
+def test_similar_views_are_refused() -> None:
     options = IntrinsicsOptions(smallest_coverage=0.1)
     assert refused(lambda: find_intrinsics(ahead(), BOARD, options)).reason == Reason.DEGENERATE
     assert refused(lambda: find_intrinsics([tilted()[0]] * 8, BOARD, options)).reason == Reason.DEGENERATE
 
 
-def test_too_little_of_the_picture_is_refused() -> None:
+def test_poor_coverage_of_the_picture_is_refused() -> None:
     error = refused(lambda: find_intrinsics(tilted(), BOARD, IntrinsicsOptions(smallest_coverage=0.999)))
     assert error.reason == Reason.TOO_FEW_POINTS
     assert "corners" in str(error)

@@ -19,7 +19,7 @@ angles = st.one_of(st.floats(0, math.pi), st.floats(0, 1e-7), st.floats(math.pi 
 
 
 @given(axes, angles)
-def test_a_rotation_vector_comes_back(axis: np.ndarray, angle: float) -> None:
+def test_rotation_vectors_round_trip(axis: np.ndarray, angle: float) -> None:
     rotation = turned(axis * angle)
     assert np.abs(rotation @ rotation.T - np.eye(3)).max() < 1e-12
     assert np.abs(rotation - Orientation.from_rotation_vector(*(axis * angle)).matrix()).max() < 1e-9
@@ -29,7 +29,7 @@ def test_a_rotation_vector_comes_back(axis: np.ndarray, angle: float) -> None:
 
 
 @given(axes, st.floats(0, 3))
-def test_motions_are_inverted_and_moved(axis: np.ndarray, angle: float) -> None:
+def test_motions_are_inverted_and_transformed(axis: np.ndarray, angle: float) -> None:
     pose = motion(turned(axis * angle), axis[::-1])
     assert np.abs(pose @ inverted(pose) - np.eye(4)).max() < 1e-12
     step = np.array([0.0, 0.0, math.pi / 2, 0.1, 0.0, 0.0])
@@ -39,13 +39,13 @@ def test_motions_are_inverted_and_moved(axis: np.ndarray, angle: float) -> None:
     assert apart(pose, moved(pose, np.array([0.0, 0.2, 0.0, 0.0, 0.0, 0.0])))[1] == pytest.approx(0.2)
 
 
-def test_many_cross_products_are_those_of_each() -> None:
+def test_batched_cross_products_match_single_ones() -> None:
     vectors = np.random.default_rng(1).normal(size=(5, 3))
     other = np.array([0.3, -0.2, 0.9])
     assert crossed(vectors) @ other == pytest.approx(np.cross(vectors, other))
 
 
-def test_the_mean_of_rotations_is_the_eigenvector_of_their_quaternions() -> None:
+def test_mean_rotation_is_the_eigenvector_of_the_quaternions() -> None:
     random = np.random.default_rng(2)
     base = turned(np.array([0.4, -1.0, 2.0]))
     rotations = np.stack([base @ turned(0.3 * random.normal(size=3)) for _ in range(6)])

@@ -1,4 +1,4 @@
-"""Robot pose from depth: against arms that a sensor of the test's own sees, what must be refused, and bad input."""
+"""Robot pose from depth pictures of a simulated sensor, refusals, and invalid input."""
 
 import math
 
@@ -68,7 +68,7 @@ def test_the_same_picture_gives_the_same_result(plain: View) -> None:
     assert "confirms" in first.verdict
 
 
-def test_averaged_pictures_are_better_than_one(plain: View) -> None:
+def test_averaged_pictures_reduce_the_error(plain: View) -> None:
     sensor = Sensor(shapes=[*arm(JOINTS), *tool(JOINTS)], wall=-2.0, pictures=1, noise=0.004, fixed_noise=0.0)
     rng = np.random.default_rng(5)
     stack = np.stack([sensor.take(EYE, rng) for _ in range(5)])
@@ -79,7 +79,7 @@ def test_averaged_pictures_are_better_than_one(plain: View) -> None:
     assert np.std((mean.depth - exact)[inner]) < 0.6 * np.std((single.depth - exact)[inner])
 
 
-def test_a_covered_half_is_told_and_the_pose_still_right() -> None:
+def test_half_occlusion_is_reported_and_the_pose_stays_correct() -> None:
     view = seen([*arm(JOINTS), *tool(JOINTS), Block(shift(0.4, 0.28, 0.35), (0.08, 0.08, 0.7))])
     found = solve(view)
     assert view.error(found.pose)[0] < 0.004
@@ -88,7 +88,7 @@ def test_a_covered_half_is_told_and_the_pose_still_right() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ refusals
-def test_a_round_body_leaves_its_turn_open() -> None:
+def test_rotation_of_a_round_body_is_undetermined() -> None:
     body = Capsule(np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 0.8]), 0.08)
     surface = RobotSurface.of_links([(*triangles(body), np.eye(4))], "the post")
     error = refused(seen([body]), surface=surface)
@@ -99,18 +99,18 @@ def test_a_round_body_leaves_its_turn_open() -> None:
 @pytest.mark.parametrize(
     "shapes", [[], [Block(shift(0, 0, 0.3), (0.3, 0.3, 0.6))]], ids=["nobody", "a cupboard in its place"]
 )
-def test_a_place_without_the_robot_is_refused(shapes: list[Block | Capsule]) -> None:
+def test_a_view_without_the_robot_is_refused(shapes: list[Block | Capsule]) -> None:
     assert refused(seen(shapes)).reason in (Reason.NOT_CONVERGED, Reason.NO_OVERLAP)
 
 
-def test_other_joints_than_told_are_refused(plain: View) -> None:
+def test_wrong_joint_values_are_refused(plain: View) -> None:
     bent = list(JOINTS)
     bent[2] += math.radians(12.0)
     assert refused(plain, surface=surface_of_arm(bent)).reason is Reason.NOT_CONVERGED
 
 
-def test_a_joint_that_is_slightly_off_makes_no_good_result(plain: View) -> None:
-    """One degree of the elbow moves the base by a centimetre: too little to refuse, and it is told."""
+def test_a_slightly_wrong_joint_lowers_the_grade(plain: View) -> None:
+    """One degree of the elbow moves the base by a centimetre: too little to refuse, but the grade is lower."""
     bent = list(JOINTS)
     bent[2] += math.radians(1.0)
     found = solve(plain, surface=surface_of_arm(bent))
@@ -118,7 +118,7 @@ def test_a_joint_that_is_slightly_off_makes_no_good_result(plain: View) -> None:
     assert "joints" in found.verdict
 
 
-def test_a_robot_far_from_where_it_is_assumed_is_refused_not_found_wrong(plain: View) -> None:
+def test_a_robot_far_from_its_assumed_pose_is_refused(plain: View) -> None:
     beside = refused(plain, assumed=Pose(Position(0.3, 0.0, 0.0)))
     assert beside.reason in (Reason.NOT_CONVERGED, Reason.NO_OVERLAP)
     error = refused(plain, assumed=Pose(Position(-3.0, 0.0, 0.0)))
@@ -134,7 +134,7 @@ def test_a_covered_camera_is_refused(plain: View) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ bad input
-def test_a_picture_of_another_size_than_the_lens_is_named(plain: View) -> None:
+def test_a_picture_size_other_than_of_the_intrinsics_is_named(plain: View) -> None:
     for depth in (plain.depth[::2, ::2], np.zeros((720, 1280), np.uint16)):
         with pytest.raises(InvalidData, match="another size"):
             depth_view(depth, plain.parameters)
@@ -145,12 +145,12 @@ def test_a_picture_of_another_size_than_the_lens_is_named(plain: View) -> None:
     [np.zeros((360, 640), np.uint8), np.zeros((360, 640)), np.zeros((2, 3, 4, 5), np.uint16), np.zeros(7, np.uint16)],
     ids=["8 bit", "metres", "four axes", "a row"],
 )
-def test_what_is_no_depth_picture_is_named(depth: np.ndarray) -> None:
+def test_data_that_is_not_a_depth_picture_is_named(depth: np.ndarray) -> None:
     with pytest.raises(InvalidData, match="16 bit"):
         mean_depth(depth)
 
 
-def test_wrong_lenses_and_options_are_named(plain: View) -> None:
+def test_invalid_intrinsics_and_options_are_named(plain: View) -> None:
     for fx in (0.0, -456.0, math.nan):
         with pytest.raises(InvalidData, match="positive"):
             depth_view(plain.depth, CameraParameters(fx, 456.0, 320.0, 180.0, [0.0] * 5))
@@ -158,7 +158,7 @@ def test_wrong_lenses_and_options_are_named(plain: View) -> None:
         RobotPoseOptions(angle_within=0.0)
 
 
-def test_depth_files_are_read_and_others_named() -> None:
+def test_depth_files_are_read_and_other_files_refused() -> None:
     depth = np.arange(48, dtype=np.uint16).reshape(6, 8) * 100
     encoded = cv2.imencode(".png", depth)[1].tobytes()
     np.testing.assert_array_equal(read_depth(encoded), depth)
@@ -171,7 +171,7 @@ def test_depth_files_are_read_and_others_named() -> None:
             read_depth(content)
 
 
-def test_a_surface_that_is_none_is_named() -> None:
+def test_an_invalid_surface_is_named() -> None:
     corners, one = np.eye(3), np.array([[0, 1, 2]])
     for vertices, faces, reason in (
         (np.zeros((0, 3)), one, "no vertices"),

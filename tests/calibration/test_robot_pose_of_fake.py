@@ -1,4 +1,4 @@
-"""Robot pose where the fake camera sees the fake cell's arm, and the model is the one that the driver carries."""
+"""Robot pose from the fake camera's picture of the fake cell, with the model from the driver."""
 
 import math
 from pathlib import Path
@@ -38,7 +38,7 @@ def joints(model: RobotModel) -> list[Joint]:
     return [Joint(name, value) for name, value in zip(model.joint_names, Q, strict=True)]
 
 
-def test_the_arm_that_the_fake_camera_sees_stands_where_the_layout_says() -> None:
+def test_the_arm_is_found_where_the_layout_places_it() -> None:
     name = "ur5e"
     lens = Lens(640, 360)
     seen = arm.things(name, BASE.matrix(), Q, TIP.matrix()).values()
@@ -61,7 +61,7 @@ def test_the_arm_that_the_fake_camera_sees_stands_where_the_layout_says() -> Non
     assert found.fitness > 0.8
 
 
-def test_joints_that_are_missing_are_named() -> None:
+def test_missing_joints_are_named() -> None:
     model = model_of("ur5e")
     with pytest.raises(ModelError, match="elbow_joint"):
         surface_of(model, [joint for joint in joints(model) if joint.name != "elbow_joint"])

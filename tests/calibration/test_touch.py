@@ -1,4 +1,4 @@
-"""Frames and tools by touch: against poses that were chosen, with touching that is off, and what must be refused."""
+"""Frames and tools from touched points with known ground truth and noise, and refusals."""
 
 import math
 
@@ -37,9 +37,7 @@ def shaken(points: list[Position], sigma: float, seed: int) -> list[Position]:
 
 # ------------------------------------------------------------------------------------------------ frames
 @given(poses, st.floats(0.05, 1.0), st.floats(-0.5, 0.5), st.floats(0.2, 1.0))
-def test_three_points_determine_the_frame_and_are_said_to_be_unchecked(
-    frame: Pose, along: float, x: float, y: float
-) -> None:
+def test_three_points_give_a_frame_marked_as_unchecked(frame: Pose, along: float, x: float, y: float) -> None:
     on_x, aside = place(frame, Position(along, 0, 0)), place(frame, Position(x, y, 0))
     found = touch.frame_by_axes(frame.position, on_x, [aside])
     assert off(found.pose, frame) == pytest.approx((0, 0), abs=1e-6)
@@ -47,7 +45,7 @@ def test_three_points_determine_the_frame_and_are_said_to_be_unchecked(
     assert "cannot be checked" in found.verdict
 
 
-def test_further_points_of_the_plane_average_out_and_tell_how_good_it_is() -> None:
+def test_more_points_of_the_plane_reduce_and_measure_the_error() -> None:
     grid = [Position(0, 0, 0), Position(0.4, 0, 0), *(Position(0.1 * i, 0.1 * j, 0) for i in range(5) for j in (1, 2))]
     tilts = []
     for seed in range(40):
@@ -61,7 +59,7 @@ def test_further_points_of_the_plane_average_out_and_tell_how_good_it_is() -> No
     assert 0.3 < np.median(tilts) < 2.0  # the stated deviation is that of what happens
 
 
-def test_a_point_touched_wrong_is_named() -> None:
+def test_a_wrongly_touched_point_is_named() -> None:
     points = [place(POSE, point) for point in CORNERS]
     points[3] += Position(0.0, 0.0, 0.006)
     found = touch.frame_by_points(CORNERS, points)
@@ -71,14 +69,14 @@ def test_a_point_touched_wrong_is_named() -> None:
 
 
 @given(poses, st.integers(0, 1000))
-def test_known_points_give_the_frame_in_which_they_are_known(frame: Pose, seed: int) -> None:
+def test_known_points_give_their_frame(frame: Pose, seed: int) -> None:
     known = shaken(CORNERS, 0.03, seed)
     found = touch.frame_by_points(known, [place(frame, point) for point in known])
     assert off(found.pose, frame) == pytest.approx((0, 0), abs=1e-6)
     assert found.residual < 1e-9
 
 
-def test_the_deviation_of_known_points_is_that_of_what_happens() -> None:
+def test_stated_deviation_of_known_points_matches_the_errors() -> None:
     ratios = []
     for seed in range(60):
         found = touch.frame_by_points(CORNERS, shaken([place(POSE, point) for point in CORNERS], 0.0005, seed))
@@ -97,13 +95,13 @@ def test_the_deviation_of_known_points_is_that_of_what_happens() -> None:
     ],
     ids=["line", "nearly", "x too near", "plane too near", "same"],
 )
-def test_points_that_determine_no_frame_are_refused(points: list[Position]) -> None:
+def test_degenerate_points_are_refused(points: list[Position]) -> None:
     with pytest.raises(CalibrationRefused) as refused:
         touch.frame_by_axes(points[0], points[1], points[2:])
     assert refused.value.reason is Reason.DEGENERATE
 
 
-def test_known_points_on_a_line_or_in_another_order_are_refused() -> None:
+def test_collinear_or_reordered_known_points_are_refused() -> None:
     line = [Position(0.1 * i, 0, 0) for i in range(5)]
     with pytest.raises(CalibrationRefused, match="one line"):
         touch.frame_by_points(line, [place(POSE, point) for point in line])
@@ -112,13 +110,13 @@ def test_known_points_on_a_line_or_in_another_order_are_refused() -> None:
     assert refused.value.reason is Reason.NOT_CONVERGED
 
 
-def test_a_mirrored_set_is_not_taken_for_a_turned_one() -> None:
+def test_a_mirrored_set_of_points_is_refused() -> None:
     """Kabsch's rotation alone would be a reflection here, and its residual zero."""
     with pytest.raises(CalibrationRefused):
         touch.frame_by_points(CORNERS, [Position(p.x, p.y, -3 * p.z) for p in CORNERS])
 
 
-def test_wrong_input_is_named() -> None:
+def test_invalid_input_is_named() -> None:
     with pytest.raises(InvalidData, match="3 points are known and 2"):
         touch.frame_by_points(CORNERS[:3], CORNERS[:2])
     with pytest.raises(InvalidData, match="Point 2 of the touched"):
@@ -148,14 +146,14 @@ FOUR = tilted((0, 0, 0), (30, 0, 0), (-10, 30, 0), (0, -25, 60))
 
 
 @given(st.builds(Position, *[st.floats(-0.3, 0.3)] * 3))
-def test_four_touches_give_the_tip(tip: Position) -> None:
+def test_four_touches_give_the_tool_tip(tip: Position) -> None:
     found = touch.tip_by_touches(touching(FOUR, tip))
     assert found.position.distance_to(tip) < 1e-9
     assert found.point.distance_to(POINT) < 1e-9
     assert found.grade is Grade.GOOD
 
 
-def test_touches_that_are_off_give_a_deviation_that_is_true() -> None:
+def test_stated_deviation_of_touches_matches_the_errors() -> None:
     turns = [*FOUR, *tilted((-30, 10, 20), (15, 15, -40))]
     ratios = []
     for seed in range(60):
@@ -166,7 +164,7 @@ def test_touches_that_are_off_give_a_deviation_that_is_true() -> None:
     assert 0.4 < np.median(ratios) < 2.0
 
 
-def test_orientations_that_leave_the_tip_open_are_refused() -> None:
+def test_orientations_that_do_not_determine_the_tip_are_refused() -> None:
     about_z = tilted((0, 0, 0), (0, 0, 40), (0, 0, 90), (0, 0, 170))
     with pytest.raises(CalibrationRefused, match="one axis only") as refused:
         touch.tip_by_touches(touching(about_z))
@@ -177,7 +175,7 @@ def test_orientations_that_leave_the_tip_open_are_refused() -> None:
         touch.tip_by_touches(touching([DOWN] * 6))
 
 
-def test_a_tip_that_was_elsewhere_once_is_refused_and_named() -> None:
+def test_an_outlier_touch_is_refused_and_named() -> None:
     exact = touching([*FOUR, *tilted((-30, 10, 20), (15, 15, -40), (-20, -20, 0))])
     exact[4] = Pose(exact[4].position + Position(0.06, 0.0, 0.0), exact[4].orientation)
     with pytest.raises(CalibrationRefused, match="touch 5 is worst"):
@@ -185,9 +183,7 @@ def test_a_tip_that_was_elsewhere_once_is_refused_and_named() -> None:
 
 
 @given(orientations, orientations)
-def test_alignments_give_the_tool_whatever_sign_their_quaternions_have(
-    tool: Orientation, reference: Orientation
-) -> None:
+def test_alignments_do_not_depend_on_the_quaternion_sign(tool: Orientation, reference: Orientation) -> None:
     flange = reference * tool.inverted()
     turned = [flange, Orientation(-flange.x, -flange.y, -flange.z, -flange.w)]
     found = touch.orientation_by_alignment(turned, reference)
@@ -196,14 +192,14 @@ def test_alignments_give_the_tool_whatever_sign_their_quaternions_have(
     assert found.residual < 1e-6
 
 
-def test_alignments_that_differ_are_refused_and_one_alone_is_unchecked() -> None:
+def test_differing_alignments_are_refused_and_a_single_one_is_unchecked() -> None:
     assert not touch.orientation_by_alignment(FOUR[:1], DOWN).checked
     with pytest.raises(CalibrationRefused, match="differ"):
         touch.orientation_by_alignment(FOUR, DOWN)
 
 
 @given(orientations, orientations)
-def test_moves_along_the_tools_axes_give_its_orientation(flange: Orientation, tool: Orientation) -> None:
+def test_moves_along_the_tool_axes_give_its_orientation(flange: Orientation, tool: Orientation) -> None:
     base_from_tool = flange * tool
     along_z = POINT + Position(0, 0, 0.1).rotated(base_from_tool)
     on_x = POINT + Position(0.1, 0, 0.02).rotated(base_from_tool)
@@ -212,14 +208,14 @@ def test_moves_along_the_tools_axes_give_its_orientation(flange: Orientation, to
     assert found.residual == pytest.approx(math.atan2(0.02, 0.1))
 
 
-def test_moves_that_show_no_axes_are_refused() -> None:
+def test_moves_that_determine_no_axes_are_refused() -> None:
     with pytest.raises(CalibrationRefused, match="one line"):
         touch.orientation_by_points(DOWN, Position(), Position(0, 0, 0.1), Position(0.001, 0, 0.2))
     with pytest.raises(CalibrationRefused, match="less than"):
         touch.orientation_by_points(DOWN, Position(), Position(0, 0, 0.002), Position(0.1, 0, 0))
 
 
-def test_what_no_robot_reaches_is_refused() -> None:
+def test_points_beyond_any_robots_reach_are_refused() -> None:
     far = [Position(0, 0, 0), Position(1e200, 0, 0), Position(0, 1, 0)]
     with pytest.raises(InvalidData, match="Point 2 of the touched points is farther"):
         touch.frame_by_axes(far[0], far[1], far[2:])

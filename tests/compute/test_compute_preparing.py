@@ -72,7 +72,7 @@ def exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
 
 # ------------------------------------------------------------------------------------------------ one mesh
 @pytest.mark.parametrize("kind", ["stl", "obj", "ply", "off", "dae", "glb"])
-def test_a_fine_ball_of_every_kind_becomes_a_coarser_one_of_the_same_shape(kind: str, tmp_path: Path) -> None:
+def test_a_fine_sphere_is_simplified_in_every_file_format(kind: str, tmp_path: Path) -> None:
     made, told = prepare(tmp_path, exported(BALL, kind), f"ball.{kind}")
     assert (made.before, made.triangles) == (TRIANGLES_OF_BALL, MOST_OF_BALL)
     ball = Glb(made.content).meshes["mesh"]
@@ -98,7 +98,7 @@ def test_a_box_keeps_its_twelve_triangles_and_its_edges(tmp_path: Path) -> None:
     assert np.allclose(box["NORMAL"][box["indices"].reshape(-1, 3)], across[:, None, :], atol=1e-6)
 
 
-def test_a_cylinder_is_round_at_its_side_and_flat_at_its_ends(tmp_path: Path) -> None:
+def test_a_cylinder_keeps_a_round_side_and_flat_ends(tmp_path: Path) -> None:
     made, _ = prepare(tmp_path, exported(trimesh.creation.cylinder(0.1, 0.5, sections=96), "ply"), "pin.ply")
     pin = Glb(made.content).meshes["mesh"]
     upright = np.abs(pin["NORMAL"][:, 2])
@@ -107,14 +107,14 @@ def test_a_cylinder_is_round_at_its_side_and_flat_at_its_ends(tmp_path: Path) ->
     assert np.allclose(pin["NORMAL"][side, :2], pin["POSITION"][side, :2] / 0.1, atol=0.04)
 
 
-def test_a_small_thing_has_fewer_triangles_than_a_large_one() -> None:
+def test_a_small_mesh_gets_fewer_triangles_than_a_large_one() -> None:
     sizes = [
         simplification.budget(np.array(((0.0, 0.0, 0.0), (size, 0.0, 0.0)))) for size in (0.01, 0.1, 0.25, 0.5, 3.0)
     ]
     assert sizes == [4_000, 8_000, 20_000, 40_000, 40_000]
 
 
-def test_units_and_what_is_up_are_as_the_file_says(tmp_path: Path) -> None:
+def test_units_and_up_axis_of_the_file_are_applied(tmp_path: Path) -> None:
     box = exported(trimesh.creation.box((100.0, 200.0, 300.0)), "dae").decode()
     box = box.replace("<up_axis>Y_UP</up_axis>", '<unit meter="0.001"/><up_axis>Y_UP</up_axis>')
     made, _ = prepare(tmp_path, box, "box.dae")
@@ -134,7 +134,7 @@ def painted() -> trimesh.Trimesh:
     return ball
 
 
-def test_colours_of_faces_stay_where_they_are_when_triangles_go(tmp_path: Path) -> None:
+def test_simplification_keeps_face_colours_in_place(tmp_path: Path) -> None:
     content = exported(painted(), "ply")
     made, _ = prepare(tmp_path, content, "ball.ply")
     ball = Glb(made.content).meshes["mesh"]
@@ -146,7 +146,7 @@ def test_colours_of_faces_stay_where_they_are_when_triangles_go(tmp_path: Path) 
     assert np.all(ball["COLOR_0"][:, 3] == 1.0)
 
 
-def test_a_material_of_collada_is_a_colour_and_grey_by_default_is_none(tmp_path: Path) -> None:
+def test_collada_materials_become_colours_except_default_grey(tmp_path: Path) -> None:
     box = trimesh.creation.box((0.1, 0.1, 0.1))
     assert "COLOR_0" not in Glb(prepare(tmp_path, exported(box, "obj"), "box.obj")[0].content).meshes["mesh"]
     black = exported(box, "dae").decode()
@@ -158,7 +158,7 @@ def test_a_material_of_collada_is_a_colour_and_grey_by_default_is_none(tmp_path:
     assert np.allclose(colours[:, :3], green, atol=4e-3)
 
 
-def test_triangles_of_two_colours_meet_in_an_edge_of_colour_without_a_gap() -> None:
+def test_triangles_of_two_colours_share_an_edge_without_a_gap() -> None:
     grid = trimesh.creation.box((1, 1, 1)).subdivide().subdivide()
     left = grid.triangles_center[:, 0] < 0
     vertices = grid.vertices[grid.faces].reshape(-1, 3)
@@ -207,7 +207,7 @@ def boxy(urdf: str = URDF) -> bytes:
     )
 
 
-def test_a_robot_has_its_description_and_a_mesh_for_each_file_that_it_shows(tmp_path: Path) -> None:
+def test_a_robot_has_a_description_and_one_mesh_per_visual_file(tmp_path: Path) -> None:
     made, _ = prepare(tmp_path, boxy(), "boxy.zip")
     glb = Glb(made.content)
     assert glb.extras["urdf"] == URDF
@@ -226,7 +226,7 @@ def test_a_robot_has_its_description_and_a_mesh_for_each_file_that_it_shows(tmp_
     assert made.before == TRIANGLES_OF_BALL + 12
 
 
-def test_the_meshes_of_a_robot_share_one_budget(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_meshes_of_a_robot_share_one_triangle_budget(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mesh_functions, "MOST_OF_ROBOT", 20_000)
     names = [f"m{number}" for number in range(4)]
     links = "".join(
@@ -240,9 +240,7 @@ def test_the_meshes_of_a_robot_share_one_budget(tmp_path: Path, monkeypatch: pyt
     assert 19_000 <= made.triangles <= 20_000
 
 
-def test_a_robot_of_plain_shapes_needs_no_mesh_and_no_library_that_reads_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_robot_of_primitive_shapes_needs_no_mesh_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "trimesh", None)
     plain = '<robot name="r"><link name="a"><visual><geometry><sphere radius="1"/></geometry></visual></link></robot>'
     glb = Glb(prepare(tmp_path, plain, "r.urdf")[0].content)
@@ -267,19 +265,19 @@ def test_a_robot_of_plain_shapes_needs_no_mesh_and_no_library_that_reads_them(
         (packed(r_dot_urdf='<robot name="r"/>', **{"..__out": "x"}), "arm.zip", UnsafeDescription, "outside"),
     ],
 )
-def test_what_cannot_be_shown_is_refused_by_name(
+def test_unsupported_visuals_are_refused_by_name(
     content: bytes, name: str, kind: type[Exception], words: str, tmp_path: Path
 ) -> None:
     with pytest.raises(kind, match=words):
         prepare(tmp_path, content, name)
 
 
-def test_a_mesh_that_is_gone_is_named(tmp_path: Path) -> None:
+def test_a_missing_mesh_is_named(tmp_path: Path) -> None:
     with pytest.raises(BadMesh, match=r"gone\.stl cannot be read"):
         prepared(PrepareAsset(StoredFile(str(tmp_path / "none"), "gone.stl")), WorkerState(lambda *_: None))
 
 
-def test_the_same_is_made_the_same(tmp_path: Path) -> None:
-    """The tag by which clients keep it stands for what the asset was made of, not for when."""
+def test_the_tag_depends_only_on_the_content(tmp_path: Path) -> None:
+    """The cache tag depends on the sources of the asset, not on the time."""
     content = exported(painted(), "ply")
     assert prepare(tmp_path, content, "a.ply")[0].content == prepare(tmp_path, content, "a.ply")[0].content

@@ -49,7 +49,7 @@ async def until(condition: object, patience: float = 20.0) -> None:
             await asyncio.sleep(0.01)
 
 
-async def test_started_on_first_use_and_asked_again(compute: Compute) -> None:
+async def test_a_worker_starts_on_first_use_and_is_reused(compute: Compute) -> None:
     assert compute.pid(WorkerKind.CALIBRATION) is None
     assert (await compute.run(question())).pose.position.x == pytest.approx(0.25)
     pid = compute.pid(WorkerKind.CALIBRATION)
@@ -58,7 +58,7 @@ async def test_started_on_first_use_and_asked_again(compute: Compute) -> None:
     assert compute.pid(WorkerKind.KINEMATICS) is None
 
 
-async def test_ends_when_idle_and_comes_back() -> None:
+async def test_an_idle_worker_ends_and_restarts_on_demand() -> None:
     compute = Compute(idle=0.2)
     try:
         await compute.run(question())
@@ -71,7 +71,7 @@ async def test_ends_when_idle_and_comes_back() -> None:
         await compute.close()
 
 
-async def test_killed_in_the_middle_costs_one_computation(compute: Compute) -> None:
+async def test_a_killed_worker_fails_only_the_running_task(compute: Compute) -> None:
     await compute.run(question())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
@@ -87,7 +87,7 @@ async def test_killed_in_the_middle_costs_one_computation(compute: Compute) -> N
     assert compute.pid(WorkerKind.CALIBRATION) not in (None, pid)
 
 
-async def test_killed_while_it_has_nothing_to_do_is_nobodys_trouble(compute: Compute) -> None:
+async def test_killing_an_idle_worker_fails_no_task(compute: Compute) -> None:
     await compute.run(question())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
@@ -96,7 +96,7 @@ async def test_killed_while_it_has_nothing_to_do_is_nobodys_trouble(compute: Com
     assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
 
 
-async def test_a_stopped_process_is_given_up(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_frozen_worker_is_replaced(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
     await compute.run(question())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
@@ -118,8 +118,8 @@ worker.main(sys.argv[1:])
 """
 
 
-async def test_one_that_computes_for_ever_ends_itself(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The deadline is kept by the kernel: a library that never returns is ended all the same."""
+async def test_an_endless_task_is_ended_at_its_deadline(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kernel enforces the deadline, also for a library call that never returns."""
     monkeypatch.setattr(process, "COMMAND", ("-P", "-c", ENDLESS))
     begun = own_time()
     with pytest.raises(ComputeTimeout, match=r"longer than 0\.2 s"):
@@ -136,7 +136,7 @@ print("a library says why")
 """
 
 
-async def test_one_that_talks_nonsense_is_ended(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_worker_that_sends_garbage_is_ended(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process, "COMMAND", ("-P", "-c", NONSENSE))
     with pytest.raises(ComputeStopped) as raised:
         await compute.run(question())
@@ -145,7 +145,7 @@ async def test_one_that_talks_nonsense_is_ended(compute: Compute, monkeypatch: p
     assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
 
 
-async def test_who_goes_away_leaves_the_others_their_turn(compute: Compute) -> None:
+async def test_a_cancelled_caller_does_not_block_the_others(compute: Compute) -> None:
     await compute.run(question())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
@@ -160,7 +160,7 @@ async def test_who_goes_away_leaves_the_others_their_turn(compute: Compute) -> N
     assert compute.pid(WorkerKind.CALIBRATION) == pid
 
 
-async def test_what_is_in_the_background_waits_for_all_others(compute: Compute) -> None:
+async def test_background_tasks_wait_for_all_others(compute: Compute) -> None:
     await compute.run(question())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
@@ -181,7 +181,7 @@ async def test_what_is_in_the_background_waits_for_all_others(compute: Compute) 
     assert order == ["first", "front", "back 1", "back 2"]
 
 
-async def test_too_many_are_refused(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_too_many_waiting_tasks_are_refused(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compute_module, "MOST_WAITING", 2)
     tasks = [asyncio.create_task(compute.run(question())) for _ in range(3)]
     await asyncio.sleep(0)
@@ -191,7 +191,7 @@ async def test_too_many_are_refused(compute: Compute, monkeypatch: pytest.Monkey
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def test_errors_come_back_as_what_they_are(compute: Compute) -> None:
+async def test_errors_keep_their_type(compute: Compute) -> None:
     with pytest.raises(InvalidData, match="3 to 1000 known points"):
         await compute.run(t.FrameByPoints([], []))
     line = [Position(float(each), 0, 0) for each in range(4)]
@@ -203,15 +203,15 @@ async def test_errors_come_back_as_what_they_are(compute: Compute) -> None:
         await compute.run(t.TipByTouches([Pose()] * 2))
 
 
-def test_an_error_that_is_not_known_here_is_the_nearest_that_is() -> None:
+def test_an_unknown_error_becomes_its_nearest_known_base() -> None:
     error = error_of(m.Failed(["marker_twice", "not_found", "error"], "There are two.", "detail"))
     assert isinstance(error, NotFound)
     assert (error.code, str(error), error.detail) == ("marker_twice", "There are two.", "detail")
     assert type(error_of(m.Failed(["alien"], "What?"))) is Arcor2Error
 
 
-async def test_large_pictures_do_not_stop_the_server(compute: Compute) -> None:
-    """Forty megabytes cross in pieces; what else happens in the server goes on meanwhile."""
+async def test_large_pictures_do_not_block_the_server(compute: Compute) -> None:
+    """Forty megabytes are sent in pieces, so the server continues meanwhile."""
     await compute.run(question())
     picture = b"no picture" * 4_000_000
     late: list[float] = []
@@ -234,7 +234,7 @@ async def test_large_pictures_do_not_stop_the_server(compute: Compute) -> None:
     assert max(late) < 0.5
 
 
-async def test_closing_ends_it_whatever_it_does() -> None:
+async def test_closing_ends_a_busy_worker() -> None:
     compute = Compute(idle=60.0)
     await compute.run(question())
     pid = compute.pid(WorkerKind.CALIBRATION)
@@ -253,7 +253,7 @@ async def test_closing_ends_it_whatever_it_does() -> None:
         await compute.run(question())
 
 
-async def test_one_whose_server_is_gone_goes_too() -> None:
+async def test_a_worker_ends_with_its_server() -> None:
     process = await ComputeProcess.start(WorkerKind.CALIBRATION)
     try:
         await process.ask(question(), 10.0, None, None)
@@ -264,8 +264,8 @@ async def test_one_whose_server_is_gone_goes_too() -> None:
         await process.close()
 
 
-def test_tasks_name_what_they_are_and_who_runs_them() -> None:
-    """Every task of the union can be found by the worker, and is told of in words."""
+def test_every_task_has_a_worker_and_a_description() -> None:
+    """The worker finds every task of the union, and each has a description."""
     kinds = get_args(AnyTask)
     assert len({kind.__name__ for kind in kinds}) == len(kinds) > 5
     for kind in kinds:

@@ -62,7 +62,7 @@ async def forward(compute: Compute, joints: list[Joint], base: Pose | None = Non
 
 
 # ------------------------------------------------------------------------------------------------ robots
-async def test_joints_and_poses_belong_together(compute: Compute) -> None:
+async def test_forward_and_inverse_kinematics_agree(compute: Compute) -> None:
     base = Pose(Position(0.5, -0.2, 0.7), Orientation(0, 0, math.sin(0.4), math.cos(0.4)))
     target = base * Pose(Position(0.4, 0.2, 0.3), DOWN)
     solve = t.SolveInverse("arm", "tcp", target)
@@ -76,7 +76,7 @@ async def test_joints_and_poses_belong_together(compute: Compute) -> None:
     assert [joint.value for joint in near] == pytest.approx([joint.value for joint in joints], abs=1e-5)
 
 
-async def test_what_cannot_be_reached_says_why(compute: Compute) -> None:
+async def test_an_unreachable_pose_is_refused_with_the_reason(compute: Compute) -> None:
     far = t.SolveInverse("arm", "tcp", Pose(Position(3, 0, 0), DOWN))
     with pytest.raises(KinematicsError, match="cannot reach") as raised:
         await compute.run(far, world=world(robot()))
@@ -127,7 +127,7 @@ async def test_a_model_is_described(compute: Compute) -> None:
         ("zip.zip", b"PK\x03\x04 no archive", "robot_model", "zip"),
     ],
 )  # fmt: skip
-async def test_a_model_that_cannot_be_used_says_what_is_wrong(
+async def test_an_unusable_model_is_refused_with_the_reason(
     compute: Compute, tmp_path: Path, name: str, content: bytes, code: str, words: str
 ) -> None:
     path = tmp_path / "content"
@@ -141,7 +141,7 @@ async def test_a_model_that_cannot_be_used_says_what_is_wrong(
 
 
 # ------------------------------------------------------------------------------------------------ reachability
-async def test_reachability_follows_what_changes(compute: Compute) -> None:
+async def test_reachability_follows_changes_of_the_world(compute: Compute) -> None:
     poses = [Pose(Position(0.4, 0.2, 0.3), DOWN), Pose(Position(0.4, -0.4, 0.3), DOWN), Pose(Position(2, 0, 0), DOWN)]
     judge = t.JudgePoses("arm", "tcp", poses)
     crate = box("crate", 0.4, 0.2, 0.3, 0.2, 0.2, 0.2)
@@ -159,7 +159,7 @@ async def test_reachability_follows_what_changes(compute: Compute) -> None:
     assert "reaches" in judged[2].reason
 
 
-async def test_joints_are_judged(compute: Compute) -> None:
+async def test_joint_values_are_checked(compute: Compute) -> None:
     names = [joint.name for joint in await joints_of(compute)]
 
     def joints(*values: float) -> list[Joint]:
@@ -199,7 +199,7 @@ async def line(compute: Compute, *things: WorldItem, ignore: tuple[str, ...] = (
     return None if hit is None else hit.id
 
 
-async def test_lines_meet_what_stands_there(compute: Compute, tmp_path: Path) -> None:
+async def test_lines_hit_bodies(compute: Compute, tmp_path: Path) -> None:
     stl = tmp_path / "content"
     stl.write_bytes(PYRAMID)
     mesh = WorldBody("tent", MeshShape(StoredFile(str(stl), "tent.stl")), Pose())
@@ -217,7 +217,7 @@ async def test_lines_meet_what_stands_there(compute: Compute, tmp_path: Path) ->
     assert (facts.triangles, facts.size) == (4, (2.0, 1.0, 1.0))
 
 
-async def test_a_mesh_that_cannot_be_used_is_named_until_it_goes(compute: Compute, tmp_path: Path) -> None:
+async def test_an_unusable_mesh_is_named_until_it_is_removed(compute: Compute, tmp_path: Path) -> None:
     bad = tmp_path / "content"
     bad.write_bytes(PYRAMID.replace(b"vertex 1 0 0", b"vertex nan 0 0"))
     tent = WorldBody("tent", MeshShape(StoredFile(str(bad), "tent.stl")), Pose())
@@ -230,7 +230,7 @@ async def test_a_mesh_that_cannot_be_used_is_named_until_it_goes(compute: Comput
         await line(compute, WorldBody("gone", MeshShape(StoredFile(str(tmp_path / "gone"), "gone.stl")), Pose()))
 
 
-async def test_what_is_held_moves_along(compute: Compute) -> None:
+async def test_a_gripped_part_moves_with_the_robot(compute: Compute) -> None:
     names = [joint.name for joint in await joints_of(compute)]
     joints = [Joint(name, value) for name, value in zip(names, (0.3, -1.2, 1.0, -1.4, -1.57, 0), strict=True)]
     at = await forward(compute, joints)
@@ -260,7 +260,7 @@ async def test_what_is_held_moves_along(compute: Compute) -> None:
         await compute.run(t.PlaceInLink(model, joints, "nose", part))
 
 
-async def test_a_worker_that_is_started_anew_is_told_again() -> None:
+async def test_a_restarted_worker_receives_the_world_again() -> None:
     compute = Compute(idle=60.0)
     crate = box("crate", 0, 0.2, 0.2, 0.2, 0.2, 0.2)
     assert await line(compute, crate, robot(Pose(Position(0, 3, 0)))) == "crate"
@@ -277,8 +277,8 @@ async def test_a_worker_that_is_started_anew_is_told_again() -> None:
     await compute.close()
 
 
-async def test_a_thousand_bodies_stay_fast(compute: Compute) -> None:
-    """Only differences are told: the second question of the same world costs hardly more than that of an empty one."""
+async def test_only_differences_of_a_large_world_are_sent(compute: Compute) -> None:
+    """The second request for the same world costs hardly more than one for an empty world."""
     things = [box(f"b{n}", n % 10 + 3.0, n // 10 % 10, n // 100, 0.2, 0.2, 0.2) for n in range(1000)]
     assert await line(compute, *things) is None
     begun = time.perf_counter()
@@ -289,7 +289,7 @@ async def test_a_thousand_bodies_stay_fast(compute: Compute) -> None:
     assert await line(compute) is None
 
 
-async def test_a_mesh_of_two_gigabytes_is_refused_unread(compute: Compute, tmp_path: Path) -> None:
+async def test_a_mesh_of_two_gigabytes_is_refused_without_reading(compute: Compute, tmp_path: Path) -> None:
     huge = tmp_path / "content"
     with huge.open("wb") as file:
         file.truncate(2 * 1024**3)  # sparse: it takes no room

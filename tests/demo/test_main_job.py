@@ -126,7 +126,7 @@ async def test_four_readings_agree(cell: Cell) -> None:
     assert len(erp["results"]) == boards
 
 
-async def test_good_boards_bear_their_own_label_pressed_on(cell: Cell) -> None:
+async def test_good_boards_carry_their_own_label(cell: Cell) -> None:
     world, printer = await cell.run.tell("world", "truth"), await cell.run.tell("printer", "truth")
     good = [board["code"] for board in world["boards"] if board["good"]]
     labels = {board["code"]: board["label"] for board in world["boards"] if board["label"] is not None}
@@ -143,7 +143,7 @@ async def test_the_tower_was_green_while_the_program_ran_and_is_red_after_it(cel
 
 
 # ---------------------------------------------------------------------------------------------------- sabotage
-async def test_each_sabotage_is_told_and_the_cell_starts_again(cell: Cell) -> None:
+async def test_each_fault_is_reported_and_the_cell_restarts(cell: Cell) -> None:
     tell, run = cell.run.tell, cell.run
     await tell("erp", "add_order", order="AGAIN", product="Controller board", quantity=1)
     async with Client(cell.url, "tests") as client:
@@ -257,7 +257,7 @@ async def _state(run: Run, wanted: str) -> bool:
     return state == wanted
 
 
-async def test_once_ends_with_one_line_when_a_fault_ends_the_program(tmp_path: Path) -> None:
+async def test_once_prints_one_line_when_a_fault_ends_the_program(tmp_path: Path) -> None:
     async with demo(tmp_path, "--once", "--boards", "1", "--seed", str(GOOD)) as run:
         await until(run.at, "the demo to say where everything is", 40)
         # Nobody waits for the belt just now: what is told must name it all the same.

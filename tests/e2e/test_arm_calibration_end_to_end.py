@@ -1,4 +1,4 @@
-"""What a controller tells of its very arm is kept and used, also offline and after a restart; and people are told."""
+"""Per-robot kinematic calibration from the controller: stored, used offline and after a restart, and announced."""
 
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
@@ -101,7 +101,7 @@ async def place(tmp_path: Path) -> AsyncIterator[Place]:
         await cell.stop()
 
 
-async def test_what_the_controller_tells_is_in_force_from_then_on_also_offline_and_after_a_restart(
+async def test_calibration_from_the_controller_is_used_offline_and_after_a_restart(
     place: Place,
 ) -> None:
     told = await place.told()
@@ -132,7 +132,7 @@ async def test_what_the_controller_tells_is_in_force_from_then_on_also_offline_a
     assert (await place.told())["in_force"] == "measured"
 
 
-async def test_the_arm_is_led_safely_past_what_was_put_in_over_rest_and_what_it_holds(place: Place) -> None:
+async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place: Place) -> None:
     client, robot = place.client, place.robot
     await place.set_host(place.cell.robot_host, Parameter("payload_mass", "double", "0.0"))
     await place.cell.tell("robot", "place", q=[0.4, -1.3, 1.5, -1.77, -1.57, 0.3])
@@ -182,7 +182,7 @@ async def test_the_arm_is_led_safely_past_what_was_put_in_over_rest_and_what_it_
     await place.go_offline()
 
 
-async def test_what_is_of_another_arm_is_not_used_and_what_is_not_told_leaves_what_was(place: Place) -> None:
+async def test_calibration_of_another_arm_is_not_used(place: Place) -> None:
     await place.go_online()
     assert (await place.told())["in_force"] == "measured"
     await place.cell.tell("robot", "calibration", deltas=DELTAS.tolist(), told=False)

@@ -1,4 +1,4 @@
-"""Bad days of the whole product: cables cut, stops pressed, processes killed."""
+"""Faults of the whole product: cut cables, pressed stops, killed processes."""
 
 import asyncio
 import time
@@ -112,7 +112,7 @@ async def test_robot_off_at_start_is_named_and_a_later_start_works(cell: Cell) -
     await scene_state(client, SceneStateEnum.STARTED)
 
 
-async def test_a_foreign_program_plays_on_joints_are_shown_and_control_is_refused(cell: Cell) -> None:
+async def test_joints_are_shown_and_control_is_refused_while_another_program_runs(cell: Cell) -> None:
     await cell.tell("robot", "foreign_program", on=True)
     playing = (await arm(cell))["program"]
     assert playing is not None
@@ -134,7 +134,7 @@ async def test_a_foreign_program_plays_on_joints_are_shown_and_control_is_refuse
 
 # ---------------------------------------------------------------------------------------------------- in mid-move
 @pytest.mark.parametrize("fault", ["silence", "reset", "half_frame"])
-async def test_cable_cut_in_mid_move_fails_the_action_and_nothing_moves_again(running: Cell, fault: str) -> None:
+async def test_a_cable_cut_during_a_move_fails_the_action_and_nothing_moves_again(running: Cell, fault: str) -> None:
     client = await running.client("operator")
     await program_in_mid_move(running, client)
     cut = own_time()
@@ -148,7 +148,7 @@ async def test_cable_cut_in_mid_move_fails_the_action_and_nothing_moves_again(ru
     await client.call("SystemInfo")
 
 
-async def test_protective_stop_is_named_and_stays_until_a_person_unlocks_it(running: Cell) -> None:
+async def test_a_protective_stop_is_named_and_stays_until_unlocked(running: Cell) -> None:
     client = await running.client("operator")
     await program_in_mid_move(running, client)
     await running.tell("robot", "protective_stop")
@@ -158,7 +158,7 @@ async def test_protective_stop_is_named_and_stays_until_a_person_unlocks_it(runn
     assert (await arm(running))["safety"] == "PROTECTIVE_STOP"
 
 
-async def test_safeguard_stop_released_moves_nothing_until_a_new_command(cell: Cell) -> None:
+async def test_nothing_moves_after_a_safeguard_stop_until_a_new_command(cell: Cell) -> None:
     client = await cell.client("operator")
     project = await online(cell, client)
     await start_moving(cell, client, project)
@@ -173,7 +173,7 @@ async def test_safeguard_stop_released_moves_nothing_until_a_new_command(cell: C
 
 
 # ---------------------------------------------------------------------------------------------------- killed processes
-async def test_host_killed_in_mid_move(cell: Cell) -> None:
+async def test_the_arm_stops_when_the_cell_host_is_killed(cell: Cell) -> None:
     client = await cell.client("operator")
     project = await online(cell, client)
     (busy, *_) = [p for p in cell.hosts() if any(c.raddr and c.raddr.port == 30004 for c in p.net_connections())]

@@ -1,4 +1,4 @@
-"""A camera and a robot of a whole server, with fakes of both, are put where they really stand; what is refused."""
+"""A server with fakes of a camera and a robot calibrates their poses, and refuses what it cannot see."""
 
 import asyncio
 import contextlib
@@ -127,7 +127,7 @@ async def world(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[World
         await made.stop()
 
 
-async def test_a_camera_is_found_by_its_markers(world: World) -> None:
+async def test_camera_pose_is_calibrated_from_markers(world: World) -> None:
     async with world.holding("cam"):
         state, message = await world.calibrated("cam")
         assert state == "failed"
@@ -145,7 +145,7 @@ async def test_a_camera_is_found_by_its_markers(world: World) -> None:
         assert len(record["inputs"]) == 3
 
 
-async def test_a_robot_is_found_by_what_the_camera_sees_of_it(world: World) -> None:
+async def test_robot_pose_is_calibrated_from_depth(world: World) -> None:
     async with world.holding("arm"):
         before = off(await world.placed("arm"), ROBOT)
         assert before[0] > 20.0
@@ -160,7 +160,7 @@ async def test_a_robot_is_found_by_what_the_camera_sees_of_it(world: World) -> N
         assert record["parameters"]["camera_name"] == "cam"
 
 
-async def test_what_is_not_to_be_seen_is_not_found(world: World) -> None:
+async def test_hidden_cameras_and_robots_are_refused(world: World) -> None:
     for name, hidden, words in (("cam", {"markers": False}, "shows nothing"), ("arm", {"robot": False}, "robot")):
         async with world.holding(name):
             before = await world.placed(name)
@@ -177,7 +177,7 @@ async def test_what_is_not_to_be_seen_is_not_found(world: World) -> None:
             assert (await world.http.get("/api/calibrations")).json() == records
 
 
-async def test_a_worker_that_is_killed_costs_the_calibration_that_it_was_at(world: World) -> None:
+async def test_a_killed_worker_fails_only_the_running_calibration(world: World) -> None:
     client = world.client
     async with world.holding("arm"):
         for worker in world.workers():
@@ -199,7 +199,7 @@ async def test_a_worker_that_is_killed_costs_the_calibration_that_it_was_at(worl
         assert state == "finished", message
 
 
-async def test_what_the_robot_holds_is_in_the_way_where_the_robot_is(world: World) -> None:
+async def test_a_gripped_part_is_an_obstacle_at_the_robots_pose(world: World) -> None:
     http, arm_id = world.http, world.ids["arm"]
     joints = await world.client.get_robot_joints(arm_id)
     tip = await world.client.get_end_effector_pose(robot_id=arm_id, end_effector_id="tcp")
@@ -237,7 +237,7 @@ async def _moved(world: World, before: Pose) -> Pose | None:
     return now if now.position.distance_to(before.position) > 0.1 else None
 
 
-async def test_the_command_line_follows_it(world: World, capsys: pytest.CaptureFixture[str]) -> None:
+async def test_the_command_line_shows_the_progress(world: World, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["calibrate", "online", "camera", "cam", "--url", world.server.url]
     status = await asyncio.to_thread(app, arguments)
     told = capsys.readouterr()

@@ -1,4 +1,4 @@
-"""A device that is lost, as clients see it, online and in a program; and one project at another address."""
+"""Lost devices as clients see them, online and in a program; and one project at another address."""
 
 import asyncio
 import contextlib
@@ -124,7 +124,7 @@ C = Connection
 UP = (C.CONNECTING, C.ONLINE)
 
 
-async def test_a_device_lost_online(tmp_path: Path, scale: FakeProcess) -> None:
+async def test_a_device_lost_online_refuses_its_actions(tmp_path: Path, scale: FakeProcess) -> None:
     async with bench(tmp_path, scale.ready["port"]) as on:
         assert await on.start() == ""
         await on.state(C.CONNECTING)
@@ -151,7 +151,7 @@ async def test_a_device_lost_online(tmp_path: Path, scale: FakeProcess) -> None:
         assert C.LOST not in [data.state for data in on.states]
 
 
-async def test_who_did_not_subscribe_is_told_nothing(tmp_path: Path, scale: FakeProcess) -> None:
+async def test_clients_without_subscription_get_no_events(tmp_path: Path, scale: FakeProcess) -> None:
     async with bench(tmp_path, scale.ready["port"]) as on, Client(on.url, "old") as old:
         assert await on.start() == ""
         await on.state(C.CONNECTING)
@@ -169,7 +169,7 @@ async def test_who_did_not_subscribe_is_told_nothing(tmp_path: Path, scale: Fake
             await old.call("SubscribeEvents", rpc.SubscribeEventsArgs({"Moon"}))
 
 
-async def test_a_program_whose_device_is_lost_stops_and_says_which(tmp_path: Path, scale: FakeProcess) -> None:
+async def test_a_program_stops_and_names_the_lost_device(tmp_path: Path, scale: FakeProcess) -> None:
     async with bench(tmp_path, scale.ready["port"]) as on:
         call = on.client.call
         built = await call("BuildProject", rpc.BuildProjectArgs(on.project, "weighing"))
@@ -199,7 +199,7 @@ async def test_a_program_whose_device_is_lost_stops_and_says_which(tmp_path: Pat
         assert states[-2:] == [C.LOST, C.OFFLINE]
 
 
-async def test_one_project_at_another_address(tmp_path: Path, scale: FakeProcess) -> None:
+async def test_a_project_runs_with_a_device_at_another_address(tmp_path: Path, scale: FakeProcess) -> None:
     file = tmp_path / "cell.yaml"
     devices = [
         CellDevice("balance", "MtSicsScale", {"port": scale.ready["port"]}),
@@ -244,7 +244,9 @@ async def test_a_device_of_another_type_is_not_started(tmp_path: Path) -> None:
         ("devices: [{name: a, type: T}, {name: a, type: T}]", 11, "several devices have the same name: a"),
     ],
 )
-async def test_a_bad_cell_file_is_one_line(tmp_path: Path, text: str | None, status: int, said: str) -> None:
+async def test_an_invalid_cell_file_is_reported_in_one_line(
+    tmp_path: Path, text: str | None, status: int, said: str
+) -> None:
     import sys
 
     file = tmp_path / "cell.yaml"

@@ -1,4 +1,4 @@
-"""A jog of the fake UR through everything: whoever freezes or dies, the arm comes to rest, and stays there."""
+"""Hold-to-run motion of the fake UR: the arm stops when any process freezes or dies."""
 
 import asyncio
 import contextlib
@@ -174,7 +174,7 @@ async def jogging(place: Site) -> AsyncIterator[Jogger]:
     pytest.fail(f"the arm does not move: {list(dict.fromkeys(jogger.said))}")
 
 
-async def test_whoever_freezes_or_dies_the_arm_comes_to_rest_and_stays(fake: FakeUr, tmp_path: Path) -> None:
+async def test_the_arm_stops_when_any_process_freezes_or_dies(fake: FakeUr, tmp_path: Path) -> None:
     async with site(fake, tmp_path) as place:
         await _a_client_that_freezes(place)
         await _a_server_that_freezes(place)
@@ -261,7 +261,7 @@ async def _hold_on(jog: Callable[[], Any]) -> None:
         await asyncio.sleep(0.05)
 
 
-async def test_the_tcp_keeps_its_speed_and_a_protective_stop_is_acknowledged(fake: FakeUr, tmp_path: Path) -> None:
+async def test_the_tcp_keeps_its_speed_and_protective_stops_are_acknowledged(fake: FakeUr, tmp_path: Path) -> None:
     async with site(fake, tmp_path) as place:
         client = place.client
         await client.call("WriteLock", rpc.WriteLockArgs(place.robot))

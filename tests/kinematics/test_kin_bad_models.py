@@ -1,4 +1,4 @@
-"""What is wrong with a description, a package or a mesh is refused, by kind and by name."""
+"""Invalid descriptions, packages and meshes are refused by kind and name."""
 
 import io
 import random
@@ -146,13 +146,13 @@ def test_a_description_is_refused_by_kind_and_name(case: str) -> None:
     assert refused.value.code == kind.code
 
 
-def test_what_is_next_to_the_refused_ones_is_taken() -> None:
+def test_similar_valid_descriptions_are_accepted() -> None:
     assert RobotModel.load(urdf(GOOD)).joint_names == ("j",)
     assert RobotModel.load(with_shape('<box size="1 1 1"/>')).collision[0].link == "arm"
 
 
 # ------------------------------------------------------------------------------------------------ packages
-def test_packages_that_are_none_or_not_safe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_invalid_and_unsafe_packages_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ModelError, match=r"no URDF file"):
         RobotModel.load(packed(readme_dot_txt=b""))
     with pytest.raises(ModelError, match=r"2 URDF files: a\.urdf, b\.urdf"):
@@ -179,7 +179,7 @@ def test_packages_that_are_none_or_not_safe(tmp_path: Path, monkeypatch: pytest.
         RobotModel.load(packed(a_dot_urdf=urdf(GOOD)))
 
 
-def test_meshes_are_found_however_they_are_named() -> None:
+def test_every_form_of_mesh_reference_is_resolved() -> None:
     for name in ("package://any/meshes/arm.STL", "meshes/arm.STL", "file:meshes/arm.STL", "package://meshes/arm.STL"):
         content = packed(arm__arm_dot_urdf=with_shape(f'<mesh filename="{name}"/>'), arm__meshes__arm_dot_STL=CUBE_STL)
         (shape,) = RobotModel.load(content).collision
@@ -191,7 +191,7 @@ def test_meshes_are_found_however_they_are_named() -> None:
 
 # ------------------------------------------------------------------------------------------------ meshes
 @pytest.mark.parametrize("kind", ["stl", "obj", "ply", "off", "dae", "glb"])
-def test_a_cube_is_read_from_every_kind_and_scaled(kind: str) -> None:
+def test_a_cube_is_read_and_scaled_in_every_format(kind: str) -> None:
     exported = CUBE.export(file_type=kind)
     content = exported if isinstance(exported, bytes) else exported.encode()
     mesh = read_mesh(content, f"cube.{kind}", (0.001, 0.001, 0.001), upright=False)
@@ -202,7 +202,7 @@ def test_a_cube_is_read_from_every_kind_and_scaled(kind: str) -> None:
     assert volume == pytest.approx(6.0)
 
 
-def test_the_unit_of_a_collada_file_is_heeded() -> None:
+def test_the_unit_of_a_collada_file_is_applied() -> None:
     exported = CUBE.export(file_type="dae").decode()
     for unit, factor in (
         ('<unit name="inch" meter="0.0254"/>', 0.0254),
@@ -215,7 +215,7 @@ def test_the_unit_of_a_collada_file_is_heeded() -> None:
 
 
 @pytest.mark.parametrize(("up", "size"), [("X", (2, 3, 1)), ("Y", (1, 3, 2)), ("Z", (1, 2, 3)), ("", (1, 3, 2))])
-def test_what_is_up_in_a_collada_file_comes_to_be_up(up: str, size: tuple[int, int, int]) -> None:
+def test_the_up_axis_of_a_collada_file_is_applied(up: str, size: tuple[int, int, int]) -> None:
     exported = CUBE.export(file_type="dae").decode()
     assert "<up_axis>Y_UP</up_axis>" in exported
     said = exported.replace("<up_axis>Y_UP</up_axis>", f"<up_axis>{up}_UP</up_axis>" if up else "")
@@ -224,17 +224,17 @@ def test_what_is_up_in_a_collada_file_comes_to_be_up(up: str, size: tuple[int, i
     assert trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False).volume == pytest.approx(6.0)
 
 
-def test_binary_gltf_has_y_up_and_is_known_by_its_first_bytes() -> None:
+def test_binary_gltf_is_recognised_and_has_y_up() -> None:
     mesh = read_mesh(CUBE.export(file_type="glb"), "a cube without an ending")
     assert np.allclose(np.ptp(mesh.vertices, axis=0), (1, 3, 2))
 
 
-def test_a_mesh_is_known_by_its_content_whatever_it_is_called() -> None:
+def test_the_format_of_a_mesh_is_detected_from_its_content() -> None:
     assert len(read_mesh(CUBE_STL, "asset_1").triangles) == 12
     assert len(read_mesh(CUBE.export(file_type="ply"), "cube.stl").triangles) == 12
 
 
-def test_compressed_gltf_says_that_it_is_that() -> None:
+def test_compressed_gltf_is_refused_by_name() -> None:
     content = b'{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"]}'
     head = struct.pack("<4sIIII", b"glTF", 2, 20 + len(content), len(content), 0x4E4F534A)
     with pytest.raises(BadMesh, match=r"c\.glb is compressed \(KHR_draco_mesh_compression\)"):
@@ -265,7 +265,7 @@ def test_a_bad_mesh_is_refused_by_name(content: bytes, name: str, words: str) ->
         read_mesh(content, name)
 
 
-def test_a_mesh_without_end_is_refused_before_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_oversized_mesh_is_refused_before_reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "arm.urdf").write_bytes(with_shape('<mesh filename="arm.stl"/>'))
     with (tmp_path / "arm.stl").open("wb") as file:
         file.truncate(2 * 1024**3)  # 2 GB that take no room on the disk
@@ -276,7 +276,7 @@ def test_a_mesh_without_end_is_refused_before_it_is_read(tmp_path: Path, monkeyp
         read_mesh(CUBE_STL, "cube.stl")
 
 
-def test_an_archive_that_lies_of_its_sizes_is_read_no_further_than_allowed() -> None:
+def test_an_archive_with_false_sizes_is_read_up_to_the_limit() -> None:
     content = bytearray(packed(a_dot_urdf=b" " * 3_000_000))
     honest = struct.pack("<I", 3_000_000)
     assert content.count(honest) == 4  # compressed and not, in the header and the directory
@@ -312,7 +312,7 @@ def damaged(content: bytes, chance: random.Random) -> bytes:
 
 
 @pytest.mark.parametrize("kind", ["urdf", "zip", "stl", "obj", "ply", "off", "dae", "glb"])
-def test_whatever_is_damaged_is_read_or_refused_but_nothing_else(kind: str) -> None:
+def test_damaged_files_are_read_or_refused(kind: str) -> None:
     chance = random.Random(kind)
     refused = 0
     for _ in range(60):

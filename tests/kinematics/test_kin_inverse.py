@@ -1,4 +1,4 @@
-"""Joints for poses: forward after inverse is the pose again, nearest first, within limits, all of them."""
+"""Inverse kinematics: round trip, nearest solution first, within limits, all configurations."""
 
 import itertools
 import math
@@ -52,7 +52,7 @@ def test_forward_after_inverse_is_the_pose(name: str, values: tuple[float, ...],
 
 
 @given(SIX)
-def test_the_seed_itself_comes_back_where_it_is_a_solution(values: tuple[float, ...]) -> None:
+def test_a_seed_that_is_a_solution_is_returned(values: tuple[float, ...]) -> None:
     arm = ur().arm("tcp")
     q = np.array(values)
     assume(not arm.dexterity(q).near_singularity)
@@ -60,7 +60,7 @@ def test_the_seed_itself_comes_back_where_it_is_a_solution(values: tuple[float, 
 
 
 @given(SIX)
-def test_all_configurations_are_those_of_an_independent_solver(values: tuple[float, ...]) -> None:
+def test_configurations_match_an_independent_solver(values: tuple[float, ...]) -> None:
     arm, q = ur().arm("tcp"), np.array(values)
     assume(not arm.dexterity(q).near_singularity)
     chain = Chain("ur5e")
@@ -73,7 +73,7 @@ def test_all_configurations_are_those_of_an_independent_solver(values: tuple[flo
     assert is_among(q, found)
 
 
-def test_poses_in_and_right_beside_singularities_are_reached() -> None:
+def test_poses_at_and_near_singularities_are_reached() -> None:
     arm = ur().arm("tcp", Pose(Position(0.01, -0.03, 0.12)).matrix())
     inverse = InverseKinematics(arm)
     chance = np.random.default_rng(3)
@@ -85,7 +85,7 @@ def test_poses_in_and_right_beside_singularities_are_reached() -> None:
         assert_there(arm, inverse.solve(target, chance.uniform(-6.0, 6.0, 6)), target)
 
 
-def test_singular_poses_are_reached_with_the_free_joint_as_in_the_seed() -> None:
+def test_at_a_singularity_the_free_joint_keeps_the_seeds_value() -> None:
     arm = ur().arm("tcp")
     inverse = InverseKinematics(arm)
     for q in (
@@ -120,7 +120,7 @@ def test_all_turns_are_given_on_request_and_the_nearest_otherwise() -> None:
     assert is_among(q, found)
 
 
-def test_limits_take_configurations_away() -> None:
+def test_joint_limits_remove_configurations() -> None:
     arm = ur().arm("tcp")
     q = np.array((0.5, -1.2, 1.4, -0.4, 1.3, 0.7))
     arm.lower[2], arm.upper[2] = -3.0, 0.0  # an elbow that bends one way only
@@ -149,7 +149,7 @@ def test_a_calibrated_arm_has_its_own_configurations(
 
 
 # ------------------------------------------------------------------------------------------------ others
-def test_an_arm_without_closed_form_is_searched() -> None:
+def test_an_arm_without_closed_form_is_solved_numerically() -> None:
     arm = six_axes(wrist=0.06).arm("tool")
     inverse = InverseKinematics(arm)
     assert not inverse.has_closed_form
@@ -174,7 +174,7 @@ def test_an_arm_without_closed_form_is_searched() -> None:
 
 @pytest.mark.parametrize("elbow", ["0 1 0", "0 -1 0"])
 @given(st.tuples(*[st.floats(-1.9, 1.9)] * 6), st.tuples(*[st.floats(-1.9, 1.9)] * 6))
-def test_an_industrial_arm_has_its_configurations_computed(
+def test_an_industrial_arm_is_solved_in_closed_form(
     elbow: str, values: tuple[float, ...], seed: tuple[float, ...]
 ) -> None:
     arm, q = six_axes(elbow=elbow).arm("tool"), np.array(values)
@@ -187,7 +187,7 @@ def test_an_industrial_arm_has_its_configurations_computed(
         assert np.allclose(inverse.solve(target, q), q, atol=1e-6)
 
 
-def test_what_is_computed_and_what_is_searched_agree() -> None:
+def test_closed_form_and_numerical_solutions_agree() -> None:
     arm = six_axes().arm("tool")
     q = np.array((0.4, 0.5, -0.6, 0.8, 0.9, -0.3))
     computing, searching = InverseKinematics(arm), InverseKinematics(arm)
@@ -207,7 +207,7 @@ def test_what_is_computed_and_what_is_searched_agree() -> None:
 
 
 @given(st.tuples(*(st.floats(low, high) for low, high in dobot_kinematics.LIMITS.values())))
-def test_a_dobot_has_the_joints_that_its_driver_computes(q: tuple[float, float, float, float]) -> None:
+def test_dobot_joints_match_its_driver(q: tuple[float, float, float, float]) -> None:
     arm = RobotModel.load(DOBOT).arm("tcp")
     target = arm.forward(np.array(q))
     tool = dobot_kinematics.tool_of(Pose.from_matrix(target))
@@ -242,7 +242,7 @@ def test_a_dobot_cannot_tilt_its_tool() -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.tuples(st.floats(-2.6, 2.6), st.floats(-2.6, 2.6)), st.floats(-3.0, 3.0))
-def test_two_joints_reach_a_position_whatever_its_heading(q: tuple[float, float], heading: float) -> None:
+def test_two_joints_reach_a_position_with_any_heading(q: tuple[float, float], heading: float) -> None:
     assume(abs(q[1]) > 0.05)
     arm = RobotModel.load(TWO_AXIS).arm("tcp")
     target = arm.forward(np.array(q))
@@ -265,7 +265,7 @@ def test_two_joints_reach_a_position_whatever_its_heading(q: tuple[float, float]
         InverseKinematics(arm).solve(upside_down)
 
 
-def test_joints_that_slide_and_turn_are_mixed() -> None:
+def test_prismatic_and_revolute_joints_can_be_mixed() -> None:
     text = links("base", "x", "y", "z", "tool")
     text += joint("x", "base", "x", kind="prismatic", axis="1 0 0", limit='<limit lower="0" upper="2"/>')
     text += joint("y", "x", "y", kind="prismatic", axis="0 1 0", limit='<limit lower="-1" upper="1"/>')
@@ -282,7 +282,7 @@ def test_joints_that_slide_and_turn_are_mixed() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ refusals
-def test_what_cannot_be_reached_is_refused_with_the_place() -> None:
+def test_an_unreachable_pose_is_refused_with_its_position() -> None:
     inverse = InverseKinematics(ur().arm("tcp"))
     for position in ((1.5, 0.0, 0.3), (1.05, 0.0, 0.3), (0.0, 0.0, 0.2)):
         with pytest.raises(OutOfReach, match="ur5e cannot reach") as refused:
@@ -298,7 +298,7 @@ def test_what_cannot_be_reached_is_refused_with_the_place() -> None:
         inverse.solve(Pose().matrix(), np.zeros(5))
 
 
-def test_collisions_are_avoided_by_another_configuration_and_named_when_they_cannot_be() -> None:
+def test_another_configuration_avoids_collisions_or_they_are_named() -> None:
     arm = ur().arm("tcp")
     q = np.array((0.5, -1.2, 1.4, -1.8, -1.5, 0.7))
     target = arm.forward(q)

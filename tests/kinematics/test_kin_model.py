@@ -1,4 +1,4 @@
-"""Models say where things are: against the drivers' own kinematics, the fakes', and DH products."""
+"""Forward kinematics against the drivers, the fakes and DH products."""
 
 import math
 
@@ -33,7 +33,7 @@ def rows_of(name: str) -> list[DhRow]:
 
 @pytest.mark.parametrize("name", ["ur3e", "ur5e", "ur10e"])
 @given(SIX)
-def test_a_ur_is_where_the_controller_says(name: str, q: tuple[float, ...]) -> None:
+def test_ur_forward_kinematics_matches_the_controller(name: str, q: tuple[float, ...]) -> None:
     x, y, z, origin = Chain(name).forward(q)
     in_base = np.eye(4)
     in_base[:3] = np.column_stack((x, y, z, origin))
@@ -42,7 +42,7 @@ def test_a_ur_is_where_the_controller_says(name: str, q: tuple[float, ...]) -> N
 
 
 @given(SIX)
-def test_links_and_chains_agree_and_the_jacobian_is_the_derivative(values: tuple[float, ...]) -> None:
+def test_link_poses_match_the_chain_and_the_jacobian_its_derivative(values: tuple[float, ...]) -> None:
     q = np.array(values)
     for model, tip in ((ur(), "tcp"), (six_axes(), "tool")):
         arm = model.arm(tip)
@@ -58,7 +58,9 @@ def test_links_and_chains_agree_and_the_jacobian_is_the_derivative(values: tuple
 
 
 @given(st.tuples(*(st.floats(low, high) for low, high in dobot_kinematics.LIMITS.values())), st.floats(0.0, 0.3))
-def test_a_dobot_is_where_its_driver_says_whatever_its_tool(q: tuple[float, float, float, float], tool: float) -> None:
+def test_dobot_forward_kinematics_matches_its_driver_with_any_tool(
+    q: tuple[float, float, float, float], tool: float
+) -> None:
     model = RobotModel.load(DOBOT, {"tool_x": tool, "tool_z": -0.05, "port": "not a number, and none is needed"})
     assert model.joint_names == dobot_kinematics.JOINTS
     assert np.allclose(np.column_stack((model.lower, model.upper)), list(dobot_kinematics.LIMITS.values()))
@@ -67,7 +69,7 @@ def test_a_dobot_is_where_its_driver_says_whatever_its_tool(q: tuple[float, floa
 
 
 @given(st.tuples(st.floats(-2.6, 2.6), st.floats(-2.6, 2.6)), st.floats(0.01, 1.0), st.floats(0.01, 1.0))
-def test_a_two_axis_robot_is_where_its_driver_says_whatever_its_links(
+def test_two_axis_forward_kinematics_matches_its_driver_with_any_links(
     q: tuple[float, float], first: float, second: float
 ) -> None:
     arm = RobotModel.load(TWO_AXIS, {"link_1": first, "link_2": second}).arm("tcp")
@@ -102,7 +104,7 @@ SMALL = st.floats(-2e-3, 2e-3)
 
 @settings(max_examples=50)
 @given(SIX, st.lists(st.tuples(SMALL, SMALL, SMALL, SMALL), min_size=6, max_size=6))
-def test_a_calibrated_arm_is_exactly_where_its_own_parameters_say(
+def test_a_calibrated_arm_uses_its_own_parameters(
     q: tuple[float, ...], deltas: list[tuple[float, float, float, float]]
 ) -> None:
     rows = [row.plus(DhRow(*delta)) for row, delta in zip(rows_of("ur5e"), deltas, strict=True)]
@@ -111,7 +113,7 @@ def test_a_calibrated_arm_is_exactly_where_its_own_parameters_say(
     assert np.allclose(arm.forward(np.array(q)), expected, atol=1e-9)
 
 
-def test_parallel_axes_may_be_metres_off_along_themselves_and_links_stay_where_they_are() -> None:
+def test_offsets_along_parallel_axes_do_not_move_links() -> None:
     rows = rows_of("ur5e")
     rows[1] = rows[1].plus(DhRow(0.0, 400.0, 0.0, 0.0))
     rows[2] = rows[2].plus(DhRow(0.0, -400.0, 0.0, 0.0))
@@ -132,7 +134,7 @@ def test_the_calibration_of_another_arm_is_refused() -> None:
         calibrated(ur(), "tcp", broken)
 
 
-def test_joints_by_name_come_in_the_models_order_and_what_is_wrong_is_named() -> None:
+def test_joints_by_name_are_ordered_and_wrong_names_refused() -> None:
     model = ur()
     values = {name: 0.1 * number for number, name in enumerate(model.joint_names)}
     named = [Joint(name, value) for name, value in reversed(values.items())]
@@ -148,7 +150,7 @@ def test_joints_by_name_come_in_the_models_order_and_what_is_wrong_is_named() ->
         model.arm("nose")
 
 
-def test_several_end_effectors_are_chains_of_their_own() -> None:
+def test_each_end_effector_has_its_own_chain() -> None:
     text = links("base", "body", "left", "left_hand", "right", "right_hand")
     text += joint("trunk", "base", "body", kind="prismatic", limit='<limit lower="0" upper="0.5" velocity="0.1"/>')
     text += joint("left_1", "body", "left", xyz="0 0.2 0", axis="0 1 0")
@@ -178,7 +180,7 @@ def test_a_cylinder_between_balls_is_a_capsule() -> None:
     assert len(ur().visual) > len(ur().collision)
 
 
-def test_shapes_reach_to_the_flange_and_not_beyond() -> None:
+def test_collision_shapes_end_at_the_flange() -> None:
     q = np.array((0.4, -1.1, 0.9, -0.3, 0.6, 0.2))
     flange = ur().link_poses(q)["flange"]
     last = [each for each in ur().collision if each.link == "wrist_3_link"]
@@ -200,7 +202,7 @@ def test_a_stretched_elbow_and_a_straight_wrist_are_near_a_singularity() -> None
     assert arm.dexterity(np.array((0.3, -1.2, 0.01, -0.4, 1.3, 0.2))).near_singularity
 
 
-def test_two_joints_about_one_axis_have_no_link_between() -> None:
+def test_two_joints_on_one_axis_have_no_link_between() -> None:
     text = links("base", "l1", "flat", "l2") + joint("j1", "base", "l1", xyz="0 0 0.1")
     text += joint("fix", "l1", "flat", kind="fixed", rpy="0 0 1", limit="")
     text += joint("j2", "flat", "l2", xyz="0 0 0.2")

@@ -1,4 +1,4 @@
-"""Straight lines, rounded corners, and what is where when: against plain arithmetic of the tests' own."""
+"""Straight lines, rounded corners and timing, against independent arithmetic."""
 
 import itertools
 
@@ -31,7 +31,7 @@ def moved(pose: Pose, x: float, y: float, z: float, *turn: float) -> Pose:
 
 
 @pytest.mark.parametrize("model", [kin_robots.ur(), kin_robots.six_axes()], ids=["ur5e", "six axes"])
-def test_the_tip_keeps_to_the_line_and_turns_evenly(model: RobotModel) -> None:
+def test_the_tip_stays_on_the_line_and_rotates_evenly(model: RobotModel) -> None:
     arm = model.arm(next(iter(model.end_effectors), "tool"))
     chance = np.random.default_rng(2)
     middle = READY if model.name == "ur5e" else np.array((0.1, 0.6, -1.4, 0.3, 0.9, 0.2))
@@ -57,7 +57,7 @@ def test_the_tip_keeps_to_the_line_and_turns_evenly(model: RobotModel) -> None:
     assert done >= 5
 
 
-def test_a_line_out_of_reach_or_through_a_singularity_is_refused_where_it_breaks() -> None:
+def test_an_impossible_line_is_refused_with_the_point_where_it_fails() -> None:
     arm = kin_robots.ur().arm("tcp")
     here = arm.pose(READY)
     with pytest.raises(OutOfReach):
@@ -74,7 +74,7 @@ def test_a_line_out_of_reach_or_through_a_singularity_is_refused_where_it_breaks
         straight_line(arm, start, beyond.matrix())
 
 
-def test_a_planar_arm_keeps_to_the_line_with_the_heading_that_comes_of_it() -> None:
+def test_a_planar_arm_follows_the_line_with_a_free_heading() -> None:
     arm = RobotModel.load(kin_robots.TWO_AXIS).arm("tcp")
     start = np.array((0.3, 1.2))
     here = arm.pose(start)
@@ -85,7 +85,7 @@ def test_a_planar_arm_keeps_to_the_line_with_the_heading_that_comes_of_it() -> N
         assert line_off(here.position, here.position + Position(-0.05, 0.04, 0.0), at) < 2.0 * OFF_LINE
 
 
-def test_a_line_into_something_is_refused_and_told_where() -> None:
+def test_a_colliding_line_is_refused_with_the_point_of_collision() -> None:
     model = kin_robots.ur()
     arm = model.arm("tcp")
     here = arm.pose(READY)
@@ -110,7 +110,7 @@ def rates(timed: Trajectory, period: float = 0.002) -> tuple[Array, Array, Array
 LIMITS = MotionLimits(np.array((1.0, 2.0)), np.array((4.0, 5.0)), np.array((40.0, 50.0)))
 
 
-def test_point_to_point_is_straight_within_limits_and_no_slower_than_they_ask() -> None:
+def test_point_to_point_motion_uses_the_limits_fully() -> None:
     start, goal = np.array((0.0, 1.0)), np.array((1.5, -0.5))
     timed = point_to_point(start, goal, LIMITS)
     q, v, a = rates(timed)
@@ -126,7 +126,7 @@ def test_point_to_point_is_straight_within_limits_and_no_slower_than_they_ask() 
     assert point_to_point(goal, goal, LIMITS).duration == 0.0
 
 
-def test_with_stops_it_stands_at_each_waypoint() -> None:
+def test_motion_with_stops_rests_at_each_waypoint() -> None:
     way = [np.array(q) for q in ((0.0, 0.0), (0.5, 0.0), (0.5, 0.8))]
     timed = with_stops(way, LIMITS)
     alone = point_to_point(way[0], way[1], LIMITS).duration
@@ -138,7 +138,7 @@ def test_with_stops_it_stands_at_each_waypoint() -> None:
     assert np.minimum(np.abs(q[:, 1]), np.abs(q[:, 0] - 0.5)).max() < 1e-9
 
 
-def test_smooth_is_faster_within_limits_and_near_the_way() -> None:
+def test_smooth_motion_is_faster_within_limits_and_near_the_path() -> None:
     way = [np.array(q) for q in ((0.0, 0.0), (0.9, 0.0), (0.9, 1.8), (0.0, 1.8))]
     timed = smooth(way, LIMITS, lambda a, b: True)
     q, v, a = rates(timed)
@@ -154,7 +154,7 @@ def test_smooth_is_faster_within_limits_and_near_the_way() -> None:
     assert 0.02 < off.max() < 0.25
 
 
-def test_a_corner_without_room_is_not_rounded_but_stood_at() -> None:
+def test_a_corner_without_room_becomes_a_stop() -> None:
     way = [np.array(q) for q in ((0.0, 0.0), (0.9, 0.0), (0.9, 1.8))]
 
     def free(a: Array, b: Array) -> bool:
@@ -168,7 +168,7 @@ def test_a_corner_without_room_is_not_rounded_but_stood_at() -> None:
     assert np.linalg.norm(v[min(nearest, len(v) - 1)]) < 0.05
 
 
-def test_a_line_is_led_at_the_speed_of_the_tip() -> None:
+def test_a_line_has_the_requested_tip_speed() -> None:
     arm = kin_robots.ur().arm("tcp")
     here = arm.pose(READY)
     there = moved(here, 0.1, 0.25, 0.0)
@@ -185,7 +185,7 @@ def test_a_line_is_led_at_the_speed_of_the_tip() -> None:
         assert line_off(here.position, there.position, Position(*values)) < 2.0 * OFF_LINE
 
 
-def test_limits_that_make_no_sense_are_refused() -> None:
+def test_invalid_limits_are_refused() -> None:
     arm = kin_robots.ur().arm("tcp")
     for speed in (0.0, 1.1, float("nan")):
         with pytest.raises(InvalidData):

@@ -1,4 +1,4 @@
-"""Plans: exact or refused, the same again, through gaps, with what is held; judged by checks of the tests' own."""
+"""Plans: exact or refused, repeatable, through gaps, with gripped parts; verified by independent checks."""
 
 import itertools
 
@@ -45,7 +45,7 @@ def assert_free(world: CollisionWorld, way: list[Array], step: float = 0.004) ->
 WALL = {"wall": ((0.0, 0.55, 0.5), (0.04, 0.5, 1.0)), "floor": ((0.0, 0.0, -0.12), (2.0, 2.0, 0.1))}
 
 
-def test_around_a_wall_and_the_same_again() -> None:
+def test_a_plan_around_a_wall_is_repeatable() -> None:
     world = world_of(kin_robots.ur(), **WALL)
     way = planner(world).to_joints(READY, ACROSS)
     assert len(way) > 2
@@ -62,13 +62,13 @@ def test_around_a_wall_and_the_same_again() -> None:
     assert_free(world, other)
 
 
-def test_straight_where_nothing_is_in_the_way() -> None:
+def test_a_free_path_is_straight() -> None:
     world = world_of(kin_robots.ur(), floor=WALL["floor"])
     assert len(planner(world).to_joints(READY, ACROSS)) == 2
 
 
-def test_to_a_pose_by_the_configuration_that_is_free() -> None:
-    """The nearest configuration to the start ends in the wall; another does not."""
+def test_a_pose_is_planned_with_a_free_configuration() -> None:
+    """The configuration nearest to the start ends in the wall; another one is free."""
     model = kin_robots.ur()
     arm = model.arm("tcp")
     world = world_of(model)
@@ -81,8 +81,8 @@ def test_to_a_pose_by_the_configuration_that_is_free() -> None:
     assert_free(world, way)
 
 
-def test_what_is_held_is_led_past_too() -> None:
-    """Without the rod the straight way is free; with it, it is not."""
+def test_plans_avoid_obstacles_with_the_gripped_part() -> None:
+    """The straight path is free without the rod, and blocked with it."""
     model = kin_robots.ur()
     arm = model.arm("tcp")
     goal = READY + np.array((1.2, 0.0, 0.0, 0.0, 0.0, 0.0))
@@ -99,7 +99,7 @@ def test_what_is_held_is_led_past_too() -> None:
     assert_free(world, way)
 
 
-def test_refused_naming_why() -> None:
+def test_impossible_plans_are_refused_with_the_reason() -> None:
     model = kin_robots.ur()
     arm = model.arm("tcp")
     tip = Pose.from_matrix(arm.forward(ACROSS)).position
@@ -121,8 +121,8 @@ def test_refused_naming_why() -> None:
             planner(world).to_joints(nonsense, READY)
 
 
-def test_no_way_is_refused_and_names_what_is_in_the_way() -> None:
-    """A fence from the foot outwards, which no link gets past; an approximate answer would end at it."""
+def test_without_a_path_the_obstacle_is_named() -> None:
+    """No link gets past the fence; an approximate planner would stop in front of it."""
     world = world_of(RobotModel.load(kin_robots.TWO_AXIS), fence=((0.17, 0.0, 0.0), (0.26, 0.006, 0.1)))
     start, goal = np.array((-1.2, 0.3)), np.array((1.2, -0.3))
     began = own_time()
@@ -133,7 +133,7 @@ def test_no_way_is_refused_and_names_what_is_in_the_way() -> None:
     assert own_time() - began < 10.0
 
 
-def test_a_joint_that_stands_a_little_beyond_its_limit_gets_back() -> None:
+def test_a_joint_slightly_beyond_its_limit_can_return() -> None:
     model = RobotModel.load(kin_robots.TWO_AXIS)
     world = world_of(model)
     beyond = np.array((model.upper[0] + 0.01, 0.3))
@@ -143,13 +143,13 @@ def test_a_joint_that_stands_a_little_beyond_its_limit_gets_back() -> None:
         planner(world).to_joints(beyond + np.array((0.2, 0.0)), np.array((1.0, 0.3)))
 
 
-def test_it_can_be_stopped() -> None:
+def test_planning_can_be_cancelled() -> None:
     world = world_of(kin_robots.ur(), **WALL)
     with pytest.raises(Cancelled):
         planner(world).to_joints(READY, ACROSS, stopped=lambda: True)
 
 
-def test_robots_with_few_joints_and_linkages() -> None:
+def test_robots_with_few_joints_and_linkages_are_planned() -> None:
     planar = world_of(RobotModel.load(kin_robots.TWO_AXIS), pin=((0.2, 0.0, 0.02), (0.02, 0.02, 0.04)))
     start, goal = np.array((-1.2, 0.3)), np.array((1.2, -0.3))
     way = Planner(Sweep(planar, "arm", planar.robot("arm").model.arm("tcp"), 0.004)).to_joints(start, goal)
@@ -163,8 +163,8 @@ def test_robots_with_few_joints_and_linkages() -> None:
 
 
 @pytest.mark.parametrize("make", [kin_robots.ur, lambda: RobotModel.load(kin_robots.DOBOT)])
-def test_levers_bound_how_far_points_travel(make: object) -> None:
-    """Against vertices of the parts themselves, moved by small random steps."""
+def test_levers_bound_the_travel_of_points(make: object) -> None:
+    """Compared with the vertices of the links after small random motions."""
     model = make()  # type: ignore[operator]
     world = world_of(model)
     robot = world.robot("arm")
@@ -191,7 +191,7 @@ def test_levers_bound_how_far_points_travel(make: object) -> None:
 
 
 def test_a_thin_wire_between_two_configurations_is_found() -> None:
-    """Of 4 mm, less than half the resolution's travel: with a margin of half the resolution nothing is missed."""
+    """The wire is 4 mm thick, less than half the step; the margin of half a step makes sure it is found."""
     model = kin_robots.ur()
     arm = model.arm("tcp")
     goal = READY + np.array((1.0, 0.0, 0.0, 0.0, 0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Which poses are reached, and how little is computed again when something changes."""
+"""Reachability of poses, and how little is computed again after a change."""
 
 import math
 
@@ -32,7 +32,7 @@ def reach(world: CollisionWorld) -> Reachability:
     return Reachability(world, "arm", ur().arm("tcp"))
 
 
-def test_each_way_of_reaching_has_its_name_and_reason(world: CollisionWorld, reach: Reachability) -> None:
+def test_every_reachability_result_has_a_name_and_reason(world: CollisionWorld, reach: Reachability) -> None:
     good, far, inside = down_at(0.5, 0.1, 0.3), down_at(1.4, 0.0, 0.3), down_at(0.02, 0.0, 0.3)
     stretched = ur().arm("tcp").pose(np.array((0.1, -0.5, 0.005, -1.0, -1.5, 0.0)))
     answers = reach.judge([good, far, inside, BASE * stretched])
@@ -66,7 +66,7 @@ def test_a_joint_near_its_limit_is_named() -> None:
     assert answers[1].reason == "joint_4 would be near its limit."
 
 
-def test_only_what_changed_is_asked_again(world: CollisionWorld, reach: Reachability) -> None:
+def test_only_changed_poses_are_computed_again(world: CollisionWorld, reach: Reachability) -> None:
     chance = np.random.default_rng(1)
     poses = [down_at(*map(float, chance.uniform((0.3, -0.5, 0.1), (0.6, 0.5, 0.4)))) for _ in range(60)]
     first = reach.judge(poses)
@@ -93,7 +93,7 @@ def test_only_what_changed_is_asked_again(world: CollisionWorld, reach: Reachabi
     assert reach.computed == computed + 1
 
 
-def test_answers_are_those_of_a_fresh_look_after_any_change(world: CollisionWorld, reach: Reachability) -> None:
+def test_results_after_changes_match_a_fresh_computation(world: CollisionWorld, reach: Reachability) -> None:
     chance = np.random.default_rng(2)
     poses = [down_at(*map(float, chance.uniform((-0.8, -0.8, 0.0), (0.8, 0.8, 0.6)))) for _ in range(80)]
     reach.judge(poses)
@@ -128,7 +128,7 @@ def test_answers_are_those_of_a_fresh_look_after_any_change(world: CollisionWorl
     assert {each.reach for each in moved} >= {Reach.REACHABLE, Reach.IN_COLLISION, Reach.OUT_OF_REACH}
 
 
-def test_a_tool_reaches_farther() -> None:
+def test_a_tool_extends_the_reach() -> None:
     far = Pose(Position(1.05, 0.0, 0.2), Orientation.from_rotation_vector(0.0, math.pi / 2.0, 0.0))
     answers = []
     for tcp in (0.0, 0.3):

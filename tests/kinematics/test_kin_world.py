@@ -1,4 +1,4 @@
-"""The collision world: what touches what, by name; what is held moves along; lines; a thousand bodies."""
+"""The collision world: contacts by name, gripped parts, lines, and a thousand bodies."""
 
 import math
 import time
@@ -53,7 +53,7 @@ def where(link: str, q: np.ndarray = HOME) -> Pose:
 
 
 # ------------------------------------------------------------------------------------------------ bodies
-def test_a_body_in_the_way_is_named_until_it_is_moved_or_deleted(world: CollisionWorld) -> None:
+def test_a_colliding_body_is_named_until_moved_or_deleted(world: CollisionWorld) -> None:
     assert world.is_free("arm", HOME)
     assert pairs(world) == set()
     tip = where("flange").position
@@ -86,7 +86,7 @@ SHAPES: list[Shape] = [
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
-def test_every_shape_touches_where_its_surface_is(world: CollisionWorld, shape: Shape) -> None:
+def test_every_shape_collides_at_its_surface(world: CollisionWorld, shape: Shape) -> None:
     tip = where("flange")
     half = float(extent(shape)[1, 2])
     beside = Pose(Position(0.0, 0.0, half + 0.002))
@@ -101,7 +101,7 @@ def test_every_shape_touches_where_its_surface_is(world: CollisionWorld, shape: 
     assert pairs(world) == {("arm/wrist_3_link", "body")}
 
 
-def test_a_margin_keeps_things_apart() -> None:
+def test_a_margin_adds_distance() -> None:
     world = CollisionWorld(margin=0.05)
     world.add_robot("arm", ur(), Pose())
     world.put("body", Box(0.2, 0.2, 0.2), where("flange") * at(0.0, 0.0, 0.13))
@@ -114,7 +114,7 @@ def test_a_margin_keeps_things_apart() -> None:
         CollisionWorld(margin=-0.1)
 
 
-def test_models_of_the_protocol_become_shapes() -> None:
+def test_protocol_models_become_shapes() -> None:
     mesh = triangles_of(Box(1.0, 1.0, 1.0))
     assert of_model(object_type.Box("b", 1.0, 2.0, 3.0)) == Box(1.0, 2.0, 3.0)
     assert of_model(object_type.Cylinder("c", 1.0, 2.0)) == Cylinder(1.0, 2.0)
@@ -125,7 +125,7 @@ def test_models_of_the_protocol_become_shapes() -> None:
         of_model(object_type.Mesh("m", "m.stl"))
 
 
-def test_what_is_no_body_is_refused(world: CollisionWorld) -> None:
+def test_invalid_bodies_are_refused(world: CollisionWorld) -> None:
     with pytest.raises(ZeroLength, match="thin"):
         world.put("thin", Box(1.0, 0.0, 1.0), Pose())
     with pytest.raises(InvalidData, match="lost"):
@@ -142,14 +142,14 @@ def test_what_is_no_body_is_refused(world: CollisionWorld) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ robots
-def test_a_folded_arm_hits_itself_and_the_links_are_named(world: CollisionWorld) -> None:
+def test_self_collision_names_the_links(world: CollisionWorld) -> None:
     folded = np.array((0.0, -1.2, 3.0, 0.0, 0.0, 0.0))
     assert not world.is_free("arm", folded)
     assert all(each[0].startswith("arm/") and each[1].startswith("arm/") for each in pairs(world, folded))
     assert ("arm/upper_arm_link", "arm/wrist_1_link") in pairs(world, folded)
 
 
-def test_what_a_robot_stands_on_is_no_obstacle_but_its_arm_may_hit_it(world: CollisionWorld) -> None:
+def test_the_table_under_a_robot_collides_only_with_its_arm(world: CollisionWorld) -> None:
     world.put("table", Box(2.0, 2.0, 0.1), at(0.0, 0.0, -0.05))
     assert world.is_free("arm", HOME)
     down = np.array((0.0, 0.3, 0.0, 0.0, 0.0, 0.0))
@@ -157,7 +157,7 @@ def test_what_a_robot_stands_on_is_no_obstacle_but_its_arm_may_hit_it(world: Col
     assert not world.is_free("arm", down)
 
 
-def test_two_robots_are_in_each_others_way_as_they_stand(world: CollisionWorld) -> None:
+def test_two_robots_are_obstacles_for_each_other(world: CollisionWorld) -> None:
     reaching = np.array((0.0, -0.6, 0.4, 0.2, 0.0, 0.0))
     tip = where("flange", reaching).position
     foot = at(tip.x, tip.y, tip.z - 0.15)  # where the arm reaches to is the other's shoulder
@@ -175,7 +175,7 @@ def test_two_robots_are_in_each_others_way_as_they_stand(world: CollisionWorld) 
     assert world.is_free("arm", reaching)
 
 
-def test_a_robot_stands_where_its_base_is() -> None:
+def test_a_robot_is_placed_at_its_base() -> None:
     world = CollisionWorld()
     base = Pose(Position(3.0, -2.0, 1.0), Orientation.from_rotation_vector(0.3, 0.2, 1.0))
     world.add_robot("arm", ur(), base)
@@ -188,7 +188,7 @@ def test_a_robot_stands_where_its_base_is() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ held
-def test_what_is_held_moves_with_the_gripper_and_collides_with_the_rest(world: CollisionWorld) -> None:
+def test_a_gripped_part_moves_with_the_gripper_and_collides_with_others(world: CollisionWorld) -> None:
     tip = where("flange")
     world.put("part", Box(0.05, 0.05, 0.2), tip * at(0.0, 0.0, 0.09))  # it reaches 10 mm into the flange
     assert pairs(world) == {("arm/wrist_3_link", "part")}
@@ -218,7 +218,7 @@ def test_what_is_held_moves_with_the_gripper_and_collides_with_the_rest(world: C
         world.detach("part")
 
 
-def test_a_long_part_hits_the_arm_that_holds_it(world: CollisionWorld) -> None:
+def test_a_long_gripped_part_collides_with_its_arm(world: CollisionWorld) -> None:
     tip = where("flange")
     world.put("bar", Box(0.8, 0.03, 0.03), tip * at(0.3, 0.0, 0.02))
     world.attach("bar", "arm", "flange")
@@ -229,7 +229,7 @@ def test_a_long_part_hits_the_arm_that_holds_it(world: CollisionWorld) -> None:
     assert any(world.is_free("arm", q) for q in turned)
 
 
-def test_fingers_may_touch_what_the_hand_holds() -> None:
+def test_fingers_may_touch_the_gripped_part() -> None:
     box = '<collision><geometry><box size="0.02 0.02 0.1"/></geometry></collision>'
     text = links("base", "arm") + '<link name="hand"/>' + f'<link name="left">{box}</link><link name="far">{box}</link>'
     text += joint("j1", "base", "arm", xyz="0 0 0.5") + joint("j2", "arm", "hand", xyz="0.5 0 0")
@@ -243,7 +243,7 @@ def test_fingers_may_touch_what_the_hand_holds() -> None:
     assert world.is_free("arm", np.zeros(3))
 
 
-def test_deleting_putting_and_removing_what_is_held(world: CollisionWorld) -> None:
+def test_gripped_parts_can_be_deleted_replaced_and_removed(world: CollisionWorld) -> None:
     world.put("part", Sphere(0.05), where("flange"))
     world.attach("part", "arm", "flange")
     world.put("part", Sphere(0.01), at(0.0, 0.0, 2.0))  # put anew it is no longer held
@@ -273,7 +273,7 @@ def depths(shape: Shape, points: np.ndarray) -> np.ndarray:
     st.tuples(*[st.floats(-0.4, 0.4)] * 3),
     st.tuples(*[st.floats(-3.0, 3.0)] * 3),
 )
-def test_a_line_meets_a_shape_where_its_triangles_are(
+def test_a_line_hits_a_shape_at_its_triangles(
     shape: Shape, start: tuple[float, ...], end: tuple[float, ...], turn: tuple[float, ...]
 ) -> None:
     pose = Pose(Position(1.0, -2.0, 0.5), Orientation.from_rotation_vector(*turn))
@@ -301,7 +301,7 @@ def test_a_line_meets_a_shape_where_its_triangles_are(
         assert before.max(initial=-1.0) < step + round_off
 
 
-def test_the_first_thing_on_a_line_is_named_and_some_may_be_ignored(world: CollisionWorld) -> None:
+def test_the_first_body_on_a_line_is_named_and_bodies_can_be_ignored(world: CollisionWorld) -> None:
     start, end = Position(-2.0, 0.0, 1.5), Position(2.0, 0.0, 1.5)
     assert world.ray(start, end) is None
     for number, x in enumerate((1.0, -1.0, 0.5)):
@@ -326,7 +326,7 @@ def test_the_first_thing_on_a_line_is_named_and_some_may_be_ignored(world: Colli
         world.ray(Position(math.nan, 0.0, 0.0), end)
 
 
-def test_a_line_beside_a_mesh_is_as_thick_as_it_is_told() -> None:
+def test_a_line_next_to_a_mesh_has_the_given_thickness() -> None:
     world = CollisionWorld()
     world.put("mesh", triangles_of(Box(0.2, 0.2, 0.2)), Pose())
     line = Position(-1.0, 0.104, 0.0), Position(1.0, 0.104, 0.0)
@@ -338,7 +338,7 @@ def test_a_line_beside_a_mesh_is_as_thick_as_it_is_told() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ many
-def test_fast_and_thorough_answers_agree_among_a_thousand_bodies() -> None:
+def test_fast_and_exhaustive_checks_agree_for_a_thousand_bodies() -> None:
     chance = np.random.default_rng(4)
     world = CollisionWorld()
     world.add_robot("arm", RobotModel.load(UR / "ur5e"), Pose())
@@ -362,7 +362,7 @@ def test_fast_and_thorough_answers_agree_among_a_thousand_bodies() -> None:
     assert all(world.is_free("arm", q) == (not world.robots["arm"].in_self_collision(q)) for q in configurations)
 
 
-def test_changes_are_told_with_their_place(world: CollisionWorld) -> None:
+def test_changes_are_reported_with_their_region(world: CollisionWorld) -> None:
     before = world.revision
     world.put("a", Sphere(0.1), at(1.0, 2.0, 3.0))
     world.move("a", at(2.0, 2.0, 3.0))
