@@ -11,7 +11,7 @@ from arcor2_hw.client.rest import Listed, Rest
 from arcor2_server.cli import export_files
 from arcor2_server.cli.server_connection import HERE, Server, run
 from arcor2_server.exchange.archive import Archive
-from arcor2_server.exchange.export import Source
+from arcor2_server.exchange.export import Exporter
 
 
 class DocumentKind(Struct, frozen=True):
@@ -29,7 +29,7 @@ class DocumentKind(Struct, frozen=True):
 
     name: Literal["scene", "project"]
     saved: Callable[[Rest], Awaitable[list[Listed]]]
-    export: Callable[[Source, str], Awaitable[Archive]]
+    export: Callable[[Exporter, str], Awaitable[Archive]]
     content: str
     sources: str
     parts: str
@@ -58,7 +58,7 @@ def document_commands(kind: DocumentKind) -> App:
     ) -> int:
         async def work() -> None:
             async with server.client() as client:
-                export_files.write(await kind.export(Source(client), document), output, force)
+                export_files.write(await kind.export(Exporter(client), document), output, force)
 
         return run(f"{name} export", work)
 

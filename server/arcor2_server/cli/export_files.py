@@ -24,9 +24,9 @@ from arcor2_server.cli.tables import console
 from arcor2_server.exchange import archive as archives
 from arcor2_server.exchange.archive import Archive, Kind
 from arcor2_server.exchange.differences import Difference, describe, differences, names_of
-from arcor2_server.exchange.export import Source
-from arcor2_server.exchange.import_ import Part, Target, renamed
-from arcor2_server.exchange.validation import Known, find
+from arcor2_server.exchange.export import Exporter
+from arcor2_server.exchange.import_ import Importer, Part, renamed
+from arcor2_server.exchange.validation import Known, find_problems
 
 Output = Annotated[Path | None, Parameter(name=["--output", "-o"], help="The file; NAME.zip when not given.")]
 Force = Annotated[bool, Parameter(help="Replace the file when there is one.", negative=())]
@@ -120,13 +120,13 @@ async def bring_in(
     if name is not None:
         archive = renamed(archive, name)
     async with server.client() as client:
-        target = Target(client, archive, overwrite)
+        importer = Importer(client, archive, overwrite)
         try:
-            steps = await target.plan(await asyncio.to_thread(installed))
+            steps = await importer.plan(await asyncio.to_thread(installed))
         except InvalidPackage as error:
             raise InvalidPackage("{path}: {reason}", path=path, reason=error) from error
         if not dry_run:
-            await target.carry_out()
+            await importer.run()
     words = {"new": "would be new", "replaced": "would be replaced", "same": "is the same"} if dry_run else {}
     for step in steps:
         notice = f", {step.notice}" if step.notice else ""
@@ -143,7 +143,7 @@ async def validate(paths: list[Path], kind: Kind, as_json: bool) -> ExitStatus:
     for path in paths:
         try:
             archive = read(path, kind)
-            findings = list(find(archive, Known(archive, files)))
+            findings = list(find_problems(archive, Known(archive, files)))
         except InvalidPackage as error:
             entry, _, text = str(error).removeprefix(f"{path}: ").partition(": ")
             reported.append(
@@ -171,7 +171,7 @@ def _is_file(wanted: str) -> bool:
 
 
 async def compare(
-    old: str, new: str, kind: Kind, server: Server, export: Callable[[Source, str], Awaitable[Archive]], as_json: bool
+    old: str, new: str, kind: Kind, server: Server, export: Callable[[Exporter, str], Awaitable[Archive]], as_json: bool
 ) -> ExitStatus:
     """Compare two exports, each a file or what a server has of that name."""
 
@@ -179,7 +179,7 @@ async def compare(
         if _is_file(wanted):
             return await asyncio.to_thread(read, Path(wanted), kind)
         async with server.client() as client:
-            return await export(Source(client), wanted)
+            return await export(Exporter(client), wanted)
 
     before, after = await side(old), await side(new)
     found = differences(before, after)

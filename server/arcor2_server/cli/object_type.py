@@ -13,7 +13,7 @@ from arcor2_server.cli import export_files
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.server_connection import HERE, Failed, Server, run
 from arcor2_server.exchange.archive import Archive
-from arcor2_server.exchange.export import Source
+from arcor2_server.exchange.export import Exporter
 
 app = App(name="object-type", help="Bring object types into a server, list, check and compare them, take them out.")
 
@@ -141,7 +141,7 @@ def export(
         if not names:
             raise Failed(ExitStatus.USAGE, "give the names of the object types")
         async with server.client() as client:
-            archive = await Source(client).object_types(names)
+            archive = await Exporter(client).object_types(names)
         path = output or Path(f"{names[0]}.zip")
         export_files.write(archive, path, force)
 
@@ -173,8 +173,8 @@ def validate(*files: Annotated[Path, Parameter(help="Export files.")], as_json: 
     return run("object-type validate", lambda: export_files.validate(list(files), "object-type", as_json))
 
 
-async def _one(source: Source, name: str) -> Archive:
-    return await source.object_types([name])
+async def _one(exporter: Exporter, name: str) -> Archive:
+    return await exporter.object_types([name])
 
 
 @app.command

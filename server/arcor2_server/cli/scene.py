@@ -2,13 +2,13 @@
 
 from arcor2_hw.client.rest import Rest
 from arcor2_server.cli.document_commands import DocumentKind, document_commands
-from arcor2_server.exchange.export import Source
+from arcor2_server.exchange.export import Exporter
 
 app = document_commands(
     DocumentKind(
         name="scene",
         saved=Rest.scenes,
-        export=Source.scene,
+        export=Exporter.scene,
         content="all it needs: object types, models, meshes",
         sources="A file that `arcor2-hw scene export` or `project export` wrote.",
         parts="scene, types (with their models), assets",

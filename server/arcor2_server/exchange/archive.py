@@ -22,6 +22,7 @@ T = TypeVar("T")
 Kind = Literal["scene", "project", "object-type"]
 
 FORMAT: Final = 1
+"""Version of the export format."""
 HEAD: Final = "export.json"
 SCENE: Final = "data/scene.json"
 PROJECT: Final = "data/project.json"
@@ -29,22 +30,30 @@ SCRIPT: Final = "script.py"
 PARAMETERS: Final = "data/parameters.json"
 OVERRIDES: Final = "data/object_parameters.json"
 MAX_SIZE: Final = 512 * 1024 * 1024
-"""Bytes of all that is read of a file: meshes are large, and a zip may lie."""
+"""Maximum size of the unpacked files, bytes. It is counted while unpacking, since a zip may state wrong sizes."""
 
 
 class AssetFile(Data, frozen=True):
-    """An asset: its content, and the name of the file that it was uploaded as."""
+    """An asset: its content, and the name of the uploaded file."""
 
     content: bytes
     file_name: str = ""
 
 
 class Archive(Data, frozen=True):
-    """What an export file holds.
+    """The content of an export file.
 
-    types: the uploaded ones by name, each with its model. installed: those that the other server must have installed.
-    assets: by id. script: of a project that was written by hand. parameters, overrides: what is kept beside a project.
-    from_package: it was read of an execution package, which carries no assets.
+    Attributes:
+        kind: The kind of the exported document.
+        scene: The scene; None in an export of object types.
+        project: The project; None in an export of a scene or of object types.
+        script: The script of a project without logic.
+        types: The uploaded object types by name, with their models.
+        installed: Names of the object types that must be installed on the importing server.
+        assets: Assets by id.
+        parameters: Parameters stored next to the project.
+        overrides: Overrides stored next to the project.
+        from_package: The content was read from an execution package, which contains no assets.
     """
 
     kind: Kind
@@ -72,7 +81,7 @@ class _Asset(Data, frozen=True):
 
 
 class _Head(Data, frozen=True):
-    """export.json. types: class by file."""
+    """The content of export.json. `types`: class by file."""
 
     format: int
     kind: Kind
@@ -116,9 +125,10 @@ def files_of(archive: Archive) -> dict[str, bytes]:
 
 
 def write(archive: Archive, path: Path) -> None:
-    """Write the file atomically. The same content gives the same bytes.
+    """Write the file atomically. Equal content results in equal bytes.
 
-    Raise StorageError if that is impossible.
+    Raises:
+        StorageError: The file cannot be written.
     """
     try:
         replace_file(path, package.to_zip(files_of(archive)), mode=0o666, durable=False)
@@ -147,16 +157,16 @@ def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
         found = msgspec.json.decode(files[path], type=kind)
         check_texts(found)
         if b"\\u" in files[path]:
-            msgspec.json.encode(found)  # half a surrogate pair can be read, but neither be written nor shown
+            msgspec.json.encode(found)  # fails for a lone surrogate, which can be decoded but not encoded
         return found
     except TextTooLong as error:
         raise InvalidPackage("{path}: {reason}", path=path, reason=error) from error
     except UnicodeError as error:
-        raise InvalidPackage("{path}: it has a character that is none: {reason}", path=path, reason=error) from error
+        raise InvalidPackage("{path}: it contains an invalid character: {reason}", path=path, reason=error) from error
     except KeyError:
         raise InvalidPackage("{path}: it is missing.", path=path) from None
     except (msgspec.MsgspecError, RecursionError) as error:
-        # msgspec says where: `$.objects[2].pose.position`.
+        # The message of msgspec contains the path of the value: `$.objects[2].pose.position`.
         raise InvalidPackage("{path}: {reason}", path=path, reason=error) from error
 
 
@@ -166,7 +176,7 @@ def _text(files: Mapping[str, bytes], path: str) -> str:
     except KeyError:
         raise InvalidPackage("{path}: it is missing.", path=path) from None
     except UnicodeDecodeError as error:
-        raise InvalidPackage("{path}: it is no text: {reason}", path=path, reason=error) from error
+        raise InvalidPackage("{path}: it is not a text file: {reason}", path=path, reason=error) from error
 
 
 def _types(files: Mapping[str, bytes], head: _Head) -> dict[str, ObjectTypeSource]:
@@ -174,13 +184,16 @@ def _types(files: Mapping[str, bytes], head: _Head) -> dict[str, ObjectTypeSourc
     for path, name in head.types.items():
         if not is_valid_name(name) or path != f"object_types/{module_name(name)}.py":
             raise InvalidPackage(
-                "{head}: {path!r} cannot hold an object type {name!r}.", head=HEAD, path=path[:80], name=name[:80]
+                "{head}: {path!r} is not the file of an object type {name!r}.",
+                head=HEAD,
+                path=path[:80],
+                name=name[:80],
             )
         types[name] = ObjectTypeSource(name, _text(files, path), model=_model(files, name))
     stray = {path for path in files if path.startswith("object_types/")} - head.types.keys()
     stray |= {path for path in files if path.startswith("data/models/")} - {_model_path(name) for name in types}
     if stray:
-        raise InvalidPackage("{stray}: it belongs to no object type that {head} names.", stray=min(stray), head=HEAD)
+        raise InvalidPackage("{stray}: it belongs to no object type in {head}.", stray=min(stray), head=HEAD)
     return types
 
 
@@ -205,13 +218,16 @@ def _model(files: Mapping[str, bytes], name: str) -> ObjectModel | Unset:
 def _checked_id(document: Scene | Project, path: str) -> None:
     key = document.id
     if not key or len(key) > imported.MAX_ID or not key.isprintable() or "/" in key or key in (".", ".."):
-        raise InvalidPackage("{path}: {key!r} is no usable id.", path=path, key=key[:80])
+        raise InvalidPackage("{path}: {key!r} is not a valid id.", path=path, key=key[:80])
 
 
 def read(path: Path) -> Archive:
-    """Read an export file or an execution package, without unpacking it to disk or running any of it.
+    """Read an export file or an execution package, without unpacking it to disk or running its code.
 
-    Raise NotFound if the file does not exist, InvalidPackage naming a damaged entry, or StorageError.
+    Raises:
+        NotFound: The file does not exist.
+        InvalidPackage: An entry is damaged; the message names it.
+        StorageError: The file cannot be read.
     """
     if not path.is_file():
         raise NotFound("There is no file {path}.", path=path)
@@ -219,11 +235,11 @@ def read(path: Path) -> Archive:
     if HEAD not in files:
         if {SCRIPT, PROJECT} <= files.keys():
             return _from_package(path)
-        raise InvalidPackage("It is no export of arcor2-hw: {head} is missing.", head=HEAD)
+        raise InvalidPackage("The file is not an export of arcor2-hw: {head} is missing.", head=HEAD)
     head = _document(files, HEAD, _Head)
     if head.format != FORMAT:
         raise InvalidPackage(
-            "{head}: format {format} is of another version; this one reads {other_format}.",
+            "{head}: format {format} is not supported; this version reads format {other_format}.",
             head=HEAD,
             format=head.format,
             other_format=FORMAT,
@@ -235,7 +251,7 @@ def read(path: Path) -> Archive:
             _checked_id(document, place)
     types = _types(files, head)
     if head.kind == "object-type" and not types:
-        raise InvalidPackage("{head}: it names no object type.", head=HEAD)
+        raise InvalidPackage("{head}: it contains no object type.", head=HEAD)
     return Archive(
         head.kind,
         scene,
@@ -260,13 +276,13 @@ def _assets(files: Mapping[str, bytes], named: Iterable[_Asset]) -> dict[str, As
                 file=one.file[:80],
             )
         if one.id in assets:
-            raise InvalidPackage("{head}: the asset {id!r} is named twice.", head=HEAD, id=one.id[:80])
+            raise InvalidPackage("{head}: it contains the asset {id!r} twice.", head=HEAD, id=one.id[:80])
         assets[one.id] = AssetFile(files[one.file], one.file_name)
     return assets
 
 
 def _from_package(path: Path) -> Archive:
-    """Read an execution package; its script counts only where it is the program itself."""
+    """Read an execution package. Its script is used only for a project without logic."""
     given = imported.read(path)
     return Archive(
         "project",
@@ -279,14 +295,14 @@ def _from_package(path: Path) -> Archive:
     )
 
 
-# ------------------------------------------------------------------------------------------------ what is needed
+# ------------------------------------------------------------------------------------------------ dependencies
 def needed_modules(source: str) -> set[str]:
-    """Return the neighbours that an object type's module imports (`from .arm import Arm`), as far as it can be read."""
+    """Return the sibling modules that an object type's module imports (`from .arm import Arm`)."""
     found: set[str] = set()
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return found  # what is wrong with it is for the analysis to say
+        return found  # the analysis reports errors of the source
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.level == 1:
             found |= {node.module.partition(".")[0]} if node.module else {alias.name for alias in node.names}

@@ -15,19 +15,21 @@ from arcor2_hw.data.project import END, START
 from arcor2_server.exchange.archive import Archive
 
 TIMES: Final = frozenset({"created", "modified", "int_modified"})
-"""When something was saved is no difference."""
+"""Fields that are not compared."""
 WHOLE: Final = (frozenset("xyz"), frozenset("xyzw"))
-"""A position or an orientation is one value."""
-
-
+"""Fields of positions and orientations, which are compared as one value."""
 _ID: Final = re.compile(r"[a-z]+_[0-9a-f]{32}")
 
 
 class Difference(Data, frozen=True):
-    """One entry that is only in one of two exports, or not the same in both.
+    """One entry that is only in one of two exports, or differs.
 
-    path: names from the outside in ("scene", "objects", "tester", "pose", "position"). old, new: JSON values, UNSET
-    where there is none. text: lines of a unified diff, where a source or script differs.
+    Attributes:
+        change: The kind of difference.
+        path: Names from the outermost to the innermost: "scene", "objects", "tester", "pose", "position".
+        old: JSON value in the old export, UNSET if there is none.
+        new: JSON value in the new export, UNSET if there is none.
+        text: Lines of a unified diff if a source or script differs.
     """
 
     change: Literal["added", "removed", "changed"]
@@ -61,8 +63,8 @@ def _tree(archive: Archive) -> dict[str, Any]:
             key: f"{len(asset.content)} bytes, SHA-256 {hashlib.sha256(asset.content).hexdigest()[:16]}"
             for key, asset in archive.assets.items()
         },
-        "kept parameters": msgspec.to_builtins(archive.parameters),
-        "kept overrides": msgspec.to_builtins(archive.overrides),
+        "stored parameters": msgspec.to_builtins(archive.parameters),
+        "stored overrides": msgspec.to_builtins(archive.overrides),
     }
 
 
@@ -72,7 +74,7 @@ def _type(one: ObjectTypeSource) -> dict[str, Any]:
 
 
 class _Text(str):
-    """A text of many lines, whose differences are told by line."""
+    """A text that is compared line by line."""
 
     __slots__ = ()
 
@@ -122,7 +124,7 @@ def _is_one_value(old: dict[str, Any], new: dict[str, Any]) -> bool:
 
 
 def _keyed(items: list[Any]) -> dict[str, Any] | None:
-    """Return a list of things with ids, or else names, by these; None for a list of anything else."""
+    """Return a list of items by id, or by name; None if the items have neither."""
     for key in ("id", "name"):
         if all(isinstance(item, dict) and item.get(key) for item in items):
             found = {item[key]: item for item in items}
@@ -132,7 +134,7 @@ def _keyed(items: list[Any]) -> dict[str, Any] | None:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value for JSON, without the whole source of an object type."""
+    """Return a value for JSON, with the number of lines in place of a source or script."""
     if isinstance(value, _Text):
         return f"{len(value.splitlines())} lines"
     if isinstance(value, dict):
@@ -143,7 +145,7 @@ def _plain(value: Any) -> Any:
 
 
 def describe(value: Any, names: Mapping[str, str]) -> str:
-    """Return a value in a few words, with names where it has ids."""
+    """Return a short description of a value, with names in place of ids."""
     match value:
         case dict() if frozenset(value) in WHOLE:
             return f"({', '.join(f'{float(one):g}' for one in value.values())})"

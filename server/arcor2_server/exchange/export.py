@@ -17,8 +17,8 @@ from arcor2_hw.exceptions import Conflict, NotFound
 from arcor2_server.exchange.archive import Archive, AssetFile, mesh_of, with_needed
 
 
-def chosen(listed: Iterable[Listed], wanted: str, what: str, url: str) -> str:
-    """Return the id of a document by id or name. Raise NotFound, or Conflict if a name is not unique."""
+def find_id(listed: Iterable[Listed], wanted: str, what: str, url: str) -> str:
+    """Return the id of a document given by id or name. Raise NotFound, or Conflict if the name is not unique."""
     found = [one.id for one in listed if one.id == wanted] or [one.id for one in listed if one.name == wanted]
     if not found:
         raise NotFound("the server at {url} has no {what} {wanted}", url=url, what=what, wanted=wanted)
@@ -33,8 +33,8 @@ def chosen(listed: Iterable[Listed], wanted: str, what: str, url: str) -> str:
     return found[0]
 
 
-class Source:
-    """What a server has, asked as far as it is needed. Use it while the client is connected."""
+class Exporter:
+    """Exports documents from a server. Use it while the client is connected."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
@@ -43,20 +43,20 @@ class Source:
 
     async def scene(self, wanted: str) -> Archive:
         """Export a scene, by name or id."""
-        key = chosen(await self._rest.scenes(), wanted, "scene", self._client.url)
+        key = find_id(await self._rest.scenes(), wanted, "scene", self._client.url)
         scene = await self._rest.scene(key)
-        return await self._whole(Archive("scene", scene), scene)
+        return await self._with_dependencies(Archive("scene", scene), scene)
 
     async def project(self, wanted: str) -> Archive:
         """Export a project with its scene, by name or id."""
         rest = self._rest
-        key = chosen(await rest.projects(), wanted, "project", self._client.url)
+        key = find_id(await rest.projects(), wanted, "project", self._client.url)
         project = await rest.project(key)
         try:
             scene = await rest.scene(project.scene_id)
         except NothingThere:
             raise NotFound(
-                "the scene {scene_id} of the project {name} is not there any more",
+                "the scene {scene_id} of the project {name} does not exist any more",
                 scene_id=project.scene_id,
                 name=project.name,
             ) from None
@@ -74,21 +74,21 @@ class Source:
             parameters=await rest.kept_parameters(key),
             overrides=await rest.kept_overrides(key),
         )
-        return await self._whole(archive, scene, project)
+        return await self._with_dependencies(archive, scene, project)
 
     async def object_types(self, wanted: Collection[str]) -> Archive:
-        """Export object types that were brought in, with their bases, mixins, models and meshes."""
+        """Export uploaded object types with their bases, mixins, models and meshes."""
         uploaded = await self.uploaded()
         for name in wanted:
             if name not in uploaded:
                 raise NotFound(
-                    "no object type {name} was brought into the server at {url}", name=name, url=self._client.url
+                    "the server at {url} has no uploaded object type {name}", url=self._client.url, name=name
                 )
         types = with_needed(wanted, uploaded)
         return Archive("object-type", types=types, assets=await self._assets(types, ()))
 
     async def uploaded(self) -> dict[str, ObjectTypeSource]:
-        """Return the object types that were brought in, with their models."""
+        """Return the uploaded object types with their models."""
         if self._uploaded is None:
             models = {name.id: name for name in await self._rest.models()}
             self._uploaded = {}
@@ -99,7 +99,7 @@ class Source:
                 self._uploaded[listed.id] = one
         return self._uploaded
 
-    async def _whole(self, archive: Archive, scene: Scene, project: Project | None = None) -> Archive:
+    async def _with_dependencies(self, archive: Archive, scene: Scene, project: Project | None = None) -> Archive:
         uploaded = await self.uploaded()
         named = {obj.type for obj in scene.objects}
         if project is not None and not isinstance(project.project_objects_ids, Unset):
@@ -112,16 +112,15 @@ class Source:
     async def _assets(self, types: dict[str, ObjectTypeSource], robots: Iterable[str]) -> dict[str, AssetFile]:
         """Fetch the meshes of the types, and the descriptions of the robots among `robots`."""
         wanted = {mesh for one in types.values() if (mesh := mesh_of(one)) is not None}
-        among = {*robots, *types}
         for robot in await self._client.get_robot_meta():
-            if robot.type in among and not isinstance(robot.urdf_package_filename, Unset):
+            if robot.type in {*robots, *types} and not isinstance(robot.urdf_package_filename, Unset):
                 wanted.add(robot.urdf_package_filename)
-        there = {asset.id: asset for asset in await self._rest.assets()}
+        available = {asset.id: asset for asset in await self._rest.assets()}
         assets: dict[str, AssetFile] = {}
         with tempfile.TemporaryDirectory(prefix="arcor2-export-") as directory:
-            for key in sorted(wanted & there.keys()):
+            for key in sorted(wanted & available.keys()):
                 file = Path(directory) / "asset"
                 await self._rest.download_asset(key, file)
-                name = there[key].file_name
+                name = available[key].file_name
                 assets[key] = AssetFile(file.read_bytes(), "" if isinstance(name, Unset) else name)
         return assets

@@ -19,21 +19,21 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, Conflict, DeviceTimeout, InvalidPackage
 from arcor2_server.exchange.archive import Archive, AssetFile, with_needed
-from arcor2_server.exchange.export import Source
+from arcor2_server.exchange.export import Exporter
 from arcor2_server.exchange.rollback import Rollback
-from arcor2_server.exchange.validation import Known, find
+from arcor2_server.exchange.validation import Known, find_problems
 
 Part = Literal["all", "scene", "project", "types", "assets"]
-"""What of an export may take the place of something else on the server."""
+"""The part of an export that may overwrite items on the server."""
 Verb = Literal["new", "replaced", "same"]
-SHADOWS: Final = "takes the place of the installed type until it is removed"
+SHADOWS: Final = "hides the installed type until it is removed"
 _UNTIMED: Final[dict[str, Any]] = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
 GREETING_TIMEOUT: Final = 5.0
-"""Time limit for the greeting of the server, which tells what is open, s."""
+"""Time limit for the greeting of the server, which contains the open document, s."""
 
 
 class Step(Data, frozen=True):
-    """One thing of an export, what happens to it on the server, and what else the user should know."""
+    """One item of an export, and what the import does with it. `notice`: further information for the user."""
 
     verb: Verb
     kind: str
@@ -42,21 +42,21 @@ class Step(Data, frozen=True):
 
 
 def renamed(archive: Archive, name: str) -> Archive:
-    """Return the export as a copy, whose document has another name and a new id."""
+    """Return a copy of the export, whose document has another name and a new id."""
     if archive.project is not None:
         return replace(archive, project=replace(archive.project, id=new_id("pro"), name=name))
     if archive.scene is not None:
         return replace(archive, scene=replace(archive.scene, id=new_id("scn"), name=name))
-    raise InvalidPackage("an object type cannot be brought in under another name")
+    raise InvalidPackage("an object type cannot be imported under another name")
 
 
-class Target:
-    """A server that an export is brought into."""
+class Importer:
+    """Imports an export into a server."""
 
     def __init__(self, client: Client, archive: Archive, overwrite: Collection[Part]) -> None:
         self._client = client
         self._rest = client.rest
-        self._source = Source(client)
+        self._exporter = Exporter(client)
         self._archive = archive
         self._overwrite = overwrite
         self._conflicts: list[str] = []
@@ -69,7 +69,9 @@ class Target:
     async def plan(self, installed: list[SourceFile]) -> list[Step]:
         """Return the steps of the import without changing anything.
 
-        Raise InvalidPackage naming the first invalid entry, or Conflict naming all conflicts.
+        Raises:
+            InvalidPackage: An entry is invalid; the message names the first one.
+            Conflict: Items differ and may not be overwritten; the message names all of them.
         """
         archive = self._archive
         await self._check(installed)
@@ -87,24 +89,24 @@ class Target:
     async def _check(self, installed: list[SourceFile]) -> None:
         archive, client = self._archive, self._client
         metas = self._metas = {meta.type: meta for meta in await client.get_object_types()}
-        uploaded = await self._source.uploaded()
+        uploaded = await self._exporter.uploaded()
         used = set() if archive.scene is None else {obj.type for obj in archive.scene.objects}
         actions = {
             name: {action.name: action for action in await client.get_actions(name)}
             for name in used & metas.keys() - archive.types.keys()
         }
         robots = {robot.type: robot for robot in await client.get_robot_meta()}
-        # Sources that are there already may be what those of the export import.
-        there = [_file(one) for name, one in uploaded.items() if name not in archive.types]
+        # Sources of the export may import sources on the server.
+        on_server = [_file(one) for name, one in uploaded.items() if name not in archive.types]
         local = [file for file in installed if file.name not in uploaded]
-        known = Known(archive, [*local, *there], metas, actions, robots)
-        for finding in find(archive, known, [asset.id for asset in await self._rest.assets()]):
+        known = Known(archive, [*local, *on_server], metas, actions, robots)
+        for finding in find_problems(archive, known, [asset.id for asset in await self._rest.assets()]):
             if finding.level == "error":
                 raise InvalidPackage("{entry}: {text}", entry=finding.entry, text=finding.text)
 
-    def _may(self, part: Part, what: str) -> None:
+    def _check_overwrite(self, part: Part, what: str) -> None:
         if not {part, "all"} & set(self._overwrite):
-            self._conflicts.append(f"{what} is there already and differs (--overwrite {part} would replace it).")
+            self._conflicts.append(f"{what} exists and differs. Use --overwrite {part} to replace it.")
 
     def _note(self, kind: str, name: str, same: bool, new: bool, notice: str = "") -> None:
         step = Step("same" if same else "new" if new else "replaced", kind, name, notice)
@@ -113,50 +115,50 @@ class Target:
             self._work.append(step)
 
     async def _plan_assets(self, assets: dict[str, AssetFile]) -> None:
-        there = {asset.id for asset in await self._rest.assets()}
+        existing = {asset.id for asset in await self._rest.assets()}
         with tempfile.TemporaryDirectory(prefix="arcor2-import-") as directory:
             for key, asset in assets.items():
                 same = False
-                if key in there:
+                if key in existing:
                     file = Path(directory) / "asset"
                     await self._rest.download_asset(key, file)
                     with file.open("rb") as content:
-                        theirs = hashlib.file_digest(content, "sha256").digest()
-                    same = theirs == hashlib.sha256(asset.content).digest()
+                        digest = hashlib.file_digest(content, "sha256").digest()
+                    same = digest == hashlib.sha256(asset.content).digest()
                     if not same:
-                        self._may("assets", f"The asset {key}")
-                self._note("asset", key, same, key not in there)
+                        self._check_overwrite("assets", f"The asset {key}")
+                self._note("asset", key, same, key not in existing)
 
     async def _plan_types(self, types: dict[str, ObjectTypeSource]) -> None:
-        there = await self._source.uploaded()
+        existing = await self._exporter.uploaded()
         for name in types:
-            new, old = types[name], there.get(name)
+            new, old = types[name], existing.get(name)
             same = old is not None and (old.source, old.model) == (new.source, new.model)
             if old is not None and not same:
-                self._may("types", f"The object type {name}")
+                self._check_overwrite("types", f"The object type {name}")
             shadows = old is None and name in self._metas
             self._note("object type", name, same, old is None, SHADOWS if shadows else "")
 
     async def _plan_document(
-        self, kind: Literal["scene", "project"], given: Scene | Project, there: list[Listed]
+        self, kind: Literal["scene", "project"], given: Scene | Project, existing: list[Listed]
     ) -> None:
         old: Scene | Project | None = None
-        if any(one.id == given.id for one in there):
+        if any(one.id == given.id for one in existing):
             if kind == "scene":
                 old = self._old_scene = await self._rest.scene(given.id)
             else:
                 old = self._old_project = await self._rest.project(given.id)
-        if any(one.name == given.name and one.id != given.id for one in there):
-            self._conflicts.append(f"Another {kind} is named {given.name}: bring this one in with --name.")
+        if any(one.name == given.name and one.id != given.id for one in existing):
+            self._conflicts.append(f"Another {kind} is named {given.name}. Use --name to import this one.")
         same = old is not None and replace(old, **_UNTIMED) == replace(given, **_UNTIMED)
         if kind == "project" and same:
             same = await self._same_attachments(given.id)
         if old is not None and not same:
-            self._may(kind, f"The {kind} {old.name}")
+            self._check_overwrite(kind, f"The {kind} {old.name}")
         self._note(kind, given.name, same, old is None)
 
     async def _same_attachments(self, key: str) -> bool:
-        """Return whether the script, parameters and overrides of the project are equal, too."""
+        """Return whether the script, parameters and overrides stored next to the project are equal."""
         archive, rest = self._archive, self._rest
         if archive.script is not None:
             try:
@@ -165,11 +167,11 @@ class Target:
             except NothingThere:
                 if archive.script:
                     return False
-        kept = await rest.kept_parameters(key), await rest.kept_overrides(key)
-        return kept == (archive.parameters, archive.overrides)
+        stored = await rest.kept_parameters(key), await rest.kept_overrides(key)
+        return stored == (archive.parameters, archive.overrides)
 
     async def _check_open(self) -> None:
-        """Refuse to change an open document: saving it later would silently undo the import."""
+        """Add a conflict for an open document, since saving it later would undo the import."""
         try:
             greeting = await self._client.next_event(timeout=GREETING_TIMEOUT)
         except DeviceTimeout:
@@ -182,34 +184,34 @@ class Target:
         changed = {step.kind for step in self._work}
         for kind, given in (("scene", self._archive.scene), ("project", self._archive.project)):
             if given is not None and kind in changed and any(one.id == given.id for one in opened):
-                self._conflicts.append(f"The {kind} {given.name} is open there: close it first.")
+                self._conflicts.append(f"The {kind} {given.name} is open on the server. Close it first.")
 
-    # -------------------------------------------------------------------------------- done
-    async def carry_out(self) -> None:
-        """Run the planned steps in the order of references; undo them if one fails.
+    # -------------------------------------------------------------------------------- run
+    async def run(self) -> None:
+        """Run the planned steps, referenced items first; undo them if one fails.
 
-        The error names what was undone, and what could not be.
+        The message of the error names what was undone, and what could not be undone.
         """
         rollback = Rollback()
         try:
             with tempfile.TemporaryDirectory(prefix="arcor2-import-") as directory:
                 try:
-                    await self._carry_out(rollback, Path(directory))
+                    await self._run(rollback, Path(directory))
                 except BaseException as error:
-                    told = await rollback.run()
-                    if isinstance(error, Arcor2Error) and told:
-                        Arcor2Error.__init__(error, f"{error} {told}", error.detail)
+                    outcome = await rollback.run()
+                    if isinstance(error, Arcor2Error) and outcome:
+                        Arcor2Error.__init__(error, f"{error} {outcome}", error.detail)
                     raise
         finally:
             self._work.clear()
 
-    async def _carry_out(self, rollback: Rollback, directory: Path) -> None:
+    async def _run(self, rollback: Rollback, directory: Path) -> None:
         archive = self._archive
         work = {(step.kind, step.name) for step in self._work}
-        there = {asset.id: asset for asset in await self._rest.assets()}
+        existing = {asset.id: asset for asset in await self._rest.assets()}
         for number, (key, asset) in enumerate(archive.assets.items()):
             if ("asset", key) in work:
-                await self._put_asset(rollback, key, asset, there.get(key), directory / str(number))
+                await self._put_asset(rollback, key, asset, existing.get(key), directory / str(number))
         for name in _bases_first(archive.types):
             if ("object type", name) in work:
                 await self._put_type(rollback, archive.types[name])
@@ -219,19 +221,19 @@ class Target:
         if project is not None and ("project", project.name) in work:
             await self._put_project(rollback, project)
 
-    async def _put_asset(self, rollback: Rollback, key: str, asset: AssetFile, old: Asset | None, kept: Path) -> None:
+    async def _put_asset(self, rollback: Rollback, key: str, asset: AssetFile, old: Asset | None, copy: Path) -> None:
         rest = self._rest
         if old is None:
             rollback.before_step(f"asset {key}", lambda: rest.delete_asset(key))
         else:
-            await rest.download_asset(key, kept)
+            await rest.download_asset(key, copy)
             name = key if isinstance(old.file_name, Unset) else old.file_name
-            rollback.before_step(f"asset {key}", lambda: rest.upload_asset(key, kept, file_name=name, replace=True))
+            rollback.before_step(f"asset {key}", lambda: rest.upload_asset(key, copy, file_name=name, replace=True))
         await rest.upload_asset(key, asset.content, file_name=asset.file_name or key, replace=True)
 
     async def _put_type(self, rollback: Rollback, one: ObjectTypeSource) -> None:
         rest, name = self._rest, one.id
-        old = (await self._source.uploaded()).get(name)
+        old = (await self._exporter.uploaded()).get(name)
         what = f"object type {name}"
         model, old_model = _model(one), None if old is None else _model(old)
         if model is not None:
@@ -286,5 +288,5 @@ def _file(one: ObjectTypeSource) -> SourceFile:
 
 
 def _bases_first(types: dict[str, ObjectTypeSource]) -> list[str]:
-    """Return the types in the order of their imports, as far as they are acyclic."""
+    """Sort the types so that imported ones come first, unless imports are cyclic."""
     return sorted(types, key=lambda name: len(with_needed([name], types)))

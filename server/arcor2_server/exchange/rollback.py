@@ -8,34 +8,31 @@ from arcor2_hw.exceptions import Arcor2Error
 
 
 class Rollback:
-    """Each thing that is about to be done, with what takes it back; where it was not done, that does nothing."""
+    """The steps of an import with the calls that undo them. Undoing a step that was not done has no effect."""
 
     def __init__(self) -> None:
         self._done: list[tuple[str, Callable[[], Awaitable[Any]]]] = []
 
     def before_step(self, what: str, undo: Callable[[], Awaitable[Any]]) -> None:
-        """Note the next step, since its outcome is unknown if its answer is lost."""
+        """Note a step before it is done, since its outcome is unknown if its answer is lost."""
         self._done.append((what, undo))
 
     async def run(self) -> str:
-        """Undo all steps in reverse order; return a sentence that names what was undone, and what could not be."""
-        undone: list[str] = []
-        left: list[str] = []
+        """Undo all steps in reverse order; return sentences that name what was undone, and what could not be undone."""
+        results: dict[str, bool] = {}
         while self._done:
             what, undo = self._done.pop()
+            succeeded = True
             try:
                 await undo()
             except NothingThere:
-                pass  # it was not done, or what it hangs on has gone
+                pass  # the step was not done, or its parent is undone
             except Arcor2Error:
-                if what not in left:
-                    left.append(what)
-                continue
-            if what not in undone:
-                undone.append(what)
-        told = []
-        if undone := [what for what in reversed(undone) if what not in left]:
-            told.append(f"Taken back: {', '.join(undone)}.")
-        if left:
-            told.append(f"Could not be taken back: {', '.join(reversed(left))}; to end it, import the file again.")
-        return " ".join(told)
+                succeeded = False
+            results[what] = succeeded and results.get(what, True)
+        undone = [what for what in reversed(results) if results[what]]
+        failed = [what for what in reversed(results) if not results[what]]
+        text = f"Undone: {', '.join(undone)}." if undone else ""
+        if failed:
+            text += f" Could not be undone: {', '.join(failed)}. Import the file again to replace it."
+        return text.strip()

@@ -19,9 +19,12 @@ from arcor2_server.exchange.archive import PROJECT, SCENE, SCRIPT, Archive, mesh
 
 
 class Finding(Data, frozen=True):
-    """What is wrong, and where: the file in the export and the entry in it.
+    """A problem of an export.
 
-    level: an error keeps it from being opened or run; a note does not (a program that is not finished yet).
+    Attributes:
+        entry: The file in the export and the entry in it.
+        text: The problem.
+        level: An error prevents the document from being opened or run. A note does not (an unfinished program).
     """
 
     entry: str
@@ -30,9 +33,14 @@ class Finding(Data, frozen=True):
 
 
 class Known:
-    """Object types as those of the export and the installed ones say, else as the server that they go to says.
+    """The object types of the export, the installed ones, and those of the importing server.
 
-    elsewhere: what the server knows: metadata, actions by type, and robots.
+    Args:
+        archive: The export, whose types take precedence.
+        installed: Sources of installed types.
+        elsewhere: Metadata of the types on the server.
+        actions: Actions of these types.
+        robots: Metadata of the robot types on the server.
     """
 
     def __init__(
@@ -65,7 +73,7 @@ class Known:
         raise NotFound("The object type {type_name} has no action {name!r}.", type_name=type_name, name=name)
 
     def robot_meta(self, name: str) -> RobotMeta:
-        """Return the features of a robot type; raise NotFound when it is none."""
+        """Return the features of a robot type. Raise NotFound if the type is not a robot."""
         if not self._from_elsewhere(name):
             return self.candidates.robot_meta(name)
         try:
@@ -74,9 +82,9 @@ class Known:
             raise NotFound("The object type {name} is no robot.", name=name) from None
 
 
-def find(archive: Archive, types: Known, assets: Iterable[str] | None = None) -> Iterator[Finding]:
+def find_problems(archive: Archive, types: Known, assets: Iterable[str] | None = None) -> Iterator[Finding]:
     """Return the problems of an export. `assets`: ids that exist on the server; None without a server."""
-    there = {*archive.assets, *(assets or ())}
+    available = {*archive.assets, *(assets or ())}
     for name, one in archive.types.items():
         analysis = types.candidates.analysis(name)
         if analysis.problem is not None:
@@ -86,7 +94,7 @@ def find(archive: Archive, types: Known, assets: Iterable[str] | None = None) ->
                 why = "" if isinstance(action.problem, Unset) else f": {action.problem}"
                 yield Finding(f"object_types/{name}.{action.name}", f"The action cannot be used{why}", "note")
         mesh = mesh_of(one)
-        if mesh is not None and mesh not in there:
+        if mesh is not None and mesh not in available:
             text = f"The mesh needs the asset {mesh!r}, which is missing."
             yield Finding(
                 f"data/models of {name}", text, "note" if archive.from_package and assets is None else "error"
@@ -114,13 +122,13 @@ def _document_findings(archive: Archive, types: Known) -> Iterator[tuple[str, st
             document, _, inner = entry.partition(".")
             yield _titled(SCENE if document == "scene" else PROJECT, inner, names), text
         yield from _logic(project)
-    yield from _ids_twice(SCENE, [scene.id, *(obj.id for obj in scene.objects)])
+    yield from _duplicate_ids(SCENE, [scene.id, *(obj.id for obj in scene.objects)])
     if project is not None:
         ids = [project.id, *(one.id for one in project.parameters), *(item.id for item in project.logic)]
         for point in project.action_points:
             ids += [point.id, *(one.id for one in point.orientations), *(one.id for one in point.robot_joints)]
             ids += [action.id for action in point.actions]
-        yield from _ids_twice(PROJECT, ids)
+        yield from _duplicate_ids(PROJECT, ids)
 
 
 def _project_names(project: Project) -> dict[str, str]:
@@ -138,19 +146,19 @@ def _titled(path: str, entry: str, names: Mapping[str, str]) -> str:
     return f"{path}: {entry}" if name is None else f"{path}: {entry} ({name})"
 
 
-def _ids_twice(path: str, ids: list[str]) -> Iterator[tuple[str, str]]:
+def _duplicate_ids(path: str, ids: list[str]) -> Iterator[tuple[str, str]]:
     for key, count in Counter(ids).items():
         if not key:
             yield path, "An entry has no id."
         elif count > 1:
-            yield path, f"The id {key} is given to {count} entries."
+            yield path, f"{count} entries have the id {key}."
 
 
 def _logic(project: Project) -> Iterator[tuple[str, str]]:
     known = {action.id for point in project.action_points for action in point.actions}
     for index, item in enumerate(project.logic):
         for place in {item.start.partition("/")[0], item.end.partition("/")[0]} - {START, END} - known:
-            yield f"{PROJECT}: logic[{index}]", f"The step leads from or to an action {place}, which is not there."
+            yield f"{PROJECT}: logic[{index}]", f"The connection leads from or to action {place}, which does not exist."
 
 
 def _program(archive: Archive, scene: Scene, project: Project, types: Known, errors: bool) -> Iterator[Finding]:
@@ -163,6 +171,6 @@ def _program(archive: Archive, scene: Scene, project: Project, types: Known, err
         try:
             script.from_logic(scene, project, types.candidates.facts(scene))
         except NotFound:
-            return  # a type of the server's alone: it is asked when it builds
+            return  # a type that only the server has; the server checks it at the build
         except Arcor2Error as error:
-            yield Finding(f"{PROJECT}: logic", f"It cannot be built yet: {error}", "note")
+            yield Finding(f"{PROJECT}: logic", f"The project cannot be built yet: {error}", "note")

@@ -257,7 +257,7 @@ def test_what_differs_is_named_and_replaced_only_when_it_may_be(cli: Any, place:
     refused = cli("project", "import", "other.zip", at=place.second)
     assert refused.status == ExitStatus.CONFLICT
     for what in ("The asset crate_mesh", "The object type Crate", "The scene bench", "The project open it"):
-        assert f"{what} is there already and differs" in refused.err
+        assert f"{what} exists and differs" in refused.err
     partly = cli("project", "import", "other.zip", "--overwrite", "types", "--overwrite", "assets", at=place.second)
     assert (partly.status, "The object type" in partly.err, "The scene bench" in partly.err) == (17, False, True)
     compared = cli("project", "diff", "open it", "other.zip", at=place.second)
@@ -297,8 +297,8 @@ def test_what_differs_is_named_and_replaced_only_when_it_may_be(cli: Any, place:
     open_there = cli("project", "import", "other.zip", "--overwrite", "all", at=place.second)
     place.loop.run(leave())
     assert open_there.status == ExitStatus.CONFLICT
-    assert "The scene bench is open there: close it first." in open_there.err
-    assert "The project open it is open there: close it first." in open_there.err
+    assert "The scene bench is open on the server. Close it first." in open_there.err
+    assert "The project open it is open on the server. Close it first." in open_there.err
 
 
 async def _whole(client: Client, directory: Path) -> Any:
@@ -343,16 +343,16 @@ def test_what_fails_on_the_way_is_taken_back(
     failed = cli("project", "import", "other.zip", "--overwrite", "all", at=place.second)
     assert failed.status == ExitStatus.FAILED
     taken = "asset crate_mesh, object type Crate, object type Wall, scene bench, project open it"
-    assert f"The disk is full. Taken back: {taken}." in failed.err
+    assert f"The disk is full. Undone: {taken}." in failed.err
     assert picture() == before
 
     # What was new goes.
     monkeypatch.setattr(Rest, "put_kept_overrides", fails)
     failed = cli("project", "import", "out.zip", "--name", "copy", at=place.second)
-    assert "Taken back: project copy." in failed.err
+    assert "Undone: project copy." in failed.err
     assert picture() == before
 
-    # What cannot be taken back is named.
+    # What cannot be undone is named.
     async def gone(rest: Rest, scene: Any) -> None:
         monkeypatch.setattr(Rest, "put_scene", put_again)
         await put_scene(rest, scene)
@@ -364,8 +364,8 @@ def test_what_fails_on_the_way_is_taken_back(
     monkeypatch.setattr(Rest, "put_kept_overrides", fails)
     monkeypatch.setattr(Rest, "put_scene", gone)
     failed = cli("project", "import", "other.zip", "--overwrite", "all", at=place.second)
-    assert "Taken back: asset crate_mesh, object type Crate, object type Wall, project open it." in failed.err
-    assert "Could not be taken back: scene bench; to end it, import the file again." in failed.err
+    assert "Undone: asset crate_mesh, object type Crate, object type Wall, project open it." in failed.err
+    assert "Could not be undone: scene bench. Import the file again to replace it." in failed.err
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
     assert cli("project", "import", "out.zip", "--overwrite", "all", at=place.second).status == 0
@@ -485,18 +485,18 @@ BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
     "one id for two": (
         "data/project.json",
         lambda project: project["logic"][1].update(id=project["logic"][0]["id"]),
-        "is given to 2 entries",
+        "2 entries have the id",
     ),
     "another scene": (
         "data/project.json",
         lambda project: project.update(scene_id="scn_other"),
         "data/project.json: scene_id: The project open it belongs to another scene than bench",
     ),
-    "no id": ("data/scene.json", lambda scene: scene.update(id="a/b"), "data/scene.json: 'a/b' is no usable id"),
+    "no id": ("data/scene.json", lambda scene: scene.update(id="a/b"), "data/scene.json: 'a/b' is not a valid id"),
     "a later format": (
         "export.json",
         lambda head: head.update(format=2),
-        "export.json: format 2 is of another version",
+        "export.json: format 2 is not supported",
     ),
     "an asset that is not there": (
         "export.json",
@@ -511,7 +511,7 @@ BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
     "a source from outside": (
         "export.json",
         lambda head: head["types"].update({"data/scene.json": "Crate"}),
-        "export.json: 'data/scene.json' cannot hold an object type 'Crate'",
+        "export.json: 'data/scene.json' is not the file of an object type 'Crate'",
     ),
     "a model of another type": (
         "data/models/crate.json",
@@ -618,7 +618,7 @@ def test_a_program_that_is_not_finished_is_sound_with_a_note(cli: Any, exported:
     repacked(exported, Path("unfinished.zip"), changed("data/project.json", lambda project: project["logic"].pop()))
     checked = cli("project", "validate", "unfinished.zip")
     assert checked.status == 0
-    assert "note: unfinished.zip: data/project.json: logic: It cannot be built yet: " in checked.out
+    assert "note: unfinished.zip: data/project.json: logic: The project cannot be built yet: " in checked.out
 
 
 def test_a_token_is_needed_where_one_is_asked_for_and_a_certificate_trusted(
