@@ -4,8 +4,7 @@ from typing import Any
 
 import pytest
 
-# The clock comes before the check for leaks: its thread lives as long as the process.
-pytest_plugins = ["pytester", "tests.own_time", "tests.leaks"]
+pytest_plugins = ["pytester", "tests.leaks"]
 
 
 TIMED = ("tests/drivers/", "tests/fakes/", "tests/objects/", "tests/runtime/", "tests/testing/", "tests/e2e/")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from arcor2_hw.exceptions import DeviceError
+from arcor2_hw.testing.own_time import own_time
 
 POLL: Final = 0.01
 SLACK: Final = 0.5
@@ -40,11 +41,11 @@ def left_behind(before: set[str]) -> set[str]:
 
 def wait_until(holds: Callable[[], bool], within: float, what: str) -> float:
     """Wait until a condition holds and return the time it took in s. Fail after `within` s."""
-    began = time.monotonic()
+    began = own_time()
     while not holds():
-        assert time.monotonic() - began < within, f"{what}: not within {within:g} s"
+        assert own_time() - began < within, f"{what}: not within {within:g} s"
         time.sleep(POLL)
-    return time.monotonic() - began
+    return own_time() - began
 
 
 def stays(holds: Callable[[], bool], seconds: float, what: str) -> None:
@@ -57,11 +58,11 @@ def stays(holds: Callable[[], bool], seconds: float, what: str) -> None:
 
 def timed(call: Callable[[], Any], within: float, what: str) -> Any:
     """Call and return the result. Fail when it took longer than `within` s plus the slack."""
-    began = time.monotonic()
+    began = own_time()
     try:
         return call()
     finally:
-        took = time.monotonic() - began
+        took = own_time() - began
         assert took <= within + SLACK, f"{what} took {took:.2f} s, not {within:g} s at most"
 
 
@@ -110,6 +111,8 @@ class BackgroundCall:
 
     def outcome(self, within: float, what: str) -> BaseException | None:
         """Wait for the end and return the raised error. Fail when the call does not end in time."""
-        self._thread.join(within + SLACK)
+        began = own_time()
+        while not self.over and own_time() - began < within + SLACK:
+            self._thread.join(POLL)
         assert self.over, f"{what} has not ended within {within:g} s"
         return self.error

@@ -3,7 +3,6 @@
 import asyncio
 import os
 import signal
-import time
 from collections.abc import AsyncIterator
 from typing import get_args
 
@@ -21,11 +20,11 @@ from arcor2_hw.compute.worker import function_of
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
+from arcor2_hw.testing.own_time import own_time
 from arcor2_server.compute import process
 from arcor2_server.compute import workers as compute_module
 from arcor2_server.compute.process import ComputeProcess, error_of
 from arcor2_server.compute.workers import Compute
-from tests.own_time import own_time
 
 KNOWN = [Position(0, 0, 0), Position(1, 0, 0), Position(0, 1, 0), Position(1, 1, 0)]
 
@@ -217,10 +216,10 @@ async def test_large_pictures_do_not_block_the_server(compute: Compute) -> None:
     late: list[float] = []
 
     async def tick() -> None:
-        before = time.perf_counter()
+        before = own_time()
         while True:
             await asyncio.sleep(0.001)
-            now = time.perf_counter()
+            now = own_time()
             late.append(now - before)
             before = now
 

@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from arcor2_hw.testing.own_time import own_time
+
 
 class Doing:
     """A call on a thread of its own; `result` gives its result or raises its error."""
@@ -25,8 +27,10 @@ class Doing:
         self._thread.start()
 
     def result(self, within: float = 30.0) -> Any:
-        self._thread.join(within)
-        assert not self._thread.is_alive(), f"still busy after {within} s"
+        began = own_time()
+        while self._thread.is_alive():
+            self._thread.join(0.01)
+            assert own_time() - began < within, f"still busy after {within} s"
         if self._error is not None:
             raise self._error
         return self._value

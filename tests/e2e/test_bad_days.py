@@ -16,8 +16,8 @@ from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import Project
 from arcor2_hw.exceptions import ConnectionLost
+from arcor2_hw.testing.own_time import own_time
 from tests.e2e.harness import Cell, alive, kill, running_cell, scene_state, until
-from tests.own_time import own_time
 
 pytestmark = [pytest.mark.timeout(180), pytest.mark.alone]
 

@@ -13,8 +13,8 @@ from arcor2_hw.kinematics.errors import GoalInCollision, NoPath, OnlyInCollision
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array, Box, Sphere
 from arcor2_hw.planning.planner import Planner
+from arcor2_hw.testing.own_time import own_time
 from tests.kinematics import kin_robots
-from tests.own_time import own_time
 
 READY = np.array((0.0, -1.57, 1.57, -1.57, -1.57, 0.0))
 ACROSS = np.array((np.pi - 0.4, -1.57, 1.57, -1.57, -1.57, 0.0))

@@ -13,7 +13,7 @@ import pytest
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected
 from arcor2_hw.objects.modbus_link import ModbusLink
-from tests.own_time import own_time
+from arcor2_hw.testing.own_time import own_time
 
 Script = Callable[[bytes], bytes | None]
 """Gives the answer to a request, or None for none."""

@@ -17,7 +17,7 @@ from arcor2_hw.data.project import Action, ActionPoint, NamedOrientation, Projec
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.runtime import messages as m
-from tests.own_time import own_time
+from arcor2_hw.testing.own_time import own_time
 
 from .conftest import HostProcess, Package, scene_object
 

@@ -12,7 +12,7 @@ from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import SceneObjectOverride
 from arcor2_hw.data.secret import ObjectSecrets, new_reference
 from arcor2_hw.runtime import messages as m
-from tests.own_time import own_time
+from arcor2_hw.testing.own_time import own_time
 
 from .conftest import HostProcess, open_scene, scene_object, type_code
 

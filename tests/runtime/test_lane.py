@@ -9,7 +9,7 @@ import pytest
 
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout
 from arcor2_hw.runtime.lane import Job, Lane, on_any_lane
-from tests.own_time import own_time
+from arcor2_hw.testing.own_time import own_time
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_a_late_answer_is_dropped_and_the_lane_is_usable_again(lane: Lane) -> No
     began = own_time()
     with pytest.raises(DeviceTimeout, match="still busy with slow"):
         lane.call("next", lambda: 1, deadline=5.0)
-    assert own_time() - began < 0.05
+    assert own_time() - began < 1.0
     gate.set()
     deadline = time.monotonic() + 5
     while lane.hung and time.monotonic() < deadline:

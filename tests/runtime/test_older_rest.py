@@ -18,7 +18,7 @@ from arcor2_hw.data.object_type import ActionMetadata
 from arcor2_hw.exceptions import DeviceError
 from arcor2_hw.runtime.older import json as older_json
 from arcor2_hw.runtime.older import rest
-from tests.own_time import own_time
+from arcor2_hw.testing.own_time import own_time
 
 
 class Service(ThreadingHTTPServer):

@@ -48,14 +48,22 @@ class Carrier:
             raise type(e)(f"{self.name} on {self.carrier}: {e}", e.detail) from e
 
     # -------------------------------------------------------------------------------- life
-    def connect(self, timeout: float) -> None:
-        """Wait until the carrier is there and connected. Raises NotFound, InvalidData, NotConnected."""
+    def connect(self, timeout: float, check: Callable[[], None]) -> None:
+        """Wait until the carrier is connected and `check` passes.
+
+        A carrier whose connection is lost during the check is waited for, too: it reports the loss a little later.
+
+        Raises:
+            NotConnected: The carrier was not connected within `timeout` s.
+            NotFound, InvalidData: There is no such carrier, or it does not pass the check.
+        """
         until = time.monotonic() + timeout
         while True:
             try:
                 self._found = self._look()
+                check()
                 return
-            except NotConnected as e:
+            except (NotConnected, ConnectionLost) as e:
                 left = until - time.monotonic()
                 if left <= 0.0:
                     raise NotConnected(

@@ -61,22 +61,24 @@ class SuctionGripper(Suction):
         if self.connection is Connection.ONLINE:
             return
         self._failed = True
-        carrier, chosen = self._carrier, self._set
         try:
-            carrier.connect(timeout)
-            carrier.require_holding(chosen.vacuum_output)
-            if chosen.blow_output:
-                carrier.require(chosen.blow_output, PointDirection.OUTPUT, PointKind.DIGITAL)
-            if chosen.part_input:
-                carrier.require(chosen.part_input, PointDirection.INPUT, PointKind.DIGITAL)
-            if chosen.vacuum_input:
-                carrier.require(chosen.vacuum_input, PointDirection.INPUT, PointKind.ANALOG)
-            carrier.read(chosen.vacuum_output)
+            self._carrier.connect(timeout, self._check_points)
         except Arcor2Error:
-            carrier.disconnect()
+            self._carrier.disconnect()
             raise
         self._failed = False
-        self._was_back = carrier.connection is Connection.BACK
+        self._was_back = self._carrier.connection is Connection.BACK
+
+    def _check_points(self) -> None:
+        carrier, chosen = self._carrier, self._set
+        carrier.require_holding(chosen.vacuum_output)
+        if chosen.blow_output:
+            carrier.require(chosen.blow_output, PointDirection.OUTPUT, PointKind.DIGITAL)
+        if chosen.part_input:
+            carrier.require(chosen.part_input, PointDirection.INPUT, PointKind.DIGITAL)
+        if chosen.vacuum_input:
+            carrier.require(chosen.vacuum_input, PointDirection.INPUT, PointKind.ANALOG)
+        carrier.read(chosen.vacuum_output)
 
     def disconnect(self) -> None:
         """Let go of the carrier; the vacuum stays as it is."""

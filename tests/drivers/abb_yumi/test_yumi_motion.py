@@ -10,7 +10,7 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Joint, MoveEnd
 from arcor2_hw.exceptions import Cancelled, InvalidData, NotFound, NotInControl, OutOfRange, Refused
-from tests.own_time import own_time
+from arcor2_hw.testing.own_time import own_time
 
 from .conftest import Doing, FakeYumi, under_way
 

@@ -25,8 +25,8 @@ from arcor2_hw.exceptions import (
     Refused,
 )
 from arcor2_hw.objects import Code, NoRead
+from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 on_both = pytest.mark.parametrize("fake", ["pty", "tcp"], indirect=True)
 
@@ -272,7 +272,7 @@ def test_unplugged_while_idle_is_noticed(
     fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]
 ) -> None:
     fake.control.do("unplug")
-    wait_for(lambda: reader.connection, lambda state: state is Connection.LOST, within=1.0)
+    wait_for(lambda: reader.connection, lambda state: state is Connection.LOST)
     fake.control.do("plug")
     wait_for(lambda: reader.connection, lambda state: state is Connection.BACK)
 
@@ -392,7 +392,7 @@ def test_a_killed_owner_leaves_no_reading(
         process.kill()
         process.wait()
     killed = own_time()
-    wait_for(lambda: not fake.truth()["reading"], within=2.0)
+    wait_for(lambda: not fake.truth()["reading"])
     assert own_time() - killed < BarcodeReader.loss_reaction.within
     fake.control.do("present", code="AFTER")
     reader = make(fake.ready["port"])

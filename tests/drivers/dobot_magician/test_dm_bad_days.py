@@ -16,10 +16,10 @@ from arcor2_drivers.dobot_magician.dobot_magician import DobotMagician
 from arcor2_drivers.dobot_magician.frames import encode
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl, Refused
+from arcor2_hw.testing.own_time import own_time
 from tests.drivers.busy import BUSY, stall
 from tests.drivers.dobot_magician.test_dm_working import in_background, joints
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 
 def ptp(x: float, mode: int = 4) -> bytes:

@@ -9,9 +9,9 @@ import pytest
 from arcor2_drivers.erp.erp_service import ErpService
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, ConnectionLost, DeviceError, NotConnected, OutOfRange, Refused
+from arcor2_hw.testing.own_time import own_time
 from tests.drivers.erp.conftest import Waiting
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 NONE = (False, "", "", 0, 0)
 

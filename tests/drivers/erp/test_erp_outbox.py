@@ -7,9 +7,9 @@ import pytest
 from arcor2_drivers.erp.erp_service import ErpService
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import DeviceTimeout
+from arcor2_hw.testing.own_time import own_time
 from tests.drivers.erp.conftest import serials
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
 from arcor2_hw.data.device import Connection, Health, Identity
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, NotFound, NotInControl, Refused, SafetyStop
 from arcor2_hw.objects import MachineCommand, MachineState, UnitMode
+from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 READS = {2, 3, 4, 43}
 """Function codes that change nothing."""

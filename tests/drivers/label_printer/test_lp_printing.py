@@ -20,8 +20,8 @@ from arcor2_hw.exceptions import (
     Refused,
 )
 from arcor2_hw.testing.life import BackgroundCall
+from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 on_both = pytest.mark.parametrize("fake", ["tcp", "pty"], indirect=True)
 LABEL = "^XA^FO10,10^A0N,30^FDby hand^FS^XZ"

@@ -23,8 +23,8 @@ from arcor2_hw.exceptions import (
     Stale,
 )
 from arcor2_hw.testing.life import BackgroundCall
+from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 from .conftest import PATIENCE
 
@@ -110,7 +110,7 @@ def test_a_power_cycle_is_a_loss_and_the_exposure_is_set_again(fake: FakeProcess
     wait(lambda: camera.connection is Connection.BACK)
     assert fake.truth()["exposure"] == pytest.approx(0.005)
     frame = camera.trigger()  # its clock has begun anew; ages are right all the same
-    assert time.monotonic() - frame.monotonic < 0.5
+    assert time.monotonic() - frame.monotonic < 2.0
 
 
 @pytest.mark.parametrize("fault", ["half_frame", "garbage", "wrong_checksum", "reset"])

@@ -11,7 +11,7 @@ from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected
 from arcor2_hw.objects import observing
 from arcor2_hw.objects.observing import Observing
-from tests.own_time import own_time
+from arcor2_hw.testing.own_time import own_time
 
 
 class Line:

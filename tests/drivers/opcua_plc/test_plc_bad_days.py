@@ -20,10 +20,10 @@ from arcor2_hw.exceptions import (
     Stale,
 )
 from arcor2_hw.objects.edges import Edge
+from arcor2_hw.testing.own_time import own_time
 from tests.drivers.benches.opcua_plc_bench import ORPHAN
 from tests.drivers.opcua_plc.conftest import HANDSHAKE, POINTS, BackgroundCall
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 UP = (Connection.ONLINE, Connection.BACK)
 

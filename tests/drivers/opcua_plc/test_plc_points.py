@@ -13,9 +13,9 @@ from arcor2_drivers.opcua_plc.settings import OpcUaPlcSettings
 from arcor2_hw.data.device import Connection, Health, Quality
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, OutOfRange, Refused
 from arcor2_hw.objects.edges import Edge
+from arcor2_hw.testing.own_time import own_time
 from tests.drivers.opcua_plc.conftest import HANDSHAKE, BackgroundCall
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 URL = "opc.tcp://127.0.0.1:4840"
 

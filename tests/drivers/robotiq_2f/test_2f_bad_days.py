@@ -10,10 +10,10 @@ from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl
 from arcor2_hw.objects.small import GripperState
+from arcor2_hw.testing.own_time import own_time
 from tests.drivers.robotiq_2f.conftest import make_ready
 from tests.drivers.robotiq_2f.test_2f_gripping import in_background
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 
 def test_nobody_there(make: Callable[..., Robotiq2F]) -> None:

@@ -18,10 +18,10 @@ from arcor2_drivers.robotiq_2f.status import Activation, Command, Object, Status
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl
 from arcor2_hw.objects.small import GripperState
+from arcor2_hw.testing.own_time import own_time
 from tests.drivers.robotiq_2f.conftest import make_ready
 from tests.drivers.robotiq_2f.test_2f_gripping import in_background
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 
 @pytest.fixture(scope="module")

@@ -23,8 +23,8 @@ from arcor2_hw.exceptions import (
     Refused,
     Stale,
 )
+from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 on_both = pytest.mark.parametrize("fake", ["pty", "tcp"], indirect=True)
 
@@ -180,7 +180,7 @@ def test_unplugged_and_plugged_again(fake: FakeProcess, scale: MtSicsScale, wait
     scale.tare()
     before = [word for word in fake.truth()["received"] if word in ("T", "Z", "@")]
     fake.control.do("unplug")
-    wait_for(lambda: scale.connection, lambda state: state is Connection.LOST, within=2.0)
+    wait_for(lambda: scale.connection, lambda state: state is Connection.LOST)
     assert scale.health is Health.FAILURE
     with pytest.raises(ConnectionLost, match=fake.ready["port"]):
         scale.weigh()

@@ -26,8 +26,8 @@ from arcor2_hw.exceptions import (
     Refused,
     Stale,
 )
+from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 from .conftest import Doing, moving, standing
 

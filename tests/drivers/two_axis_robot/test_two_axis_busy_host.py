@@ -13,9 +13,9 @@ import pytest
 from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Cancelled, NotInControl
+from arcor2_hw.testing.own_time import own_time
 from tests.drivers.busy import BUSY, stall
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 from .conftest import Doing, moving, standing
 from .test_two_axis_bad_days import FAR, KILLED
@@ -57,7 +57,7 @@ def test_a_frozen_owner_stops_the_servos_within_what_is_declared(
     os.kill(owner.pid, signal.SIGSTOP)
     time.sleep(BUSY)
     assert trips(fake) == 0
-    fake.control.wait_until(standing, within=2.0)
+    fake.control.wait_until(standing)
     assert own_time() - began < TwoAxisRobot.loss_reaction.within
     assert trips(fake) == 2
 
@@ -65,7 +65,7 @@ def test_a_frozen_owner_stops_the_servos_within_what_is_declared(
 def test_a_killed_owner_stops_the_servos_at_once(fake: FakeProcess, owner: "subprocess.Popen[bytes]") -> None:
     owner.kill()
     began = own_time()
-    fake.control.wait_until(standing, within=2.0)
+    fake.control.wait_until(standing)
     assert own_time() - began < 0.4 + 0.3  # the watchdog of its settings, and what a busy machine adds
 
 

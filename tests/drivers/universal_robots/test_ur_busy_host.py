@@ -12,8 +12,8 @@ import pytest
 from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_hw.data.device import LossKind
 from arcor2_hw.exceptions import Cancelled, ConnectionLost
+from arcor2_hw.testing.own_time import own_time
 from tests.drivers.busy import BUSY, stall
-from tests.own_time import own_time
 
 from .conftest import Doing, FakeUr, moving, wait
 

@@ -9,7 +9,7 @@ import pytest
 
 from arcor2_drivers.universal_robots.dashboard import Dashboard
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected, Refused
-from tests.own_time import own_time
+from arcor2_hw.testing.own_time import own_time
 
 GREETING = b"Connected: Universal Robots Dashboard Server\n"
 Answer = Callable[[socket.socket, bytes], None]

@@ -17,7 +17,7 @@ from arcor2_fakes.ur.language import parse
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import MoveEnd
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, NotInControl, OutOfRange, Refused, SafetyStop
-from tests.own_time import own_time
+from arcor2_hw.testing.own_time import own_time
 
 from .conftest import Doing, FakeUr, make, moving, wait
 

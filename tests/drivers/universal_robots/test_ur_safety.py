@@ -18,7 +18,7 @@ from arcor2_hw.exceptions import (
     Refused,
     SafetyStop,
 )
-from tests.own_time import own_time
+from arcor2_hw.testing.own_time import own_time
 
 from .conftest import Doing, FakeUr, make, moving, wait
 

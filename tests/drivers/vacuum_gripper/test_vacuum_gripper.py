@@ -25,9 +25,9 @@ from arcor2_hw.exceptions import (
     Refused,
     Stale,
 )
+from arcor2_hw.testing.own_time import own_time
 from tests.drivers.around import Carrier
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 from .conftest import Make
 

@@ -14,8 +14,8 @@ import pytest
 from arcor2_fakes.abb_yumi.arm import Motion
 from arcor2_fakes.abb_yumi.kinematics import HOME, LIMITS, Kinematics, NotReachable, quaternion
 from arcor2_fakes.abb_yumi.protocol import Rejected, framed, parsed
+from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 HOST = "127.77.3.1"
 RWS, LEFT, RIGHT = 8080, 6101, 6111

@@ -8,8 +8,8 @@ import pytest
 import serial
 
 from arcor2_fakes.control import ControlError
+from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
-from tests.own_time import own_time
 
 
 class Host:

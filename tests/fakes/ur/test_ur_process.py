@@ -13,7 +13,7 @@ import psutil
 import pytest
 
 from arcor2_fakes.control import BlockingControlClient, ControlError, parse_address
-from tests.own_time import own_time
+from arcor2_hw.testing.own_time import own_time
 
 
 class RtdeSocket:

@@ -17,10 +17,10 @@ from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.project import Action, ActionPoint, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidPackage, NotFound
+from arcor2_hw.testing.own_time import own_time
 from arcor2_server.errors import RequestRefused
 from arcor2_server.storage import packages as packages_module
 from arcor2_server.storage.packages import Packages
-from tests.own_time import own_time
 from tests.runtime.conftest import Package, scene_object
 
 from .conftest import Recorder, Server, serving

@@ -14,9 +14,9 @@ from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.testing.own_time import own_time
 from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc import operation as _operation  # noqa: F401 - for its handlers
-from tests.own_time import own_time
 
 from .conftest import Recorder, Server, action, robot_meta, serving
 

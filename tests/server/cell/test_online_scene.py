@@ -22,9 +22,9 @@ from arcor2_hw.data.project import (
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import ConnectionLost
+from arcor2_hw.testing.own_time import own_time
 from arcor2_server.errors import RequestRefused
 from arcor2_server.hosts.process import CellError
-from tests.own_time import own_time
 from tests.runtime.conftest import scene_object
 
 from .conftest import Recorder, Server, action, robot_meta, serving

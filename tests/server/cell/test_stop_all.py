@@ -12,9 +12,9 @@ from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
 from arcor2_hw.data.rpc import StopAllData, StopKind
 from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.testing.own_time import own_time
 from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc import operation as _operation  # noqa: F401 - for its handlers
-from tests.own_time import own_time
 from tests.runtime.conftest import Package, scene_object
 
 from .conftest import Server, action, serving

@@ -12,8 +12,8 @@ from pathlib import Path
 import psutil
 import pytest
 
+from arcor2_hw.testing.own_time import own_time
 from arcor2_server.cli.exit_status import ExitStatus
-from tests.own_time import own_time
 from tests.server.core import serving
 from tests.server.core.serving import COMMAND, ServerProcess, running, talking
 

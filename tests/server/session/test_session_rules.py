@@ -27,13 +27,13 @@ from arcor2_hw.data.project import (
 from arcor2_hw.data.project_index import global_pose
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
+from arcor2_hw.testing.own_time import own_time
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks import project_problems, scene_problems
 from arcor2_server.documents.dependents import project_after
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.logic import check_logic_item
 from arcor2_server.documents.reparenting import changes_for_parent
-from tests.own_time import own_time
 from tests.server.session.desk import RecordedTypes
 
 RANDOM = SceneObject("rnd", "RandomActions", UNSET, [], "obj_r")
@@ -156,7 +156,7 @@ def test_eighteen_diamonds_and_a_long_chain_are_checked_in_time() -> None:
     began = own_time()
     with pytest.raises(InvalidData, match="loop"):
         add(document, step(at, "s"))
-    assert own_time() - began < 0.05  # 2**18 paths would take a second at the least
+    assert own_time() - began < 0.5  # 2**18 paths would take a second at the least
 
     names = [f"c{n}" for n in range(1000)]
     chain = branching(*names)

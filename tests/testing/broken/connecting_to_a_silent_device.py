@@ -10,5 +10,5 @@ class BrokenPress(ToyPress):
 
     def _nobody(self, timeout: float) -> Exception:
         if self._there:
-            time.sleep(timeout + 0.6)
+            time.sleep(timeout + 4.0)
         return super()._nobody(timeout)

@@ -12,5 +12,5 @@ class BrokenPress(ToyPress):
 
     def disconnect(self) -> None:
         if self._read_at and self.connection is Connection.OFFLINE:
-            time.sleep(1.6)
+            time.sleep(5.0)
         super().disconnect()

@@ -12,5 +12,5 @@ class BrokenPress(ToyPress):
 
     def _stopped(self) -> Exception:
         if self.connection is Connection.OFFLINE:
-            time.sleep(2.0)
+            time.sleep(5.0)
         return super()._stopped()

@@ -13,7 +13,7 @@ class BrokenPress(ToyPress):
     @action
     def stroke(self, *, an: str | None = None) -> None:
         """Press."""
-        until = time.monotonic() + 1.6
+        until = time.monotonic() + 5.0
         while self._acting.locked() and time.monotonic() < until:
             time.sleep(0.01)
         super().stroke()

@@ -1,0 +1,48 @@
+"""A clock for time limits that stands still while this process or its children wait for a processor.
+
+A test that a call returns within 1 s would otherwise fail next to processes that take the processor away, from the
+driver or from its fake. On an idle machine it is the ordinary clock; on the busiest it runs at a tenth of the speed.
+"""
+
+import contextlib
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final, NamedTuple
+
+PROC: Final = Path("/proc")
+SLOWEST: Final = 0.1
+"""Lowest speed of the clock, so that a call that hangs is noticed on any machine."""
+
+
+class Instant(NamedTuple):
+    """A moment; the difference of two is the time between them, s, without the time spent waiting for a processor.
+
+    Attributes:
+        clock: Monotonic time, s.
+        waited: Time for which each thread of the process and its children has waited for a processor, s.
+    """
+
+    clock: float
+    waited: dict[str, float]
+
+    def __sub__(self, earlier: "Instant") -> float:
+        waited = sum(value - earlier.waited.get(thread, 0.0) for thread, value in self.waited.items())
+        elapsed = self.clock - earlier.clock
+        return max(elapsed - waited, SLOWEST * elapsed)
+
+
+def own_time() -> Instant:
+    """Return the present moment."""
+    return Instant(time.monotonic(), dict(_waited(str(os.getpid()))))
+
+
+def _waited(process: str) -> Iterator[tuple[str, float]]:
+    """Yield the threads of a process and its children, and for how many seconds each waited for a processor."""
+    with contextlib.suppress(OSError):  # the process has ended, or the kernel has no such statistics
+        for thread in (PROC / process / "task").iterdir():
+            with contextlib.suppress(OSError):
+                yield thread.name, int((thread / "schedstat").read_text().split()[1]) / 1e9
+                for child in (thread / "children").read_text().split():
+                    yield from _waited(child)
