@@ -204,12 +204,12 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         await asyncio.gather(panel.get_by_text("In progress: ").wait_for(), screen.press(texts.FIND_BY_MARKERS))
         await panel.get_by_role("list", name="Calibration history").get_by_text("known to").wait_for()
         millimetres, degrees = off(await _stands(screen, ids["eye"]), CAMERA)
-        assert millimetres < 2.0
+        assert millimetres < 3.0
         assert degrees < 0.2
         change = panel.get_by_role("group", name="Before and after")
         moved = re.search(r"Moved by ([\d.]+) mm and [\d.]+°", await change.inner_text())
         assert moved is not None
-        assert abs(float(moved[1]) - off(before, CAMERA)[0]) < 2.0
+        assert abs(float(moved[1]) - off(before, CAMERA)[0]) < 3.0
         assert await screen.faults() == []
         await screen.picture("calibrated camera")
         # Undo the calibration, and repeat it.
