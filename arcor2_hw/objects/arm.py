@@ -1,14 +1,16 @@
-"""Parts shared by arm drivers: stop guards, exclusive motions, joint checks and alarms for safety stops."""
+"""Parts shared by arm drivers: stop guards, exclusive motions, checks of arguments, and alarms for safety stops."""
 
 import contextlib
 import threading
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Final
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import Final, NoReturn
 
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Severity
+from arcor2_hw.data.geometry import Orientation
 from arcor2_hw.data.robot import Joint, Safety
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, InvalidData, NotFound, OutOfRange, Refused
+from arcor2_hw.objects.settings import within
 
 TCP: Final = "tcp"
 """Name of the only end effector of an arm."""
@@ -109,6 +111,50 @@ def check_confirmed(confirmed_by: str) -> None:
     """Raise InvalidData if `confirmed_by` is empty. It is the name of the person who inspected the robot."""
     if not confirmed_by.strip():
         raise InvalidData("confirmed_by must name the person who inspected the robot.")
+
+
+def refuse_acknowledgement(arm: str, code: str, alarms: Iterable[Alarm], action: str = "") -> NoReturn:
+    """Refuse to acknowledge an alarm that only a person at the robot can acknowledge.
+
+    Args:
+        arm: Name of the arm, for errors.
+        code: Code of the alarm.
+        alarms: Active alarms of the arm.
+        action: Method that takes the name of this person; empty: the alarm is acknowledged at the controller.
+
+    Raises:
+        NotFound: The alarm is not active.
+        Refused: It is active.
+    """
+    if code not in {alarm.code for alarm in alarms}:
+        raise NotFound(f"{arm} has no alarm {code}.")
+    if not action:
+        raise Refused(f"{code} of {arm} must be acknowledged at the controller.")
+    raise Refused(
+        f"{code} of {arm} must be acknowledged by the person who inspected the robot: {action}(confirmed_by)."
+    )
+
+
+def check_jog(
+    arm: str,
+    twist: Collection[float] | None,
+    velocities: Collection[float] | None,
+    joints: Collection[str],
+    valid_for: float,
+) -> None:
+    """Raise OutOfRange unless there is either a twist or a velocity for each joint, valid for 0.01 to 1 s."""
+    within(f"{arm}: valid_for", valid_for, 0.01, 1.0)
+    if (twist is None) == (velocities is None):
+        raise OutOfRange(f"{arm}: jog needs either twist or joint_velocities.")
+    if velocities is not None and len(velocities) != len(joints):
+        raise OutOfRange(f"{arm}: joint_velocities must have {len(joints)} numbers.")
+
+
+def jog_axes(arm: str, frame: str, axes: Mapping[str, Orientation]) -> Orientation:
+    """Return the axes of a frame in which an arm is jogged. Raise Refused unless `axes` contains it."""
+    if frame not in axes:
+        raise Refused(f"{arm} cannot be jogged in frame {frame!r}. Use {', '.join(axes)}.")
+    return axes[frame]
 
 
 class SafetyAlarm:

@@ -1,6 +1,5 @@
 """DobotMagician: the object type of the Dobot Magician, composed of observer, control and motion."""
 
-import time
 from typing import ClassVar, Final
 
 from arcor2_hw.actions import StrEnum, action
@@ -8,13 +7,13 @@ from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Control as ControlMode
-from arcor2_hw.data.robot import Joint, Mode, MoveResult, Power, ProgramState, RobotState, RobotType, Safety
+from arcor2_hw.data.robot import Joint, Mode, Power, ProgramState, RobotState, RobotType, Safety
 from arcor2_hw.exceptions import DeviceError, DeviceFault, NotFound, OutOfRange, Refused
-from arcor2_hw.objects import HoldsParts, Robot
-from arcor2_hw.objects.arm import TCP, StopGuard, check_end_effector, named_joints
-from arcor2_hw.objects.connected import Connected
+from arcor2_hw.keep_alive import once_within
+from arcor2_hw.objects import HoldsParts
+from arcor2_hw.objects.arm import StopGuard, check_end_effector, named_joints
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
-from arcor2_hw.objects.surroundings import Surroundings
+from arcor2_hw.objects.single_arm import SingleArm
 
 from . import alarms
 from .control import Control
@@ -40,7 +39,7 @@ class DobotMoveType(StrEnum):
 _MODES: Final = {DobotMoveType.LINEAR: LINE_TO_POSE, DobotMoveType.JOINT: JOINT_TO_POSE, DobotMoveType.JUMP: JUMP}
 
 
-class DobotMagician(HoldsParts, Connected, Robot):
+class DobotMagician(HoldsParts, SingleArm):
     """Dobot Magician: four axes, 0.5 kg, 320 mm, with suction cup or gripper."""
 
     _ABSTRACT = False
@@ -63,15 +62,10 @@ class DobotMagician(HoldsParts, Connected, Robot):
         self._control = Control(self._observer, settings, self._move_lock)
         self._motion = Motion(self, self._observer, self._control, settings, self._move_lock)
         self._observer.on_lost = self.on_lost  # type: ignore[method-assign]
-        self.safe_moves = self._motion.safe
+        self.safe_moves, self.motions = self._motion.safe, self._motion.log
         self.keep_connection(self._observer.who, self._observer.observing)
 
     # -------------------------------------------------------------------------------- connection and control
-    def surround(self, surroundings: Surroundings) -> None:
-        """Store the access to objects around the arm, and load its model."""
-        super().surround(surroundings)
-        self.safe_moves.prepare()
-
     def on_lost(self, error: DeviceError) -> None:
         """End control."""
         self._control.drop()
@@ -163,10 +157,6 @@ class DobotMagician(HoldsParts, Connected, Robot):
             self._motion.obstacles(sample),
         )
 
-    def get_end_effectors_ids(self) -> set[str]:
-        """Return the only end effector."""
-        return {TCP}
-
     def get_end_effector_pose(self, end_effector: str) -> Pose:
         """Return the tool in the world, by the arm's own kinematics. Raise NotFound, NotConnected or Stale."""
         check_end_effector(self.name, end_effector)
@@ -193,11 +183,6 @@ class DobotMagician(HoldsParts, Connected, Robot):
         return self._dobot.max_tcp_speed
 
     # -------------------------------------------------------------------------------- motion
-    @property
-    def last_move(self) -> MoveResult | None:
-        """Return the result of the last motion."""
-        return self._motion.last
-
     def check_if_ready_to_move(self) -> None:
         """Raise what prevents the arm from moving."""
         self._motion.check_ready()
@@ -376,10 +361,7 @@ class DobotMagician(HoldsParts, Connected, Robot):
             actual = self._observer.get(command, "2B")
         if actual != wanted:
             raise DeviceFault("{what} did not switch.", f"sent {wanted}, read {actual}", what=what)
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            guard.check(what)
-            time.sleep(POLL)
+        once_within(lambda: guard.check(what), seconds, POLL)
         if on:
             self.attach_part(hanging=command is Command.SUCTION_CUP)
         else:

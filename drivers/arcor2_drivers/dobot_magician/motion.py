@@ -8,9 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.robot import MoveEnd, MoveResult
 from arcor2_hw.exceptions import (
-    Cancelled,
     ConnectionLost,
     DeviceError,
     DeviceFault,
@@ -22,6 +20,7 @@ from arcor2_hw.objects import Robot
 from arcor2_hw.objects.arm import StopGuard, exclusive_motion, named_joints
 from arcor2_hw.objects.safe_moves import SafeMoves
 from arcor2_hw.objects.settings import within
+from arcor2_hw.objects.single_arm import MotionLog, move_around_obstacles, on_free_line
 
 from . import alarms, kinematics
 from .control import Control
@@ -56,7 +55,7 @@ class Motion:
         self._lock = motion_lock
         self._who = observer.who
         self.safe = SafeMoves(robot)
-        self.last: MoveResult | None = None
+        self.log = MotionLog(self._tcp)
 
     # -------------------------------------------------------------------------------- kinematics
     def world(self, tool: Tool) -> Pose:
@@ -99,40 +98,38 @@ class Motion:
         with exclusive_motion(self._lock, self._robot.name):
             yield
 
-    def to_pose(self, pose: Pose, mode: int, speed: float, guard: StopGuard) -> MoveResult:
+    def to_pose(self, pose: Pose, mode: int, speed: float, guard: StopGuard) -> None:
         """Move the tool to a pose."""
         self._check_speed(speed)
         tool, q = self.solve(pose)
         with self._exclusive():
-            return self._to_tool(tool, q, mode, speed, guard)
+            self._to_tool(tool, q, mode, speed, guard)
 
-    def to_joints(self, q: Joints, speed: float, guard: StopGuard) -> MoveResult:
+    def to_joints(self, q: Joints, speed: float, guard: StopGuard) -> None:
         """Move to joint values; all joints arrive together."""
         self._check_speed(speed)
         with self._exclusive():
-            return self._to_angles(q, speed, guard)
+            self._to_angles(q, speed, guard)
 
     def line_safely(self, pose: Pose, speed: float, guard: StopGuard) -> None:
         """Move in a line. Raise PathBlocked if it collides."""
         self._check_speed(speed)
         tool, q = self.solve(pose)
-        with self._exclusive():
-            (end_effector,) = self._robot.get_end_effectors_ids()
-            path = self.safe.line(end_effector, self._robot.robot_joints(), pose)
-            path.require_begin(self._robot.name, self._robot.robot_joints())
-            with self.safe.monitored(path):
-                self._to_tool(tool, q, LINE_TO_POSE, speed, guard)
+        with self._exclusive(), on_free_line(self._robot, self.safe, pose):
+            self._to_tool(tool, q, LINE_TO_POSE, speed, guard)
 
     def go_around(self, q: Joints, speed: float, guard: StopGuard) -> None:
         """Move to joint values around obstacles, stopping at each waypoint: the path is straight in joint space."""
         self._check_speed(speed)
         with self._exclusive():
-            goal = named_joints(JOINTS, q)
-            path = self.safe.to_joints(self._robot.robot_joints(), goal, speed, stopped=guard.stopped)
-            path.require_begin(self._robot.name, self._robot.robot_joints())
-            with self.safe.monitored(path):
-                for waypoint in path.waypoints[1:]:
-                    self._to_angles(kinematics.values(self._robot.name, waypoint), speed, guard)
+            move_around_obstacles(
+                self._robot,
+                self.safe,
+                named_joints(JOINTS, q),
+                speed,
+                guard,
+                lambda waypoint: self._to_angles(kinematics.values(self._robot.name, waypoint), speed, guard),
+            )
 
     def home(self, guard: StopGuard) -> None:
         """Reference the axes."""
@@ -142,7 +139,7 @@ class Motion:
     def _check_speed(self, speed: float) -> None:
         within(f"{self._who}: speed", speed, SLOWEST, 1.0)
 
-    def _to_tool(self, tool: Tool, q: Joints, mode: int, speed: float, guard: StopGuard) -> MoveResult:
+    def _to_tool(self, tool: Tool, q: Joints, mode: int, speed: float, guard: StopGuard) -> None:
         start = self._observer.sample()
         budget = max(self._joint_time(start.q, q, speed), self._line_time(start.tool, tool, speed))
         if mode == JUMP:
@@ -154,16 +151,16 @@ class Motion:
 
         what = "a linear move" if mode == LINE_TO_POSE else "a move"
         numbers = (*(value * 1000.0 for value in tool[:3]), math.degrees(tool.r))
-        return self._run(what, speed, budget, reached, guard, Command.PTP, "B4f", mode, *numbers)
+        self._run(what, speed, budget, reached, guard, Command.PTP, "B4f", mode, *numbers)
 
-    def _to_angles(self, q: Joints, speed: float, guard: StopGuard) -> MoveResult:
+    def _to_angles(self, q: Joints, speed: float, guard: StopGuard) -> None:
         budget = self._joint_time(self._observer.sample().q, q, speed)
 
         def reached(sample: Sample) -> bool:
             return max(abs(a - b) for a, b in zip(sample.q, q, strict=True)) < ANGLE_REACHED
 
         angles = map(math.degrees, q)
-        return self._run("a joint move", speed, budget, reached, guard, Command.PTP, "B4f", JOINT_TO_ANGLES, *angles)
+        self._run("a joint move", speed, budget, reached, guard, Command.PTP, "B4f", JOINT_TO_ANGLES, *angles)
 
     def _joint_time(self, start: Joints, end: Joints, speed: float) -> float:
         angle = max(abs(a - b) for a, b in zip(start, end, strict=True))
@@ -184,7 +181,7 @@ class Motion:
         command: Command,
         layout: str,
         *values: float,
-    ) -> MoveResult:
+    ) -> None:
         """Put a motion into the empty queue, start it, and wait until it is observed to have ended."""
         started, what = time.monotonic(), f"{what} of {self._who}"
         with self._control.commands:
@@ -193,14 +190,12 @@ class Motion:
             self._observer.set(Command.PTP_COMMON, "2f", speed * 100.0, speed * 100.0)
             index = self._observer.queue(command, layout, *values)
             self._observer.set(Command.QUEUE_START)
-        try:
+        with self.log.recorded(speed, self._await_standstill):
             self._wait_done(what, index, started + budget, reached, guard)
-        except Cancelled:
-            with contextlib.suppress(DeviceError):  # the caller of `stop` receives it
-                self._control.wait_rest()
-            self._record(speed, started, MoveEnd.STOPPED)
-            raise
-        return self._record(speed, started, MoveEnd.DONE)
+
+    def _await_standstill(self) -> None:
+        with contextlib.suppress(DeviceError):  # the caller of `stop` receives it
+            self._control.wait_rest()
 
     def _wait_done(
         self, what: str, index: int, deadline: float, reached: Callable[[Sample], bool], guard: StopGuard
@@ -228,11 +223,9 @@ class Motion:
             self._control.send_stop()
             raise DeviceTimeout("{what} did not end within the computed time. It was stopped.", what=what) from e
 
-    def _record(self, speed: float, started: float, end: MoveEnd) -> MoveResult:
+    def _tcp(self) -> Pose:
         newest = self._observer.newest()
-        pose = self.world(newest.tool) if newest is not None else self._robot.pose
-        self.last = MoveResult(pose, speed, time.monotonic() - started, end)
-        return self.last
+        return self.world(newest.tool) if newest is not None else self._robot.pose
 
 
 def _time(way: float, speed: float, acceleration: float) -> float:

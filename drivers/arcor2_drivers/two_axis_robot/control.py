@@ -8,8 +8,8 @@ from typing import Final
 
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Severity
-from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, NotInControl, Refused
-from arcor2_hw.keep_alive import TOO_SLOW
+from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotInControl, Refused
+from arcor2_hw.keep_alive import TOO_SLOW, once_within
 from arcor2_hw.objects.arm import StopCounter, check_confirmed
 
 from . import registers as reg
@@ -174,15 +174,10 @@ class Control:
 
     def wait_rest(self, timeout: float) -> None:
         """Wait for standstill. Raise DeviceTimeout."""
-        until = time.monotonic() + timeout
-        while self.ours and not self._observer.fresh().value.standing:
-            if time.monotonic() > until:
-                raise DeviceTimeout(
-                    "{name} did not come to a standstill within {timeout:g} s of a stop.",
-                    name=self.name,
-                    timeout=timeout,
-                )
-            time.sleep(POLL)
+        if not once_within(lambda: not self.ours or self._observer.fresh().value.standing, timeout, POLL):
+            raise DeviceTimeout(
+                "{name} did not come to a standstill within {timeout:g} s of a stop.", name=self.name, timeout=timeout
+            )
 
     # -------------------------------------------------------------------------------- hand teaching
     def set_teaching(self, enabled: bool) -> None:
@@ -212,17 +207,6 @@ class Control:
                     found[code] = Alarm(code, Severity.ERROR, f"servo {number}: {text}", remedy, since)
         self._since = {code: alarm.since for code, alarm in found.items()}
         return list(found.values())
-
-    def acknowledge(self, code: str) -> None:
-        """Raise Refused: only a named person can acknowledge a hardware error. Raise NotFound for an inactive alarm."""
-        if code not in {alarm.code for alarm in self.alarms()}:
-            raise NotFound("{name} has no alarm {code}.", name=self.name, code=code)
-        raise Refused(
-            "Alarm {code} of {name} must be acknowledged by the person who inspected the robot: "
-            "restart_safety(confirmed_by).",
-            code=code,
-            name=self.name,
-        )
 
     def check_faults(self, state: State) -> None:
         """Raise DeviceFault if a servo has a hardware error."""

@@ -8,13 +8,22 @@ from collections.abc import Sequence
 from typing import Final
 
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.data.robot import Joint, MoveEnd, MoveResult
+from arcor2_hw.data.robot import Joint, MoveEnd
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotInControl, OutOfRange, Refused
 from arcor2_hw.keep_alive import RunningTime
 from arcor2_hw.objects import Robot
-from arcor2_hw.objects.arm import TCP, StopGuard, exclusive_motion, joint_values, named_joints
+from arcor2_hw.objects.arm import (
+    TCP,
+    StopGuard,
+    check_jog,
+    exclusive_motion,
+    jog_axes,
+    joint_values,
+    named_joints,
+)
 from arcor2_hw.objects.safe_moves import SafeMoves
 from arcor2_hw.objects.settings import within
+from arcor2_hw.objects.single_arm import MotionLog, move_around_obstacles
 
 from . import kinematics
 from . import registers as reg
@@ -47,19 +56,13 @@ class Motion:
     def __init__(
         self, robot: Robot, observer: Observer, control: Control, settings: TwoAxisRobotSettings, lock: threading.Lock
     ) -> None:
-        self._robot, self._observer, self._control, self._settings, self._lock = (
-            robot,
-            observer,
-            control,
-            settings,
-            lock,
-        )
-        self._name = robot.name
+        self._robot, self._observer, self._control = robot, observer, control
+        self._settings, self._lock, self._name = settings, lock, robot.name
         self._links = settings.link_1, settings.link_2
         self._directions = settings.direction_1, settings.direction_2
         self.limits = {"joint_1": (settings.lower_1, settings.upper_1), "joint_2": (settings.lower_2, settings.upper_2)}
         self.safe = SafeMoves(robot)
-        self.last: MoveResult | None = None
+        self.log = MotionLog(self._tcp)
 
     # -------------------------------------------------------------------------------- kinematics
     def present(self) -> Angles:
@@ -114,31 +117,32 @@ class Motion:
         """Hold the arm for one motion. Raise Refused while it moves."""
         return exclusive_motion(self._lock, self._name)
 
-    def to_joints(self, q: Angles, speed: float, acceleration: float, guard: StopGuard) -> MoveResult:
+    def to_joints(self, q: Angles, speed: float, acceleration: float, guard: StopGuard) -> None:
         """Move to angles; both joints arrive together."""
         within(f"{self._name}: speed", speed, 0.001, 1.0)
         within(f"{self._name}: acceleration", acceleration, 0.01, 1.0)
         with self.exclusive():
-            return self._drive(q, speed, acceleration, guard)
+            self._drive(q, speed, acceleration, guard)
 
     def go_around(self, q: Angles, speed: float, guard: StopGuard) -> None:
         """Move to angles around obstacles, stopping at each waypoint: the path is straight in joint space."""
         within(f"{self._name}: speed", speed, 0.001, 1.0)
         with self.exclusive():
             self._control.require_motion()
-            joints, goal = self._robot.robot_joints(), named_joints(JOINTS, q)
-            path = self.safe.to_joints(joints, goal, speed, stopped=guard.stopped)
-            path.require_begin(self._name, self._robot.robot_joints())
-            with self.safe.monitored(path):
-                for waypoint in path.waypoints[1:]:
-                    self._drive(self.values(waypoint), speed, 1.0, guard)
+            move_around_obstacles(
+                self._robot,
+                self.safe,
+                named_joints(JOINTS, q),
+                speed,
+                guard,
+                lambda waypoint: self._drive(self.values(waypoint), speed, 1.0, guard),
+            )
 
-    def _drive(self, q: Angles, speed: float, acceleration: float, guard: StopGuard) -> MoveResult:
+    def _drive(self, q: Angles, speed: float, acceleration: float, guard: StopGuard) -> None:
         self._control.require_motion()
         goals = to_ticks(q[0], self._directions[0]), to_ticks(q[1], self._directions[1])
         self._check_servo_limits(goals)
         start = self._observer.fresh().value
-        started = time.monotonic()
         top, ramp = speed * self._settings.max_joint_speed, acceleration * self._settings.joint_acceleration
         distances = [abs(goal - servo.position) * reg.TICK for goal, servo in zip(goals, start.servos, strict=True)]
         longest = max(distances)
@@ -153,20 +157,16 @@ class Motion:
             self._check_valid("A move", guard)
             bus.sync_write(GOALS, blocks)
 
-        try:
-            self._observer.do(command)
-            self._check_accepted(goals, guard)
-            self._wait_done(goals, 1.5 * slowest + 1.0, guard)
-        except Cancelled:
-            self._control.wait_rest(REST_WITHIN)
-            self._record(speed, started, MoveEnd.STOPPED)
-            raise
-        except (DeviceFault, NotInControl):
-            with contextlib.suppress(DeviceError):  # the other servo must not continue alone
-                self._observer.do(self._control.brake, urgent=True)
-            self._record(speed, started, MoveEnd.SAFETY)
-            raise
-        return self._record(speed, started, MoveEnd.DONE)
+        with self.log.recorded(speed, lambda: self._control.wait_rest(REST_WITHIN)) as recording:
+            try:
+                self._observer.do(command)
+                self._check_accepted(goals, guard)
+                self._wait_done(goals, 1.5 * slowest + 1.0, guard)
+            except (DeviceFault, NotInControl):
+                with contextlib.suppress(DeviceError):  # the other servo must not continue alone
+                    self._observer.do(self._control.brake, urgent=True)
+                recording.end = MoveEnd.SAFETY
+                raise
 
     def _check_valid(self, what: str, guard: StopGuard) -> None:
         guard.check(f"{what} of {self._name}")
@@ -223,29 +223,21 @@ class Motion:
                 )
             time.sleep(POLL)
 
-    def _record(self, speed: float, started: float, end: MoveEnd) -> MoveResult:
+    def _tcp(self) -> Pose:
         newest = self._observer.newest()
-        pose = self.world(self._angles(newest)) if newest is not None else self._robot.pose  # None: disconnected
-        self.last = MoveResult(pose, speed, time.monotonic() - started, end)
-        return self.last
+        return self.world(self._angles(newest)) if newest is not None else self._robot.pose  # None: disconnected
 
     # -------------------------------------------------------------------------------- jogging
     def jog(
         self, twist: Sequence[float] | None, velocities: Sequence[float] | None, frame: str, valid_for: float
     ) -> None:
         """Move with a velocity that expires: the goals are where the servos stop afterwards."""
-        within(f"{self._name}: valid_for", valid_for, 0.01, 1.0)
-        if (twist is None) == (velocities is None):
-            raise OutOfRange("{name}: jog needs either twist or joint_velocities.", name=self._name)
+        check_jog(self._name, twist, velocities, JOINTS, valid_for)
         guard, until = self._control.stops.guard(), time.monotonic() + valid_for
         with self.exclusive():
             self._control.require_motion()
             state = self._observer.current().value
             rates = self._rates(twist, frame, self._angles(state)) if twist is not None else list(velocities or ())
-            if len(rates) != len(JOINTS):
-                raise OutOfRange(
-                    "{name}: joint_velocities must have {count} numbers.", name=self._name, count=len(JOINTS)
-                )
             top, blocks = self._settings.max_joint_speed, {}
             for joint, rate in enumerate(rates):
                 within(f"{self._name}: velocity of {JOINTS[joint]}", rate, -top, top)
@@ -282,12 +274,8 @@ class Motion:
             "world": self._robot.pose.orientation.inverted(),
             "base": Orientation(),
             "tool": Orientation.from_rotation_vector(0.0, 0.0, heading),
-        }.get(frame)
-        if axes is None:
-            raise Refused(
-                "{name} has no frame {frame!r} for jogging; use world, base or tool.", name=self._name, frame=frame
-            )
-        x, y, z = Position(*twist[:3]).rotated(axes)
+        }
+        x, y, z = Position(*twist[:3]).rotated(jog_axes(self._name, frame, axes))
         if abs(z) > STILL or any(abs(part) > STILL for part in twist[3:]):
             raise Refused("{name} moves in a plane, and cannot rotate its tool separately.", name=self._name)
         rates = kinematics.rates(self._links, q, x, y)

@@ -7,14 +7,12 @@ from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Control as ControlMode
-from arcor2_hw.data.robot import Joint, Mode, MoveResult, Power, ProgramState, RobotState, RobotType, Safety
+from arcor2_hw.data.robot import Joint, Mode, Power, ProgramState, RobotState, RobotType, Safety
 from arcor2_hw.exceptions import DeviceError, Refused
 from arcor2_hw.keep_alive import FROZEN_AFTER
-from arcor2_hw.objects import Robot
-from arcor2_hw.objects.arm import TCP, check_end_effector, named_joints
-from arcor2_hw.objects.connected import Connected
+from arcor2_hw.objects.arm import TCP, check_end_effector, named_joints, refuse_acknowledgement
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
-from arcor2_hw.objects.surroundings import Surroundings
+from arcor2_hw.objects.single_arm import SingleArm
 
 from .control import Control
 from .motion import JOINTS, Motion
@@ -24,7 +22,7 @@ from .settings import LONGEST_WATCHDOG, TwoAxisRobotSettings
 MODELS: Final = {1020: "XM430-W350", 1030: "XM430-W210", 1120: "XM540-W270", 1130: "XM540-W150"}
 
 
-class TwoAxisRobot(Connected, Robot):
+class TwoAxisRobot(SingleArm):
     """A planar arm of two Dynamixel servos for fine manipulation."""
 
     _ABSTRACT = False
@@ -40,15 +38,10 @@ class TwoAxisRobot(Connected, Robot):
         self._control = Control(name, self._observer, settings)
         self._motion = Motion(self, self._observer, self._control, settings, self._move_lock)
         self._observer.on_lost = self.on_lost  # type: ignore[method-assign]
-        self.safe_moves = self._motion.safe
+        self.safe_moves, self.motions = self._motion.safe, self._motion.log
         self.keep_connection(self._observer.who, self._observer.observing)
 
     # -------------------------------------------------------------------------------- connection and control
-    def surround(self, surroundings: Surroundings) -> None:
-        """Store the access to objects around the arm, and load its model."""
-        super().surround(surroundings)
-        self.safe_moves.prepare()
-
     def on_lost(self, error: DeviceError) -> None:
         """End control."""
         self._control.drop(f"the connection was lost: {error}")
@@ -81,7 +74,7 @@ class TwoAxisRobot(Connected, Robot):
 
     def acknowledge(self, code: str) -> None:
         """Raise Refused: only a named person can acknowledge a hardware error. Raise NotFound for an inactive alarm."""
-        self._control.acknowledge(code)
+        refuse_acknowledgement(self.name, code, self.alarms(), "restart_safety")
 
     def take_control(self) -> None:
         """Take control, unless we have it; the arm does not move. Raise DeviceFault, NotInControl or Refused."""
@@ -117,18 +110,6 @@ class TwoAxisRobot(Connected, Robot):
             speed_override=1.0,
             not_ready_because=missing,
         )
-
-    def get_end_effectors_ids(self) -> set[str]:
-        """Return the only end effector, the tool center point."""
-        return {TCP}
-
-    def grippers(self) -> set[str]:
-        """Return no gripper."""
-        return set()
-
-    def suctions(self) -> set[str]:
-        """Return no suction cup."""
-        return set()
 
     def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
         """Return the angles, rad. Raise Stale."""
@@ -169,11 +150,6 @@ class TwoAxisRobot(Connected, Robot):
         return named_joints(JOINTS, (self._motion.solve_free if avoid_collisions else self._motion.solve)(pose, seed))
 
     # -------------------------------------------------------------------------------- motion
-    @property
-    def last_move(self) -> MoveResult | None:
-        """Return the result of the last motion."""
-        return self._motion.last
-
     def check_if_ready_to_move(self) -> None:
         """Raise what prevents the arm from moving."""
         super().check_if_ready_to_move()

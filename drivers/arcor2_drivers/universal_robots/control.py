@@ -3,13 +3,13 @@
 import contextlib
 import logging
 import threading
-import time
 from typing import Final
 
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Control as ControlMode
 from arcor2_hw.data.robot import ProgramState
 from arcor2_hw.exceptions import Cancelled, DeviceError, NotInControl, OutOfRange, Refused, SafetyStop
+from arcor2_hw.keep_alive import once_within
 from arcor2_hw.objects.arm import StopCounter, label
 
 from .arm import Arm
@@ -214,9 +214,8 @@ class Control:
 
     def _await_samples(self) -> None:
         """Wait for two samples: the second was taken after now, and so with the tool that was sent."""
-        wanted, deadline = self._observer.samples_received + 2, time.monotonic() + TOOL_REPORTED
-        while self._observer.samples_received < wanted and time.monotonic() < deadline:
-            time.sleep(0.002)
+        wanted = self._observer.samples_received + 2
+        once_within(lambda: self._observer.samples_received >= wanted, TOOL_REPORTED, 0.002)
 
     def set_teaching(self, enabled: bool) -> None:
         """Enable or disable hand teaching. Raise Refused if the payload is not set."""

@@ -1,13 +1,12 @@
 """Digital inputs and outputs of a UR arm: actions for programs, and points for other objects of the scene."""
 
-import time
-from collections.abc import Callable
 from typing import Final
 
 from arcor2_hw.actions import action
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Reading
 from arcor2_hw.exceptions import DeviceFault, DeviceTimeout, OutOfRange, Refused
+from arcor2_hw.keep_alive import once_within
 from arcor2_hw.objects.small import IOPoint, OnLoss, PointDirection, PointKind
 
 from .control import Control
@@ -31,16 +30,6 @@ POINTS: Final = {
     else IOPoint(name, PointDirection.INPUT, PointKind.DIGITAL)
     for name in NUMBERS
 }
-
-
-def once_within(seconds: float, holds: Callable[[], bool]) -> bool:
-    """Return whether a condition becomes true in time."""
-    until = time.monotonic() + seconds
-    while not holds():
-        if time.monotonic() > until:
-            return False
-        time.sleep(POLL)
-    return True
 
 
 class DigitalIO:
@@ -85,7 +74,7 @@ class DigitalIO:
             guard.check(f"Waiting for input {number} of {self.name}")
             return self.get_digital_input(number) is value
 
-        if not once_within(timeout, seen):
+        if not once_within(seen, timeout, POLL):
             raise DeviceTimeout(
                 "Input {number} of {name} was not {value} in {timeout:g} s.",
                 number=number,
@@ -131,7 +120,7 @@ class DigitalIO:
             )
         self._control.current().set_output(output, value)
         self._on_switched(output, value)
-        if not once_within(OUTPUT_WITHIN, lambda: bool(self._observer.sample().outputs >> output & 1) is value):
+        if not once_within(lambda: self._observer.sample().outputs >> output & 1 == value, OUTPUT_WITHIN, POLL):
             raise DeviceFault(
                 "Output {output} of {name} did not switch {value}.",
                 output=output,

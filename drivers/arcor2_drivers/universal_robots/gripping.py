@@ -5,12 +5,14 @@ from typing import Final
 from arcor2_hw.actions import action
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import DeviceFault, Refused
+from arcor2_hw.keep_alive import once_within
 from arcor2_hw.objects import HoldsParts
 from arcor2_hw.objects.arm import StopGuard
 
-from .digital_io import DigitalIO, once_within
+from .digital_io import DigitalIO
 from .motion import Motion
 from .settings import UrSettings
+from .timing import POLL
 
 NOTHING_HELD: Final = "nothing_held"
 PART_LOST: Final = "part_lost"
@@ -93,7 +95,7 @@ class DigitalGripper(HoldsParts, DigitalIO):
             guard.check(f"The gripper of {self.name}")
             return self._part_sensed() is held
 
-        return once_within(self._ur.gripper_time, seen) or self._part_sensed() is None
+        return once_within(seen, self._ur.gripper_time, POLL) or self._part_sensed() is None
 
     def _check_part_held(self, when: str) -> None:
         if self._part_sensed() is False:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from arcor2_hw.data.geometry import Orientation
-from arcor2_hw.exceptions import OutOfRange, Refused
+from arcor2_hw.objects.arm import check_jog, jog_axes
 
 from .arm import Arm
 from .control import Control
@@ -24,9 +24,7 @@ class Jog:
     ) -> None:
         """Move with a twist of the TCP, or with joint velocities, for `valid_for` s. Raise OutOfRange or Refused."""
         arm, settings, guard = self._arm, self._arm.settings, self._control.stops.guard()
-        arm.within("valid_for", valid_for, 0.01, 1.0)
-        if (twist is None) == (velocities is None):
-            raise OutOfRange("{name}: jog needs either twist or joint_velocities.", name=arm.name)
+        check_jog(arm.name, twist, velocities, JOINTS, valid_for)
         with self._motion.exclusive():
             session = self._control.current()
             if twist is not None:
@@ -36,10 +34,6 @@ class Jog:
                 command, values, ramp = "speedL", [*linear, *angular], settings.tcp_acceleration
             else:
                 command, values, ramp = "speedJ", list(velocities or ()), settings.joint_acceleration
-                if len(values) != len(JOINTS):
-                    raise OutOfRange(
-                        "{name}: joint_velocities must have {count} numbers.", name=arm.name, count=len(JOINTS)
-                    )
                 limit = self._motion.joint_speed(1.0)
                 for name, value in zip(JOINTS, values, strict=True):
                     arm.within(f"velocity of {name}", value, -limit, limit)
@@ -48,14 +42,11 @@ class Jog:
     def _in_base(self, twist: Sequence[float], frame: str) -> tuple[Vector3, Vector3]:
         """Return linear and angular velocity in the controller's base."""
         base = self._arm.base.orientation.inverted()
-        orientation = {
+        axes = {
             "world": base,
             "base": base * self._arm.pose.orientation,
             "tool": Orientation.from_rotation_vector(*self._observer.sample().tcp[3:]),
-        }.get(frame)
-        if orientation is None:
-            raise Refused(
-                "{name} cannot be jogged in frame {frame!r}; use world, base or tool.", name=self._arm.name, frame=frame
-            )
+        }
+        orientation = jog_axes(self._arm.name, frame, axes)
         x, y, z, rx, ry, rz = twist
         return rotated((x, y, z), orientation), rotated((rx, ry, rz), orientation)

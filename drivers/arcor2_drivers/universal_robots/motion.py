@@ -1,7 +1,6 @@
 """Motion: moves of a UR arm by the control program, its kinematics, and stopping."""
 
 import contextlib
-import dataclasses
 import math
 import threading
 import time
@@ -9,10 +8,12 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.robot import MoveEnd, MoveResult
-from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, NotInControl, Refused, SafetyStop
+from arcor2_hw.data.robot import MoveResult
+from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, NotInControl, Refused
+from arcor2_hw.keep_alive import once_within
 from arcor2_hw.objects import Robot
 from arcor2_hw.objects.arm import StopGuard, exclusive_motion
+from arcor2_hw.objects.single_arm import MotionLog
 
 from .arm import Arm
 from .control import Control
@@ -63,7 +64,11 @@ class Motion:
     def __init__(self, arm: Arm, observer: Observer, pendant: Pendant, control: Control, lock: threading.Lock) -> None:
         self._arm, self._observer, self._pendant, self._control = arm, observer, pendant, control
         self._lock = lock
-        self.last: MoveResult | None = None
+        self.log = MotionLog(self._tcp)
+
+    def _tcp(self) -> Pose | None:
+        newest = self._observer.newest()
+        return None if newest is None else self._arm.tcp(newest)
 
     @contextlib.contextmanager
     def exclusive(self) -> Iterator[None]:
@@ -127,31 +132,11 @@ class Motion:
     def run(self, session: ControlSession, move: Move, guard: StopGuard) -> MoveResult:
         """Start an asynchronous motion and wait until it is observed to have ended."""
         number, _ = self._observer.sample().operation(session.upper)
-        with self.recorded(move.fraction, session):
+        with self.log.recorded(move.fraction, lambda: self.wait_rest(session)):
             session.do(move.name, *move.command, stopped=guard.stopped)
             self._wait_done(session, move, number, guard)
-        assert self.last is not None
-        return self.last
-
-    @contextlib.contextmanager
-    def recorded(self, fraction: float, session: ControlSession | None = None) -> Iterator["Record"]:
-        """Record the result of a motion in `last`; with a session, wait for standstill after a stop."""
-        started, record = time.monotonic(), Record()
-        try:
-            yield record
-            record.end = record.end or MoveEnd.DONE
-        except Cancelled:
-            record.end = MoveEnd.STOPPED
-            if session is not None:
-                self.wait_rest(session)
-            raise
-        except SafetyStop:
-            record.end = MoveEnd.SAFETY
-            raise
-        finally:
-            newest = self._observer.newest()
-            if record.end is not None and newest is not None:
-                self.last = MoveResult(self._arm.tcp(newest), fraction, time.monotonic() - started, record.end)
+        assert self.log.last is not None
+        return self.log.last
 
     def _wait_done(self, session: ControlSession, move: Move, number: int, guard: StopGuard) -> None:
         what = f"{move.name} of {self._arm.name}"
@@ -195,9 +180,8 @@ class Motion:
             self._control.set_teaching(False)
         self.wait_rest(session)
         self._control.note_stop(session)
-        until = time.monotonic() + REST_WITHIN
-        while session.own is not None and session.ended is None and time.monotonic() < until:
-            time.sleep(POLL)  # until the control program accepts the next command
+        # The control program accepts the next command only then.
+        once_within(lambda: session.own is None or session.ended is not None, REST_WITHIN, POLL)
 
     def wait_rest(self, session: ControlSession) -> None:
         """Wait for standstill; use the dashboard when it takes too long. Raise DeviceTimeout."""
@@ -229,13 +213,6 @@ class Motion:
                 "{name} cannot reach the pose.", f"in the controller's base: {position}", name=self._arm.name
             )
         return q
-
-
-@dataclasses.dataclass
-class Record:
-    """How a motion ended."""
-
-    end: MoveEnd | None = None
 
 
 class Budget:

@@ -152,14 +152,14 @@ class Paths:
         self._runs = (self._runs + 1) % RUN_NUMBERS
         frequency, deceleration = settings.watchdog_frequency, settings.stop_deceleration
         program = motion_program(self._runs, move.command, session.registers, frequency, tool, deceleration, limit)
-        with self._motion.recorded(move.fraction) as record:
+        with self._motion.log.recorded(move.fraction) as recording:
             port = session.play(self._runs, program, guard.stopped)
             try:
                 state = self._wait_end(session, port, what, guard, move.budget)
             finally:
                 port.close()
             if state is RunState.STOPPED:
-                record.end = MoveEnd.STOPPED
+                recording.end = MoveEnd.STOPPED
         newest = self._observer.newest()
         arrived = newest is not None and move.reached(newest)
         session.resume()
@@ -168,8 +168,8 @@ class Paths:
             raise Cancelled("{what} was stopped.", what=what)
         if state is RunState.ARRIVED and not arrived:
             raise DeviceFault("{what} ended before its target.", what=what)
-        assert self._motion.last is not None
-        return self._motion.last, state
+        assert self._motion.log.last is not None
+        return self._motion.log.last, state
 
     def _wait_end(
         self, session: ControlSession, port: ScriptPort, what: str, guard: StopGuard, budget: float

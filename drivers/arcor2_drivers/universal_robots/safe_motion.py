@@ -9,6 +9,7 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.objects import Robot
 from arcor2_hw.objects.arm import TCP, StopGuard, named_joints
 from arcor2_hw.objects.safe_moves import SafeMoves, Tool
+from arcor2_hw.objects.single_arm import move_around_obstacles, on_free_line
 
 from .arm import Arm
 from .control import Control
@@ -40,9 +41,7 @@ class SafeMotion:
             if not linear:
                 self._go_around(self._free(target, named_joints(JOINTS, q)), speed, guard)
                 return
-            path = self.moves.line(TCP, self._robot.robot_joints(), target)
-            path.require_begin(self._arm.name, self._robot.robot_joints())
-            with self.moves.monitored(path):
+            with on_free_line(self._robot, self.moves, target):
                 self._motion.run(self._control.current(), self._motion.line(vector, speed), guard)
 
     def to_joints(self, q: list[float], speed: float, guard: StopGuard) -> None:
@@ -59,13 +58,13 @@ class SafeMotion:
         return self._free(pose, joints) if avoid_collisions else joints
 
     def _go_around(self, goal: list[Joint], speed: float, guard: StopGuard) -> None:
-        """Plan a path and follow it; stop at each waypoint, because the path is checked as straight in joint space."""
-        path = self.moves.to_joints(self._robot.robot_joints(), goal, speed, stopped=guard.stopped)
-        path.require_begin(self._arm.name, self._robot.robot_joints())
-        with self.moves.monitored(path):
-            for waypoint in path.waypoints[1:]:
-                move = self._motion.joints([joint.value for joint in waypoint], speed)
-                self._motion.run(self._control.current(), move, guard)
+        """Move to joint values around obstacles."""
+
+        def move(waypoint: list[Joint]) -> None:
+            command = self._motion.joints([joint.value for joint in waypoint], speed)
+            self._motion.run(self._control.current(), command, guard)
+
+        move_around_obstacles(self._robot, self.moves, goal, speed, guard, move)
 
     def _free(self, pose: Pose, joints: list[Joint]) -> list[Joint]:
         """Return the joints for a pose in a collision-free configuration; the given ones if they are free.

@@ -1,13 +1,13 @@
 """Safety and power of a UR arm: health, alarms, and the commands that a person decides on."""
 
 import logging
-import time
 from collections.abc import Callable
 from typing import Final
 
 from arcor2_hw.data.device import Alarm, Health
 from arcor2_hw.data.robot import Safety
-from arcor2_hw.exceptions import DeviceTimeout, NotFound, Refused
+from arcor2_hw.exceptions import DeviceTimeout, Refused
+from arcor2_hw.keep_alive import once_within
 from arcor2_hw.objects.arm import SafetyAlarm, check_confirmed
 
 from .control import Control
@@ -33,7 +33,7 @@ class SafetySystem:
         self._observer, self._pendant, self._control = observer, pendant, control
         self._alarm = SafetyAlarm(REMEDIES)
 
-    def health(self) -> Health:
+    def condition(self) -> Health:
         """Return the condition of an observed arm."""
         newest = self._observer.newest()
         safety = safety_of(newest.safety_mode) if newest is not None else Safety.NORMAL
@@ -45,17 +45,6 @@ class SafetySystem:
         """Return the active safety stop, if any."""
         newest = self._observer.newest()
         return self._alarm.alarms(safety_of(newest.safety_mode) if newest is not None else Safety.NORMAL)
-
-    def acknowledge(self, code: str) -> None:
-        """Raise Refused: only a named person can acknowledge a safety stop. Raise NotFound for an inactive alarm."""
-        if code not in {alarm.code for alarm in self.alarms()}:
-            raise NotFound("{name} has no alarm {code}.", name=self._name, code=code)
-        raise Refused(
-            "{code} of {name} must be acknowledged by the person who inspected the robot: "
-            "acknowledge_protective_stop(confirmed_by).",
-            code=code,
-            name=self._name,
-        )
 
     def power_on(self) -> None:
         """Switch drive power on."""
@@ -98,16 +87,13 @@ class SafetySystem:
         return safety_of(self._observer.sample().safety_mode)
 
     def _await(self, what: str, holds: Callable[[Sample], bool], within: float) -> None:
-        until = time.monotonic() + within
-        while not holds(self._observer.sample(max_age=0.5)):
-            if time.monotonic() > until:
-                raise DeviceTimeout(
-                    "{name} did not {what} within {within:g} s. Check the pendant.",
-                    name=self._name,
-                    what=what,
-                    within=within,
-                )
-            time.sleep(POLL)
+        if not once_within(lambda: holds(self._observer.sample(max_age=0.5)), within, POLL):
+            raise DeviceTimeout(
+                "{name} did not {what} within {within:g} s. Check the pendant.",
+                name=self._name,
+                what=what,
+                within=within,
+            )
 
 
 def _is(sample: Sample, *states: Safety) -> bool:

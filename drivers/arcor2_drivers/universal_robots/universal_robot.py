@@ -3,14 +3,13 @@
 import time
 from typing import ClassVar, Final, Literal
 
-from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction
+from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint, KinematicCalibration, MoveResult, RobotState, RobotType
 from arcor2_hw.exceptions import DeviceError, OutOfRange, Refused
-from arcor2_hw.objects import Robot
-from arcor2_hw.objects.arm import TCP, check_end_effector, named_joints
+from arcor2_hw.objects.arm import TCP, check_end_effector, named_joints, refuse_acknowledgement
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
-from arcor2_hw.objects.surroundings import Surroundings
+from arcor2_hw.objects.single_arm import SingleArm
 
 from .arm import Arm
 from .control import Control
@@ -37,7 +36,7 @@ SAME_ANGLE: Final = 0.02
 """Differences between nominal model and controller with the same tool, m and rad: real ones are smaller."""
 
 
-class UniversalRobot(MoveActions, DigitalGripper, Robot):
+class UniversalRobot(MoveActions, DigitalGripper, SingleArm):
     """A Universal Robots arm."""
 
     _ABSTRACT = True
@@ -74,14 +73,10 @@ class UniversalRobot(MoveActions, DigitalGripper, Robot):
         self._jog = Jog(self._arm, self._observer, self._control, self._motion)
         self._safe = SafeMotion(self, self._arm, self._observer, self._control, self._motion)
         self._safety = SafetySystem(self._observer, self._pendant, self._control)
-        self.safe_moves = self._safe.moves
+        self.safe_moves, self.motions = self._safe.moves, self._motion.log
+        self.keep_connection(self._observer.who, self._observer.observing)
 
     # -------------------------------------------------------------------------------- connection and control
-    def surround(self, surroundings: Surroundings) -> None:
-        """Store the access to objects around the arm, and load its model."""
-        super().surround(surroundings)
-        self.safe_moves.prepare()
-
     def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
         """Observe the controller; a program continues to play. Raise NotConnected, DeviceTimeout or ConnectionLost."""
         if self._observer.observing.online:
@@ -100,17 +95,9 @@ class UniversalRobot(MoveActions, DigitalGripper, Robot):
         self._observer.observing.stop()
         self._pendant.dashboard.close()
 
-    @property
-    def connection(self) -> Connection:
-        """Return the state of the observing connection."""
-        return self._observer.observing.state
-
-    @property
-    def health(self) -> Health:
+    def condition(self) -> Health:
         """Return the condition of the arm."""
-        if self._observer.observing.online:
-            return self._safety.health()
-        return Health.FAILURE if self.connection in (Connection.LOST, Connection.FAILED) else Health.NORMAL
+        return self._safety.condition() if self._observer.observing.online else Health.NORMAL
 
     def identify(self) -> Identity:
         """Return model, serial number and version; without a dashboard server, type and version."""
@@ -147,10 +134,6 @@ class UniversalRobot(MoveActions, DigitalGripper, Robot):
             self._control.obstacles(sample, control),
         )
 
-    def get_end_effectors_ids(self) -> set[str]:
-        """Return the only end effector, the TCP."""
-        return {TCP}
-
     def get_end_effector_pose(self, end_effector: str) -> Pose:
         """Return the TCP of the settings in the world. Raise NotFound, NotConnected, ConnectionLost or Stale.
 
@@ -174,10 +157,6 @@ class UniversalRobot(MoveActions, DigitalGripper, Robot):
     def grippers(self) -> set[str]:
         """Return the gripper on a digital output, if one is set."""
         return {"gripper"} if self._ur.gripper_output >= 0 else set()
-
-    def suctions(self) -> set[str]:
-        """Return no suction cup."""
-        return set()
 
     def joint_limits(self) -> dict[str, tuple[float, float]]:
         """Return the limits of an arm as delivered, rad; its safety configuration may be narrower."""
@@ -215,11 +194,6 @@ class UniversalRobot(MoveActions, DigitalGripper, Robot):
         return self._paths.wrench()
 
     # -------------------------------------------------------------------------------- motion
-    @property
-    def last_move(self) -> MoveResult | None:
-        """Return the result of the last motion."""
-        return self._motion.last
-
     def check_if_ready_to_move(self) -> None:
         """Raise what prevents the arm from moving."""
         super().check_if_ready_to_move()
@@ -361,7 +335,7 @@ class UniversalRobot(MoveActions, DigitalGripper, Robot):
 
     def acknowledge(self, code: str) -> None:
         """Raise Refused: only a named person can acknowledge a safety stop. Raise NotFound for an inactive alarm."""
-        self._safety.acknowledge(code)
+        refuse_acknowledgement(self.name, code, self.alarms(), "acknowledge_protective_stop")
 
     def power_on(self) -> None:
         """Switch drive power on; brakes stay closed. Raise NotInControl, Refused or DeviceTimeout."""
