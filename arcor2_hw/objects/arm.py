@@ -127,11 +127,14 @@ def refuse_acknowledgement(arm: str, code: str, alarms: Iterable[Alarm], action:
         Refused: It is active.
     """
     if code not in {alarm.code for alarm in alarms}:
-        raise NotFound(f"{arm} has no alarm {code}.")
+        raise NotFound("{arm} has no alarm {code}.", arm=arm, code=code)
     if not action:
-        raise Refused(f"{code} of {arm} must be acknowledged at the controller.")
+        raise Refused("{code} of {arm} must be acknowledged at the controller.", code=code, arm=arm)
     raise Refused(
-        f"{code} of {arm} must be acknowledged by the person who inspected the robot: {action}(confirmed_by)."
+        "{code} of {arm} must be acknowledged by the person who inspected the robot: {action}(confirmed_by).",
+        code=code,
+        arm=arm,
+        action=action,
     )
 
 
@@ -145,15 +148,17 @@ def check_jog(
     """Raise OutOfRange unless there is either a twist or a velocity for each joint, valid for 0.01 to 1 s."""
     within(f"{arm}: valid_for", valid_for, 0.01, 1.0)
     if (twist is None) == (velocities is None):
-        raise OutOfRange(f"{arm}: jog needs either twist or joint_velocities.")
+        raise OutOfRange("{arm}: jog needs either twist or joint_velocities.", arm=arm)
     if velocities is not None and len(velocities) != len(joints):
-        raise OutOfRange(f"{arm}: joint_velocities must have {len(joints)} numbers.")
+        raise OutOfRange("{arm}: joint_velocities must have {count} numbers.", arm=arm, count=len(joints))
 
 
 def jog_axes(arm: str, frame: str, axes: Mapping[str, Orientation]) -> Orientation:
     """Return the axes of a frame in which an arm is jogged. Raise Refused unless `axes` contains it."""
     if frame not in axes:
-        raise Refused(f"{arm} cannot be jogged in frame {frame!r}. Use {', '.join(axes)}.")
+        raise Refused(
+            "{arm} cannot be jogged in frame {frame!r}. Use {axes}.", arm=arm, frame=frame, axes=", ".join(axes)
+        )
     return axes[frame]
 
 

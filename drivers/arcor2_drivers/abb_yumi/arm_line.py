@@ -231,13 +231,18 @@ class ArmLine:
         try:
             status = Status(found.status)
         except ValueError:
-            problem = f"{self.who} answered with the unknown status {found.status}."
-            raise DeviceFault(problem, fault_code=found.status) from None
-        what = f"{self.who}, {command.what}: {MEANING.get(status, status.name)}"
+            raise DeviceFault(
+                "{device} answered with the unknown status {status}.",
+                fault_code=found.status,
+                device=self.who,
+                status=found.status,
+            ) from None
+        template, values = "{device}, {command}: {reason}", {"device": self.who, "command": command.what}
+        values["reason"] = MEANING.get(status, status.name)
         if status in (Status.BAD_CHECK, Status.RAPID_ERROR):
             number = int(found.values[0]) if found.values else int(status)
-            raise DeviceFault(what, f"status {int(status)} {found.values}", number)
-        raise CommandRefused(what, status)
+            raise DeviceFault(template, f"status {int(status)} {found.values}", number, **values)
+        raise CommandRefused(template, status, **values)
 
     def stop(self) -> bool:
         """Stop the arm, whatever else is in progress; return whether the server confirmed standstill in time."""

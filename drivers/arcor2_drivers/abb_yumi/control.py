@@ -39,7 +39,8 @@ class Control:
         self._rws: Rws | None = None
         self._mastership = False
         self._taking = threading.Lock()
-        observer.on_sample, observer.on_lost = self._on_sample, self._on_lost
+        observer.on_sample = self._on_sample
+        observer.on_lost = self._on_lost  # type: ignore[method-assign]
 
     # -------------------------------------------------------------------------------- taking and releasing
     @property
@@ -66,8 +67,12 @@ class Control:
             self._check_takable(panel, state)
             running = read_running(rws)
             if running and not panel.ours:
-                problem = f"The RAPID program {panel.program_names} runs on {name}. Stop it before taking control."
-                raise NotInControl(problem, rws.address)
+                raise NotInControl(
+                    "The RAPID program {programs} runs on {robot}. Stop it before taking control.",
+                    rws.address,
+                    programs=panel.program_names,
+                    robot=name,
+                )
             if not panel.ours:
                 raise Refused(
                     "{name} has {program_names} loaded. Load Arcor2Left.pgf and Arcor2Right.pgf "
@@ -190,8 +195,12 @@ class Control:
                 safety=label(safety),
             )
         if panel.operation_mode != AUTOMATIC:
-            problem = f"{name} is in operating mode {panel.operation_mode}. Select automatic mode at the pendant."
-            raise NotInControl(problem, self._observer.rws.address)
+            raise NotInControl(
+                "{robot} is in operating mode {mode}. Select automatic mode at the pendant.",
+                self._observer.rws.address,
+                robot=name,
+                mode=panel.operation_mode,
+            )
 
     def _take_mastership(self, rws: Rws) -> None:
         try:
@@ -200,8 +209,12 @@ class Control:
             client = holder(rws)
             if client is None:
                 raise
-            problem = f"{client} has mastership of {self._arms.name}."
-            raise NotInControl(problem, f"{rws.address}: {e}; {e.detail}") from e
+            raise NotInControl(
+                "{client} has mastership of {robot}.",
+                f"{rws.address}: {e}; {e.detail}",
+                client=client,
+                robot=self._arms.name,
+            ) from e
         self._mastership = True
 
     def _release_mastership(self) -> None:
@@ -261,8 +274,8 @@ class Control:
 
     def _on_lost(self, error: DeviceError) -> None:
         if (session := self.session) is not None:
-            problem = f"The connection to {self._observer.who} is lost."
-            session.end(ConnectionLost(problem, str(error)), wait=False)
+            lost = ConnectionLost("The connection to {device} is lost.", str(error), device=self._observer.who)
+            session.end(lost, wait=False)
 
     def _why_stopped(self) -> DeviceError:
         """Return why the program or the motors stopped.
@@ -307,7 +320,7 @@ class Control:
             return error
         session = self.session
         with contextlib.suppress(DeviceError):
-            sample = self._observer.sample_after(time.monotonic())
+            sample = self._observer.fresh().value
             if sample.control_state != MOTORS_ON or not sample.running:
                 cause = self._why_stopped()
                 if session is not None and session.ended is error:

@@ -77,8 +77,12 @@ class Kinematics:
                     joints = self._inverse(line, tcp, described)
                     return joints, RobTarget(flange, described.configuration, described.arm_angle)
         position = ", ".join(f"{value:.3f}" for value in tcp.position)
-        problem = f"The {arm} arm of {self._arms.name} cannot reach the pose."
-        raise Robot.KinematicsException(problem, f"in the robot's frame: {position}")
+        raise Robot.KinematicsException(
+            "The {arm} arm of {robot} cannot reach the pose.",
+            f"in the robot's frame: {position}",
+            arm=arm,
+            robot=self._arms.name,
+        )
 
     @staticmethod
     def _inverse(line: ArmLine, tcp: Pose, like: RobTarget) -> list[float]:

@@ -22,6 +22,7 @@ from arcor2_hw.exceptions import (
     Refused,
     SafetyStop,
 )
+from arcor2_hw.keep_alive import once_within
 from arcor2_hw.objects.arm import StopGuard, exclusive_motion
 
 from . import nominal
@@ -213,8 +214,13 @@ class Motion:
         longest = float(np.abs(np.array(goal) - start).max())
         duration = longest / (speed * self._arms.settings.max_joint_speed) + RAMP
         if duration > LONGEST:
-            problem = f"{self._arms.name}: at speed {speed:g} the move would take {duration:.0f} s"
-            raise OutOfRange("{problem}; at most {longest:.0f} s is allowed.", problem=problem, longest=LONGEST)
+            raise OutOfRange(
+                "{robot}: at speed {speed:g} the move would take {duration:.0f} s. At most {longest:.0f} s is allowed.",
+                robot=self._arms.name,
+                speed=speed,
+                duration=duration,
+                longest=LONGEST,
+            )
         return duration
 
     def _line_time(self, arm: str, poses: list[Pose], speed: float) -> float:
@@ -304,7 +310,7 @@ class Motion:
         self, commands: dict[str, Command], speed: float, started: float, end: MoveEnd
     ) -> dict[str, MoveResult]:
         ended = time.monotonic()
-        sample = self._observer.sample_after(ended)
+        sample = self._observer.fresh().value
         results = {arm: MoveResult(self._arms.tcp(sample, arm), speed, ended - started, end) for arm in commands}
         self.last |= results
         return results
@@ -320,17 +326,17 @@ class Motion:
             return
         if not all(_stop_all([session.lines[arm] for arm in arms])) and session.ended is None:
             self._control.stop_rapid()
-        until = time.monotonic() + REST_WITHIN
-        while session.ended is None and self.in_progress(arms):
-            if time.monotonic() > until:
-                raise self._no_rest()
-            time.sleep(0.005)
+        if not once_within(lambda: session.ended is not None or not self.in_progress(arms), REST_WITHIN, 0.005):
+            raise self._no_rest()
         if session.ended is not None:
             self._await_rest(arms)
 
     def _no_rest(self) -> DeviceTimeout:
-        problem = f"{self._arms.name} did not come to a standstill within {REST_WITHIN:g} s of a stop."
-        return DeviceTimeout("{problem} Press the emergency stop.", problem=problem)
+        return DeviceTimeout(
+            "{robot} did not come to a standstill within {limit:g} s of a stop. Press the emergency stop.",
+            robot=self._arms.name,
+            limit=REST_WITHIN,
+        )
 
     def _await_rest(self, arms: tuple[str, ...]) -> None:
         """Wait for standstill of arms that were ours; without observation the watchdog stops them."""
@@ -339,16 +345,20 @@ class Motion:
             return
         until = time.monotonic() + REST_WITHIN
         with contextlib.suppress(ConnectionLost, NotConnected):
-            self._observer.sample_after(time.monotonic())
-            while max(self._observer.sample_after(time.monotonic()).speeds[arm] for arm in arms) > AT_REST:
+            self._observer.fresh()
+            while max(self._observer.fresh().value.speeds[arm] for arm in arms) > AT_REST:
                 if time.monotonic() > until:
                     raise self._no_rest()
 
     def _check_no_foreign_motion(self) -> None:
         newest, panel = self._observer.newest(), self._observer.known_panel
         if newest is not None and panel is not None and newest.moving and newest.running and not panel.ours:
-            problem = f"{self._arms.name} is being moved by {panel.program_names}. Stop it there."
-            raise NotInControl(problem, self._observer.rws.address)
+            raise NotInControl(
+                "{robot} is being moved by {programs}. Stop it there.",
+                self._observer.rws.address,
+                robot=self._arms.name,
+                programs=panel.program_names,
+            )
 
 
 def _stop_all(lines: list[ArmLine]) -> list[bool]:

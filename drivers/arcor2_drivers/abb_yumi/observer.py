@@ -1,12 +1,11 @@
 """Observation of the controller: one thread polls Robot Web Services. It never writes."""
 
-import threading
 import time
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, Refused, Stale
-from arcor2_hw.objects.observing import Observing
+from arcor2_hw.exceptions import ConnectionLost, NotConnected, Refused
+from arcor2_hw.objects.state_observer import Snapshot, StateObserver
 
 from .frames import Configuration, RobTarget, pose_from, to_radians
 from .rws import FIRST_WITHIN, Fields, Rws
@@ -20,10 +19,6 @@ FRESH: Final = 0.8
 """Greatest age of a sample, s: it takes six requests of ten ms or more each."""
 AT_REST: Final = 2e-3
 """Joint speed below which a joint is at standstill, rad/s."""
-
-
-class _Leaving(Exception):
-    """Observation ends between two requests."""
 
 
 class Holder(NamedTuple):
@@ -70,11 +65,6 @@ class Sample(NamedTuple):
     joints: dict[str, list[float]]
     targets: dict[str, RobTarget]
     speeds: dict[str, float]
-
-    @property
-    def age(self) -> float:
-        """Return the time since reading started, s."""
-        return time.monotonic() - self.monotonic
 
     @property
     def moving(self) -> bool:
@@ -169,62 +159,37 @@ def read_target(fields: Fields) -> RobTarget:
     return RobTarget(pose, configuration, to_radians([float(fields["eax_a"])])[0])
 
 
-class Observer:
-    """Observes the controller. `on_sample` and `on_lost` are called on the observing thread."""
+class Observer(StateObserver[Sample]):
+    """Observes the controller. `on_sample` is called after each reading on the observing thread."""
 
-    on_sample: Callable[[Sample], None] | None = None
-    on_lost: Callable[[DeviceError], None] | None = None
+    busy_period = 0.02
+    answers_within = 1.0
 
     def __init__(self, name: str, settings: YumiSettings) -> None:
         self.rws = Rws(name, settings.host, settings.rws_port, settings.user, settings.password)
-        self.who = self.rws.who
-        self.fresh = max(FRESH, 3.0 * settings.poll_period)
+        self.period, self.fresh_for = settings.poll_period, max(FRESH, 3.0 * settings.poll_period)
+        super().__init__(self.rws.who)
         self.version = ""
-        self._period = settings.poll_period
-        self._sample: Sample | None = None
+        self.on_sample: Callable[[Sample], None] = lambda _: None
         self._panel: Panel | None = None
-        self._received = threading.Condition()
-        self._hurry = threading.Event()
-        self._ending = False
+        self._before: Sample | None = None
         self._part = 0
-        self.observing = Observing(self.who, self._open, self._watch, self._close, self._lost)
-
-    def connect(self, timeout: float) -> None:
-        """Start to observe. Raise NotConnected, DeviceTimeout or ConnectionLost."""
-        self._ending = False
-        self.observing.start(timeout)
 
     def leave(self) -> None:
         """Send no further requests; call `disconnect` afterwards."""
         self._ending = True
-        self._hurry.set()
+        self.hurry()
 
     def disconnect(self) -> None:
         """Stop observing and end the session."""
         online = self.observing.online
-        self.leave()
-        self.observing.stop()
+        super().disconnect()
         if online:
             self.rws.logout()
 
-    def newest(self) -> Sample | None:
-        """Return the latest sample, whatever its age; None before the first."""
-        return self._sample
-
     def sample(self) -> Sample:
         """Return the latest sample. Raise NotConnected, ConnectionLost, or Stale if it is too old."""
-        newest = self._sample
-        if newest is not None and newest.age <= self.fresh and self.observing.online:
-            return newest
-        self.observing.check()
-        if newest is None:
-            raise NotConnected("{device} has not been read yet.", device=self.who)
-        raise Stale(
-            "The state of {device} is {age:.2f} s old; at most {fresh:g} s is allowed.",
-            device=self.who,
-            age=newest.age,
-            fresh=self.fresh,
-        )
+        return self.current().value
 
     def panel(self) -> Panel:
         """Return the latest panel. Raise as `sample`."""
@@ -241,23 +206,9 @@ class Observer:
         """Store a panel that was read elsewhere."""
         self._panel = panel
 
-    def sample_after(self, moment: float, within: float = 1.0) -> Sample:
-        """Wait for a sample started after a moment (monotonic). Raise DeviceTimeout, or why the connection is lost."""
-        self._hurry.set()
-        with self._received:
-            while (newest := self._sample) is None or newest.monotonic < moment:
-                self.observing.check()
-                left = moment + within - time.monotonic()
-                if left <= 0.0 or not self._received.wait(min(left, 0.2)):
-                    self.observing.check()
-                    if time.monotonic() > moment + within:
-                        raise DeviceTimeout(
-                            "{device} has sent no new state for {within:g} s.", device=self.who, within=within
-                        )
-        return newest
-
     # -------------------------------------------------------------------------------- on the observing thread
-    def _open(self, timeout: float) -> None:
+    def open(self, timeout: float) -> Snapshot[Sample]:
+        """Read version, panel and state of the controller."""
         with self.rws.all_until(time.monotonic() + timeout):
             self.version = self.rws.get("/rw/system", FIRST_WITHIN)[0].get("rwversion", "")
             if not self.version.startswith("6."):
@@ -267,38 +218,32 @@ class Observer:
                     device=self.who,
                     version=version,
                 )
-            self._sample = None
+            self._before = None
             self._panel = read_panel(self.rws)
-            self._read()
+            return Snapshot.by(self.read)
 
-    def _close(self) -> None:
+    def close(self) -> None:
+        """Close the connection, but not the session at the controller."""
         self.rws.close()
 
-    def _watch(self, stopping: threading.Event) -> None:
-        while not stopping.is_set():
-            self._hurry.wait(self._period)
-            self._hurry.clear()
-            try:
-                self._read()
-            except _Leaving:
-                stopping.wait(1.0)
-                return
-            self._part = (self._part + 1) % len(PARTS)
-            assert self._panel is not None
-            before = self._panel
-            found = PARTS[self._part](self.rws, before)
-            if self._panel is before:  # else it was read elsewhere meanwhile
-                self._panel = found._replace(monotonic=time.monotonic())
+    def after_reading(self) -> None:
+        """Pass the sample on, and read the next part of the panel."""
+        if (newest := self.newest()) is not None:
+            self.on_sample(newest)
+        self._check_not_leaving()
+        self._part = (self._part + 1) % len(PARTS)
+        assert self._panel is not None
+        before = self._panel
+        found = PARTS[self._part](self.rws, before)
+        if self._panel is before:  # else it was read elsewhere meanwhile
+            self._panel = found._replace(monotonic=time.monotonic())
 
     def _check_not_leaving(self) -> None:
-        if self._ending:
-            raise _Leaving
+        if self.ending:
+            raise NotConnected("{device} is being disconnected.", device=self.who)
 
-    def _lost(self, error: DeviceError) -> None:
-        if self.on_lost is not None:
-            self.on_lost(error)
-
-    def _read(self) -> None:
+    def read(self) -> Sample:
+        """Read the state of the robot."""
         started, rws = time.monotonic(), self.rws
         self._check_not_leaving()
         state = rws.value("/rw/panel/ctrlstate", "ctrlstate")
@@ -320,15 +265,11 @@ class Observer:
                     device=self.who,
                     unit=unit,
                 ) from None
-        sample = Sample(started, state, running, joints, targets, self._speeds(started, joints))
-        with self._received:
-            self._sample = sample
-            self._received.notify_all()
-        if self.on_sample is not None:
-            self.on_sample(sample)
+        self._before = Sample(started, state, running, joints, targets, self._speeds(started, joints))
+        return self._before
 
     def _speeds(self, now: float, joints: dict[str, list[float]]) -> dict[str, float]:
-        last = self._sample
+        last = self._before
         if last is None:
             return dict.fromkeys(ARMS, 0.0)
         spent = max(now - last.monotonic, 1e-3)

@@ -8,6 +8,7 @@ from typing import Final
 
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import DeviceError, DeviceTimeout, Refused
+from arcor2_hw.keep_alive import once_within
 
 from .arm_line import ArmLine
 from .frames import orientation_values, position_values
@@ -18,6 +19,7 @@ from .settings import ARMS, YumiSettings
 LINE_WITHIN: Final = 2.0
 """Time for the servers to listen after the program was started, s."""
 POLL: Final = 0.05
+"""Time between two readings of a value that is awaited, s."""
 
 log = logging.getLogger(__name__)
 
@@ -79,13 +81,8 @@ def release_mastership(rws: Rws, domain: str) -> bool:
 
 def await_value(rws: Rws, path: str, field: str, value: str, within: float, what: str) -> None:
     """Wait until a field of a resource has a value. Raise DeviceTimeout; `what` names the expected action."""
-    until = time.monotonic() + within
-    while rws.value(path, field) != value:
-        if time.monotonic() > until:
-            raise DeviceTimeout(
-                "{device} did not {what} within {within:g} s.", device=rws.who, what=what, within=within
-            )
-        time.sleep(POLL)
+    if not once_within(lambda: rws.value(path, field) == value, within, POLL):
+        raise DeviceTimeout("{device} did not {what} within {limit:g} s.", device=rws.who, what=what, limit=within)
 
 
 def start_rapid(rws: Rws) -> None:

@@ -5,15 +5,23 @@ from typing import ClassVar, Final
 import numpy as np
 
 from arcor2_hw.actions import StrEnum, action
-from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction
+from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Control as ControlMode
 from arcor2_hw.data.robot import Joint, MoveResult, RobotState, RobotType, Safety
-from arcor2_hw.exceptions import NotFound, Refused
+from arcor2_hw.exceptions import Refused
 from arcor2_hw.keep_alive import FROZEN_AFTER
 from arcor2_hw.objects import MultiArmRobot
-from arcor2_hw.objects.arm import TCP, SafetyAlarm, check_confirmed, check_end_effector, named_joints
+from arcor2_hw.objects.arm import (
+    TCP,
+    SafetyAlarm,
+    check_confirmed,
+    check_end_effector,
+    named_joints,
+    refuse_acknowledgement,
+)
+from arcor2_hw.objects.connected import Connected
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 
 from .arms import JOINT_LIMITS, JOINTS, Arms, other_arm
@@ -37,7 +45,7 @@ class MoveType(StrEnum):
     JOINT = "joint"
 
 
-class YuMi(Hands, MultiArmRobot):
+class YuMi(Hands, Connected, MultiArmRobot):
     """ABB YuMi (IRB 14000): two arms of seven axes, 0.5 kg each, 559 mm."""
 
     _ABSTRACT = False
@@ -58,6 +66,7 @@ class YuMi(Hands, MultiArmRobot):
         self._kinematics = Kinematics(self._arms, self._observer)
         self._motion = Motion(self._arms, self._observer, self._control, self._kinematics)
         self._safety_alarm = SafetyAlarm(REMEDIES)
+        self.keep_connection(self._observer.who, self._observer.observing)
 
     # -------------------------------------------------------------------------------- connection and control
     def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
@@ -74,17 +83,9 @@ class YuMi(Hands, MultiArmRobot):
         self._control.disconnect()
         self._observer.disconnect()
 
-    @property
-    def connection(self) -> Connection:
-        """Return the state of the observing connection."""
-        return self._observer.observing.state
-
-    @property
-    def health(self) -> Health:
+    def condition(self) -> Health:
         """Return the condition of the robot."""
-        if not self._observer.observing.online:
-            return Health.FAILURE if self.connection in (Connection.LOST, Connection.FAILED) else Health.NORMAL
-        safety = self._safety()
+        safety = self._safety() if self._observer.observing.online else Safety.NORMAL
         if safety is Safety.FAULT:
             return Health.FAILURE
         return Health.NORMAL if safety is Safety.NORMAL else Health.CHECK_FUNCTION
@@ -298,16 +299,8 @@ class YuMi(Hands, MultiArmRobot):
 
     def acknowledge(self, code: str) -> None:
         """Raise Refused: only a named person can acknowledge a safety stop. Raise NotFound for an inactive alarm."""
-        if code not in {alarm.code for alarm in self.alarms()}:
-            raise NotFound("{name} has no alarm {code}.", name=self.name, code=code)
-        if code == Safety.PROTECTIVE_STOP.value:
-            raise Refused(
-                "{code} of {name} must be acknowledged by the person who inspected the robot: "
-                "acknowledge_protective_stop(confirmed_by).",
-                code=code,
-                name=self.name,
-            )
-        raise Refused("{code} of {name} must be acknowledged at the controller.", code=code, name=self.name)
+        action = "acknowledge_protective_stop" if code == Safety.PROTECTIVE_STOP.value else ""
+        refuse_acknowledgement(self.name, code, self.alarms(), action)
 
     def acknowledge_protective_stop(self, confirmed_by: str) -> None:
         """Acknowledge a collision, so that control can be taken again; the old motion does not continue."""

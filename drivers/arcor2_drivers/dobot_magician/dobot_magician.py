@@ -248,7 +248,7 @@ class DobotMagician(HoldsParts, SingleArm):
         try:
             return self._motion.forward(values(self.name, joints))
         except OutOfRange as e:
-            raise self.KinematicsException(str(e)) from None
+            raise self.KinematicsException(e.message, e.detail) from None
 
     # -------------------------------------------------------------------------------- actions
     @action(deadline=LONGEST_HOMING)

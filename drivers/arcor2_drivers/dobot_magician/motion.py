@@ -73,8 +73,9 @@ class Motion:
             q = kinematics.inverse(tool, self._settings.tool_x, self._settings.tool_z)
         except (Unreachable, ValueError) as e:
             where = ", ".join(f"{value:.3f}" for value in pose.position)
-            problem = f"{self._robot.name} cannot reach the pose: {e}"
-            raise Robot.KinematicsException(problem, f"in the world: {where}") from None
+            raise Robot.KinematicsException(
+                "{robot} cannot reach the pose: {reason}", f"in the world: {where}", robot=self._robot.name, reason=e
+            ) from None
         return tool._replace(r=q[0] + q[3]), q
 
     # -------------------------------------------------------------------------------- moving

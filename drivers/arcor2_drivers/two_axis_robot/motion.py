@@ -192,8 +192,10 @@ class Motion:
                 self._control.require()
                 guard.check(f"A move of {self._name}")
                 self._control.stop()
-                problem = f"{self._observer.bus.servo(number)} did not accept the goal {goal}."
-                raise DeviceFault(problem, fault_code="goal")
+                servo_name = self._observer.bus.servo(number)
+                raise DeviceFault(
+                    "{servo} did not accept the goal {goal}.", fault_code="goal", servo=servo_name, goal=goal
+                )
 
     def _wait_done(self, goals: tuple[int, int], budget: float, guard: StopGuard) -> None:
         clock = RunningTime()  # while this computer is busy, neither the joints nor their states are observed
@@ -212,8 +214,12 @@ class Motion:
             ):
                 since, positions = now, (servos[0].position, servos[1].position)
             elif now - since > STANDING:
-                problem = f"{' and '.join(short)} of {self._name} stopped short of the goal."
-                raise DeviceFault("{problem} Remove what blocks the arm.", fault_code="short_of_goal", problem=problem)
+                raise DeviceFault(
+                    "{joints} of {robot} stopped short of the goal. Remove what blocks the arm.",
+                    fault_code="short_of_goal",
+                    joints=" and ".join(short),
+                    robot=self._name,
+                )
             if now > budget:
                 self._control.stop()
                 raise DeviceTimeout(

@@ -102,9 +102,9 @@ class DigitalIO:
     def _point(self, name: str) -> IOPoint:
         if name not in POINTS:
             raise OutOfRange(
-                "{name} has no point {other_name!r}. Its points are {points}.",
+                "{name} has no point {point!r}. Its points are {points}.",
                 name=self.name,
-                other_name=name,
+                point=name,
                 points=", ".join(POINTS),
             )
         return POINTS[name]

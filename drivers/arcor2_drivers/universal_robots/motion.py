@@ -194,8 +194,11 @@ class Motion:
                 return
             now = time.monotonic()
             if now > until:
-                problem = f"{self._arm.name} did not come to a standstill within {REST_WITHIN:g} s of a stop."
-                raise DeviceTimeout("{problem} Press the emergency stop.", problem=problem)
+                raise DeviceTimeout(
+                    "{robot} did not come to a standstill within {limit:g} s of a stop. Press the emergency stop.",
+                    robot=self._arm.name,
+                    limit=REST_WITHIN,
+                )
             if now > dashboard_at and session.ended is None:
                 session.stop_by_dashboard()
             time.sleep(POLL)

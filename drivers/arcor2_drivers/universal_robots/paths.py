@@ -59,8 +59,13 @@ class Paths:
         limit = Limit(force, rotated((x, y, z), arm.base.orientation.inverted()))
         result, state = self._guarded_line(target, speed, limit)
         if state is not RunState.PUSHED:
-            problem = f"{arm.name} made no contact within {max_distance:g} m."
-            raise DeviceFault(problem, f"no force of {force:g} N", NO_CONTACT)
+            raise DeviceFault(
+                "{robot} made no contact within {distance:g} m.",
+                f"no force of {force:g} N",
+                NO_CONTACT,
+                robot=arm.name,
+                distance=max_distance,
+            )
         return result
 
     def force_limited(self, target: Pose, force: float, speed: float) -> MoveResult:

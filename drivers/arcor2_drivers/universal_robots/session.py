@@ -115,9 +115,12 @@ class ControlSession:
         """Return the error that a text of ur_rtde's constructor stands for."""
         lower = text.lower()
         if "in use" in lower or "in_use" in lower:
-            block = "24 to 47" if self.upper else "0 to 23"
-            problem = f"Input registers {block} of {self.who} are used by a fieldbus or another client."
-            return NotInControl(problem, text)
+            return NotInControl(
+                "Input registers {registers} of {device} are used by a fieldbus or another client.",
+                text,
+                registers="24 to 47" if self.upper else "0 to 23",
+                device=self.who,
+            )
         if "remote control" in lower:
             return NotInControl("{device} is in local control.", text, device=self.who)
         return DeviceFault("{device} does not start the control program.", text, device=self.who)
@@ -345,8 +348,11 @@ class ControlSession:
 
     def left_remote_control(self) -> NotInControl:
         """Return the error for a program that was stopped at the controller."""
-        problem = f"{self.who} left remote control. Check the pendant, then retry."
-        return NotInControl(problem, "the program was stopped at the controller")
+        return NotInControl(
+            "{device} left remote control. Check the pendant, then retry.",
+            "the program was stopped at the controller",
+            device=self.who,
+        )
 
     def _end_by_safety(self, safety_mode: int) -> None:
         """Stop the program, then end: after a safeguard stop it would continue as soon as the guard closes."""

@@ -215,7 +215,7 @@ def test_an_arm_that_is_too_close_may_leave(fake: FakeYumi, ready: YuMi) -> None
     home = ready.robot_joints(arm_id="right")
     fake.do("place", arm="left", joints=[2.0, -139.0, 19.0, 7.0, 47.0, -4.0, 136.0])
     fake.do("place", arm="right", joints=[26.0, -138.0, 7.0, -15.0, 62.0, 33.0, -145.0])
-    ready._observer.sample_after(time.monotonic())
+    ready._observer.fresh()
     with pytest.raises(Refused) as error:
         ready.move_to_joints(turned(ready, "right", 1, 0.2), 0.5, arm_id="right")
     assert "too close" in str(error.value)

@@ -242,7 +242,7 @@ def test_what_cannot_be_jogged(ready: TwoAxisRobot) -> None:
     for wrong in ({}, {"joint_velocities": [0.1]}, {"joint_velocities": [99.0, 0.0]}):
         with pytest.raises(OutOfRange):
             ready.jog(**wrong)  # type: ignore[arg-type]
-    with pytest.raises(Refused, match="no frame 'user'"):
+    with pytest.raises(Refused, match="cannot be jogged in frame 'user'"):
         ready.jog((0.1, 0.0, 0.0, 0.0, 0.0, 0.0), frame="user")
     ready.move_to_joints(joints(0.0, 0.0), 0.8)
     with pytest.raises(Refused, match="stretched"):
