@@ -1,1 +1,1 @@
-"""Vacuum gripper on the outputs of a robot or of an I/O block."""
+"""Vacuum gripper on the outputs of a robot or I/O block."""

@@ -11,22 +11,22 @@ from arcor2_hw.objects.settings import Range, within
 
 @dataclasses.dataclass
 class VacuumGripperSettings(Settings):
-    """The points of the carrier that the gripper uses, by their names on the carrier.
+    """Points of the carrier that the gripper uses, by their names on the carrier.
 
     :param carrier: name of the robot or I/O block in the scene whose outputs are used
-    :param vacuum_output: digital output that makes the vacuum
-    :param blow_output: digital output of the blast of air; empty: there is none
-    :param part_input: digital input that is on while a part is held; empty: there is none
-    :param vacuum_input: analogue input of the vacuum below the surrounding pressure, Pa; empty: there is none
-    :param part_vacuum: vacuum from which on a part counts as held, where no part_input tells, Pa
-    :param grip_time: longest time for a part to be held; without a sensor the time that is waited, s
-    :param release_time: longest time for a part to be gone; without a sensor the time that is waited, s
-    :param blow_time: length of the blast of air, s
-    :param lost_after: a part is lost when it is not sensed for that long, s
+    :param vacuum_output: digital output that switches the vacuum
+    :param blow_output: digital output that switches the blast of air; empty: none
+    :param part_input: digital input that is on while a part is held; empty: none
+    :param vacuum_input: analogue input of the vacuum below ambient pressure, Pa; empty: none
+    :param part_vacuum: vacuum from which on a part counts as held, if there is no part_input, Pa
+    :param grip_time: longest time until a part is held; without a sensor the time to wait, s
+    :param release_time: longest time until a part is released; without a sensor the time to wait, s
+    :param blow_time: duration of the blast of air, s
+    :param lost_after: time without a sensed part after which it counts as lost, s
     :param robot: name of the robot that carries the gripper; empty: the carrier, or the only robot of the scene
-    :param part_size_x: edge of a gripped part along the x axis of the tool, m; 0: unknown, safe moves ignore the part
-    :param part_size_y: edge of a gripped part along the y axis of the tool, m
-    :param part_size_z: edge of a gripped part along the z axis of the tool, m
+    :param part_size_x: size of a gripped part along the x axis of the tool, m; 0: unknown, safe moves ignore the part
+    :param part_size_y: size of a gripped part along the y axis of the tool, m
+    :param part_size_z: size of a gripped part along the z axis of the tool, m
     """
 
     carrier: str
