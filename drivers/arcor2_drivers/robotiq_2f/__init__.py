@@ -1,1 +1,1 @@
-"""The Robotiq 2F gripper on the URCap's ASCII port or on Modbus RTU (docs/devices/robotiq-2f.md)."""
+"""Robotiq 2F grippers on the ASCII port of the URCap or on Modbus RTU."""

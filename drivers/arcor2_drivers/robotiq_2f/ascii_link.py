@@ -1,4 +1,4 @@
-"""The gripper on the ASCII port of the URCap."""
+"""AsciiLink: the gripper on the ASCII port of the URCap. Protocol: docs/devices/robotiq-2f.md."""
 
 import re
 from typing import Final
@@ -9,21 +9,21 @@ from arcor2_hw.objects.line import Line
 from .status import Activation, Command, Object, Status
 
 LONGEST: Final = 64
-"""Longest answer, bytes: a valid one has about ten."""
+"""Greatest length of an answer, bytes; a valid one has about ten."""
 _VALUE: Final = re.compile(rb"([A-Z]{3}) ([0-9A-F]{1,3})\r?\n")
 _ACKNOWLEDGED: Final = re.compile(rb"ack(\r?\n)?")
 _ORDER: Final = ("ACT", "GTO", "STA", "FLT", "PRE", "OBJ", "POS")
-"""Variables in the order of reading: the object status after the request it belongs to, so that it is never older."""
+"""Variables in the order of reading. OBJ comes after the request it depends on, so that it is never older."""
 
 
 class AsciiLink(Line):
-    """A gripper on a TCP port. A missing or invalid answer breaks the line, see Line."""
+    """A gripper on a TCP port. A missing or invalid answer breaks the line, see `Line`."""
 
     def __init__(self, name: str, host: str, port: int, request_timeout: float) -> None:
         super().__init__(f"{name} at {host}:{port}", f"socket://{host}:{port}", answer_timeout=request_timeout)
 
     def read(self) -> Status:
-        """Ask for all variables, one after the other. Raises DeviceTimeout, ConnectionLost, DeviceFault."""
+        """Read all variables. Raise DeviceTimeout, ConnectionLost or DeviceFault."""
         values = {name: self._get(name) for name in _ORDER}
         try:
             return Status(
@@ -36,12 +36,10 @@ class AsciiLink(Line):
                 position=values["POS"],
             )
         except ValueError as error:
-            raise DeviceFault(
-                "{device} sent what no gripper of this kind sends: {reason}", device=self.who, reason=error
-            ) from error
+            raise DeviceFault("{device} sent an invalid status: {reason}", device=self.who, reason=error) from error
 
     def write(self, command: Command) -> None:
-        """Set variables in one line. Raises Refused naming the line, DeviceTimeout, ConnectionLost."""
+        """Set variables in one line. Raise Refused, DeviceTimeout or ConnectionLost."""
         values = {
             "ACT": int(command.act),
             "GTO": int(command.go_to),
@@ -51,18 +49,18 @@ class AsciiLink(Line):
         }
         line = " ".join(["SET", *(f"{name} {value}" for name, value in values.items() if value is not None)])
         if not self._exchange(line, _ACKNOWLEDGED):
-            raise Refused("{device} refuses {line}", device=self.who, line=line)
+            raise Refused("{device} refuses the command {line}.", device=self.who, line=line)
 
     def _get(self, name: str) -> int:
         found = self._exchange(f"GET {name}", _VALUE)
         if not found:
-            raise DeviceFault("{device} does not know the variable {name}", device=self.who, name=name)
+            raise DeviceFault("{device} has no variable {name}.", device=self.who, name=name)
         answered, value = found[1].decode(), found[2].decode()
         number = int(value, 16 if any(c in "ABCDEF" for c in value) else 10)  # FLT may come as two hex digits
         if answered != name or number > 255:
             raise self.broken(
                 DeviceFault(
-                    "{device} answers {answered} {value} when asked for {name}",
+                    "{device} answered {answered} {value} to a request for {name}.",
                     device=self.who,
                     answered=answered,
                     value=value,
@@ -72,17 +70,20 @@ class AsciiLink(Line):
         return number
 
     def _exchange(self, line: str, expected: re.Pattern[bytes]) -> re.Match[bytes] | None:
-        """Send a line and return its answer; None when the gripper refuses it or does not know it."""
+        """Send a line and return the answer; None if the gripper refuses the line."""
 
-        def answer(came: bytes) -> re.Match[bytes] | bool | None:
-            came = came.lstrip(b"\r\n ")
-            if found := expected.fullmatch(came):
+        def answer(received: bytes) -> re.Match[bytes] | bool | None:
+            received = received.lstrip(b"\r\n ")
+            if found := expected.fullmatch(received):
                 return found
-            if came.rstrip(b"\r\n") in (b"?", b"nack"):
+            if received.rstrip(b"\r\n") in (b"?", b"nack"):
                 return False
-            if came.endswith(b"\n") or len(came) > LONGEST or not came.isascii():
-                what = f"{self.who}: what came is no valid answer to {line}"
-                raise self.broken(DeviceFault(what, repr(came[:32])))
+            if received.endswith(b"\n") or len(received) > LONGEST or not received.isascii():
+                raise self.broken(
+                    DeviceFault(
+                        "{device} sent an invalid answer to {line}.", repr(received[:32]), device=self.who, line=line
+                    )
+                )
             return None
 
         found = self.ask(line.encode("ascii") + b"\n", answer, line)

@@ -1,4 +1,4 @@
-"""A Robotiq 2F gripper: activates on command, grips with force and speed, notices a lost part."""
+"""Robotiq2F: the object type of Robotiq 2F grippers."""
 
 import contextlib
 from typing import ClassVar, Final
@@ -21,18 +21,19 @@ from .settings import Robotiq2FSettings, Wire
 from .status import FIRST_MAJOR, HELD, Activation, Command, Link, Object, Status, fault_of
 
 MARGIN: Final = 2.0
-"""Time a motion may take beyond stroke / speed, s: acceleration, building up the force, a slow wire."""
-TAKEN_WITHIN: Final = 1.0
-"""Time from a command to its echo in the status, s."""
+"""Time a motion may take beyond stroke / speed, s: for acceleration, the force to build up, and a slow wire."""
+ACCEPTED_WITHIN: Final = 1.0
+"""Time limit from a command to its echo in the status, s."""
 STANDS_WITHIN: Final = 2.0
-"""Time from a stop to standstill, s."""
+"""Time limit from a stop to standstill, s."""
 LONGEST_ACTION: Final = 300.0
+"""Deadline of an action, s: the whole stroke at the lowest speed takes less."""
 PAD_HEIGHT: Final = 0.022
-"""Height of the pads of the fingers, m: the assumed height of a part of unknown size."""
+"""Height of the pads of the fingers, m; the assumed height of a part of unknown size."""
 
 
 def link_of(name: str, settings: Robotiq2FSettings) -> Link:
-    """Return the closed connection that the settings choose."""
+    """Return the connection that the settings select; it is not open yet."""
     if settings.wire is Wire.MODBUS_RTU:
         return RtuLink(name, settings.serial_port, settings.baud_rate, settings.unit_id, settings.request_timeout)
     return AsciiLink(name, settings.host, settings.port, settings.request_timeout)
@@ -42,7 +43,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
     """A Robotiq 2F-85 or 2F-140 adaptive gripper, on a robot's URCap or on Modbus RTU."""
 
     _ABSTRACT = False
-    # It finishes a motion, then holds: spindle and spring are self-locking.
+    # The gripper finishes its motion, then holds: spindle and spring are self-locking.
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"activate": "stop", "grip": "stop", "release": "stop"}
     busy_period = 0.01
@@ -59,7 +60,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         self._activating = False
         self._other_client = ""
         self._commanded: int | None = None
-        """The position we commanded last; None when the gripper need not have it."""
+        """Latest position that we commanded; None while the gripper need not be there."""
         self._echoed = False
         self._held = self._lost = False
         self._fault_since: Timestamp = now()
@@ -70,7 +71,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         return self._gripper.read()
 
     def on_state(self, snapshot: Snapshot[Status]) -> None:
-        """Notice faults, a lost part, and commands of other clients."""
+        """Detect faults, a lost part, and commands of other clients."""
         status, before = snapshot.value, self.newest()
         if status.fault and (before is None or before.fault != status.fault):
             self._fault_since = now()
@@ -87,7 +88,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         if status.echo == commanded:
             self._echoed = True
         elif self._echoed:
-            self._other_client = f"another client of the gripper, which asks for position {status.echo},"
+            self._other_client = f"another client of the gripper, which requested position {status.echo},"
             self.drop_control(f"{self._other_client} has control")
 
     def condition(self) -> Health:
@@ -96,7 +97,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         return Health.NORMAL if status is None or not status.fault else fault_of(status.fault).health
 
     def alarms(self) -> list[Alarm]:
-        """Return the present fault."""
+        """Return the active fault."""
         code = self.current().fault
         if not code:
             return []
@@ -104,9 +105,11 @@ class Robotiq2F(PolledControl[Status], Gripper):
         return [Alarm(str(code), fault.severity, fault.text, fault.remedy, self._fault_since)]
 
     def acknowledge(self, code: str) -> None:
-        """Reset the gripper after a fault with a code of 10 or more; it is not activated then, and nothing moves.
+        """Reset the gripper after a fault from code 10 on, without motion; activate it afterwards.
 
-        Raises NotFound when there is no such fault, Refused for one that ends with its cause.
+        Raises:
+            NotFound: The fault is not active.
+            Refused: The fault is cleared by removing its cause.
         """
         status = self.fresh()
         if not status.fault or str(status.fault) != code:
@@ -114,7 +117,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         if status.fault < FIRST_MAJOR:
             fault = fault_of(status.fault)
             raise Refused(
-                "{device}: fault {code} ends with its cause: {text}; {remedy}",
+                "{device}: fault {code} ({text}) is cleared by removing its cause: {remedy}.",
                 device=self.who,
                 code=code,
                 text=fault.text,
@@ -125,32 +128,32 @@ class Robotiq2F(PolledControl[Status], Gripper):
 
     # -------------------------------------------------------------------------------- control
     def disconnect(self) -> None:
-        """Stop observing; does nothing when not connected. The gripper keeps what it holds."""
+        """Stop observing. The gripper keeps a gripped part."""
         super().disconnect()
         self._held = self._lost = False
 
     def leave(self) -> None:
-        """Leave the gripper alone: it finishes what it does, and holds."""
+        """Send nothing when disconnecting: the gripper finishes its motion, then holds."""
 
     def is_busy(self, state: Status) -> bool:
         """Return whether the fingers move."""
         return state.moving
 
     def owner_of(self, state: Status) -> str | None:
-        """Return who moves the gripper; another client is noticed only by that."""
+        """Return the owner; another client is detected only while it moves the gripper."""
         if self.in_control:
             return US
         return "another client, which moves the gripper," if state.moving else None
 
     def arm(self) -> None:
-        """Take control; nothing is written, and the gripper is not activated."""
+        """Take control without writing anything; the gripper is not activated."""
         self._other_client, self._commanded = "", None
 
     def release_control(self) -> None:
-        """Release control. Raises Refused while the gripper moves."""
+        """Release control. Raise Refused while the gripper moves."""
         if self.in_control and self.fresh().moving:
             raise Refused(
-                "{device}: release_control is refused in state {state}: stop it first",
+                "{device}: release_control is refused in state {state}: stop the gripper first",
                 device=self.who,
                 state=self.state(),
             )
@@ -161,7 +164,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         return super().control_owner() or self._other_client or None
 
     def drop_control(self, why: str = NOBODY) -> None:
-        """Note that we have no control any more."""
+        """Note that control has ended."""
         super().drop_control(why)
         self._commanded = None
 
@@ -181,12 +184,19 @@ class Robotiq2F(PolledControl[Status], Gripper):
 
     def _fault(self, status: Status, what: str) -> DeviceFault:
         fault = fault_of(status.fault)
-        text = f"{self.who}: {what} ended by fault {status.fault}: {fault.text}"
-        return DeviceFault(text, fault.remedy, fault_code=status.fault)
+        return DeviceFault(
+            "{device}: {what} ended by fault {code}: {text}",
+            fault.remedy,
+            status.fault,
+            device=self.who,
+            what=what,
+            code=status.fault,
+            text=fault.text,
+        )
 
     # -------------------------------------------------------------------------------- observing
     def state(self) -> GripperState:
-        """Return what it is doing. Raises Stale, NotConnected, ConnectionLost."""
+        """Return the state of the gripper. Raise Stale, NotConnected or ConnectionLost."""
         status = self.current()
         if status.moving and not self._lost:
             return GripperState.MOVING
@@ -197,19 +207,19 @@ class Robotiq2F(PolledControl[Status], Gripper):
         return GripperState.HOLDING if status.object in HELD else GripperState.AT_POSITION
 
     def width(self) -> float:
-        """Return the width between the fingers, m. Raises Stale, NotConnected, ConnectionLost."""
+        """Return the width between the fingers, m. Raise Stale, NotConnected or ConnectionLost."""
         return scaling.width(self._s, self.current().position)
 
     # -------------------------------------------------------------------------------- motion
     def stop(self) -> None:
-        """Stop the fingers and return at standstill. The gripper keeps what it holds; at standstill nothing is sent."""
+        """Stop moving fingers and wait for standstill. A gripped part stays gripped."""
         self.stop_waiting()
         if not self.in_control:
             return
         with self._sending:
             moving = self._acting.locked() or self.fresh().moving
             if moving:
-                self._gripper.write(Command(act=not self._activating, go_to=False))  # only a reset ends an activation
+                self._gripper.write(Command(act=not self._activating, go_to=False))  # only a reset stops an activation
         if moving:
             self._await_standstill()
 
@@ -229,7 +239,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
             self._gripper.write(command)
             self._commanded = command.position
 
-        self.send(what, write, go_on)  # a stop comes before, and this is not sent, or after it
+        self.send(what, write, go_on)  # with a stop, either it is not sent or the stop follows
 
     def _reset(self, go_on: GoOn) -> None:
         self._write(Command(act=False, go_to=False), "the reset", go_on)
@@ -237,7 +247,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         def done(status: Status) -> bool:
             return not status.act and status.activation is Activation.RESET and not status.fault
 
-        self.wait(done, TAKEN_WITHIN + self._s.request_timeout, "the reset")
+        self.wait(done, ACCEPTED_WITHIN + self._s.request_timeout, "the reset")
 
     def _move(self, width: float, force: float, speed: float, what: str) -> Status:
         """Move the fingers to a width; return the status at standstill."""
@@ -259,16 +269,18 @@ class Robotiq2F(PolledControl[Status], Gripper):
                     raise self._fault(status, what)
                 if not status.active:
                     raise DeviceFault(
-                        "{device}: {what} was ended: the gripper was reset or switched off", device=self.who, what=what
+                        "{device}: {what} ended early: the gripper was reset or switched off",
+                        device=self.who,
+                        what=what,
                     )
-                taken = status.go_to and status.echo == command.position
-                return taken and status.object is not Object.MOVING
+                accepted = status.go_to and status.echo == command.position
+                return accepted and status.object is not Object.MOVING
 
             try:
-                return self.wait(stands, self._s.stroke / speed + TAKEN_WITHIN + MARGIN, what, go_on)
+                return self.wait(stands, self._s.stroke / speed + ACCEPTED_WITHIN + MARGIN, what, go_on)
             except DeviceTimeout:
-                with contextlib.suppress(DeviceError):  # then it finishes the motion, and holds
-                    self._write(Command(go_to=False), what, go_on)  # no motion that nobody waits for
+                with contextlib.suppress(DeviceError):  # without it the gripper finishes the motion, then holds
+                    self._write(Command(go_to=False), what, go_on)  # no caller waits for the motion any more
                 raise
 
     # -------------------------------------------------------------------------------- actions
@@ -304,8 +316,8 @@ class Robotiq2F(PolledControl[Status], Gripper):
     ) -> tuple[bool, float]:
         """Move the fingers to a width; return whether a part is held, and the width between the fingers, m.
 
-        :param width: width to move to when nothing is in between, m
-        :param force: force to hold with, N
+        :param width: width to move to if no part is between the fingers, m
+        :param force: gripping force, N
         :param speed: speed of the fingers, m/s
         """
         status = self._move(width, force, speed, f"grip to {width:g} m")
@@ -320,7 +332,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
 
     @action(deadline=LONGEST_ACTION)
     def release(self, *, an: str | None = None) -> None:
-        """Open fully; fails when the fingers are blocked."""
+        """Open completely; fail if the fingers are blocked."""
         try:
             status = self._move(self._s.stroke, self._s.min_force, self._s.max_speed, "release")
         finally:
@@ -334,6 +346,6 @@ class Robotiq2F(PolledControl[Status], Gripper):
 
     @action
     def part_held(self, *, an: str | None = None) -> bool:
-        """Return whether a part is held; false when it was lost after it was gripped."""
+        """Return whether a part is held; false after a gripped part was lost."""
         self.fresh()
         return self.state() is GripperState.HOLDING

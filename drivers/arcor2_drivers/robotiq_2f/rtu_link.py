@@ -1,4 +1,4 @@
-"""The gripper on Modbus RTU."""
+"""RtuLink: the gripper on Modbus RTU. Registers: docs/devices/robotiq-2f.md."""
 
 from typing import Final
 
@@ -13,7 +13,7 @@ COUNT: Final = 3
 
 
 def decode(registers: list[int]) -> Status:
-    """Return the status in its three registers. Raises ValueError for what no gripper sends."""
+    """Return the status in its three registers. Raise ValueError if they are invalid."""
     if len(registers) != COUNT:
         raise ValueError(f"{len(registers)} registers instead of {COUNT}")
     status = registers[0] >> 8
@@ -29,7 +29,7 @@ def decode(registers: list[int]) -> Status:
 
 
 def encode(command: Command, before: list[int]) -> list[int]:
-    """Return the three request registers; values that the command leaves open stay as `before`."""
+    """Return the three request registers; a value that is None in the command stays as in `before`."""
     position = before[1] & 0xFF if command.position is None else command.position
     speed = before[2] >> 8 if command.speed is None else command.speed
     force = before[2] & 0xFF if command.force is None else command.force
@@ -45,17 +45,15 @@ class RtuLink(ModbusLink):
         self._requests = [0] * COUNT
 
     def read(self) -> Status:
-        """Read the status. Raises DeviceTimeout, ConnectionLost, DeviceFault."""
+        """Read the status. Raise DeviceTimeout, ConnectionLost or DeviceFault."""
         registers = self.read_holding_registers(STATUS, COUNT)
         try:
             return decode(registers)
         except ValueError as error:
-            raise DeviceFault(
-                "{device} sent what no gripper of this kind sends: {reason}", device=self.who, reason=error
-            ) from error
+            raise DeviceFault("{device} sent an invalid status: {reason}", device=self.who, reason=error) from error
 
     def write(self, command: Command) -> None:
-        """Write all requests at once; never sent a second time."""
+        """Write all request registers; never repeated."""
         values = encode(command, self._requests)
         self.write_registers(REQUESTS, *values)
         self._requests = values

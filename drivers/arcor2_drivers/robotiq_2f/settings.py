@@ -11,14 +11,14 @@ from arcor2_hw.objects.settings import Range, check_host, check_serial_port, wit
 
 
 class Wire(StrEnum):
-    """How the gripper is reached."""
+    """Wire to the gripper."""
 
     URCAP = "urcap"
     MODBUS_RTU = "modbus_rtu"
 
 
 class Model(StrEnum):
-    """Which gripper it is."""
+    """Model of the gripper."""
 
     TWO_F_85 = "2F-85"
     TWO_F_140 = "2F-140"
@@ -26,7 +26,7 @@ class Model(StrEnum):
 
 @dataclasses.dataclass(frozen=True)
 class ModelData:
-    """The vendor's data sheet of a model; m, kg, N, m/s. A tcp_z of 0 is unknown."""
+    """Data sheet of a model, in m, kg, N and m/s. A tcp_z of 0 is unknown."""
 
     tcp_z: float
     mass: float
@@ -45,31 +45,31 @@ MODELS: Final = {
 
 @dataclasses.dataclass
 class Robotiq2FSettings(Settings):
-    """Where the gripper is, and the limits of its model. A number that is 0 means that of the model.
+    """Connection and limits of the gripper. The value 0 stands for the value of the model.
 
-    :param model: which gripper it is
-    :param wire: urcap for the ASCII port of the URCap on a robot, modbus_rtu for a serial port
-    :param host: address of the robot controller whose URCap has the gripper; for urcap
+    :param model: model of the gripper
+    :param wire: urcap for the ASCII port of the URCap, modbus_rtu for a serial port
+    :param host: address of the robot controller with the URCap; for urcap
     :param port: TCP port of the URCap
     :param serial_port: path of the serial port, such as /dev/ttyUSB0; for modbus_rtu
-    :param baud_rate: bits per second of the serial port
+    :param baud_rate: bit rate of the serial port, bit/s
     :param unit_id: Modbus unit id
-    :param request_timeout: seconds the gripper has to answer one request
-    :param activation_timeout: seconds an activation may take
-    :param tcp_z: from the flange to the tool centre point of the closed fingers, m; to be given for a 2F-140
+    :param request_timeout: time limit of an answer, s
+    :param activation_timeout: time limit of the activation, s
+    :param tcp_z: from the flange to the tool centre point of the closed fingers, m; required for a 2F-140
     :param mass: mass with fingers, kg
     :param stroke: width between the open fingers, m
-    :param open_position: the gripper's own position when open, 0 to 255
-    :param closed_position: the gripper's own position when closed, 0 to 255
+    :param open_position: position of the open fingers, 0 to 255
+    :param closed_position: position of the closed fingers, 0 to 255
     :param min_force: force for the value 0, N
     :param max_force: force for the value 255, N
     :param min_speed: speed for the value 0, m/s
     :param max_speed: speed for the value 255, m/s
     :param robot: name of the robot that carries the gripper; empty: the only robot of the scene
-    :param part_size_x: edge of a gripped part along the x axis of the tool, m; 0: unknown, its width counts
-    :param part_size_y: edge of a gripped part along the y axis of the tool, m
-    :param part_size_z: edge of a gripped part along the z axis of the tool, m
-    :param part_offset_z: from the tool center point to the center of a gripped part along the tool, m
+    :param part_size_x: size of a gripped part along the x axis of the tool, m; 0: unknown, its width is used
+    :param part_size_y: size of a gripped part along the y axis of the tool, m
+    :param part_size_z: size of a gripped part along the z axis of the tool, m
+    :param part_offset_z: shift of a gripped part from the tool center point along the tool, m
     """
 
     model: Model = Model.TWO_F_85

@@ -1,4 +1,4 @@
-"""Status and commands of the gripper on either wire; its faults with text and remedy."""
+"""Status, commands and faults of the gripper, independent of the wire."""
 
 import dataclasses
 import enum
@@ -29,7 +29,7 @@ HELD: Final = (Object.CONTACT_OPENING, Object.CONTACT_CLOSING)
 
 @dataclasses.dataclass(frozen=True)
 class Status:
-    """One reading. `echo` is the position request that the gripper has received."""
+    """Status of the gripper. `echo` is the position request that the gripper uses."""
 
     act: bool
     go_to: bool
@@ -41,7 +41,7 @@ class Status:
 
     @property
     def active(self) -> bool:
-        """Return whether it is activated."""
+        """Return whether the gripper is activated."""
         return self.act and self.activation is Activation.ACTIVE
 
     @property
@@ -54,7 +54,7 @@ class Status:
 
 @dataclasses.dataclass(frozen=True)
 class Command:
-    """A command; values that are None stay as they are."""
+    """A command; values that are None stay unchanged."""
 
     act: bool = True
     go_to: bool = True
@@ -64,7 +64,7 @@ class Command:
 
 
 class Link(Protocol):
-    """A connection to the gripper. Every error names the device and its address."""
+    """A connection to the gripper. Its errors name the device and its address."""
 
     who: str
 
@@ -72,17 +72,17 @@ class Link(Protocol):
         """Open within `timeout` s; nothing is sent."""
 
     def close(self) -> None:
-        """Close; does nothing when closed. A request that waits for its answer fails at once."""
+        """Close, if open; a pending request fails at once."""
 
     def read(self) -> Status:
-        """Read the status. Values that are read one by one: the object status after its requests, then the width."""
+        """Read the status. If values are read one by one, the object status is read after the requests."""
 
     def write(self, command: Command) -> None:
-        """Send a command; never sent a second time."""
+        """Send a command; never repeated."""
 
 
 class Fault(NamedTuple):
-    """The meaning of a fault, and what to do about it."""
+    """Text and remedy of a fault."""
 
     text: str
     remedy: str
@@ -91,7 +91,7 @@ class Fault(NamedTuple):
 
 
 FIRST_MAJOR: Final = 0x0A
-"""Lowest code of the faults that only a reset ends."""
+"""Lowest code of the faults that only a reset clears."""
 _REACTIVATE: Final = "; acknowledge the fault, then activate the gripper"
 
 FAULTS: Final = {
@@ -131,6 +131,6 @@ FAULTS: Final = {
 
 
 def fault_of(code: int) -> Fault:
-    """Return the meaning of a fault; an unknown code counts as a failure."""
+    """Return text and remedy of a fault; an unknown code counts as a failure."""
     unknown = Fault(f"fault {code}", "see the manual" + _REACTIVATE, Severity.ERROR, Health.FAILURE)
     return FAULTS.get(code, unknown)

@@ -250,7 +250,7 @@ def test_another_client_is_noticed_and_named(
     other.take_control()
     thread, _ = in_background(lambda: other.grip(0.08, speed=0.02))
     wait_for(lambda: gripper.control_owner() != "us")
-    with pytest.raises(NotInControl, match="another client of the gripper, which asks for position 16"):
+    with pytest.raises(NotInControl, match="another client of the gripper, which requested position 16"):
         gripper.release()
     with pytest.raises(NotInControl, match="another client, which moves the gripper, has it"):
         gripper.take_control()
