@@ -1,14 +1,13 @@
-"""The control channel of a fake: JSON lines over TCP by which a test or the world makes it fail or asks for the truth.
+"""Control channel of a fake: JSON lines over TCP, to inject faults and to read the true state.
 
-One request a line, ``{"id": 1, "do": "truth", ...}``, one answer, ``{"id": 1, "ok": true, "data": ...}`` or
-``{"id": 1, "ok": false, "error": "..."}``. ``{"id": 2, "do": "subscribe", "to": "truth", "rate": 50}`` makes the fake
-push ``{"event": "truth", "data": ...}`` that often (Hz); with rate 0 it pushes whenever the fake calls `publish`.
-``{"do": "unsubscribe", "to": "truth"}`` ends it, ``{"do": "commands"}`` lists what there is, ``{"do": "describe"}``
-says what each takes.
+It is used by tests and by simulated worlds. Each request is a line, ``{"id": 1, "do": "truth", ...}``, with one answer,
+``{"id": 1, "ok": true, "data": ...}`` or ``{"id": 1, "ok": false, "error": "..."}``.
+``{"id": 2, "do": "subscribe", "to": "truth", "rate": 50}`` subscribes to events ``{"event": "truth", "data": ...}`` at this rate, Hz; with rate 0 an event is sent when the fake calls `publish`.
+``{"do": "unsubscribe", "to": "truth"}`` ends the subscription. ``{"do": "commands"}`` lists the commands,
+``{"do": "describe"}`` their parameters.
 
-A fake makes a `ControlServer`, registers its commands and sources, and hands it its wires (`arcor2_fakes.wire`), which
-brings the faults every fake knows: silence, reset, half_frame, garbage, slow, refuse, heal. `ControlClient` (asyncio)
-and `BlockingControlClient` (tests) speak to it. `arcor2_fakes.process` holds the life of a fake's process.
+`arcor2_fakes.serving` creates the `ControlServer` of a fake and registers the faults of its wires
+(`arcor2_fakes.wire`). `ControlClient` (asyncio) and `BlockingControlClient` (tests) connect to it.
 """
 
 import asyncio
@@ -23,23 +22,25 @@ from typing import Any, Self
 
 import msgspec
 
-MAX_LINE = 1 << 20  # a truth is some kilobytes; nothing honest comes near
+MAX_LINE = 1 << 20  # bytes; the state of a fake takes some kilobytes
 MAX_RATE = 500.0  # Hz
 
 Handler = Callable[..., Any]
-"""Called with the request's other fields as keywords; returns JSON data, or a coroutine that gives it. `ValueError`,
-`TypeError` and `LookupError` become the answer's error."""
+"""Called with the other fields of the request as keyword arguments; returns JSON data or an awaitable of it.
+
+`ValueError`, `TypeError`, `LookupError` and `OSError` become the error of the answer.
+"""
 
 _encoder = msgspec.json.Encoder()
 _decoder = msgspec.json.Decoder()
 
 
 class ControlError(Exception):
-    """The fake refused a control command, or the control channel broke or did not answer in time."""
+    """The fake refused a command, or the control channel broke or did not answer in time."""
 
 
 def parse_address(address: str) -> tuple[str, int]:
-    """``HOST:PORT`` taken apart. Raises `ValueError` when it is not of that form."""
+    """Return host and port of ``HOST:PORT``. Raise `ValueError` for another format."""
     host, separator, port = address.rpartition(":")
     if not separator or not host or not port.isdigit() or int(port) > 0xFFFF:
         raise ValueError(f"{address!r} is not HOST:PORT")
@@ -47,7 +48,7 @@ def parse_address(address: str) -> tuple[str, int]:
 
 
 class ControlServer:
-    """Serves the control channel. Commands are registered before or after `start`."""
+    """Serves the control channel. Commands may be registered before or after `start`."""
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
         self._bind = (host, port)
@@ -57,33 +58,33 @@ class ControlServer:
         self._sessions: set[_Session] = set()
 
     def command(self, name: str, handler: Handler) -> None:
-        """Register what ``{"do": name, ...}`` calls."""
+        """Register the function that ``{"do": name, ...}`` calls."""
         self._commands[name] = handler
 
     def source(self, name: str, read: Callable[[], Any]) -> None:
-        """Register something that may be asked for as a command and subscribed to, such as the truth."""
+        """Register a value that clients can read by a command and subscribe to, such as the truth."""
         self._sources[name] = read
         self._commands[name] = read
 
     def publish(self, name: str) -> None:
-        """Push the source `name` to those that subscribed to it with rate 0."""
+        """Send the source `name` to the clients that subscribed to it with rate 0."""
         for session in tuple(self._sessions):
             session.changed(name)
 
     @property
     def address(self) -> str:
-        """``host:port``; the real port once `start` has returned."""
+        """Return ``host:port``; after `start` the real port."""
         host, port = self._bind
         return f"{host}:{port}"
 
     async def start(self) -> str:
-        """Listen and returns the address. Raises `OSError` when the port is taken."""
+        """Listen and return the address. Raise `OSError` if the port is in use."""
         self._server = await asyncio.start_server(self._serve, *self._bind, limit=MAX_LINE)
         self._bind = (self._bind[0], self._server.sockets[0].getsockname()[1])
         return self.address
 
     async def close(self) -> None:
-        """Close the port and every session."""
+        """Close the port and all sessions."""
         if self._server is not None:
             self._server.close()
         sessions = tuple(self._sessions)
@@ -99,9 +100,9 @@ class ControlServer:
         try:
             await session.run()
         except ConnectionError:
-            pass  # the other end went; nothing is owed to it
+            pass  # the client has disconnected
         except asyncio.CancelledError:
-            pass  # only `close` cancels; the stream server would log it as an error
+            pass  # by `close`; the stream server would log it as an error
         finally:
             self._sessions.discard(session)
             session.end()
@@ -132,7 +133,7 @@ class _Session:
             except asyncio.LimitOverrunError:
                 self._send({"id": 0, "ok": False, "error": f"a line has at most {MAX_LINE} bytes"})
                 await self._writer.drain()
-                return  # what follows can't be told apart from the rest of the line
+                return  # the next request cannot be distinguished from the rest of the line
             if line.strip():
                 self._send(await self._answer(line))
                 await self._writer.drain()
@@ -195,15 +196,14 @@ class _Session:
 
     def _every(self, name: str, period: float, due: float) -> None:
         loop = asyncio.get_running_loop()
-        due = max(due + period, loop.time())  # a stall is not made up for by a burst
+        due = max(due + period, loop.time())  # no burst of events after a delay
         self._pushing[name] = loop.call_at(due, self._every, name, period, due)
         self._push(name)
 
     def _push(self, name: str) -> None:
         transport = self._writer.transport
-        if (
-            not transport.is_closing() and transport.get_write_buffer_size() < MAX_LINE
-        ):  # else: a slow reader misses some
+        # A slow client misses events.
+        if not transport.is_closing() and transport.get_write_buffer_size() < MAX_LINE:
             self._send({"event": name, "data": self._sources[name]()})
 
     def _send(self, message: dict[str, Any]) -> None:
@@ -211,7 +211,7 @@ class _Session:
 
 
 def _described(name: str, handler: Handler) -> dict[str, Any]:
-    """Return a command's name, what it takes: ``name``, ``[name]`` or ``name=default``, and its first line of text."""
+    """Return name, parameters (``name``, ``[name]`` or ``name=default``) and summary of a command."""
     takes = []
     for each in inspect.signature(handler).parameters.values():
         if each.default is each.empty:
@@ -231,7 +231,7 @@ def _data(answer: Any, command: str) -> Any:
 
 
 class ControlClient:
-    """The control channel for asyncio: ``client = await ControlClient.connect("127.0.0.1:4000")``."""
+    """Client of the control channel for asyncio: ``client = await ControlClient.connect("127.0.0.1:4000")``."""
 
     def __init__(self, address: str, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.address = address
@@ -244,7 +244,7 @@ class ControlClient:
 
     @classmethod
     async def connect(cls, address: str, within: float = 10.0) -> Self:
-        """Raise `ControlError` when nobody listens there, `ValueError` for an address that is none."""
+        """Connect. Raise `ControlError` if the fake cannot be reached, `ValueError` for an invalid address."""
         host, port = parse_address(address)
         try:
             async with asyncio.timeout(within):
@@ -254,7 +254,7 @@ class ControlClient:
         return cls(address, reader, writer)
 
     async def do(self, command: str, within: float = 10.0, **arguments: Any) -> Any:
-        """Return the data of a command. Raises `ControlError` when it is refused, late, or the channel is gone."""
+        """Execute a command and return its data. Raise `ControlError` if it is refused, late, or the channel closed."""
         if self._closed.is_set():
             raise ControlError(f"{command}: the control channel {self.address} is closed")
         number = next(self._numbers)
@@ -270,16 +270,16 @@ class ControlClient:
             del self._waiting[number]
 
     async def subscribe(self, listener: Callable[[Any], None], to: str = "truth", rate: float = 0.0) -> None:
-        """Call `listener` with each pushed value, in the event loop; `rate` in Hz, 0 means on change."""
+        """Call `listener` in the event loop with each value at a rate, Hz; 0: on change."""
         self._listeners[to] = listener
         await self.do("subscribe", to=to, rate=rate)
 
     async def wait_closed(self) -> None:
-        """Return when the fake has gone or `close` was called."""
+        """Wait until the channel is closed by either side."""
         await self._closed.wait()
 
     async def close(self) -> None:
-        """Close the channel; does nothing the second time."""
+        """Close the channel. The second call does nothing."""
         self._task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await asyncio.shield(asyncio.gather(self._task, return_exceptions=True))
@@ -306,7 +306,7 @@ class ControlClient:
                     if future is not None and not future.done():
                         future.set_result(message)
         except (OSError, ValueError):
-            pass  # told below to whoever waits
+            pass  # reported below to all pending commands
         finally:
             self._closed.set()
             for future in self._waiting.values():
@@ -315,7 +315,7 @@ class ControlClient:
 
 
 class BlockingControlClient:
-    """The control channel for a test: one request, one answer, with a time limit. A context manager."""
+    """Client of the control channel for tests: one request at a time, with a time limit. A context manager."""
 
     def __init__(self, address: str, within: float = 10.0) -> None:
         self.address = address
@@ -327,7 +327,7 @@ class BlockingControlClient:
             raise ControlError(f"control channel {address}: {e}") from e
 
     def do(self, command: str, within: float = 10.0, **arguments: Any) -> Any:
-        """Return the data of a command. Raises `ControlError` when it is refused, late, or the channel is gone."""
+        """Execute a command and return its data. Raise `ControlError` if it is refused, late, or the channel closed."""
         number = next(self._numbers)
         deadline = time.monotonic() + within
         try:
@@ -341,7 +341,7 @@ class BlockingControlClient:
             raise ControlError(f"{command}: {self.address}: {e}") from e
 
     def wait_until(self, holds: Callable[[Any], bool], within: float = 20.0, command: str = "truth") -> Any:
-        """Ask until the answer satisfies `holds`; returns it. Raises `ControlError`, with the last answer, if late."""
+        """Repeat a command until `holds` accepts its data, and return it. Raise `ControlError` after `within` s."""
         deadline = time.monotonic() + within
         while not holds(data := self.do(command)):
             if time.monotonic() > deadline:

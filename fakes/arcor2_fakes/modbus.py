@@ -1,7 +1,7 @@
-"""A pymodbus server on the wires of the fakes: pymodbus answers the requests, the wires carry the bytes and faults.
+"""A pymodbus server on the wires of the fakes: pymodbus answers the requests, the wires carry bytes and faults.
 
-The pymodbus server never listens itself: each connection of a wire gets one of its protocol objects, as if the server
-had accepted it. So silence, resets and half frames happen below Modbus, as with a real cable.
+The pymodbus server does not listen: each connection of a wire is passed to one of its protocol objects. Silence, resets
+and half frames therefore affect the bytes below Modbus, as on a real cable.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ def tcp_wire(server: ModbusBaseServer, host: str, port: int, name: str = "modbus
 
 
 def serial_line(server: ModbusBaseServer, link: Path | None = None, unit: int | None = None) -> PtyLine:
-    """Return a pty on which a server answers; with `unit`, answers in the name of other units are dropped."""
+    """Return a pty on which a server answers; with `unit`, answers of other units are dropped."""
     protocol: Any = server.handle_new_connection()
     line = PtyLine(protocol.data_received, link)
 
@@ -41,7 +41,7 @@ def serial_line(server: ModbusBaseServer, link: Path | None = None, unit: int | 
 
 
 class _Transport(asyncio.Transport):
-    """What pymodbus takes for its transport."""
+    """Transport of a pymodbus protocol object."""
 
     def __init__(self, send: Callable[[bytes], object], close: Callable[[], None]) -> None:
         super().__init__()

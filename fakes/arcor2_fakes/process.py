@@ -1,4 +1,4 @@
-"""The life cycle of a fake's process: ready line, orderly end on SIGTERM and SIGINT, end with its parent."""
+"""Process of a fake: its ready line, and its orderly end on SIGTERM, on SIGINT, or with its parent process."""
 
 import asyncio
 import contextlib
@@ -13,17 +13,17 @@ import msgspec
 import uvloop
 
 _PARENT_WATCH_PERIOD = 0.2  # s
-_AHEAD = -10  # niceness that is asked for: a device has a processor of its own
-_TICK = 0.02  # s
-_HELD_UP = 0.1  # s
+_AHEAD = -10  # requested niceness, because a real device has its own processor
+_TICK = 0.02  # s, period of `OwnTime`
+_HELD_UP = 0.1  # s, longest step of `OwnTime`
 _PARENT = os.getppid()
-_told_to_end: ContextVar[asyncio.Event] = ContextVar("told_to_end")
+_end: ContextVar[asyncio.Event] = ContextVar("end")
 
 
 class OwnTime:
-    """A clock that stops while this process is held up: a device has a processor of its own.
+    """A clock that stops while this process is not scheduled, because a real device has its own processor.
 
-    What arrived meanwhile, such as a trigger of a watchdog, is handled before the watchdog counts the time.
+    Data received meanwhile, such as a watchdog signal, is handled before a watchdog counts the time.
     """
 
     def __init__(self) -> None:
@@ -31,27 +31,27 @@ class OwnTime:
         self._read, self._elapsed = self._loop.time(), 0.0
 
     def __call__(self) -> float:
-        """Return the seconds that it has run."""
+        """Return the running time, s."""
         return self._elapsed + min(self._loop.time() - self._read, _HELD_UP)
 
     def run(self) -> None:
-        """Let it run from now on, in the running event loop."""
+        """Start the clock in the running event loop."""
         self._elapsed, self._read = self(), self._loop.time()
         self._loop.call_later(_TICK, self.run)
 
 
 def announce(**addresses: object) -> None:
-    """Print the one line on standard output: ``ready {json}``."""
+    """Print the ready line on standard output: ``ready {json}``."""
     sys.stdout.write(f"ready {msgspec.json.encode(addresses).decode()}\n")
     sys.stdout.flush()
 
 
-async def until_told_to_end() -> None:
-    """Return on SIGTERM, SIGINT, or when the parent process has gone. To be called within `run`.
+async def wait_for_end() -> None:
+    """Wait for SIGTERM, SIGINT, or the end of the parent process. Call it within `run`.
 
-    The parent is watched by its id, not by PR_SET_PDEATHSIG: that one fires when the *thread* that started us ends.
+    The id of the parent is polled, because PR_SET_PDEATHSIG fires when the *thread* that started this process ends.
     """
-    end = _told_to_end.get()
+    end = _end.get()
     while os.getppid() == _PARENT:
         try:
             async with asyncio.timeout(_PARENT_WATCH_PERIOD):
@@ -62,9 +62,12 @@ async def until_told_to_end() -> None:
 
 
 def run(main: Callable[[], Awaitable[None]], name: str, *, ahead: bool = True) -> int:
-    """Run a fake to its end and return the exit status: 0, or 1 with one line on standard error (a port is taken).
+    """Run a fake until its end and return the exit status: 0, or 1 with a line on standard error if a port is in use.
 
-    `ahead`: it goes before other processes, where we may ask for that; not for one that computes much.
+    Args:
+        main: The fake.
+        name: Name of the fake, for messages.
+        ahead: Whether to request a higher priority than that of other processes; not for a fake that computes much.
     """
     if ahead:
         with contextlib.suppress(OSError):
@@ -73,9 +76,9 @@ def run(main: Callable[[], Awaitable[None]], name: str, *, ahead: bool = True) -
 
     async def body() -> None:
         end = asyncio.Event()
-        _told_to_end.set(end)
+        _end.set(end)
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGTERM, signal.SIGINT):  # before anything is announced: a signal may follow at once
+        for number in (signal.SIGTERM, signal.SIGINT):  # before the ready line, after which a signal may arrive at once
             loop.add_signal_handler(number, end.set)
         await main()
 

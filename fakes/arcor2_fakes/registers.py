@@ -1,7 +1,7 @@
-"""A fake that is a handful of registers: its process, its wire (Modbus, a text line, HTTP), faults and truth.
+"""Fakes of devices with a few registers: their process, wire (Modbus, text line, HTTP), faults and truth.
 
-The fake of a new device derives from `Device` and is run by `serve_device`. A device of another kind is a class with
-`words`, `write` and `heard`, run by `serve`; another text or HTTP protocol is another function `answer`.
+The fake of a new device derives from `Device` and is run by `serve_device`. Another kind of device is a class with
+`words`, `write` and `heard`, run by `serve`. Another text or HTTP protocol is another function `answer`.
 """
 
 from __future__ import annotations
@@ -22,46 +22,46 @@ from arcor2_fakes.wire import Connection, TcpWire
 READ_INPUT, WRITE_ONE, WRITE_SEVERAL = 4, 6, 16
 MAX_LINE = 4096
 Answer = Callable[["Registers", bytes], bytes]
-"""Takes a request and gives the answer; both are whole lines without their end, or for HTTP whole messages."""
+"""Returns the answer to a request; both are lines without their end, or HTTP messages."""
 
 
 class Refusal(Exception):
-    """The device refuses what is written, in its present state."""
+    """The device refuses a write in its present state."""
 
 
 class Registers(Protocol):
-    """The device: words that are read, words that are written."""
+    """A device: registers that are read, registers that are written."""
 
     written: list[list[int]]
-    """All that was ever written: address, values."""
+    """All writes: address, then values."""
 
     def words(self) -> list[int]:
-        """Return what is read, 16 bit each, at this moment."""
+        """Return the present values of the registers that are read, 16 bits each."""
         ...
 
     def write(self, address: int, values: list[int]) -> None:
-        """Take what is written. Raises Refusal."""
+        """Execute a write. Raise Refusal."""
         ...
 
     def heard(self) -> None:
-        """Note that the host spoke."""
+        """Note a request of the host."""
         ...
 
 
 NOBODY, HOST, PANEL = 0, 1, 2
 """Values of the register `owner`."""
 COMMAND, WATCHDOG = 0, 2
-"""Register that are written: a command with its arguments, and the time without a request after which it stops, ms."""
+"""Registers that are written: a command with its arguments; the time without a request after which it stops, ms."""
 
 
 class Device:
-    """A device of the starters: a command register, a watchdog of the host, and an operator panel.
+    """A device of the driver templates: a command register, a watchdog on the host, and an operator panel.
 
     A subclass overrides `command` and, where it needs them, `power_on`, `advance` and `let_go`.
     """
 
     names: tuple[str, ...] = ("state", "value", "count", "fault", "owner")
-    """The registers that are read, in order; each is an attribute."""
+    """Registers that are read, in order; each is an attribute."""
 
     def __init__(self) -> None:
         self.written: list[list[int]] = []
@@ -72,13 +72,13 @@ class Device:
         self.power_on()
 
     def power_on(self) -> None:
-        """Set what the device has besides its registers."""
+        """Initialize the state that is not in registers."""
 
     def advance(self, now: float) -> None:
-        """Move on to the time `now` (monotonic, s)."""
+        """Advance the simulation to a time (monotonic, s)."""
 
     def command(self, number: int, *values: int) -> None:
-        """Obey a command. Raises Refusal."""
+        """Execute a command. Raise Refusal."""
         raise NotImplementedError
 
     def let_go(self) -> None:
@@ -87,12 +87,12 @@ class Device:
 
     @property
     def busy(self) -> bool:
-        """Return whether it works."""
+        """Return whether the device is working."""
         return self.state == 1
 
     def heard(self) -> None:
         """Note a request of the host."""
-        self.words()  # a watchdog that has expired before stays expired
+        self.words()  # a watchdog that expired before this request stays expired
         self.spoke = time.monotonic()
 
     def words(self) -> list[int]:
@@ -105,7 +105,7 @@ class Device:
         return [getattr(self, name) for name in self.names]
 
     def write(self, address: int, values: list[int]) -> None:
-        """Take what the host writes."""
+        """Execute a write of the host. Raise Refusal."""
         if self.owner == PANEL:
             raise Refusal("the panel has control")
         self.written.append([address, *values])
@@ -119,7 +119,7 @@ class Device:
             self.command(*values)
 
     def rest(self) -> None:
-        """Start again as after power on: for tests that share one process."""
+        """Reset to the state after power on, for tests that share a process."""
         self.__init__()  # type: ignore[misc]
 
     def panel(self, on: bool) -> None:
@@ -132,7 +132,7 @@ class Device:
 
 
 def answer_line(device: Registers, line: bytes) -> bytes:
-    """Speak the starter's text protocol: `R first count` gives `= words`, `W first words` gives OK or ERR."""
+    """Answer the text protocol of the template: `R first count` with `= words`, `W first words` with OK or ERR."""
     try:
         verb, first, *rest = line.decode("ascii").split()
         numbers = [int(part) for part in rest]
@@ -150,7 +150,7 @@ def answer_line(device: Registers, line: bytes) -> bytes:
 
 
 def answer_http(device: Registers, request: bytes) -> bytes:
-    """Speak the starter's HTTP: `GET /registers` gives a list of words, `PUT /registers/FIRST` takes one."""
+    """Answer the HTTP API of the template: `GET /registers` and `PUT /registers/FIRST`, each with a list of words."""
     head, _, body = request.partition(b"\r\n\r\n")
     method, path, *_ = head.split(b"\r\n", 1)[0].decode("latin-1").split(" ")
     status, content = "404 Not Found", json.dumps({"error": "no such path"})
@@ -170,7 +170,7 @@ def answer_http(device: Registers, request: bytes) -> bytes:
 
 
 def http_length(buffer: bytes) -> int | None:
-    """Return the length of the first whole HTTP request of a buffer, None while it is not whole."""
+    """Return the length of the first HTTP request in a buffer, None while it is incomplete."""
     end = buffer.find(b"\r\n\r\n")
     if end < 0:
         return None
@@ -182,7 +182,7 @@ def http_length(buffer: bytes) -> int | None:
 
 
 def line_length(buffer: bytes) -> int | None:
-    """Return the length of the first line of a buffer with its CR, None while there is no whole one."""
+    """Return the length of the first line in a buffer, with its CR; None while it is incomplete."""
     end = buffer.find(b"\r")
     return None if end < 0 else end + 1
 
@@ -190,13 +190,13 @@ def line_length(buffer: bytes) -> int | None:
 def cut(
     device: Registers, answer: Answer, length: Callable[[bytes], int | None], send: Callable[[bytes], Any], end: bytes
 ) -> Callable[[bytes], None]:
-    """Return what takes bytes as they come, and answers each whole request."""
+    """Return a function that receives bytes and answers each complete request."""
     buffer = bytearray()
 
     def received(data: bytes) -> None:
         buffer.extend(data)
         if len(buffer) > MAX_LINE:
-            buffer.clear()  # no request is so long: noise
+            buffer.clear()  # no valid request is that long
         while (taken := length(bytes(buffer))) is not None:
             request = bytes(buffer[:taken]).strip(b"\r\n") if end else bytes(buffer[:taken])
             del buffer[:taken]
@@ -207,7 +207,7 @@ def cut(
 
 
 def modbus_wire(device: Registers, host: str, port: int) -> TcpWire:
-    """Return a Modbus TCP port: `words` are its input registers, `write` takes its holding registers."""
+    """Return a Modbus TCP port: `words` are its input registers, `write` executes writes of holding registers."""
     from pymodbus.constants import ExcCodes
     from pymodbus.server import ModbusTcpServer
     from pymodbus.simulator import DataType, SimData, SimDevice
@@ -252,7 +252,7 @@ def http_wire(device: Registers, answer: Answer, host: str, port: int) -> TcpWir
 
 
 def text_line(device: Registers, answer: Answer, host: str, port: int, link: Path | None) -> Line:
-    """Return a text line: a pty that `link` points to, whose own path changes when it is unplugged, or a TCP port."""
+    """Return a text line: a pty with a symbolic link, or without `link` a TCP port."""
     received = cut(device, answer, line_length, lambda frame: line.send(frame), b"\r")
     line: Line = TcpLine(received, host, port) if link is None else PtyLine(received, link)
     return line
@@ -266,10 +266,15 @@ def serve(
     commands: Callable[[Any], dict[str, Callable[..., Any]]] = lambda _: {},
     answer: Answer | None = None,
 ) -> int:
-    """Run the fake of a device until it is told to end; return the exit status.
+    """Run the fake of a device until the end of the process; return the exit status.
 
-    bus: modbus, serial, tcp or http. truth: what is really so, for tests. commands: what the world does to the device,
-    by the name under which the control channel calls it. answer: the codec of a text or HTTP protocol of one's own.
+    Args:
+        name: Name of the device.
+        make: Returns the device.
+        truth: Returns the true state of the device, for tests.
+        bus: modbus, serial, tcp or http.
+        commands: Returns the commands of the control channel by name.
+        answer: Codec of another text or HTTP protocol.
     """
     parser = argparse.ArgumentParser(prog=name, description=f"Fake {name} on {bus}.")
     parser.add_argument("--host", default="127.0.0.1")
@@ -298,7 +303,7 @@ def serve(
 
 
 def serve_device(name: str, make: Callable[[], Device], bus: str, *commands: str) -> int:
-    """Run the fake of a Device until it is told to end; return the exit status.
+    """Run the fake of a `Device` until the end of the process; return the exit status.
 
     Args:
         name: Name of the device.

@@ -1,4 +1,4 @@
-"""The line a host is connected to: a pty that can be pulled out like a USB cable, or a TCP port with the same bytes."""
+"""Serial lines of devices: a pty that can be unplugged like a USB cable, or a TCP port that carries the same bytes."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ _CHUNK = 4096
 
 
 class Line(Protocol):
-    """What a device is wired to."""
+    """Serial line of a device."""
 
     @property
     def port(self) -> str:
-        """What a host opens: a path, or a `socket://` URL."""
+        """Return the path or `socket://` URL that a host opens."""
         ...
 
     @property
     def plugged(self) -> bool:
-        """Whether a host could open it."""
+        """Return whether a host can open the line."""
         ...
 
     def send(self, frame: bytes) -> None:
-        """Put a frame on the line; it is lost if nobody listens."""
+        """Send a frame; it is lost without a host."""
         ...
 
     async def plug(self) -> None:
-        """Connect the device; does nothing if it is connected."""
+        """Plug the cable in, unless it is."""
         ...
 
     async def unplug(self) -> None:
-        """Pull the cable; does nothing if it is pulled."""
+        """Unplug the cable, unless it is."""
         ...
 
     async def fault(self, kind: str, seconds: float = 1.0) -> None:
@@ -46,33 +46,35 @@ class Line(Protocol):
 
 
 class PtyLine:
-    """A pseudo terminal, as a USB virtual serial port.
+    """A pseudo terminal that acts as a USB serial port.
 
     Args:
-        received: called with bytes from the host.
-        link: where a symbolic link to the terminal is kept, since its own path changes with each `plug`.
+        received: Called with bytes from the host.
+        link: Symbolic link to the terminal, whose own path changes with each `plug`.
     """
 
     def __init__(self, received: Callable[[bytes], None], link: Path | None = None) -> None:
         self._received = received
         self._link = link
-        self._ends: tuple[int, int] | None = None  # ours, and the host's, kept open so that a host may come and go
+        self._ends: tuple[int, int] | None = (
+            None  # ours and the host's; the latter stays open, so that hosts can open and close the terminal
+        )
         self._path = ""
         self._faults = Faults()
         self._loop = asyncio.get_running_loop()
 
     @property
     def port(self) -> str:
-        """The link if there is one, else the terminal's path."""
+        """Return the link, or without one the path of the terminal."""
         return self._path if self._link is None else str(self._link)
 
     @property
     def plugged(self) -> bool:
-        """Whether the terminal is there."""
+        """Return whether the terminal exists."""
         return self._ends is not None
 
     def send(self, frame: bytes) -> None:
-        """Put a frame on the line."""
+        """Send a frame."""
         data = self._faults.outgoing(frame)
         if data and self._faults.delay:
             self._loop.call_later(self._faults.delay, self._write, data)
@@ -81,7 +83,7 @@ class PtyLine:
 
     def _write(self, data: bytes) -> None:
         if self._ends is not None:
-            # A full buffer means that nobody reads; what a serial line carries then is lost.
+            # A full buffer means that no host reads. On a real line the bytes are lost, too.
             with contextlib.suppress(BlockingIOError):
                 os.write(self._ends[0], data)
 
@@ -95,7 +97,7 @@ class PtyLine:
             self._received(data)
 
     async def plug(self) -> None:
-        """Make a new terminal and let the link point to it. Raises `OSError` if there can be no such link."""
+        """Create a terminal, and the link to it. Raise `OSError` if the link cannot be created."""
         if self._ends is not None:
             return
         ours, hosts = os.openpty()
@@ -112,7 +114,7 @@ class PtyLine:
         self._loop.add_reader(ours, self._readable)
 
     async def unplug(self) -> None:
-        """Take the terminal away: the host's reads and writes fail from now on."""
+        """Close the terminal, so that reads and writes of the host fail."""
         if self._ends is not None:
             self._loop.remove_reader(self._ends[0])
             self._close_ends()
@@ -126,7 +128,7 @@ class PtyLine:
         self._ends = None
 
     async def fault(self, kind: str, seconds: float = 1.0) -> None:
-        """Apply one of the shared faults; a reset is pulled and plugged again, a port that refuses is gone."""
+        """Apply one of the shared faults. A reset unplugs and plugs the cable, refuse unplugs it."""
         self._faults.set(kind, seconds)
         if kind in ("reset", "refuse"):
             await self.unplug()
@@ -135,7 +137,7 @@ class PtyLine:
 
 
 class TcpLine:
-    """A TCP port, as a serial device server. One host at a time: who comes last has the line."""
+    """A TCP port, as of a serial device server. A new host replaces the previous one."""
 
     def __init__(self, received: Callable[[bytes], None], host: str, port: int) -> None:
         self._received = received
@@ -144,12 +146,12 @@ class TcpLine:
 
     @property
     def port(self) -> str:
-        """A URL that pyserial's `serial_for_url` takes."""
+        """Return a URL for `serial_for_url` of pyserial."""
         return f"socket://{self._wire.address}"
 
     @property
     def plugged(self) -> bool:
-        """Whether the port is open."""
+        """Return whether the port is open."""
         return self._plugged
 
     def _opened(self, connection: Connection) -> None:
@@ -158,12 +160,12 @@ class TcpLine:
         connection.received = self._received
 
     def send(self, frame: bytes) -> None:
-        """Put a frame on the line."""
+        """Send a frame."""
         for connection in tuple(self._wire.connections):
             connection.send(frame)
 
     async def plug(self) -> None:
-        """Listen. Raises `OSError` when the port is taken."""
+        """Listen. Raise `OSError` if the port is in use."""
         await self._wire.listen()
         self._plugged = True
 
@@ -180,7 +182,7 @@ class TcpLine:
 
 
 def _point(link: Path, target: str) -> None:
-    """Let the link point to the target in one step, so that a host never finds half a change."""
+    """Replace the link atomically, so that a host always finds a valid one."""
     if link.exists() and not link.is_symlink():
         raise FileExistsError(f"{link} exists and is no symbolic link")
     new = link.with_name(f"{link.name}.{os.getpid()}")

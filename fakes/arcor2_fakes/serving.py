@@ -1,4 +1,4 @@
-"""The process of a fake: its wires, its control channel, its ready line and its end."""
+"""Serve a fake: its wires, control channel, simulation, ready line and end."""
 
 import asyncio
 import contextlib
@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from arcor2_fakes.control import ControlServer, Handler, parse_address
-from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.process import announce, run, wait_for_end
 from arcor2_fakes.serial_line import Line
 from arcor2_fakes.wire import TcpWire, register_faults
 
@@ -16,7 +16,7 @@ Wire = TcpWire | Line
 
 
 class Fake:
-    """A fake while it runs: `serve` makes one and passes it to the function that builds the device."""
+    """A running fake. `serve` creates it and passes it to the function that builds the device."""
 
     def __init__(self, name: str, channel: ControlServer) -> None:
         self.name, self.channel = name, channel
@@ -24,16 +24,16 @@ class Fake:
         self._ends: list[Callable[[], object]] = []
 
     def commands(self, **handlers: Handler) -> None:
-        """Make functions known to the control channel by name."""
+        """Register commands of the control channel by name."""
         for name, handler in handlers.items():
             self.channel.command(name, handler)
 
     def truth(self, read: Callable[[], Any]) -> None:
-        """Make the real state known to the control channel as `truth`."""
+        """Register the true state as source `truth` of the control channel."""
         self.channel.source("truth", read)
 
     def at_end(self, call: Callable[[], object]) -> None:
-        """Call a function, which may be a coroutine function, when the fake ends."""
+        """Call a function or coroutine function when the fake ends."""
         self._ends.append(call)
 
     def simulate(self, advance: Callable[[float], object], period: float) -> None:
@@ -61,14 +61,14 @@ class Fake:
         self.at_end(end)
 
     def wires(self, checked: tuple[str, ...] = (), /, **wires: Wire) -> None:
-        """Serve on wires, and register their faults; `checked` names those whose frames end in a checksum."""
+        """Serve on wires and register their faults; `checked` names those whose frames end in a checksum."""
         self._wires |= wires
         register_faults(self.channel, dict(wires), checked)
 
     def line(
         self, line: Line, unplugged: Callable[[], object] = lambda: None, name: str = "serial", checked: bool = False
     ) -> None:
-        """Serve on a serial line that the control channel can plug and unplug.
+        """Serve on a serial line, and register commands to plug and unplug it.
 
         Args:
             line: The line.
@@ -95,7 +95,7 @@ class Fake:
                 wire.reset()
 
     async def run(self, **addresses: Wire | Callable[[], object]) -> None:
-        """Open the wires, print the ready line, and return when the fake is told to end.
+        """Open the wires, print the ready line, and wait for the end of the process.
 
         Args:
             addresses: Contents of the ready line: the address of a wire, or the value of a function.
@@ -104,7 +104,7 @@ class Fake:
             await (wire.listen() if isinstance(wire, TcpWire) else wire.plug())
         shown = {name: each() if callable(each) else address_of(each) for name, each in addresses.items()}
         announce(name=self.name, **shown, control=await self.channel.start())
-        await until_told_to_end()
+        await wait_for_end()
 
     async def close(self) -> None:
         """Close the wires and the control channel."""
@@ -129,14 +129,14 @@ def address_of(wire: Wire) -> str:
 def serve(
     name: str, control: str, body: Callable[[Fake], Awaitable[None]], *addresses: str | None, ahead: bool = True
 ) -> int:
-    """Run a fake to its end and return the exit status: 2 for an address that is not HOST:PORT.
+    """Run a fake until its end and return the exit status: 2 for an address that is not HOST:PORT.
 
     Args:
         name: Name of the fake, for messages.
         control: HOST:PORT of the control channel.
         body: Builds the device and awaits `Fake.run`.
-        addresses: Further addresses to check before anything starts; None for one that was not given.
-        ahead: Whether it may run before other processes; see `process.run`.
+        addresses: Further addresses to check first; None for one that is not set.
+        ahead: Whether to request a higher priority; see `process.run`.
     """
     try:
         host, port = parse_address(control)

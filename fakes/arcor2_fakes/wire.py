@@ -1,4 +1,4 @@
-"""A device's TCP port that can be told to fail: silence, reset, half a frame, garbage, slow, refuse, and to heal."""
+"""TCP ports of devices with fault injection: silence, reset, half a frame, garbage, slow and refuse."""
 
 import asyncio
 import contextlib
@@ -19,19 +19,17 @@ _TEXTS = {
     "half_frame": "send half of the next frame and then nothing",
     "garbage": "send random bytes in place of frames",
     "slow": "send everything so many seconds late",
-    "refuse": "take no new connection",
-    "heal": "be well again",
+    "refuse": "accept no new connection",
+    "heal": "work again",
     CHECKSUM: "send frames whose checksum is wrong",
 }
 _RESET_ON_CLOSE = struct.pack("ii", 1, 0)  # struct linger: on, 0 s: closing sends RST
 _TIMER_GRAIN = 0.001  # s, of the event loop
-_MAX_UNSENT = (
-    1 << 20
-)  # a client that does not read must not fill the fake's memory; frames are dropped as a full device would
+_MAX_UNSENT = 1 << 20  # bytes; further frames to a client that does not read are dropped, as by a real device
 
 
 class Faults:
-    """The injected faults of a wire, applied to what it sends. For any transport: TCP, pty, CAN hub."""
+    """Injected faults of a wire, applied to the frames it sends, for any transport: TCP, pty, CAN hub."""
 
     def __init__(self) -> None:
         self.silent = False
@@ -41,7 +39,7 @@ class Faults:
         self.delay = 0.0
 
     def outgoing(self, frame: bytes) -> bytes:
-        """Return what is sent instead of `frame`; b"" for nothing. The caller applies `delay`."""
+        """Return the bytes to send in place of a frame, possibly none. The caller applies `delay`."""
         if self.silent:
             return b""
         if self.half_next:
@@ -54,7 +52,7 @@ class Faults:
         return frame
 
     def set(self, fault: str, seconds: float = 1.0) -> None:
-        """Apply one of `FAULTS`; reset and refuse belong to the transport and change nothing here."""
+        """Apply one of `FAULTS`; the transport implements reset and refuse."""
         if fault not in (*FAULTS, CHECKSUM):
             raise ValueError(f"no fault {fault!r}; there are {', '.join(FAULTS)}")
         if fault == "silence":
@@ -75,7 +73,7 @@ class Faults:
 
 
 class Faulty(Protocol):
-    """A wire as the control channel sees it: a TCP port here, a pty or a hub elsewhere."""
+    """A wire with fault injection: a TCP port, a pty, a CAN hub."""
 
     async def fault(self, kind: str, seconds: float = 1.0) -> None:
         """Apply one of `FAULTS`."""
@@ -83,9 +81,9 @@ class Faulty(Protocol):
 
 
 def register_faults(control: ControlServer, wires: dict[str, Faulty], checked: Container[str] = ()) -> None:
-    """Make each fault a command: ``{"do": "slow", "wire": "rtde", "seconds": 2}``; without a wire: to all.
+    """Register each fault as a command: ``{"do": "slow", "wire": "rtde", "seconds": 2}``; without a wire for all.
 
-    `checked` names the wires whose frames end in a checksum; they can be told to send wrong ones.
+    `checked` names the wires whose frames end in a checksum, for the fault `wrong_checksum`.
     """
 
     async def apply(kind: str, among: dict[str, Faulty], wire: str | None, seconds: float) -> None:
@@ -110,15 +108,15 @@ def register_faults(control: ControlServer, wires: dict[str, Faulty], checked: C
 
 
 class Connection(asyncio.Protocol):
-    """One client on a `TcpWire`. The device sets `received` and `closed` when told of it, and sends whole frames."""
+    """A client of a `TcpWire`. The device sets `received` and `closed` in `opened`, and sends complete frames."""
 
     def __init__(self, wire: "TcpWire") -> None:
         self.wire = wire
         self.received: Callable[[bytes], None] = lambda _: None
         self.closed: Callable[[], None] = lambda: None
         self.alive = False
-        self._torn = False  # half a frame went out: nothing sensible can follow
-        self._late: deque[tuple[float, bytes]] = deque()  # (when due, frame), in order
+        self._torn = False  # half a frame was sent, so that no further frame can be decoded
+        self._late: deque[tuple[float, bytes]] = deque()  # (time to send, frame), in order
         self._transport: asyncio.Transport
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -129,7 +127,7 @@ class Connection(asyncio.Protocol):
         self.wire.opened(self)
 
     def data_received(self, data: bytes) -> None:
-        """Handle the event of the loop. A cut cable carries nothing in either direction."""
+        """Handle the event of the loop; a silent wire carries nothing in either direction."""
         if not self.wire.faults.silent:
             self.received(data)
 
@@ -140,7 +138,7 @@ class Connection(asyncio.Protocol):
         self.closed()
 
     def send(self, frame: bytes) -> bool:
-        """Send one frame, or what the wire's faults make of it. False if it was lost."""
+        """Send a frame, subject to the faults of the wire. Return whether it was sent."""
         faults = self.wire.faults
         if not self.alive or self._torn or self._transport.get_write_buffer_size() > _MAX_UNSENT:
             return False
@@ -160,7 +158,7 @@ class Connection(asyncio.Protocol):
         return True
 
     def close(self) -> None:
-        """Close when everything is sent."""
+        """Close after everything has been sent."""
         if self.alive:
             self._transport.close()
 
@@ -173,7 +171,7 @@ class Connection(asyncio.Protocol):
             self._transport.abort()
 
     def heal(self) -> None:
-        """Send what is late; drops a connection that half a frame went out on, for there is no way back into step."""
+        """Send delayed frames; reset a connection on which half a frame was sent."""
         if self._torn:
             self.reset()
         elif self.alive:
@@ -192,7 +190,7 @@ class Connection(asyncio.Protocol):
 
 
 class TcpWire:
-    """A listening TCP port of a device. `opened` is called with each new `Connection`."""
+    """A TCP port of a device. `opened` is called with each new `Connection`."""
 
     def __init__(self, name: str, host: str, port: int, opened: Callable[[Connection], None]) -> None:
         self.name = name
@@ -204,11 +202,11 @@ class TcpWire:
 
     @property
     def address(self) -> str:
-        """``host:port``; the real port once `listen` has returned."""
+        """Return ``host:port``; after `listen` the real port."""
         return f"{self._host}:{self._port}"
 
     async def listen(self) -> str:
-        """Open the port and returns the address. Raises `OSError` when it is taken."""
+        """Open the port and return the address. Raise `OSError` if it is in use."""
         if self._server is None:
             loop = asyncio.get_running_loop()
             self._server = await loop.create_server(lambda: Connection(self), self._host, self._port)
@@ -216,13 +214,13 @@ class TcpWire:
         return self.address
 
     def refuse(self) -> None:
-        """Close the listening port; connections stay."""
+        """Stop listening; connections stay open."""
         if self._server is not None:
             self._server.close()
             self._server = None
 
     def reset(self) -> None:
-        """Send RST on every connection."""
+        """Reset every connection."""
         for connection in tuple(self.connections):
             connection.reset()
 

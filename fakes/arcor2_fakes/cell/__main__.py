@@ -16,7 +16,7 @@ from arcor2_fakes.cell.devices import DeviceFeed, DeviceGone, Fake, FakeDevices,
 from arcor2_fakes.cell.layout import Layout, LayoutError, read_layout
 from arcor2_fakes.cell.world import World
 from arcor2_fakes.control import ControlServer, parse_address
-from arcor2_fakes.process import announce, run, until_told_to_end
+from arcor2_fakes.process import announce, run, wait_for_end
 
 GONE_STATUS = 3
 _PICTURE_PERIOD = 0.1  # s; the camera renders anew when something was moved
@@ -186,7 +186,7 @@ def main(
         nonlocal problem
         try:
             drawn = draw_boards(boards, seed)
-            problem = await first_of(until_told_to_end(), live(cell, drawn, addresses, channel, patience))
+            problem = await first_of(wait_for_end(), live(cell, drawn, addresses, channel, patience))
         except DeviceGone as e:
             problem = str(e)
 
