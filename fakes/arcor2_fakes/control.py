@@ -2,7 +2,8 @@
 
 It is used by tests and by simulated worlds. Each request is a line, ``{"id": 1, "do": "truth", ...}``, with one answer,
 ``{"id": 1, "ok": true, "data": ...}`` or ``{"id": 1, "ok": false, "error": "..."}``.
-``{"id": 2, "do": "subscribe", "to": "truth", "rate": 50}`` subscribes to events ``{"event": "truth", "data": ...}`` at this rate, Hz; with rate 0 an event is sent when the fake calls `publish`.
+``{"id": 2, "do": "subscribe", "to": "truth", "rate": 50}`` subscribes to events ``{"event": "truth", "data": ...}`` at
+this rate, Hz; with rate 0 an event is sent when the fake calls `publish`.
 ``{"do": "unsubscribe", "to": "truth"}`` ends the subscription. ``{"do": "commands"}`` lists the commands,
 ``{"do": "describe"}`` their parameters.
 

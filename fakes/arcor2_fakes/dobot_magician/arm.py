@@ -9,7 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 from arcor2_fakes.dobot_magician.geometry import Four, beyond, joints_for, tool_at
-from arcor2_fakes.dobot_magician.motion import Motion, Part, Trapezoid, between
+from arcor2_fakes.dobot_magician.motion import Motion, Part, between
+from arcor2_fakes.trapezoid import Trapezoid
 
 QUEUE = 32
 HOMING = 5.0  # s: duration of each half at speed 1, to the switches and back

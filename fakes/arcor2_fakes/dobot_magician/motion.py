@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable
 
 from arcor2_fakes.dobot_magician.geometry import Four
+from arcor2_fakes.trapezoid import Trapezoid
 
 
 def between(a: Four, b: Four, share: float) -> Four:
@@ -17,41 +17,6 @@ def between(a: Four, b: Four, share: float) -> Four:
         a[2] + (b[2] - a[2]) * share,
         a[3] + (b[3] - a[3]) * share,
     )
-
-
-@dataclasses.dataclass(frozen=True)
-class Trapezoid:
-    """A trapezoidal speed profile."""
-
-    distance: float
-    speed: float
-    acceleration: float
-
-    @property
-    def _ramp(self) -> float:
-        """Return the time of one ramp, s; shorter if the maximum speed is not reached."""
-        return min(self.speed / self.acceleration, math.sqrt(self.distance / self.acceleration))
-
-    @property
-    def duration(self) -> float:
-        """Return the duration, s."""
-        ramp = self._ramp
-        if ramp <= 0.0:
-            return 0.0
-        return ramp + self.distance / (self.acceleration * ramp)
-
-    def share(self, time: float) -> float:
-        """Return the fraction of the distance covered after `time` s."""
-        whole, ramp = self.duration, self._ramp
-        if time >= whole:
-            return 1.0
-        if time < ramp:
-            done = 0.5 * self.acceleration * time * time
-        elif time > whole - ramp:
-            done = self.distance - 0.5 * self.acceleration * (whole - time) ** 2
-        else:
-            done = self.acceleration * ramp * (time - 0.5 * ramp)
-        return done / self.distance
 
 
 @dataclasses.dataclass(frozen=True)

@@ -329,7 +329,7 @@ class _WithProgress(Interpreter):
         self._script = script
 
     def at_once(self, call: Call) -> None:
-        """Run the calls, and report progress."""
+        """Run a call, or report progress."""
         if call.name == "signal_async_progress":
             self._script.progress(int(call.get("value", 0, 0)))
         else:

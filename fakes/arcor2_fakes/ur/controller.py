@@ -84,7 +84,7 @@ class Controller:
         self._steps: Steps | None = None
         self._conditions: dict[SafetyMode, bool] = dict.fromkeys(SafetyMode, False)
         self._unlockable = 0  # cycle from which a protective stop may be unlocked
-        self._goes_on = False  # a safeguard stop holds the program, which continues by itself
+        self._resumes = False  # a safeguard stop holds the program, which then continues by itself
         self._suspended = False  # held without reporting it
         self._watchdog: tuple[int, float] | None = None  # input register and timeout, s
         self._written = [0] * 48  # cycle of the last write of each integer register
@@ -156,18 +156,18 @@ class Controller:
     # -------------------------------------------------------------------------------------------------------- safety
     @property
     def safety_bits(self) -> int:
-        """RTDE safety_status_bits."""
+        """Return RTDE safety_status_bits."""
         return SAFETY_BITS[self.safety]
 
     @property
     def robot_bits(self) -> int:
-        """RTDE robot_status_bits: power on, program running, teach button."""
+        """Return RTDE robot_status_bits: power on, program running, teach button."""
         powered = self.robot_mode >= RobotMode.POWER_ON
         return int(powered) | int(self.program is not None) << 1 | int(self.freedrive) << 2
 
     @property
     def joint_mode(self) -> JointMode:
-        """RTDE joint_mode, the same for all joints."""
+        """Return RTDE joint_mode, the same for all joints."""
         if self.safety is SafetyMode.FAULT:
             return JointMode.FAULT
         if self.safety is SafetyMode.VIOLATION:
@@ -193,7 +193,7 @@ class Controller:
         log.info("protective stop: %s", why)
         self._unlockable = self.cycles + round(UNLOCK_WAIT * self.time_scale * self.frequency)
         self._pause(protective=True)
-        self._goes_on = False
+        self._resumes = False
         self._condition(SafetyMode.PROTECTIVE_STOP, True)
 
     def unlock_protective_stop(self) -> None:
@@ -214,14 +214,14 @@ class Controller:
         "paused" is reported; `reports_paused` selects the other interpretation of the manual.
         """
         if on and not self._conditions[SafetyMode.SAFEGUARD_STOP]:
-            self._goes_on = self.runtime in (Runtime.PLAYING, Runtime.RESUMING)
-            if reports_paused or not self._goes_on:
+            self._resumes = self.runtime in (Runtime.PLAYING, Runtime.RESUMING)
+            if reports_paused or not self._resumes:
                 self._pause()
             else:
                 self._suspended = True
                 self.arm.hold()
         self._condition(SafetyMode.SAFEGUARD_STOP, on)
-        if not on and self._goes_on and self.safety in MAY_MOVE:
+        if not on and self._resumes and self.safety in MAY_MOVE:
             self._resume()
         if not on and self.program is None and self.safety in MAY_MOVE:
             self.arm.go_on()
@@ -232,8 +232,8 @@ class Controller:
         if on:
             self._cut(mode)
         else:
-            self._condition(SafetyMode.SYSTEM_EMERGENCY_STOP, False)
-            self._condition(SafetyMode.ROBOT_EMERGENCY_STOP, False)
+            for each in (SafetyMode.SYSTEM_EMERGENCY_STOP, SafetyMode.ROBOT_EMERGENCY_STOP):
+                self._condition(each, False)
 
     def fault(self, violation: bool) -> None:
         """Enter a violation of a safety limit, or a fault, until `restart_safety`."""
@@ -292,7 +292,7 @@ class Controller:
             self.after(_BRAKE_RELEASE_TIME, lambda: self._mode_from(RobotMode.IDLE, RobotMode.RUNNING))
 
     def boot(self) -> None:
-        """Return the controller has just been switched on: booting, then off."""
+        """Switch the controller on: booting, then off."""
         self.power_off()
         self._mode(RobotMode.BOOTING)
         self.after(_POWER_ON_TIME, lambda: self._mode_from(RobotMode.BOOTING, RobotMode.POWER_OFF))
@@ -325,9 +325,8 @@ class Controller:
         if why != "ended":
             self.programs_killed += 1
         program, steps = self.program, self._steps
-        self.program, self._steps, self._watchdog, self._goes_on = None, None, None, False
-        self._suspended = False
-        self.freedrive = False
+        self.program, self._steps, self._watchdog = None, None, None
+        self._resumes = self._suspended = self.freedrive = False
         self.arm.halt()
         if self.safety in MAY_MOVE:
             self.arm.go_on()
@@ -341,11 +340,11 @@ class Controller:
         """Pause on the path. Raise `Refused` if no program plays."""
         if self.runtime is not Runtime.PLAYING:
             raise Refused("Failed to execute: pause")
-        self._goes_on = False
+        self._resumes = False
         self._pause()
 
     def play_program(self) -> None:
-        """Continue a paused program, or starts the loaded one. Raise `Refused`."""
+        """Continue a paused program, or start the loaded one. Raise `Refused`."""
         if self.robot_mode is not RobotMode.RUNNING or self.safety not in MAY_MOVE:
             raise Refused("Failed to execute: play")
         if self.runtime in (Runtime.PAUSED, Runtime.PAUSING):
@@ -362,7 +361,7 @@ class Controller:
             self.runtime = Runtime.PAUSING
 
     def _resume(self) -> None:
-        self._goes_on = self._suspended = False
+        self._resumes = self._suspended = False
         self.arm.go_on()
         if self.runtime in (Runtime.PAUSED, Runtime.PAUSING):
             self.runtime = Runtime.RESUMING

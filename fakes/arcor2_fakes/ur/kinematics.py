@@ -48,12 +48,12 @@ class NoSolution(ValueError):
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """Return vector product."""
+    """Return the vector product."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def dot(a: Vector, b: Vector) -> float:
-    """Return scalar product."""
+    """Return the scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -88,7 +88,7 @@ def invert(a: Transform) -> Transform:
 
 
 def from_pose(pose: Sequence[float]) -> Transform:
-    """Return x, y, z [m] and rotation vector [rad] as a transform (Rodrigues' formula)."""
+    """Return the transform of x, y, z [m] and a rotation vector [rad] (Rodrigues' formula)."""
     px, py, pz, rx, ry, rz = pose
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
     if angle < 1e-12:
@@ -105,7 +105,7 @@ def from_pose(pose: Sequence[float]) -> Transform:
 
 
 def rotation_vector(a: Transform) -> Vector:
-    """Return axis times angle in [0, pi], stable at both ends."""
+    """Return axis times angle, angle in [0, pi]; stable at both ends."""
     x, y, z, _ = a
     vx, vy, vz = y[2] - z[1], z[0] - x[2], x[1] - y[0]
     sine2 = math.sqrt(vx * vx + vy * vy + vz * vz)  # 2 sin
@@ -126,12 +126,12 @@ def rotation_vector(a: Transform) -> Vector:
 
 
 def to_pose(a: Transform) -> tuple[float, ...]:
-    """A transform as x, y, z [m] and rotation vector [rad]."""
+    """Return x, y, z [m] and rotation vector [rad] of a transform."""
     return (*a[3], *rotation_vector(a))
 
 
 def difference(a: Transform, b: Transform) -> tuple[Vector, Vector]:
-    """Translation and rotation vector, in base axes, that take `a` to `b`."""
+    """Return translation and rotation vector, in base axes, from `a` to `b`."""
     o, p = a[3], b[3]
     turn = compose((b[0], b[1], b[2], (0.0, 0.0, 0.0)), invert((a[0], a[1], a[2], (0.0, 0.0, 0.0))))
     return (p[0] - o[0], p[1] - o[1], p[2] - o[2]), rotation_vector(turn)
@@ -148,7 +148,7 @@ class Chain:
         self._flange_from_tcp = IDENTITY
 
     def set_tcp(self, offset: Sequence[float]) -> None:
-        """Return the TCP in the flange, as on the wire."""
+        """Set the TCP in the flange, x, y, z [m] and rotation vector [rad]."""
         self.tcp = from_pose(offset)
         self._flange_from_tcp = invert(self.tcp)
 
@@ -161,7 +161,7 @@ class Chain:
         return self._frames(q)[0]
 
     def jacobian(self, q: Sequence[float]) -> np.ndarray:
-        """Return 6 x 6, TCP velocity (m/s, rad/s, base axes) per joint velocity."""
+        """Return the Jacobian, shape (6, 6): TCP velocity (m/s, rad/s, base axes) per joint velocity."""
         return self._tip_and_jacobian(q)[1]
 
     def _tip_and_jacobian(self, q: Sequence[float]) -> tuple[Transform, np.ndarray]:

@@ -24,9 +24,13 @@ _PROTECTIVE_TIME = 0.08  # s, the same for a protective stop
 class Motion(Protocol):
     """A motion; `step` returns the next joint positions."""
 
-    done: bool
     along_path: bool
     """Whether a pause may slow it down on its path; if not, it ends by itself or by a halt."""
+
+    @property
+    def done(self) -> bool:
+        """Return whether the motion has ended."""
+        ...
 
     def step(self, arm: "Arm", dt: float, /) -> Joints:
         """Return positions after `dt` seconds of the motion's own time."""
@@ -154,14 +158,14 @@ class Arm:
         """How fast path time runs now: the speed slider, or on its way to or from zero in a pause."""
         self.slider = 1.0
         self.held = False
-        """Return whether path time is stopped, by a pause or by the safety system."""
+        """Whether path time is stopped, by a pause or by the safety system."""
         self.speed_limit = MAX_JOINT_SPEED
         self._ramp = _PAUSE_TIME
         self._pose: tuple[float, ...] | None = None
 
     @property
     def pose(self) -> tuple[float, ...]:
-        """Return the TCP as x, y, z and rotation vector."""
+        """Return the pose of the TCP as x, y, z and rotation vector."""
         if self._pose is None:
             self._pose = to_pose(self.chain.forward(self.q))
         return self._pose
@@ -177,7 +181,7 @@ class Arm:
         return self.motion is not None
 
     def twist(self) -> list[float]:
-        """Return TCP velocity in base axes."""
+        """Return the TCP velocity in base axes."""
         if not self.moving:
             return [0.0] * 6
         twist: list[float] = (self.chain.jacobian(self.q) @ self.qd).tolist()
@@ -233,7 +237,7 @@ class Arm:
         self.motion, self.qd, self.q, self._pose = None, (0.0,) * 6, tuple(q), None
 
     def step(self, dt: float) -> None:
-        """One control cycle. Raise `MotionRefused` if a limit would be exceeded; the arm is then unchanged."""
+        """Run one control cycle. Raise `MotionRefused` if a limit would be exceeded; the arm is then unchanged."""
         wanted = 0.0 if self.held else self.slider
         if self.rate != wanted:
             change = dt / self._ramp

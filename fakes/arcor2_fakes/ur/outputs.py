@@ -14,7 +14,7 @@ _LINK_LOAD = (0.0, 30.0, 14.0, 1.5, 1.0, 0.0)  # N m at full reach, roughly thos
 
 
 def readers(c: Controller) -> dict[str, Reader]:
-    """One function per RTDE output variable; each returns the values to pack."""
+    """Return a function per RTDE output variable; it returns the values to pack."""
     arm = c.arm
     six = (0.0,) * 6
 

@@ -102,7 +102,7 @@ INPUTS = {
 
 
 def pack(kind: int, payload: bytes = b"") -> bytes:
-    """One frame."""
+    """Return a frame."""
     return HEADER.pack(HEADER.size + len(payload), kind) + payload
 
 

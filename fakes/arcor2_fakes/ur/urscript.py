@@ -126,7 +126,7 @@ class Interpreter:
     def __init__(self, controller: Controller) -> None:
         self.controller = controller
         self._left: Motion | None = None
-        """The motion that a blend has left early."""
+        """Motion that a blend has left early."""
 
     def run(self, statements: Sequence[Call]) -> Steps:
         """Run all calls in order. Raise `MotionRefused`, or `ValueError` and the like."""
@@ -189,7 +189,7 @@ class Interpreter:
         c.changed()
 
     def joints(self, pose: Sequence[float], near: Sequence[float] | None = None) -> tuple[float, ...]:
-        """get_inverse_kin. Raise `NoSolution`."""
+        """Return the joint positions for a pose (get_inverse_kin). Raise `NoSolution`."""
         return self.controller.chain.inverse(from_pose(pose), near or self.controller.arm.q)
 
     def move_joints(self, q: Sequence[float], velocity: float, acceleration: float, blend: float = 0.0) -> Steps:

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from arcor2_fakes.trapezoid import Trapezoid
 from arcor2_fakes.ur.kinematics import Chain, from_pose
 from arcor2_fakes.ur.motion import Arm, JointSpeed
-from arcor2_fakes.ur.paths import MotionRefused, Profile
+from arcor2_fakes.ur.paths import MotionRefused
 
 DT = 0.002
 HOME = (0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0)
@@ -31,7 +32,7 @@ def run(arm, seconds=30.0, each=lambda: None):
 
 @given(st.floats(1e-6, 10), st.floats(0.01, 4), st.floats(0.01, 40))
 def test_profile_keeps_its_limits(length, velocity, acceleration):
-    profile = Profile(length, velocity, acceleration)
+    profile = Trapezoid(length, velocity, acceleration)
     assert profile.duration >= length / velocity
     steps = [profile.position(profile.duration * i / 200) for i in range(201)]
     dt = profile.duration / 200
