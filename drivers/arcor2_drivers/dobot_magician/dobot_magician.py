@@ -253,7 +253,7 @@ class DobotMagician(HoldsParts, SingleArm):
     # -------------------------------------------------------------------------------- actions
     @action(deadline=LONGEST_HOMING)
     def home(self, *, an: str | None = None) -> None:
-        """Reference the axes: the arm moves to its switches and back. Keep clear of it."""
+        """Home the arm: move to its switches and back. Keep clear of it."""
         self._motion.home(self._control.stops.guard())
 
     @action

@@ -133,7 +133,7 @@ class Motion:
             )
 
     def home(self, guard: StopGuard) -> None:
-        """Reference the axes."""
+        """Home the arm."""
         with self._exclusive():
             self._run("homing", 1.0, self._settings.home_timeout, lambda _: True, guard, Command.HOME, "I", 0)
 
