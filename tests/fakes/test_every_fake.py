@@ -109,7 +109,7 @@ def test_ten_times_as_fast_the_servos_take_a_tenth_and_their_watchdog_its_time()
             clock.now += 0.001
             servo.advance()
         times.append(clock.now - began)
-        servo.hear()
+        servo.restart_watchdog()
         assert servo.write(98, b"\x0a") == 0  # 0.2 s
         began = clock.now
         while servo["watchdog"] != 0xFF:

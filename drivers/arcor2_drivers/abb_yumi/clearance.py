@@ -29,7 +29,7 @@ TIMING: Final = 0.05
 """Fraction of a synchronized path by which one arm may be ahead of the other."""
 
 
-def bones(arm: str, joints: Array, tcp: Pose) -> Array:
+def capsule_points(arm: str, joints: Array, tcp: Pose) -> Array:
     """Return shoulder, elbow, wrist, flange and TCP, shape (n, 5, 3), for joints of shape (n, 7)."""
     found = nominal.frames(arm, joints)
     points = np.empty((len(joints), 5, 3))
@@ -38,7 +38,7 @@ def bones(arm: str, joints: Array, tcp: Pose) -> Array:
     return points
 
 
-def between(one: Array, other: Array) -> Array:
+def clearances(one: Array, other: Array) -> Array:
     """Return the clearance of capsules, m, for points of shape (..., 5, 3), broadcast; negative if they overlap."""
     p, q = one[..., :-1, None, :], other[..., None, :-1, :]
     u, v = one[..., 1:, None, :] - p, other[..., None, 1:, :] - q
@@ -74,22 +74,22 @@ class Clearance:
         other = other_arm(arm)
         with self._lock:
             there = self._paths.get(other, other_joints[None, :])
-            mine = bones(arm, path, self._tools[arm])
-            theirs = bones(other, there, self._tools[other])
-            gaps = between(mine[:, None], theirs[None, :]).min(axis=1)
+            mine = capsule_points(arm, path, self._tools[arm])
+            theirs = capsule_points(other, there, self._tools[other])
+            gaps = clearances(mine[:, None], theirs[None, :]).min(axis=1)
             self._check(arm, gaps)
             self._paths[arm] = path
 
     def claim_both(self, paths: dict[str, Array]) -> None:
         """Check paths that both arms execute in step, and reserve them until `free`. Raise Refused."""
         count = max(len(path) for path in paths.values())
-        one, two = (_resampled(bones(arm, paths[arm], self._tools[arm]), count) for arm in ARMS)
+        one, two = (_resampled(capsule_points(arm, paths[arm], self._tools[arm]), count) for arm in ARMS)
         with self._lock:
             reach = int(np.ceil(TIMING * count))
             gaps = np.full(count, np.inf)
             for shift in range(-reach, reach + 1):
                 at = np.clip(np.arange(count) + shift, 0, count - 1)
-                gaps = np.minimum(gaps, between(one, two[at]))
+                gaps = np.minimum(gaps, clearances(one, two[at]))
             self._check("left", gaps)
             self._paths.update(paths)
 
@@ -97,11 +97,11 @@ class Clearance:
         """Check joints of one arm against the present ones of the other. Raise Refused."""
         other = other_arm(arm)
         mine, theirs = (
-            bones(arm, joints[None, :], self._tools[arm]),
-            bones(other, other_joints[None, :], self._tools[other]),
+            capsule_points(arm, joints[None, :], self._tools[arm]),
+            capsule_points(other, other_joints[None, :], self._tools[other]),
         )
         with self._lock:
-            self._check(arm, np.append(np.inf, between(mine, theirs)))
+            self._check(arm, np.append(np.inf, clearances(mine, theirs)))
 
     def free(self, arm: str) -> None:
         """Drop the path of an arm that is at standstill."""

@@ -42,7 +42,7 @@ def register_commands(fake: Fake, arm: Arm, commands: Commands) -> None:
 
     def drive(turn: float, percent: float = 5.0) -> None:
         """Turn the base, like a program on another host."""
-        arm.set.speed_ratio = float(percent)
+        arm.settings.speed_ratio = float(percent)
         first, second, third, fourth = arm.joints
         target = (first + float(turn), second, third, fourth)
         arm.enqueue(lambda: arm.point_to_point(JOINT_TO_ANGLES, target))

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from arcor2_fakes.dobot_magician.geometry import Four, beyond, joints_for, tool_at
+from arcor2_fakes.dobot_magician.geometry import Four, joints_for, limit_alarm, tool_at
 from arcor2_fakes.dobot_magician.motion import Motion, Part, between
 from arcor2_fakes.trapezoid import Trapezoid
 
@@ -20,8 +20,8 @@ RESET, PLANNING_SINGULAR, PLANNING_LIMIT, MOVING_LIMIT = 0x00, 0x10, 0x11, 0x21
 
 
 @dataclasses.dataclass
-class Parameters:
-    """Parameters; mm, degrees and seconds, ratios in percent."""
+class Settings:
+    """Settings; mm, degrees and seconds, ratios in percent."""
 
     home: Four = (259.1, 0.0, -8.5, 0.0)
     bias: tuple[float, float, float] = (59.7, 0.0, 0.0)
@@ -57,7 +57,7 @@ class Arm:
         self._boot()
 
     def _boot(self) -> None:
-        self.set = Parameters()
+        self.settings = Settings()
         self.queue: deque[tuple[int, Callable[[], Motion | None]]] = deque()
         self.running = False
         self.done_index = 0
@@ -76,7 +76,7 @@ class Arm:
     @property
     def tool(self) -> Four:
         """Return x, y, z in mm and r in degrees."""
-        return tool_at(self.joints, self.set.bias)
+        return tool_at(self.joints, self.settings.bias)
 
     @property
     def moving(self) -> bool:
@@ -123,7 +123,7 @@ class Arm:
                 return
             self.motions += 1
         joints, ended = self._motion.advance(seconds * self.pace)
-        if joints is None or (not self._homing and (beyond(joints) is not None)):
+        if joints is None or (not self._homing and (limit_alarm(joints) is not None)):
             self.raise_alarm(MOVING_LIMIT)
             return
         self.joints = joints
@@ -146,7 +146,7 @@ class Arm:
     def home(self) -> Motion:
         """Move to the switches and back to the home position."""
         self._homing = True
-        start, end = self.joints, joints_for(self.set.home, self.set.bias) or FOLDED
+        start, end = self.joints, joints_for(self.settings.home, self.settings.bias) or FOLDED
         whole = Trapezoid(1.0, 1.0 / (HOMING - 1.0), 1.0 / (HOMING - 1.0))
         return Motion(
             [
@@ -162,17 +162,17 @@ class Arm:
         elif mode in (7, 8):  # steps of the tool
             target = _sum(self.tool, target)
         by_angles = mode in (3, 4, 5, 6)
-        end = target if by_angles else joints_for(target, self.set.bias)
+        end = target if by_angles else joints_for(target, self.settings.bias)
         if end is None or not all(map(math.isfinite, end)):
             self._refuse(PLANNING_SINGULAR if end is None else PLANNING_LIMIT)
             return None
-        code = beyond(end)
+        code = limit_alarm(end)
         if code is not None:
             self._refuse(code if by_angles else PLANNING_LIMIT)
             return None
         if mode in (1, 4, 6, 8):
             return Motion([self._joint_part(self.joints, end)])
-        goal = tool_at(end, self.set.bias)
+        goal = tool_at(end, self.settings.bias)
         if mode in (2, 5, 7):
             return Motion([self._straight_part(self.tool, goal)])
         return self._jump(goal, straight=mode == 9)
@@ -184,9 +184,9 @@ class Arm:
 
     def _jump(self, goal: Four, *, straight: bool) -> Motion | None:
         here = self.tool
-        top = min(max(here[2], goal[2]) + self.set.jump_height, self.set.highest)
+        top = min(max(here[2], goal[2]) + self.settings.jump_height, self.settings.highest)
         over, above = (*here[:2], top, here[3]), (*goal[:2], top, goal[3])
-        first, last = joints_for(over, self.set.bias), joints_for(above, self.set.bias)
+        first, last = joints_for(over, self.settings.bias), joints_for(above, self.settings.bias)
         if first is None or last is None:
             self._refuse(PLANNING_LIMIT)
             return None
@@ -195,22 +195,24 @@ class Arm:
 
     def _joint_part(self, start: Four, end: Four) -> Part:
         """Return the part in which all joints arrive together; the slowest determines the time."""
-        fast, quick = self.set.speed_ratio / 100.0, self.set.acceleration_ratio / 100.0
+        fast, quick = self.settings.speed_ratio / 100.0, self.settings.acceleration_ratio / 100.0
         shares = [
             Trapezoid(abs(b - a), speed * fast, acceleration * quick)
             for a, b, speed, acceleration in zip(
-                start, end, self.set.joint_speed, self.set.joint_acceleration, strict=True
+                start, end, self.settings.joint_speed, self.settings.joint_acceleration, strict=True
             )
         ]
         return Part(max(shares, key=lambda one: one.duration), lambda share: between(start, end, share))
 
     def _straight_part(self, start: Four, end: Four) -> Part:
-        fast, quick = self.set.speed_ratio / 100.0, self.set.acceleration_ratio / 100.0
-        way = Trapezoid(math.dist(start[:3], end[:3]), self.set.speed * fast, self.set.acceleration * quick)
-        turn = Trapezoid(abs(end[3] - start[3]), self.set.turning * fast, self.set.turning_acceleration * quick)
+        fast, quick = self.settings.speed_ratio / 100.0, self.settings.acceleration_ratio / 100.0
+        way = Trapezoid(math.dist(start[:3], end[:3]), self.settings.speed * fast, self.settings.acceleration * quick)
+        turn = Trapezoid(
+            abs(end[3] - start[3]), self.settings.turning * fast, self.settings.turning_acceleration * quick
+        )
         return Part(
             max(way, turn, key=lambda one: one.duration),
-            lambda share: joints_for(between(start, end, share), self.set.bias),
+            lambda share: joints_for(between(start, end, share), self.settings.bias),
         )
 
     def truth(self) -> dict[str, Any]:
@@ -229,7 +231,7 @@ class Arm:
             "suction": self.suction,
             "gripper": self.gripper,
             "steppers": {str(number): state for number, state in self.steppers.items()},
-            "speed_ratio": self.set.speed_ratio,
+            "speed_ratio": self.settings.speed_ratio,
         }
 
 

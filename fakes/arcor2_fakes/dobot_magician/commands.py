@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 
 from arcor2_fakes.dobot_magician.arm import Arm
-from arcor2_fakes.dobot_magician.frames import Cutter, build
+from arcor2_fakes.dobot_magician.frames import FrameBuffer, build
 from arcor2_fakes.dobot_magician.motion import Motion
 
 WRITES, QUEUED = 0x01, 0x02
@@ -21,7 +21,7 @@ class Commands:
 
     def __init__(self, arm: Arm, send: Callable[[bytes], None]) -> None:
         self._arm, self._send = arm, send
-        self._cutter = Cutter()
+        self._frames = FrameBuffer()
         self.received: deque[tuple[int, int]] = deque(maxlen=2000)
         self.stops: deque[float] = deque(maxlen=200)
         """Times of forced stops, on the monotonic clock, s."""
@@ -30,7 +30,7 @@ class Commands:
 
     def drop_input(self) -> None:
         """Drop an incomplete frame."""
-        self._cutter.drop()
+        self._frames.clear()
 
     def renew(self) -> None:
         """Drop received bytes, and reset all faults."""
@@ -42,10 +42,10 @@ class Commands:
 
     def feed(self, data: bytes) -> None:
         """Process received bytes."""
-        for command, control, parameters in self._cutter.cut(data):
+        for command, control, parameters in self._frames.feed(data):
             self.received.append((command, control))
             try:
-                answer = self._obey(command, control, parameters)
+                answer = self._execute(command, control, parameters)
             except (struct.error, BufferError, IndexError):
                 continue
             if answer is not None and command not in self.mute:
@@ -55,31 +55,31 @@ class Commands:
                     frame = frame[:-1] + bytes((frame[-1] ^ 0x55,))
                 self._send(frame)
 
-    def _obey(self, command: int, control: int, given: bytes) -> bytes | None:
+    def _execute(self, command: int, control: int, data: bytes) -> bytes | None:
         if not control & WRITES:
-            return self._tell(command)
+            return self._read(command)
         if control & QUEUED:
-            begin = self._motion(command, given)
+            begin = self._motion(command, data)
             return None if begin is None else struct.pack("<Q", self._arm.enqueue(begin))
-        return b"" if self._do(command, given) else None
+        return b"" if self._write(command, data) else None
 
-    def _motion(self, command: int, given: bytes) -> Callable[[], Motion | None] | None:
+    def _motion(self, command: int, data: bytes) -> Callable[[], Motion | None] | None:
         arm = self._arm
         if command == 31:
-            struct.unpack("<I", given)
+            struct.unpack("<I", data)
             return arm.home
         if command == 84:
-            mode, *target = struct.unpack("<B4f", given)
+            mode, *target = struct.unpack("<B4f", data)
             x, y, z, r = target
             return (lambda: arm.point_to_point(mode, (x, y, z, r))) if mode <= 9 else None
 
         def later() -> None:
-            self._do(command, given)
+            self._write(command, data)
 
         return later if command in (30, 60, 62, 63, 80, 81, 82, 83, 135) else None
 
-    def _tell(self, command: int) -> bytes | None:
-        arm, has = self._arm, self._arm.set
+    def _read(self, command: int) -> bytes | None:
+        arm, settings = self._arm, self._arm.settings
         match command:
             case 0:
                 return SERIAL.encode("ascii")
@@ -93,51 +93,55 @@ class Commands:
                 bits = sum(1 << code for code in arm.alarms)
                 return bits.to_bytes(ALARM_BYTES, "little")
             case 30:
-                return struct.pack("<4f", *has.home)
+                return struct.pack("<4f", *settings.home)
             case 60:
-                return struct.pack("<3f", *has.bias)
+                return struct.pack("<3f", *settings.bias)
             case 62:
                 return bytes(arm.suction)
             case 63:
                 return bytes(arm.gripper)
             case 80:
-                return struct.pack("<8f", *has.joint_speed, *has.joint_acceleration)
+                return struct.pack("<8f", *settings.joint_speed, *settings.joint_acceleration)
             case 81:
-                return struct.pack("<4f", has.speed, has.turning, has.acceleration, has.turning_acceleration)
+                return struct.pack(
+                    "<4f", settings.speed, settings.turning, settings.acceleration, settings.turning_acceleration
+                )
             case 82:
-                return struct.pack("<2f", has.jump_height, has.highest)
+                return struct.pack("<2f", settings.jump_height, settings.highest)
             case 83:
-                return struct.pack("<2f", has.speed_ratio, has.acceleration_ratio)
+                return struct.pack("<2f", settings.speed_ratio, settings.acceleration_ratio)
             case 246:
                 return struct.pack("<Q", arm.done_index)
             case 247:
                 return struct.pack("<I", arm.space)
         return None
 
-    def _do(self, command: int, given: bytes) -> bool:
-        arm, has = self._arm, self._arm.set
+    def _write(self, command: int, data: bytes) -> bool:
+        arm, settings = self._arm, self._arm.settings
         match command:
             case 21:
                 arm.alarms.clear()
             case 30:
-                has.home = struct.unpack("<4f", given)
+                settings.home = struct.unpack("<4f", data)
             case 60:
-                has.bias = struct.unpack("<3f", given)
+                settings.bias = struct.unpack("<3f", data)
             case 62:
-                arm.suction = struct.unpack("<2B", given)
+                arm.suction = struct.unpack("<2B", data)
             case 63:
-                arm.gripper = struct.unpack("<2B", given)
+                arm.gripper = struct.unpack("<2B", data)
             case 80:
-                numbers = struct.unpack("<8f", given)
-                has.joint_speed, has.joint_acceleration = numbers[:4], numbers[4:]
+                numbers = struct.unpack("<8f", data)
+                settings.joint_speed, settings.joint_acceleration = numbers[:4], numbers[4:]
             case 81:
-                has.speed, has.turning, has.acceleration, has.turning_acceleration = struct.unpack("<4f", given)
+                settings.speed, settings.turning, settings.acceleration, settings.turning_acceleration = struct.unpack(
+                    "<4f", data
+                )
             case 82:
-                has.jump_height, has.highest = struct.unpack("<2f", given)
+                settings.jump_height, settings.highest = struct.unpack("<2f", data)
             case 83:
-                has.speed_ratio, has.acceleration_ratio = struct.unpack("<2f", given)
+                settings.speed_ratio, settings.acceleration_ratio = struct.unpack("<2f", data)
             case 135:
-                number, enabled, speed = struct.unpack("<BBi", given)
+                number, enabled, speed = struct.unpack("<BBi", data)
                 if number in arm.steppers:
                     arm.steppers[number] = (bool(enabled), speed)
             case 240:

@@ -14,17 +14,17 @@ def build(command: int, control: int, parameters: bytes = b"") -> bytes:
     return bytes((_HEAD, _HEAD, len(payload))) + payload + bytes(((0x100 - sum(payload) % 0x100) % 0x100,))
 
 
-class Cutter:
+class FrameBuffer:
     """Finds frames in received bytes; a frame with a wrong checksum is skipped, as by the arm."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
 
-    def drop(self) -> None:
+    def clear(self) -> None:
         """Drop an incomplete frame."""
         self._bytes.clear()
 
-    def cut(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
+    def feed(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
         """Return id, control and parameters of each frame completed by `data`."""
         self._bytes += data
         while len(self._bytes) >= 3:

@@ -49,7 +49,7 @@ def joints_for(tool: Four, bias: tuple[float, float, float]) -> Four | None:
     return base, math.degrees(two), math.degrees(three), r - base
 
 
-def beyond(joints: Four) -> int | None:
+def limit_alarm(joints: Four) -> int | None:
     """Return the alarm of the first joint beyond a limit: from 40h on, positive and negative limits alternate."""
     for number, (angle, low, high) in enumerate(zip(joints, LOWEST, HIGHEST, strict=True)):
         if angle > high + 1e-3:

@@ -41,13 +41,13 @@ class Bus:
         """Process received bytes."""
         for found in self._receiver.feed(data):
             if isinstance(found, BadCrc):
-                if (servo := self._awake(found.servo)) is not None:
+                if (servo := self._answering(found.servo)) is not None:
                     self._answer(servo, BAD_CRC)
             else:
                 self.packets += 1
-                self._obey(found)
+                self._execute(found)
 
-    def _awake(self, number: int) -> Servo | None:
+    def _answering(self, number: int) -> Servo | None:
         servo = self.servos.get(number)
         return servo if servo is not None and servo.answers else None
 
@@ -58,30 +58,30 @@ class Bus:
             frame = frame[:-1] + bytes([frame[-1] ^ 0x01])
         self._send(frame)
 
-    def _obey(self, given: Instruction) -> None:
-        parameters = given.parameters
-        if given.code == SYNC_READ and given.servo == BROADCAST and len(parameters) > 4:
-            for servo in self._named(parameters[4:]):
+    def _execute(self, instruction: Instruction) -> None:
+        parameters = instruction.parameters
+        if instruction.code == SYNC_READ and instruction.servo == BROADCAST and len(parameters) > 4:
+            for servo in self._addressed(parameters[4:]):
                 self._read(servo, parameters[:4])
-        elif given.code == SYNC_WRITE and given.servo == BROADCAST and len(parameters) > 4:
+        elif instruction.code == SYNC_WRITE and instruction.servo == BROADCAST and len(parameters) > 4:
             self._sync_write(parameters)
-        elif given.code == PING and given.servo == BROADCAST:
-            for servo in self._named(bytes(sorted(self.servos))):
+        elif instruction.code == PING and instruction.servo == BROADCAST:
+            for servo in self._addressed(bytes(sorted(self.servos))):
                 self._ping(servo)
-        elif (one := self._awake(given.servo)) is not None:
-            one.hear()
+        elif (one := self._answering(instruction.servo)) is not None:
+            one.restart_watchdog()
             if (error := self._refusals.pop(one.number, OK)) != OK:
                 self._answer(one, error)
             else:
-                self._alone(one, given.code, parameters)
+                self._execute_single(one, instruction.code, parameters)
 
-    def _named(self, numbers: bytes) -> list[Servo]:
-        found = [servo for number in numbers if (servo := self._awake(number)) is not None]
+    def _addressed(self, numbers: bytes) -> list[Servo]:
+        found = [servo for number in numbers if (servo := self._answering(number)) is not None]
         for servo in found:
-            servo.hear()
+            servo.restart_watchdog()
         return found
 
-    def _alone(self, servo: Servo, code: int, parameters: bytes) -> None:
+    def _execute_single(self, servo: Servo, code: int, parameters: bytes) -> None:
         if code == PING:
             self._ping(servo)
         elif code == READ:
@@ -118,5 +118,5 @@ class Bus:
         if len(rest) % (size + 1):
             return  # a broadcast is never answered, not even with an error
         for start in range(0, len(rest), size + 1):
-            for servo in self._named(rest[start : start + 1]):
+            for servo in self._addressed(rest[start : start + 1]):
                 servo.write(address, rest[start + 1 : start + 1 + size])

@@ -8,9 +8,9 @@ TICKS: Final = 4096  # per turn
 VELOCITY_UNIT: Final = 0.229 * TICKS / 60.0  # ticks/s
 ACCELERATION_UNIT: Final = 214.577 * TICKS / 3600.0  # ticks/s²
 WATCHDOG_UNIT: Final = 0.02  # s
-HARDEST: Final = 80_000.0  # ticks/s²: acceleration of the motor without a profile
+MAX_ACCELERATION: Final = 80_000.0  # ticks/s²: acceleration of the motor without a profile
 STEP: Final = 0.001  # s
-REBOOTS: Final = 0.3  # s without an answer
+REBOOT_TIME: Final = 0.3  # s without an answer
 EEPROM_END: Final = 64
 TABLE_END: Final = 147
 TRIPPED: Final = 0xFF
@@ -74,8 +74,8 @@ class Servo:
         self._clock = clock
         self._values = {name: field.default for name, field in FIELDS.items()}
         self._values["id"] = number
-        self._now = self._heard = self._began = clock()
-        self._away_until = -math.inf
+        self._now = self._instructed_at = self._booted_at = clock()
+        self._rebooting_until = -math.inf
         self._shaft = position
         self._speed = 0.0
         self._target = position
@@ -91,7 +91,7 @@ class Servo:
         now = self._clock()
         limit = self._values["watchdog"]
         if self._values["torque"] and 0 < limit < TRIPPED:
-            trips = self._heard + limit * WATCHDOG_UNIT * self._time_scale
+            trips = self._instructed_at + limit * WATCHDOG_UNIT * self._time_scale
             if trips < now:
                 self._move_until(trips)
                 self._values["watchdog"] = TRIPPED
@@ -137,19 +137,19 @@ class Servo:
             if field.address >= EEPROM_END:
                 self._values[name] = field.default
         self._speed = 0.0
-        self._began = self._now
-        self._away_until = self._now + REBOOTS
+        self._booted_at = self._now
+        self._rebooting_until = self._now + REBOOT_TIME
 
     @property
     def answers(self) -> bool:
         """Return whether the servo is connected and has booted."""
-        return not self.absent and self._clock() >= self._away_until
+        return not self.absent and self._clock() >= self._rebooting_until
 
     def _move_until(self, until: float) -> None:
         if not self._values["torque"]:
             self._speed = 0.0
         elif self._speed or self._target != self._shaft:
-            acceleration = self._values["profile_acceleration"] * ACCELERATION_UNIT or HARDEST
+            acceleration = self._values["profile_acceleration"] * ACCELERATION_UNIT or MAX_ACCELERATION
             limit = self._values["velocity_limit"]
             fastest = min(self._values["profile_velocity"] or limit, limit) * VELOCITY_UNIT
             while self._now < until and (self._speed or self._target != self._shaft):
@@ -176,17 +176,17 @@ class Servo:
         """Return the alert bit of its status packets."""
         return ALERT if self._values["hardware_error"] else 0
 
-    def hear(self) -> None:
+    def restart_watchdog(self) -> None:
         """Restart the bus watchdog: an instruction was received."""
         self.advance()
-        self._heard = self._now
+        self._instructed_at = self._now
 
     def read(self, address: int, size: int) -> bytes | int:
         """Return bytes of the table, or an error."""
         if size < 1 or address + size > TABLE_END:
             return BAD_RANGE
         values = self._values
-        values["tick"] = int((self._now - self._began) * 1000.0) % 32768
+        values["tick"] = int((self._now - self._booted_at) * 1000.0) % 32768
         values["position"] = round(self.position)
         values["velocity"] = round(self._speed / VELOCITY_UNIT)
         values["moving"] = int(abs(values["velocity"]) > values["moving_threshold"])
@@ -211,7 +211,7 @@ class Servo:
             if error := self._error(name, field, new[name]):
                 return error
         for name, value in new.items():
-            self._take(name, value)
+            self._store(name, value)
         return OK
 
     def _error(self, name: str, field: Field, value: int) -> int:
@@ -227,7 +227,7 @@ class Servo:
             low, high = values["min_position"], values["max_position"]
         return OK if low <= value <= high else BAD_LIMIT
 
-    def _take(self, name: str, value: int) -> None:
+    def _store(self, name: str, value: int) -> None:
         self.writes.append((name, value))
         was, self._values[name] = self._values[name], value
         if name == "goal" or (name == "torque" and value and not was):

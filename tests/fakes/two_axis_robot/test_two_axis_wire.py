@@ -91,12 +91,12 @@ def test_a_servo_moves_under_its_profile_and_stops_when_the_bus_is_silent(second
     assert servo.write(116, (2048).to_bytes(4, "little")) == 0
     assert servo.write(98, b"\x05") == 0
     assert servo.write(64, b"\x01") == 0
-    servo.hear()
+    servo.restart_watchdog()
     assert servo.write(116, (3548).to_bytes(4, "little")) == 0
     fastest = 0.0
     while now[0] < seconds:
         now[0] += 0.01
-        servo.hear()
+        servo.restart_watchdog()
         fastest = max(fastest, servo.speed)
     assert 2048 < servo.position < 3548
     assert fastest <= 100 * 0.229 * 4096 / 60 + 1
