@@ -12,9 +12,13 @@ import time
 from collections.abc import Iterator
 
 from arcor2_hw.data.robot import Mode
-from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, Refused
+
+from .sockets import connect, exchange
 
 PORT = 29999
+NAME = "dashboard server"
+"""Name of the port in errors."""
 MAX_LINE = 4096
 """Greatest length of an answer, bytes: the longest ones contain a file name."""
 
@@ -73,22 +77,13 @@ class Dashboard:
         with self._locked(deadline):
             opened = self._connected(deadline)
             try:
-                opened.settimeout(max(deadline - time.monotonic(), 0.001))
-                opened.sendall(command.encode("ascii") + b"\n")
-                return self._line(deadline)
-            except TimeoutError:
+                with exchange(NAME, self.address, timeout, command):
+                    opened.settimeout(max(deadline - time.monotonic(), 0.001))
+                    opened.sendall(command.encode("ascii") + b"\n")
+                    return self._line(deadline)
+            except DeviceError:
                 self._shut()
-                raise DeviceTimeout(
-                    "Dashboard {address} did not answer {command!r} in {timeout:g} s.",
-                    address=self.address,
-                    command=command,
-                    timeout=timeout,
-                ) from None
-            except OSError as e:
-                self._shut()
-                raise ConnectionLost(
-                    "Dashboard {address} closed the connection.", f"{command!r}: {e}", address=self.address
-                ) from e
+                raise
 
     def do(self, command: str, expected: str, timeout: float = 1.0) -> None:
         """Send a command. Raise Refused, with the controller's text, for an answer other than `expected`."""
@@ -123,15 +118,14 @@ class Dashboard:
         if self._socket is not None and self._is_idle(self._socket):
             return self._socket
         self._shut()
+        left = max(deadline - time.monotonic(), 0.001)
+        self._socket = connect(NAME, self._host, self._port, left)
         try:
-            self._socket = socket.create_connection((self._host, self._port), max(deadline - time.monotonic(), 0.001))
-            self._line(deadline)  # the greeting
-        except TimeoutError:
+            with exchange(NAME, self.address, left):
+                self._line(deadline)  # the greeting
+        except DeviceError:
             self._shut()
-            raise DeviceTimeout("Dashboard {address} does not answer.", address=self.address) from None
-        except OSError as e:
-            self._shut()
-            raise NotConnected("No dashboard server at {address}.", str(e), address=self.address) from e
+            raise
         return self._socket
 
     def _is_idle(self, opened: socket.socket) -> bool:

@@ -14,9 +14,12 @@ from collections.abc import Iterator
 from typing import Final
 
 from arcor2_hw.data.robot import DhParameters, KinematicCalibration
-from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected
+
+from .sockets import connect, exchange
 
 PORT: Final = 30001
+NAME: Final = "primary port"
+"""Name of the port in errors."""
 TIMEOUT: Final = 2.0
 """Time for the kinematics to arrive, s: the controller sends ten states per second."""
 MAX_MESSAGE: Final = 1 << 16
@@ -72,20 +75,11 @@ def read_calibration(host: str, timeout: float = TIMEOUT, port: int = PORT) -> K
         ConnectionLost: The controller broke the exchange off.
     """
     address = f"{host}:{port}"
-    try:
-        with contextlib.closing(socket.create_connection((host, port), timeout)) as opened:
-            for kind, content in _messages(opened, time.monotonic() + timeout):
-                if kind == _STATE and (found := calibration_in(content)) is not None:
-                    return found
-    except TimeoutError:
-        raise DeviceTimeout(
-            "UR controller {address} sent no kinematics within {timeout:g} s.", address=address, timeout=timeout
-        ) from None
-    except ConnectionRefusedError as e:
-        raise NotConnected("No UR controller at {address}.", str(e), address=address) from e
-    except (OSError, ValueError) as e:
-        raise ConnectionLost("UR controller {address} broke the exchange off.", str(e), address=address) from e
-    raise ConnectionLost("UR controller {address} closed the connection.", address=address)
+    with contextlib.closing(connect(NAME, host, port, timeout)) as opened, exchange(NAME, address, timeout):
+        for kind, content in _messages(opened, time.monotonic() + timeout):
+            if kind == _STATE and (found := calibration_in(content)) is not None:
+                return found
+        raise ConnectionError("closed by the controller")
 
 
 def _messages(opened: socket.socket, deadline: float) -> Iterator[tuple[int, bytes]]:

@@ -11,9 +11,13 @@ import struct
 import time
 from typing import Final, Self
 
-from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected
+from arcor2_hw.exceptions import DeviceFault
+
+from .sockets import connect, exchange
 
 PORT: Final = 30004
+NAME: Final = "RTDE port"
+"""Name of the port in errors."""
 MAX_FRAME: Final = 4096
 """Greatest size of a frame, bytes; a recipe of all variables is smaller."""
 _PROTOCOL: Final = 2
@@ -92,31 +96,14 @@ class RtdeStream:
             DeviceFault: The controller does not have a variable.
         """
         deadline = time.monotonic() + timeout
-        address = f"{host}:{port}"
-        try:
-            opened = socket.create_connection((host, port), timeout)
-        except TimeoutError:
-            raise DeviceTimeout(
-                "UR controller {address} cannot be reached within {timeout:g} s.", address=address, timeout=timeout
-            ) from None
-        except ConnectionResetError as e:  # the port is open: a reset may overtake the acceptance
-            raise ConnectionLost("UR controller {address} broke the exchange off.", str(e), address=address) from e
-        except OSError as e:
-            raise NotConnected(
-                "No UR controller at {address}: {reason}.", str(e), address=address, reason=e.strerror or e
-            ) from e
+        opened = connect(NAME, host, port, timeout)
         stream = cls(host, port, opened)
         try:
-            opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            stream._set_up(names, deadline)
-        except BaseException as e:
+            with exchange(NAME, stream.address, timeout):
+                opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                stream._set_up(names, deadline)
+        except BaseException:
             stream.close()
-            if isinstance(e, TimeoutError):
-                raise DeviceTimeout(
-                    "UR controller {address} did not answer within {timeout:g} s.", address=address, timeout=timeout
-                ) from None
-            if isinstance(e, (OSError, ValueError, struct.error)):
-                raise ConnectionLost("UR controller {address} broke the exchange off.", str(e), address=address) from e
             raise
         return stream
 
@@ -126,25 +113,17 @@ class RtdeStream:
         Raises:
             ConnectionLost: The controller closed or reset the connection, or sent garbage.
         """
-        try:
+        with exchange(NAME, self.address, wait):
             if self._socket.gettimeout() != wait:
                 self._socket.settimeout(wait)
-            data = self._socket.recv(16 * MAX_FRAME)
-        except TimeoutError:
-            return []
-        except OSError as e:
-            raise ConnectionLost(
-                "The connection to UR controller {address} broke.", str(e), address=self.address
-            ) from e
-        if not data:
-            raise ConnectionLost("UR controller {address} closed the connection.", address=self.address)
-        try:
+            try:
+                data = self._socket.recv(16 * MAX_FRAME)
+            except TimeoutError:
+                return []
+            if not data:
+                raise ConnectionError("closed by the controller")
             found, self._buffer = frames(self._buffer + data if self._buffer else data)
             return [self._layout.unpack(f[1:]) for kind, f in found if kind == _DATA and f[0] == self._number]
-        except (ValueError, IndexError, struct.error) as e:
-            raise ConnectionLost(
-                "UR controller {address} sends data that is not RTDE.", str(e), address=self.address
-            ) from e
 
     def close(self) -> None:
         """Close the connection, if it is open."""

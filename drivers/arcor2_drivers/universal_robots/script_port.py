@@ -5,9 +5,11 @@ import socket
 import time
 from typing import Final, Self
 
-from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected
+from .sockets import connect, exchange
 
 PORT: Final = 30003
+NAME: Final = "script port"
+"""Name of the port in errors."""
 _CHUNK: Final = 1 << 16
 
 
@@ -21,32 +23,16 @@ class ScriptPort:
     @classmethod
     def open(cls, host: str, timeout: float, port: int = PORT) -> Self:
         """Connect. Raise NotConnected or DeviceTimeout."""
-        address = f"{host}:{port}"
-        try:
-            return cls(address, socket.create_connection((host, port), timeout))
-        except TimeoutError:
-            raise DeviceTimeout("The script port {address} does not answer.", address=address) from None
-        except OSError as e:
-            raise NotConnected("No script port at {address}.", str(e), address=address) from e
+        return cls(f"{host}:{port}", connect(NAME, host, port, timeout))
 
     def send(self, program: str, timeout: float) -> None:
         """Send a program. Raise DeviceTimeout or ConnectionLost."""
         deadline = time.monotonic() + timeout
         rest = memoryview(program.encode("ascii"))
-        try:
+        with exchange(NAME, self.address, timeout):
             while rest:
                 self._socket.settimeout(max(deadline - time.monotonic(), 0.001))
                 rest = rest[self._socket.send(rest) :]
-        except TimeoutError:
-            raise DeviceTimeout(
-                "The script port {address} did not take a program in {timeout:g} s.",
-                address=self.address,
-                timeout=timeout,
-            ) from None
-        except OSError as e:
-            raise ConnectionLost(
-                "The script port {address} closed the connection.", str(e), address=self.address
-            ) from e
 
     def drain(self) -> None:
         """Discard the stream of the controller, so that its buffer does not fill."""

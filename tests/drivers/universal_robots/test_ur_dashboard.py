@@ -59,8 +59,9 @@ def test_a_late_answer_answers_no_later_question(server: Callable[[Answer], Dash
     dashboard = server(answer)
     assert dashboard.ask("first") == "answer to first"
     began = own_time()
-    with pytest.raises(DeviceTimeout, match="slow"):
+    with pytest.raises(DeviceTimeout, match=dashboard.address) as timeout:
         dashboard.ask("slow", 0.1)
+    assert timeout.value.detail == "slow"
     assert own_time() - began < 0.25
     time.sleep(0.3)
     assert dashboard.ask("next") == "answer to next"
