@@ -1,4 +1,4 @@
-"""Calibration of cameras and robots from pictures, computed by the worker."""
+"""Calibration of cameras and robots from pictures, computed by the compute worker."""
 
 from typing import Protocol
 
@@ -19,11 +19,11 @@ from arcor2_server.errors import RequestRefused
 from arcor2_server.workspace.markers import Markers
 
 EXPECTED_WITHIN = (0.3, 0.5)
-"""m and rad, standard deviations of the pose that a camera has in the scene: enough to choose between two answers."""
+"""Standard deviations of the pose that a camera has in the scene, m and rad, to choose between two solutions."""
 
 
 class RobotView(Data, frozen=True):
-    """A robot seen by a camera with a known pose. robot_pose: the assumed pose of the robot."""
+    """A robot seen by a camera with a known pose. `robot_pose`: the assumed pose of the robot."""
 
     robot_joints: list[Joint]
     robot_pose: Pose
@@ -32,10 +32,10 @@ class RobotView(Data, frozen=True):
 
 
 class Calibration(Protocol):
-    """Computes poses from picture files.
+    """Computes poses from picture files. `on_progress` is called with the progress.
 
-    on_progress: called with the progress. Methods raise InvalidData for a file that is not a picture,
-    CalibrationRefused if the pictures determine no pose, NotInstalled, ComputeStopped and ComputeTimeout.
+    Methods raise InvalidData for a file that is not a picture, CalibrationRefused if the pictures do not determine a
+    pose, NotInstalled, ComputeStopped and ComputeTimeout.
     """
 
     async def camera(
@@ -48,7 +48,7 @@ class Calibration(Protocol):
     ) -> CameraPose:
         """Return the pose of a camera that sees the configured markers.
 
-        expected: its approximate pose, used only if the markers alone leave two solutions.
+        `expected` is its approximate pose, used only if the markers alone allow two solutions.
         """
 
     async def markers(self, parameters: CameraParameters, picture: bytes) -> list[MarkerCorners]:
@@ -79,7 +79,7 @@ class CalibrationService:
         configuration = self._markers.configuration
         if not configuration.markers and not configuration.boards:
             raise CalibrationRefused(
-                "No markers are configured: say which stand where (serve --markers, or PUT /api/calibration/markers).",
+                "No markers are configured. Set their poses (serve --markers, or PUT /api/calibration/markers).",
                 reason=Reason.NO_MARKER,
             )
         task = FindCameraPose(pictures, parameters, configuration.layout, configuration.options)
@@ -92,7 +92,7 @@ class CalibrationService:
         distance, angle = EXPECTED_WITHIN
         hinted = replace(task.options, expected=expected, expected_position=distance, expected_orientation=angle)
         found = await run(replace(task, options=hinted), on_progress=on_progress)
-        return replace(found, verdict=f"{found.verdict} Of two answers, the one near its present pose was taken.")
+        return replace(found, verdict=f"{found.verdict} Of two solutions, the one near the present pose was chosen.")
 
     async def markers(self, parameters: CameraParameters, picture: bytes) -> list[MarkerCorners]:
         """Return the corners of every marker in the picture."""
@@ -115,11 +115,11 @@ class RunningCalibrations:
         self._objects: set[str] = set()
 
     def begin(self, object_id: str, name: str) -> None:
-        """Count an object as being calibrated; raise RequestRefused while it is already."""
+        """Mark an object as being calibrated. Raise RequestRefused if it is being calibrated already."""
         if object_id in self._objects:
             raise RequestRefused("{name} is being calibrated already.", name=name)
         self._objects.add(object_id)
 
     def end(self, object_id: str) -> None:
-        """Count an object no longer."""
+        """Remove the mark of an object."""
         self._objects.discard(object_id)

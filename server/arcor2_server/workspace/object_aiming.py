@@ -15,8 +15,12 @@ if TYPE_CHECKING:
 class ObjectAiming:
     """The aiming of one user.
 
-    points: focus points in the frame of the object's mesh.
-    poses: touched poses of the end effector, by index of the point.
+    Attributes:
+        object_id: The aimed object.
+        robot: The robot with which the user touches the points.
+        points: Focus points in the frame of the object's mesh.
+        document: The open document.
+        poses: Touched poses of the end effector, by index of the point.
     """
 
     object_id: str
@@ -41,15 +45,15 @@ class ObjectAimings:
         return aiming
 
     def require(self, user: str, document: "Document") -> ObjectAiming:
-        """Return the aiming of a user in the open scene. Raise RequestRefused if that is impossible."""
+        """Return the aiming of a user in the open scene. Raise RequestRefused if there is none."""
         if (aiming := self.of(user, document)) is None:
             raise RequestRefused("You are not aiming: send ObjectAimingStart first.")
         return aiming
 
     def begin(self, user: str, aiming: ObjectAiming) -> None:
-        """Let a user aim."""
+        """Start the aiming of a user."""
         self._aimings[user] = aiming
 
     def end(self, user: str) -> None:
-        """Forget a user's aiming."""
+        """End the aiming of a user."""
         self._aimings.pop(user, None)

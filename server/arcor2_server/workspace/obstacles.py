@@ -11,12 +11,15 @@ INFLATION: Final = 0.01
 
 
 class ObstacleRegistry:
-    """Obstacles added over REST. They stay until they are deleted or the scene is stopped over REST."""
+    """Obstacles added over REST. They exist until they are deleted or the scene is stopped over REST.
+
+    `started`: whether the scene was started over REST. `inflation`: see `INFLATION`.
+    """
 
     def __init__(self, inflation: float = INFLATION) -> None:
         self.started = False
         self.inflation = inflation
-        self._put: dict[str, Obstacle] = {}
+        self._obstacles: dict[str, Obstacle] = {}
         self.on_change: list[Callable[[], None]] = []
         """Called when obstacles changed."""
         self.on_put: list[Callable[[Obstacle], None]] = []
@@ -27,33 +30,33 @@ class ObstacleRegistry:
     @property
     def obstacles(self) -> dict[str, Obstacle]:
         """Return the obstacles by id."""
-        return dict(self._put)
+        return dict(self._obstacles)
 
     def put(self, obstacle: Obstacle) -> None:
         """Add an obstacle, or replace the one with its id."""
-        self._put[obstacle.model.id] = obstacle
+        self._obstacles[obstacle.model.id] = obstacle
         for notify in self.on_put:
             notify(obstacle)
         self._changed()
 
     def get(self, key: str) -> Obstacle:
         """Return an obstacle. Raise NotFound if there is none."""
-        if (obstacle := self._put.get(key)) is None:
+        if (obstacle := self._obstacles.get(key)) is None:
             raise NotFound("There is no collision model {key!r}.", key=key)
         return obstacle
 
     def remove(self, key: str) -> None:
         """Remove an obstacle. Raise NotFound if there is none."""
-        if self._put.pop(key, None) is None:
+        if self._obstacles.pop(key, None) is None:
             raise NotFound("There is no collision model {key!r}.", key=key)
         self._removed([key])
 
     def stop(self) -> None:
         """Stop and remove all obstacles."""
         self.started = False
-        gone = list(self._put)
-        self._put.clear()
-        self._removed(gone)
+        removed = list(self._obstacles)
+        self._obstacles.clear()
+        self._removed(removed)
 
     def _removed(self, keys: list[str]) -> None:
         for notify in self.on_remove:

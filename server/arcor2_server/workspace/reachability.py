@@ -40,26 +40,26 @@ DELAY: Final = 0.05
 """Delay after an edit, s; successive edits are computed once."""
 AT_LATEST: Final = 0.3
 """Maximum delay while further edits arrive, s."""
-ANSWER_WITHIN: Final = 1.0
+ANSWER_TIMEOUT: Final = 1.0
 """Time that a request waits for running computations, s."""
-DESCRIBED_WITHIN: Final = 10.0
-"""Time limit of a request for the list of end effectors, s; a worker may have to start for it."""
-PIECE: Final = 100
-"""Number of poses in one task; other tasks run between two of them."""
+DESCRIPTION_TIMEOUT: Final = 10.0
+"""Time that a request waits for the list of end effectors, s, which includes the start of a worker."""
+BATCH_SIZE: Final = 100
+"""Number of poses in one compute task. Other tasks run between two batches."""
 
 Target = Pose | list[Joint]
 
 
 @dataclass(slots=True)
 class _Row:
-    """The results for one end effector. targets: the poses and joints for which `judged` is valid in `world`."""
+    """The results for one end effector. `targets`: the poses and joints for which `results` is valid in `world`."""
 
     robot: str
     end_effector: str
     arm: str | Unset = UNSET
     targets: dict[str, Target] = field(default_factory=dict)
     world: Mapping[str, WorldItem] = field(default_factory=dict)
-    judged: dict[str, ReachOfItem] = field(default_factory=dict)
+    results: dict[str, ReachOfItem] = field(default_factory=dict)
 
 
 class ReachabilityBoard:
@@ -87,7 +87,7 @@ class ReachabilityBoard:
         self._scene_collisions = scene_collisions
         self._rows: dict[tuple[str, str], _Row] = {}
         self._effectors: dict[bytes, list[str]] = {}
-        self._asked = False
+        self._requested = False
         self._wake = asyncio.Event()
         self._idle = asyncio.Event()
         self._idle.set()
@@ -95,56 +95,61 @@ class ReachabilityBoard:
         """Set when the rows exist."""
         self._working: asyncio.Task[None] | None = None
         self._stopped = StoppedRobots(host, robots)
-        session.on_change.append(lambda edit: self.schedule() if edit is not None else self._begin_anew())
+        session.on_change.append(lambda edit: self.schedule() if edit is not None else self._reset())
         collisions.on_change.append(self.schedule)
         host.board.on_obstacles_changed.append(self.schedule)
         robot_calibrations.on_change.append(lambda _: self.schedule())
 
-    # -------------------------------------------------------------------------------- asked
+    # -------------------------------------------------------------------------------- requests
     async def ask(self, args: "ReachabilityArgs") -> list[ReachabilityData]:
-        """Return what is known, having waited a moment for it. RequestRefused, NotFound for what cannot be asked of."""
+        """Return the results after a short wait for running computations.
+
+        Raises:
+            RequestRefused: No project is open, or the object is not a robot with a model.
+            NotFound: The robot, an orientation or joints do not exist.
+        """
         self._session.require_project_open()
         project = self._session.require_project()
         chosen = self._chosen(args)
         known = {key for point in project.action_points for key in _items(point)}
         wanted = known if isinstance(args.ids, Unset) else args.ids
-        if strange := sorted(wanted - known):
-            raise NotFound("The project has no orientation or joints {strange!r}.", strange=strange[0])
-        self._asked = True
+        if unknown := sorted(wanted - known):
+            raise NotFound("The project has no orientation or joints {unknown!r}.", unknown=unknown[0])
+        self._requested = True
         self.schedule()
-        for event, within in ((self._described, DESCRIBED_WITHIN), (self._idle, ANSWER_WITHIN)):
+        for event, within in ((self._described, DESCRIPTION_TIMEOUT), (self._idle, ANSWER_TIMEOUT)):
             try:
                 async with asyncio.timeout(within):
                     await event.wait()
             except TimeoutError:
-                log.debug("reachability is being worked out still")
-        rows = [row for row in self._rows.values() if row.robot in chosen and _is_asked(row, args)]
-        return [self._data(row, self._of_interest(row, wanted)) for row in rows]
+                log.debug("reachability is still being computed")
+        rows = [row for row in self._rows.values() if row.robot in chosen and _is_requested(row, args)]
+        return [self._data(row, self._items_of(row, wanted)) for row in rows]
 
     def _chosen(self, args: "ReachabilityArgs") -> set[str]:
         if isinstance(args.robot_id, Unset):
             return {robot.id for robot in self._robots.with_models()}
         robot = self._robots.robot(args.robot_id)
-        self._robot_models.require(robot, "by which its reach could be told")
+        self._robot_models.require(robot, "to compute its reachability")
         return {robot.id}
 
-    def _of_interest(self, row: _Row, wanted: set[str]) -> list[ReachOfItem]:
-        """Return the items of a row by id, without joints of other robots."""
+    def _items_of(self, row: _Row, wanted: set[str]) -> list[ReachOfItem]:
+        """Return the results of a row for the wanted ids, without joints of other robots."""
         project = self._session.require_project()
         own = {orientation.id for point in project.action_points for orientation in point.orientations}
         own |= {each.id for point in project.action_points for each in point.robot_joints if _is_of(each, row)}
-        return [row.judged.get(key, ReachOfItem(key, Reach.UNKNOWN)) for key in sorted(wanted & own)]
+        return [row.results.get(key, ReachOfItem(key, Reach.UNKNOWN)) for key in sorted(wanted & own)]
 
     def _data(self, row: _Row, items: list[ReachOfItem]) -> ReachabilityData:
         return ReachabilityData(row.robot, row.end_effector, self._session.revision, items, row.arm)
 
-    # -------------------------------------------------------------------------------- when
+    # -------------------------------------------------------------------------------- schedule
     @property
     def _wanted(self) -> bool:
-        return self._asked or bool(self._hub.subscribers(NAME))
+        return self._requested or bool(self._hub.subscribers(NAME))
 
     def schedule(self) -> None:
-        """Compute what changed after a short delay."""
+        """Compute changed items after a short delay."""
         if not self._wanted or self._session.project is None:
             return
         self._idle.clear()
@@ -152,9 +157,9 @@ class ReachabilityBoard:
         if self._working is None:
             self._working = asyncio.create_task(self._work(), name="reachability")
 
-    def _begin_anew(self) -> None:
-        """Forget all: another document is open, or none."""
-        self._asked = False
+    def _reset(self) -> None:
+        """Drop all results, since another document was opened or closed."""
+        self._requested = False
         self._stop()
         self.schedule()
 
@@ -166,12 +171,12 @@ class ReachabilityBoard:
         self._effectors.clear()
         self._stopped.forget()
         self._wake.clear()
-        self._described.set()  # who waits is told that there is nothing to wait for
+        self._described.set()  # wakes the waiting requests
         self._described = asyncio.Event()
         self._idle.set()
 
     async def close(self) -> None:
-        """Stop when the server ends."""
+        """Cancel the computation."""
         working = self._working
         self._stop()
         if working is not None:
@@ -187,7 +192,7 @@ class ReachabilityBoard:
                 await asyncio.sleep(DELAY)
             self._wake.clear()
             try:
-                await self._round()
+                await self._compute_all()
             except Exception:
                 log.exception("reachability failed")
             if not self._wake.is_set():
@@ -207,50 +212,50 @@ class ReachabilityBoard:
         try:
             return await self._stopped.update(self._neighbours())
         except Exception:
-            log.exception("where robots stand could not be asked")
+            log.exception("joints of robots cannot be read")
             return False
 
     def _neighbours(self) -> list[SceneObject]:
-        """Return the robots that have a model, where there are several."""
+        """Return the robots with a model if there are several, else an empty list."""
         found = self._robots.with_models()
         return found if len(found) > 1 else []
 
-    # -------------------------------------------------------------------------------- one round
-    async def _round(self) -> None:
-        standing = self._robots.with_models()
+    # -------------------------------------------------------------------------------- computation
+    async def _compute_all(self) -> None:
+        robots = self._robots.with_models()
         await self._stopped.update(self._neighbours())
-        names = {robot.id for robot in standing}
-        for key in [key for key in self._rows if key[0] not in names]:
+        ids = {robot.id for robot in robots}
+        for key in [key for key in self._rows if key[0] not in ids]:
             del self._rows[key]
-        problems = {robot.id: await self._described_robot(robot) for robot in standing}
+        problems = {robot.id: await self._describe(robot) for robot in robots}
         self._described.set()
         poses = await self._poses()
-        for robot in standing:
+        for robot in robots:
             problem = problems[robot.id]
-            # One whose model cannot be used is in nobody's way, nor is one of which nobody knows where it stands.
+            # Robots with an unusable model or with unknown joints are not obstacles.
             others = [
-                one for one in standing if one is not robot and not problems[one.id] and one.id in self._stopped.joints
+                one for one in robots if one is not robot and not problems[one.id] and one.id in self._stopped.joints
             ]
             for row in [row for row in self._rows.values() if row.robot == robot.id]:
-                await self._judge(row, [robot, *others], poses | self._joints(row), problem)
+                await self._update(row, [robot, *others], poses | self._joints(row), problem)
             if self._wake.is_set():
-                return  # something changed meanwhile: what is known of the old state is of no use
+                return  # the next computation uses the new state
 
-    async def _described_robot(self, robot: SceneObject) -> str:
-        """Bring the rows of a robot up to date; return why its model cannot be used, empty when it can."""
+    async def _describe(self, robot: SceneObject) -> str:
+        """Update the rows of a robot; return why its model cannot be used, empty if it can."""
         model = self._robot_models.find(robot)
         if model is None:
             return ""
         try:
-            await self._rows_of(robot, model)
+            await self._update_rows(robot, model)
         except Arcor2Error as error:
             if not any(row.robot == robot.id for row in self._rows.values()):
                 self._rows[robot.id, ""] = _Row(robot.id, "")
             return str(error)
         return ""
 
-    async def _rows_of(self, robot: SceneObject, model: RobotSource) -> None:
-        """Bring the rows of a robot up to date with the end effectors of its model."""
+    async def _update_rows(self, robot: SceneObject, model: RobotSource) -> None:
+        """Create a row for each end effector of a robot's model, and delete the other rows of the robot."""
         key = repr((model.urdf, sorted(model.settings.items(), key=str))).encode()
         if key not in self._effectors:
             found = await self._compute.run(DescribeRobot(model), background=True)
@@ -260,12 +265,12 @@ class ReachabilityBoard:
         for link in self._effectors[key]:
             arm, _, name = link.partition("_") if several else ("", "", link)
             wanted[robot.id, link] = _Row(robot.id, name or link, arm if name and several else UNSET)
-        for gone in [key for key in self._rows if key[0] == robot.id and key not in wanted]:
-            del self._rows[gone]
+        for removed in [key for key in self._rows if key[0] == robot.id and key not in wanted]:
+            del self._rows[removed]
         self._rows = {**wanted, **self._rows}
 
     async def _poses(self) -> dict[str, Target]:
-        """Return the orientations of the project as poses in the world; others get their turn between many."""
+        """Return the orientations of the project as poses in the world. Yields to the event loop between batches."""
         session = self._session
         project = session.project
         found: dict[str, Target] = {}
@@ -275,25 +280,24 @@ class ReachabilityBoard:
                     bare, named = session.orientation(orientation.id)
                     found[orientation.id] = global_pose(session, bare, named.orientation)
                 except NotFound:
-                    continue  # it went meanwhile
-                if len(found) % PIECE == 0:
+                    continue  # removed meanwhile
+                if len(found) % BATCH_SIZE == 0:
                     await asyncio.sleep(0)
         return found
 
     def _joints(self, row: _Row) -> dict[str, Target]:
-        """Return the joints of the project that are meant for an end effector."""
+        """Return the joints of the project for the arm of an end effector."""
         project = self._session.project
         points = project.action_points if project is not None else ()
         return {each.id: each.joints for point in points for each in point.robot_joints if _is_of(each, row)}
 
-    async def _judge(self, row: _Row, standing: list[SceneObject], targets: dict[str, Target], problem: str) -> None:
-        """Compute new and possibly changed items. standing: the robot, and the robots that it may collide with."""
-        for gone in row.judged.keys() - targets.keys():
-            del row.judged[gone]
-            row.targets.pop(gone, None)
-        world = self._scene_collisions.world(
-            standing, {key: at for key, at in self._stopped.joints.items() if key != row.robot}
-        )
+    async def _update(self, row: _Row, robots: list[SceneObject], targets: dict[str, Target], problem: str) -> None:
+        """Compute new and possibly changed items. `robots`: the robot, and those with which it may collide."""
+        for removed in row.results.keys() - targets.keys():
+            del row.results[removed]
+            row.targets.pop(removed, None)
+        joints = {key: values for key, values in self._stopped.joints.items() if key != row.robot}
+        world = self._scene_collisions.world(robots, joints)
         if world != row.world:
             row.targets.clear()
             row.world = world
@@ -303,17 +307,18 @@ class ReachabilityBoard:
             return
         for kind in (list, Pose):
             of_kind = [key for key, target in new.items() if isinstance(target, kind)]
-            for start in range(0, len(of_kind), PIECE):
-                piece = of_kind[start : start + PIECE]
+            for start in range(0, len(of_kind), BATCH_SIZE):
+                batch = of_kind[start : start + BATCH_SIZE]
                 try:
-                    judged = await self._asked_of_worker(row, [new[key] for key in piece])
+                    judged = await self._judge(row, [new[key] for key in batch])
                 except Arcor2Error as error:
-                    judged = [Judged(Reach.UNKNOWN, str(error))] * len(piece)
-                self._note(row, dict(zip(piece, judged, strict=True)), targets)
+                    judged = [Judged(Reach.UNKNOWN, str(error))] * len(batch)
+                self._note(row, dict(zip(batch, judged, strict=True)), targets)
                 if self._wake.is_set():
                     return
 
-    async def _asked_of_worker(self, row: _Row, targets: list[Any]) -> list[Judged]:
+    async def _judge(self, row: _Row, targets: list[Any]) -> list[Judged]:
+        """Compute the reachability of poses or joints in the worker."""
         effector = row.end_effector if isinstance(row.arm, Unset) else f"{row.arm}_{row.end_effector}"
         joints = isinstance(targets[0], list)
         task = JudgeJoints(row.robot, targets) if joints else JudgePoses(row.robot, effector, targets)
@@ -321,7 +326,7 @@ class ReachabilityBoard:
         try:
             return await run(task, world=row.world, place=place, background=True)
         except ComputeStopped:
-            # Whoever else's question it was that ended the worker: once more.
+            # Another task may have crashed the worker, so try once more.
             return await run(task, world=row.world, place=place, background=True)
 
     def _note(self, row: _Row, judged: dict[str, Judged], targets: dict[str, Target]) -> None:
@@ -330,8 +335,8 @@ class ReachabilityBoard:
         for key, one in judged.items():
             item = ReachOfItem(key, one.reach, self._scene_collisions.with_names(one.reason) or UNSET)
             row.targets[key] = targets[key]
-            if row.judged.get(key) != item:
-                row.judged[key] = item
+            if row.results.get(key) != item:
+                row.results[key] = item
                 changed.append(item)
         if changed:
             self._hub.broadcast(make_event(NAME, self._data(row, changed)))
@@ -348,6 +353,6 @@ def _is_of(joints: ProjectRobotJoints, row: _Row) -> bool:
     return isinstance(joints.arm_id, Unset) or isinstance(row.arm, Unset) or joints.arm_id == row.arm
 
 
-def _is_asked(row: _Row, args: "ReachabilityArgs") -> bool:
+def _is_requested(row: _Row, args: "ReachabilityArgs") -> bool:
     arm = isinstance(args.arm_id, Unset) or args.arm_id == row.arm
     return arm and (isinstance(args.end_effector_id, Unset) or args.end_effector_id == row.end_effector)
