@@ -110,7 +110,7 @@ async def test_calibration_from_the_controller_is_used_offline_and_after_a_resta
     assert tip().distance_to(tip(DELTAS)) > 1e-3, "else nothing would be tested"
 
     message = await place.go_online()
-    assert message.startswith("arm: kinematics are from now on those of the calibration in its controller")
+    assert message.startswith("arm: The calibration in the controller is now used")
     told = await place.told()
     assert told["in_force"] == "measured"
     assert len(told["checksum"].split("-")) == 6
@@ -187,7 +187,7 @@ async def test_calibration_of_another_arm_is_not_used(place: Place) -> None:
     assert (await place.told())["in_force"] == "measured"
     await place.cell.tell("robot", "calibration", deltas=DELTAS.tolist(), told=False)
     message = await place.go_online()
-    assert "does not tell its calibration, kinematics are those that it told before" in message
+    assert "The calibration cannot be read from the controller. The stored one is used." in message
     assert place.cell.robot_host in message
     assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6
 
@@ -195,7 +195,7 @@ async def test_calibration_of_another_arm_is_not_used(place: Place) -> None:
     strange[2, 0] += 0.2
     await place.cell.tell("robot", "calibration", deltas=strange.tolist())
     message = await place.go_online()
-    assert "arm: the calibration in its controller is not used, kinematics are nominal." in message
+    assert "arm: The calibration in the controller cannot be used. Kinematics are nominal." in message
     told = await place.told()
     assert told["in_force"] == "nominal"
     assert "50 mm" in told["refused"]

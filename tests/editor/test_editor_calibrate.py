@@ -182,7 +182,11 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         await tray.locator(".task").filter(has_text="Starting the scene by pictures · Eva").wait_for()
         await scene_state(client, SceneStateEnum.STARTED, 60)
         # The server's notification about the robot is shown.
-        await tray.locator(".notice.info").filter(has_text="arm: kinematics are from now on those").wait_for()
+        await (
+            tray.locator(".notice.info")
+            .filter(has_text="arm: The calibration in the controller is now used")
+            .wait_for()
+        )
 
         await _choose(screen, "eye")
         await screen.press("Take a picture")

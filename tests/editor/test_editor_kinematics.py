@@ -28,7 +28,7 @@ async def test_the_robot_panel_names_the_kinematics_in_force(browser: Browser, c
         await client.call("StartScene")
         await scene_state(client, SceneStateEnum.STARTED)
         await screen.sees("Uses this robot's calibration, read")
-        await screen.sees("arm: kinematics are from now on those of the calibration in its controller.")
+        await screen.sees("arm: The calibration in the controller is now used.")
         await screen.settle()
         await screen.picture("kinematics")
         await client.call("StopScene")

@@ -174,4 +174,4 @@ async def test_operator_takes_over_a_project_left_open_and_locked(
             opened = (await wendy.next_event("OpenProject", timeout=10)).data.project
             assert "unsaved" in [each.name for each in opened.action_points]
             notice = (await wendy.next_event("Notification", timeout=10)).data.message
-            assert notice.startswith("Olga took over what you had locked")
+            assert notice.startswith("Olga released your locks")

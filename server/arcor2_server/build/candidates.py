@@ -52,7 +52,7 @@ class Candidates:
     def robot_meta(self, name: str) -> RobotMeta:
         """Return the features of a robot type; raise NotFound when it is none."""
         if (robot := self.analysis(name).robot) is None:
-            raise NotFound("The object type {name} is no robot.", name=name)
+            raise NotFound("The object type {name} is not a robot.", name=name)
         return robot
 
     def enumerations(self, name: str) -> dict[tuple[str, str], Enumeration]:

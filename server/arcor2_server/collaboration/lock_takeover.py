@@ -18,9 +18,9 @@ class LockTakeover:
     """Lists and releases the locks of users.
 
     Args:
-        locks: the lock table.
-        users: the registered users.
-        name_of: returns the name of a locked item, empty if it is unknown.
+        locks: The lock table.
+        users: The registered users.
+        name_of: Returns the name of a locked item, empty if it is unknown.
     """
 
     def __init__(self, locks: Locks, users: Users, name_of: Callable[[str], str]) -> None:
@@ -29,7 +29,7 @@ class LockTakeover:
         self._name_of = name_of
 
     def held(self, user: str) -> list[HeldLock]:
-        """Return what the client of a user locked, without what the server locks for the time of a request."""
+        """Return the locks that the client of a user requested, without those that the server takes for a request."""
         locks = self._locks
         kinds: dict[str, LockType | Unset] = dict.fromkeys(locks.read_locked_by(user), UNSET)
         for item in locks.write_locked_by(user):
@@ -37,9 +37,9 @@ class LockTakeover:
         return [HeldLock(item, self._name_of(item), locks.locked_at(user, item), kind) for item, kind in kinds.items()]
 
     def release(self, user: str, by: str) -> list[Event]:
-        """Release the locks of a user who left; return the events to send. The user is notified on returning."""
+        """Release the locks of a user who left; return the events to send. A notice is sent when the user returns."""
         names = [lock.name or lock.object_id for lock in self.held(user)]
         time = now()[:16].replace("T", " ")
-        ids = self._users.release(user, f"{by} took over what you had locked, at {time} UTC: {', '.join(names)}.")
+        ids = self._users.release(user, f"{by} released your locks at {time} UTC: {', '.join(names)}.")
         log.info("locks taken over", user=user, by=by, ids=ids)
         return [make_event("ObjectsUnlocked", LockData(ids, user))] if ids else []

@@ -3,8 +3,7 @@
 from collections.abc import Iterable
 from typing import Final
 
-from msgspec import UNSET
-
+from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Presence, UserPresenceData
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
@@ -14,7 +13,7 @@ from arcor2_server.errors import RequestRefused
 from arcor2_server.events import Connection, EventHub, encode, make_event
 
 PERIOD: Final = 1 / 15
-"""Seconds between two events of one user."""
+"""Minimum time between two events of one user, s."""
 
 
 class PresenceBoard:
@@ -28,14 +27,14 @@ class PresenceBoard:
         users.on_enter.append(self._entered)
         users.on_leave.append(self._left)
 
-    def everybody(self) -> list[Event]:
+    def all_events(self) -> list[Event]:
         """Return the events that describe all connected users."""
-        return [self._event(name) for name in self._users.names()]
+        return [self._event(name, self._presence.get(name, UNSET)) for name in self._users.names()]
 
     def users_of(self, documents: Iterable[str]) -> list[str]:
         """Return the users who have one of these scenes or projects open.
 
-        A user whose client does not say what it shows counts, unless the role is too low to open anything.
+        Users whose clients do not report their presence are included, unless their role is too low to open a document.
         """
         shown, found = set(documents), []
         for name in self._users.names():
@@ -49,26 +48,21 @@ class PresenceBoard:
         """Store and publish the presence of a client. Raise RequestRefused if it cannot be encoded."""
         user = client.user
         assert user is not None
-        before = self._presence.get(user)
-        self._presence[user] = presence
         try:
-            self._events.put(user, encode(self._event(user)))
+            event = encode(self._event(user, presence))
         except UnicodeEncodeError as error:
-            del self._presence[user]
-            if before is not None:
-                self._presence[user] = before
-            raise RequestRefused("This cannot be sent to others: {reason}.", reason=error) from None
+            raise RequestRefused("The presence cannot be sent to other clients: {reason}.", reason=error) from None
+        self._presence[user] = presence
+        self._events.put(user, event)
 
     def close(self) -> None:
-        """Stop when the server ends."""
+        """Cancel the pending events."""
         self._events.close()
 
-    def _event(self, user: str) -> Event:
+    def _event(self, user: str, presence: Presence | Unset = UNSET) -> Event:
         client = self._users.client_of(user)
         role = "" if client is None else client.role.name.lower()
-        return make_event(
-            "UserPresence", UserPresenceData(user, client is not None, role, self._presence.get(user, UNSET))
-        )
+        return make_event("UserPresence", UserPresenceData(user, client is not None, role, presence))
 
     def _entered(self, user: str) -> None:
         self._presence.pop(user, None)

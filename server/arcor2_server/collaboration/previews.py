@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Final
 
 from msgspec import UNSET
@@ -12,20 +13,18 @@ from arcor2_server.collaboration.throttle import Throttle
 from arcor2_server.events import Connection, EventHub, encode, make_event
 
 PERIOD: Final = 1 / 30
-"""Seconds between two events of one item."""
+"""Minimum time between two events of one item, s."""
 CHECK_PERIOD: Final = 0.1
 """Period of checking that users who drag an item still hold its lock, s."""
 NAME: Final = "MovePreview"
 
 
+@dataclass(slots=True)
 class _Dragged:
-    __slots__ = ("client", "ending", "locked", "user")
-
-    def __init__(self, client: Connection, user: str, locked: str) -> None:
-        self.client = client
-        self.user = user
-        self.locked = locked
-        self.ending = False
+    client: Connection
+    user: str
+    locked: str
+    changed: bool = False
 
 
 class Previews:
@@ -44,7 +43,7 @@ class Previews:
             self._end(preview.id)
             return
         dragged = self._dragged.get(preview.id)
-        if dragged is None or dragged.ending or dragged.client is not client or dragged.user != user:
+        if dragged is None or dragged.changed or dragged.client is not client or dragged.user != user:
             self._dragged[preview.id] = _Dragged(client, user, locked)
         data = MovePreviewData(
             id=preview.id,
@@ -58,25 +57,25 @@ class Previews:
             self._check_timer = asyncio.get_running_loop().call_later(CHECK_PERIOD, self._check_holders)
 
     def changed(self, items: Iterable[str]) -> None:
-        """Note that items were changed or removed: their previews end there."""
+        """Note that items were changed or removed, so that `end_changed` ends their previews."""
         if self._dragged:
             for item in items:
                 if (dragged := self._dragged.get(item)) is not None:
-                    dragged.ending = True
+                    dragged.changed = True
 
     def end_changed(self) -> None:
-        """End the previews of what was changed or removed."""
-        for item in [item for item, dragged in self._dragged.items() if dragged.ending]:
+        """End the previews of changed and removed items."""
+        for item in [item for item, dragged in self._dragged.items() if dragged.changed]:
             self._end(item)
 
     def close(self) -> None:
-        """Stop when the server ends."""
+        """Cancel the pending events."""
         self._events.close()
         if self._check_timer is not None:
             self._check_timer.cancel()
 
     def _check_holders(self) -> None:
-        """End the previews of clients that left or do not hold the lock any more."""
+        """End the previews of clients that disconnected or no longer hold the lock."""
         self._check_timer = None
         for item, dragged in list(self._dragged.items()):
             if dragged.client not in self._hub.clients or not self._locks.holds(dragged.user, dragged.locked):

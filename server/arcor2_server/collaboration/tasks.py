@@ -16,7 +16,7 @@ from arcor2_server.collaboration.throttle import Throttle
 from arcor2_server.events import EventHub, encode, make_event
 
 PERIOD: Final = 0.1
-"""Seconds between two events of one task."""
+"""Minimum time between two events of one task, s."""
 NAME: Final = "TaskState"
 
 
@@ -28,20 +28,20 @@ class Task:
         self.state = state
 
     def at(self, progress: float | None, message: str = "") -> None:
-        """Report the progress, 0..1 (None: unknown), and the present step."""
+        """Report the progress, 0 to 1 (None: unknown), and the present step."""
         share = UNSET if progress is None else min(max(progress, 0.0), 1.0)
         self._tasks._update(self, replace(self.state, progress=share, message=message or self.state.message))
 
     def finish(self, message: str = "") -> None:
-        """It is done."""
+        """End the task as finished."""
         self._end(TaskProgress.FINISHED, message)
 
     def fail(self, message: str) -> None:
-        """It failed; `message` is why."""
+        """End the task as failed; `message` is the reason."""
         self._end(TaskProgress.FAILED, message)
 
     def cancel(self, message: str = "") -> None:
-        """It was given up."""
+        """End the task as cancelled."""
         self._end(TaskProgress.CANCELLED, message)
 
     def _end(self, how: TaskProgress, message: str) -> None:
@@ -58,7 +58,7 @@ class Tasks:
         self._events = Throttle(PERIOD, lambda key, event: hub.stream_to_subscribers(NAME, key, event))
 
     def begin(self, kind: TaskKind, title: str, started_by: str | None = None) -> Task:
-        """Start a task; `title` is a sentence without a full stop."""
+        """Start a task. `title` is a sentence without a full stop."""
         state = TaskStateData(new_id("task"), kind, title, TaskProgress.RUNNING, now(), started_by or UNSET)
         task = self._running[state.id] = Task(self, state)
         self._events.put(state.id, encode(make_event(NAME, state)))
@@ -78,12 +78,12 @@ class Tasks:
             raise
         task.finish()
 
-    def under_way(self) -> list[Event]:
+    def running_events(self) -> list[Event]:
         """Return the events that describe all running tasks."""
         return [make_event(NAME, task.state) for task in self._running.values()]
 
     def close(self) -> None:
-        """Stop when the server ends."""
+        """Cancel the pending events."""
         self._events.close()
 
     def _update(self, task: Task, state: TaskStateData) -> None:

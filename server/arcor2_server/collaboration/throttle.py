@@ -1,11 +1,11 @@
-"""Limits the rate of events: the first is sent at once, later ones replace each other until the period ends."""
+"""Limits the rate of events: the first is sent at once, and the latest one at the end of each period."""
 
 import asyncio
 from collections.abc import Callable
 
 
 class Throttle:
-    """Passes on messages by `send(key, message)`: of each key at most the newest one per `period` seconds."""
+    """Calls `send(key, message)` with the latest message of each key, at most once per `period` seconds."""
 
     def __init__(self, period: float, send: Callable[[str, bytes], None]) -> None:
         self._period = period
@@ -14,7 +14,7 @@ class Throttle:
         self._timers: dict[str, asyncio.TimerHandle] = {}
 
     def put(self, key: str, message: bytes) -> None:
-        """Pass on at once, or in place of what still waits."""
+        """Send a message at once, or at the end of the period in place of a waiting one."""
         if key in self._timers:
             self._waiting[key] = message
             return
@@ -22,7 +22,7 @@ class Throttle:
         self._start(key)
 
     def end(self, key: str, message: bytes) -> None:
-        """Pass on at once whatever waits: it is the last of its key, which waits no more."""
+        """Send the last message of a key at once, in place of a waiting one."""
         self._waiting.pop(key, None)
         if (timer := self._timers.pop(key, None)) is not None:
             timer.cancel()
@@ -38,7 +38,7 @@ class Throttle:
             self._start(key)
 
     def close(self) -> None:
-        """Drop what waits."""
+        """Drop the waiting messages."""
         for timer in self._timers.values():
             timer.cancel()
         self._timers.clear()

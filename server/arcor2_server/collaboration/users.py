@@ -15,14 +15,14 @@ from arcor2_server.settings import ServerSettings
 
 log = structlog.get_logger(__name__)
 
-PONG_WITHIN: Final = 1.0
-"""Time limit for the present connection of a name to answer a ping and keep the name, s (protocol, section 3)."""
+PONG_TIMEOUT: Final = 1.0
+"""Time limit for the connection of a registered user to answer a ping and keep the name, s (protocol, section 3)."""
 
-NOTICES_OF_USER: Final = 20
+MAX_NOTICES: Final = 20
 """Maximum number of notices for a returning user; older ones are dropped."""
 
-USERS_WITH_NOTICES: Final = 200
-"""Number of users who left for whom notices are stored."""
+MAX_USERS_WITH_NOTICES: Final = 200
+"""Maximum number of disconnected users for whom notices are stored."""
 
 
 class Users:
@@ -49,7 +49,7 @@ class Users:
         return list(self._clients)
 
     def left_at(self, user: str) -> str | None:
-        """Return when the connection of a user with locks ended; None while the user is connected."""
+        """Return the time at which the connection of a user with locks closed; None while the user is connected."""
         return self._left.get(user)
 
     def require_left(self, user: str) -> None:
@@ -58,25 +58,24 @@ class Users:
             raise RequestRefused("{user} is connected. Ask {user} to unlock it.", user=user)
 
     def release(self, user: str, notice: str) -> list[str]:
-        """Release all locks of a user who left and return their ids. The user receives the notice on returning."""
+        """Release all locks of a user who left and return their ids. The notice is sent when the user returns."""
         waiting = self._notices.pop(user, [])
-        self._notices[user] = [*waiting, notice][-NOTICES_OF_USER:]
-        while len(self._notices) > USERS_WITH_NOTICES:
+        self._notices[user] = [*waiting, notice][-MAX_NOTICES:]
+        while len(self._notices) > MAX_USERS_WITH_NOTICES:
             del self._notices[next(iter(self._notices))]
         return self._locks.release_all(user)
 
     async def register(self, client: Connection, name: str) -> list[Event]:
         """Register a user; return the events that describe the held locks to this client.
 
-        Raise RequestRefused if the name is empty, or another client with it is connected.
+        Raises:
+            RequestRefused: The name is empty, or another connected client has it.
         """
         if not name:
             raise RequestRefused("The user name must not be empty.")
         holder = self._clients.get(name)
         if holder is not None and holder is not client:
-            if await holder.ping(PONG_WITHIN):
-                raise RequestRefused("The user name {name!r} is already in use.", name=name)
-            if self._clients.get(name) not in (holder, None):
+            if await holder.ping(PONG_TIMEOUT) or self._clients.get(name) not in (holder, None):
                 raise RequestRefused("The user name {name!r} is already in use.", name=name)
             holder.user = None
         if client.user is not None and client.user != name:
@@ -102,7 +101,7 @@ class Users:
         return events
 
     def disconnected(self, client: Connection) -> None:
-        """Unregister the user of a closed connection. The locks are released after the time-out."""
+        """Unregister the user of a closed connection. The locks are released after a time limit."""
         if client.user is not None and self._clients.get(client.user) is client:
             self._leave(client.user)
 
@@ -119,7 +118,7 @@ class Users:
         self._releases.pop(name, None)
         self._left.pop(name, None)
         if ids := self._locks.release_all(name):
-            log.info("locks released after time-out", user=name, ids=ids)
+            log.info("locks released after the time limit", user=name, ids=ids)
             self._hub.broadcast(make_event("ObjectsUnlocked", LockData(ids, name)))
 
     def close(self) -> None:

@@ -15,18 +15,21 @@ from arcor2_server.events import Connection, EventHub, encode, make_event
 from arcor2_server.storage.shared_data import SharedData
 
 MAX_VALUE: Final = 64 * 1024
+"""Maximum size of one value, bytes."""
 MAX_VIEW: Final = 1024 * 1024
-"""Bytes of all values of one document and scope."""
+"""Maximum size of all values of one document and scope, bytes."""
 MAX_KEYS: Final = 1000
+"""Maximum number of values of one document and scope."""
 MAX_DOCUMENTS: Final = 200
 """Maximum number of documents per user with stored views."""
 MAX_SHARED: Final = 10_000
 """Maximum number of documents with stored shared views."""
 MAX_CACHED: Final = 64
+"""Maximum number of cached views."""
 
 
 class ViewStates:
-    """The view values by user (empty: shared) and document. They are stored in the database; some are cached."""
+    """The view values by user (empty: shared) and document, stored in the database and cached."""
 
     def __init__(self, hub: EventHub, data: SharedData) -> None:
         self._hub = hub
@@ -36,7 +39,7 @@ class ViewStates:
         self._turn = asyncio.Lock()
 
     async def get(self, scope: ViewScope, user: str, document: str) -> ViewState:
-        """Return a view. Raise StorageError if that is impossible."""
+        """Return a view. Raise StorageError if it cannot be read."""
         async with self._turn:
             values = await self._view(_owner(scope, user), document)
             decoded = {key: msgspec.json.decode(value) for key, value in values.items()}
@@ -45,9 +48,18 @@ class ViewStates:
     async def change(
         self, scope: ViewScope, user: str, document: str, values: Mapping[str, Any], by: Connection
     ) -> int:
-        """Write values (None: delete) and publish them to other clients; return the revision.
+        """Write values and publish them to other clients; return the revision.
 
-        Raise RequestRefused or StorageError if that is impossible.
+        Args:
+            scope: Whether the view belongs to a user or is shared.
+            user: The user.
+            document: The id of the scene or project.
+            values: The changed values by key; None deletes a value.
+            by: The client that changes the view.
+
+        Raises:
+            RequestRefused: A limit is exceeded, or a value cannot be encoded.
+            StorageError: The values cannot be written.
         """
         encoded = {key: _encoded(key, value) for key, value in values.items()}
         owner = _owner(scope, user)
@@ -55,11 +67,9 @@ class ViewStates:
             before = await self._view(owner, document)
             after = {key: value for key, value in (before | encoded).items() if value is not None}
             if len(after) > max(MAX_KEYS, len(before)):
-                raise RequestRefused("More than {most_keys} keys are not kept for one document.", most_keys=MAX_KEYS)
+                raise RequestRefused("More than {max_keys} keys cannot be stored for one document.", max_keys=MAX_KEYS)
             if sum(map(len, after.values())) > max(MAX_VIEW, sum(map(len, before.values()))):
-                raise RequestRefused(
-                    "More than {largest_view} bytes are not kept for one document.", largest_view=MAX_VIEW
-                )
+                raise RequestRefused("More than {max_view} bytes cannot be stored for one document.", max_view=MAX_VIEW)
             revision = max(await self._now() + 1, time.time_ns() // 1_000_000)
             await self._data.put_view(owner, document, encoded, revision)
             self._revision = revision
@@ -72,13 +82,13 @@ class ViewStates:
         return revision
 
     async def forget(self, document: str) -> None:
-        """Delete all views of a deleted document. Raise StorageError if that is impossible."""
+        """Delete all views of a deleted document. Raise StorageError if the database cannot be written."""
         async with self._turn:
             await self._data.delete_document(document)
             for key in [key for key in self._views if key[1] == document]:
                 del self._views[key]
 
-    # -------------------------------------------------------------------------------- inside
+    # -------------------------------------------------------------------------------- internals
     async def _view(self, owner: str, document: str) -> dict[str, bytes]:
         key = owner, document
         if (view := self._views.get(key)) is None:
@@ -118,9 +128,7 @@ def _encoded(key: str, value: Any) -> bytes | None:
     try:
         encoded = msgspec.json.encode(value)
     except (RecursionError, UnicodeEncodeError, OverflowError) as error:
-        raise RequestRefused("The value of {key!r} cannot be kept: {reason}.", key=key, reason=error) from None
+        raise RequestRefused("The value of {key!r} cannot be stored: {reason}.", key=key, reason=error) from None
     if len(encoded) > MAX_VALUE:
-        raise RequestRefused(
-            "The value of {key!r} has more than {largest_value} bytes.", key=key, largest_value=MAX_VALUE
-        )
+        raise RequestRefused("The value of {key!r} has more than {max_value} bytes.", key=key, max_value=MAX_VALUE)
     return encoded

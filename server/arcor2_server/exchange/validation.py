@@ -79,7 +79,7 @@ class Known:
         try:
             return self._robots[name]
         except KeyError:
-            raise NotFound("The object type {name} is no robot.", name=name) from None
+            raise NotFound("The object type {name} is not a robot.", name=name) from None
 
 
 def find_problems(archive: Archive, types: Known, assets: Iterable[str] | None = None) -> Iterator[Finding]:

@@ -1,18 +1,11 @@
-"""Look-ups in the analysed object types, and how a cell host or a package gets their code."""
+"""Look-ups in the analysed object types, and their code for cell hosts and packages."""
 
 from collections.abc import Iterable
 from pathlib import Path
 
 from msgspec import Struct
 
-from arcor2_hw.analysis import (
-    Enumeration,
-    InstalledType,
-    Library,
-    SourceFile,
-    TypeAnalysis,
-    module_name,
-)
+from arcor2_hw.analysis import Enumeration, InstalledType, Library, SourceFile, TypeAnalysis, module_name
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource, find_action
 from arcor2_hw.data.robot import RobotMeta
@@ -37,7 +30,7 @@ class PackageType(Data, frozen=True):
 
 
 class Known(Struct, frozen=True):
-    """All results of the analysis, replaced as a whole."""
+    """All results of the analysis. They are replaced as a whole."""
 
     analyses: dict[str, TypeAnalysis] = {}
     metas: dict[str, ObjectTypeMeta] = {}
@@ -57,7 +50,7 @@ class TypeCatalog:
     # ------------------------------------------------------------------------------------------------ look-ups
     @property
     def digest(self) -> str:
-        """Return a digest of all types, robots and actions; it is the same in the next process if they are."""
+        """A digest of all types, robots and actions, which does not depend on the process."""
         return self._known.digest
 
     def names(self) -> list[str]:
@@ -69,7 +62,7 @@ class TypeCatalog:
         return name in self._known.metas
 
     def metas(self) -> list[ObjectTypeMeta]:
-        """Return all types, by name, built-in and disabled ones too."""
+        """Return all types, sorted by name, including built-in and disabled ones."""
         return list(self._known.metas.values())
 
     def meta(self, name: str) -> ObjectTypeMeta:
@@ -92,7 +85,7 @@ class TypeCatalog:
         return name == base or base in self._analysis(name).bases
 
     def actions(self, name: str) -> list[ObjectAction]:
-        """Return the actions of a type: inherited and disabled ones too, hidden ones not."""
+        """Return the actions of a type, including inherited and disabled ones, without hidden ones."""
         return [action for action in self._analysis(name).actions if not action.meta.hidden]
 
     def action(self, type_name: str, name: str) -> ObjectAction:
@@ -106,7 +99,7 @@ class TypeCatalog:
         return self._analysis(name).enumerations
 
     def keyword_only(self, name: str) -> frozenset[tuple[str, str]]:
-        """Return the parameters of a type's actions that are given by name only, by action and parameter."""
+        """Return the keyword-only parameters of a type's actions as pairs of action and parameter."""
         return self._analysis(name).keyword_only
 
     def robot_metas(self) -> list[RobotMeta]:
@@ -117,25 +110,25 @@ class TypeCatalog:
         """Return the features of a robot type. Raise NotFound if it is not a robot."""
         self.meta(name)
         if (robot := self._known.robots.get(name)) is None:
-            raise NotFound("The object type {name} is no robot.", name=name)
+            raise NotFound("The object type {name} is not a robot.", name=name)
         return robot
 
     def implements(self, name: str, method: str) -> bool:
-        """Return whether a type really has an optional method, by itself or by an ancestor."""
+        """Return whether a type or one of its ancestors implements an optional method."""
         return method in self._analysis(name).implemented
 
     def files(self) -> list[SourceFile]:
-        """Return the sources of installed and then of uploaded types, to be put into another library in this order."""
+        """Return the sources of installed types, then those of uploaded types, which shadow them in this order."""
         installed = (each.file for each in self._installed.values() if each.file is not None)
         return [*installed, *map(self._library.file, self._uploaded)]
 
     def is_uploaded(self, name: str) -> bool:
-        """Return whether a type was uploaded, and so can be changed and deleted."""
+        """Return whether a type was uploaded. Only uploaded types can be changed and deleted."""
         return name in self._uploaded
 
     # ------------------------------------------------------------------------------------------------ code
     def type_code(self, name: str) -> TypeCode:
-        """Return how the cell host gets at one type."""
+        """Return the code of one type for the cell host."""
         self.meta(name)
         return self._code(name)
 
@@ -150,7 +143,7 @@ class TypeCatalog:
         """Return types and the uploaded modules that they need, in the order of their imports."""
         found: dict[str, None] = {}
         for name in names:
-            # A helper or mixin is no type of its own, but its module may be wanted.
+            # A helper or mixin is not a type, but its module may be needed.
             known = self._known.analyses[name] if name in self._uploaded else self._analysis(name)
             for file in known.modules:
                 if file.name in self._uploaded:
@@ -159,7 +152,7 @@ class TypeCatalog:
         return list(found)
 
     def type_codes(self, names: Iterable[str]) -> list[TypeCode]:
-        """Return how the cell host gets at types and at the uploaded modules they need, bases and mixins first."""
+        """Return the code of types and of the uploaded modules that they need, bases and mixins first."""
         return [self._code(name) for name in self._with_needed(names)]
 
     def sources_for(self, names: Iterable[str]) -> list[PackageType]:

@@ -38,7 +38,7 @@ class PendingChanges:
         return changes
 
     def skip(self, name: str) -> None:
-        """Skip a type of which the caller notifies the clients."""
+        """Remove a type from the changes, since the caller notifies the clients of it."""
         sent = {key: meta for key, meta in self._sent.items() if key != name}
         if (meta := self._current.get(name)) is not None:
             sent[name] = meta

@@ -9,7 +9,7 @@ from arcor2_server.object_types.changes import Changes
 from arcor2_server.object_types.registry import ObjectTypes
 
 QUIET: Final = 0.5
-"""Seconds without an upload before the clients are notified of all uploads at once."""
+"""Time without an upload after which the clients are notified of all uploads, s."""
 
 
 def change_events(changes: Changes) -> list[Event]:
@@ -32,14 +32,14 @@ class TypeNotifications:
         self._publishing: set[asyncio.Task[None]] = set()
 
     async def uploaded(self) -> None:
-        """Take over the object types that were written to the storage; notify the clients when uploads pause."""
+        """Read object types that were written to the storage, and notify the clients when uploads pause."""
         await self._types.update()
         if self._timer is not None:
             self._timer.cancel()
         self._timer = asyncio.get_running_loop().call_later(QUIET, self._start)
 
     async def publish(self) -> None:
-        """Look for new and changed object types and notify the clients of them."""
+        """Read new and changed object types and notify the clients of them."""
         for event in change_events(await self._types.refresh()):
             self._hub.broadcast(event)
 
@@ -50,7 +50,7 @@ class TypeNotifications:
         task.add_done_callback(self._publishing.discard)
 
     async def close(self) -> None:
-        """Cancel notifications that are due."""
+        """Cancel pending notifications."""
         if self._timer is not None:
             self._timer.cancel()
         for task in self._publishing:

@@ -9,15 +9,7 @@ import msgspec
 import structlog
 from msgspec.structs import replace
 
-from arcor2_hw.analysis import (
-    BUILT_IN,
-    SourceFile,
-    TypeAnalysis,
-    installed_types,
-    module_name,
-    snapshot,
-    worker,
-)
+from arcor2_hw.analysis import BUILT_IN, SourceFile, TypeAnalysis, installed_types, module_name, snapshot, worker
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.object_type import ObjectTypeMeta, ObjectTypeSource
 from arcor2_hw.data.robot import RobotMeta
@@ -61,14 +53,14 @@ class ModelStore(Protocol):
         """Return whether an asset exists."""
 
     async def offer(self, key: str, content: bytes, description: str) -> object:
-        """Store the model of an installed driver unless the asset exists."""
+        """Offer the model of an installed driver as an asset."""
 
 
 class ObjectTypes(TypeCatalog):
     """The registry of object types.
 
-    `revision` grows with every change. A type is disabled if its source cannot be read, or its collision model or mesh
-    is missing. A robot's description is listed only if it exists.
+    `revision` grows with every change. A type is disabled if its source cannot be analysed, or if its collision model
+    or mesh is missing. A robot's model is listed only if the asset exists.
     """
 
     def __init__(self, storage: SourceStore, assets: ModelStore, stored_analysis: Path | None = None) -> None:
@@ -81,7 +73,7 @@ class ObjectTypes(TypeCatalog):
         self._pending = PendingChanges()
         self._reading = asyncio.Lock()
 
-    # ------------------------------------------------------------------------------------------------ life
+    # ------------------------------------------------------------------------------------------------ reading
     async def load(self) -> None:
         """Read built-in, installed and uploaded types."""
         async with self._reading:
@@ -91,7 +83,7 @@ class ObjectTypes(TypeCatalog):
 
     @property
     def up_to_date(self) -> bool:
-        """Return whether there is nothing that clients do not know yet."""
+        """Whether clients were notified of all object types in the storage."""
         return self._stored_revision == self._read_at and not self._pending.changes
 
     @property
@@ -102,13 +94,11 @@ class ObjectTypes(TypeCatalog):
         """Read object types that were written to the storage; return changes of which clients were not notified."""
         if self.up_to_date:
             return self._pending.changes
-        async with self._reading:
-            if self._stored_revision != self._read_at:
-                await self._read_uploaded()
-            return self._pending.take()
+        await self.update()
+        return self._pending.take()
 
     async def update(self) -> None:
-        """Read object types that were written to the storage. The next refresh returns the changes."""
+        """Read object types that were written to the storage. The next `refresh` returns the changes."""
         async with self._reading:
             if self._stored_revision != self._read_at:
                 await self._read_uploaded()
@@ -120,12 +110,12 @@ class ObjectTypes(TypeCatalog):
                 self._library.add(installed.file)
 
     async def _offer_models(self) -> None:
-        """Offer the models of robots that lie with installed drivers as assets."""
+        """Offer the robot models of installed drivers as assets."""
         for folder in sorted({each.folder for each in self._installed.values() if each.folder}):
             try:
                 packages = await asyncio.to_thread(robot_packages, Path(folder))
             except OSError as error:
-                log.warning("the models of a driver cannot be read", folder=folder, reason=error.strerror)
+                log.warning("robot models of a driver cannot be read", folder=folder, reason=error.strerror)
                 continue
             for name, content in packages.items():
                 await self._assets.offer(name, content, "the model of an installed driver's robot")
@@ -147,7 +137,7 @@ class ObjectTypes(TypeCatalog):
             if name not in self._uploaded and name in self._installed:
                 log.warning("uploaded object type shadows an installed one", type=name, of=self._origin(name))
             self._uploaded[name] = one
-        # Off the event loop: a hundred types take a moment to read.
+        # In a thread, since the analysis of many types would block the event loop.
         complete = await self._analyse_huge()
         known = await asyncio.to_thread(self._analyse, await self._storage.types_without_model(), complete)
         self._known = known
@@ -158,7 +148,7 @@ class ObjectTypes(TypeCatalog):
         self.revision += 1
 
     def _withdraw(self, name: str) -> None:
-        """Forget an uploaded type; the installed one of that name is in its place again."""
+        """Remove an uploaded type, so that an installed one of that name is used again."""
         del self._uploaded[name]
         self._library.remove(name)
         installed = self._installed.get(name)
@@ -203,9 +193,10 @@ class ObjectTypes(TypeCatalog):
         return Known(analyses, metas, robots, digest)
 
     async def _analyse_huge(self) -> bool:
-        """Analyse all types in another process if one of them would keep this one busy for long.
+        """Analyse all types in another process if one of them is huge.
 
-        Return whether the results may be stored: not if the analysis failed, which disables the huge types.
+        Return whether the results may be stored. If the analysis fails, the huge types are disabled, and the results
+        must not be stored.
         """
         if not worker.is_needed(self._library) or (
             self._stored_analysis is not None and await asyncio.to_thread(self._restored, self._stored_analysis)
@@ -221,7 +212,7 @@ class ObjectTypes(TypeCatalog):
         return True
 
     def _restored(self, file: Path) -> bool:
-        """Take over the analysis stored by an earlier process; return False if it is missing or outdated."""
+        """Restore the analysis stored by an earlier process; return False if it is missing or outdated."""
         try:
             return snapshot.restore(self._library, file.read_bytes())
         except OSError:
@@ -233,7 +224,9 @@ class ObjectTypes(TypeCatalog):
         try:
             write_private(file, encoded)
         except OSError as error:
-            log.warning("analysis not stored: the next start takes longer", file=str(file), reason=error.strerror)
+            log.warning(
+                "analysis cannot be stored, so the next start takes longer", file=str(file), reason=error.strerror
+            )
 
     def _missing_mesh(self, one: ObjectTypeSource) -> str:
         """Return the problem of a missing mesh, empty if none is missing."""
@@ -250,12 +243,12 @@ class ObjectTypes(TypeCatalog):
 
     # ------------------------------------------------------------------------------------------------ changes
     async def add(self, source: ObjectTypeSource) -> ObjectTypeMeta:
-        """Save an uploaded type (new, or of changed source or model) and analyse it; the caller notifies the clients.
+        """Save a new or changed uploaded type and analyse it. The caller notifies the clients.
 
-        It takes the place of an installed type of the same name until it is deleted.
+        It shadows an installed type of the same name until it is deleted.
 
         Raises:
-            InvalidData: The name is that of a base class.
+            InvalidData: A base class has this name.
         """
         self.require_replaceable(source.id)
         async with self._reading:
@@ -265,7 +258,7 @@ class ObjectTypes(TypeCatalog):
         return self.meta(source.id)
 
     async def remove(self, name: str) -> ObjectTypeMeta:
-        """Delete an uploaded type and return its last meta; an installed type of that name is in its place again.
+        """Delete an uploaded type and return its last metadata. An installed type of that name is used again.
 
         Raises:
             InvalidData: The type is a base class, or installed.
@@ -281,18 +274,18 @@ class ObjectTypes(TypeCatalog):
 
     @staticmethod
     def require_replaceable(name: str) -> None:
-        """Refuse to replace a base class. Raise InvalidData if that is impossible."""
+        """Raise InvalidData for a base class, which cannot be replaced."""
         if name in BUILT_IN:
             raise InvalidData("The object type {name} is built in and cannot be replaced.", name=name)
 
     def require_deletable(self, name: str) -> None:
-        """Refuse to delete a base class or an installed type. Raise InvalidData if that is impossible."""
+        """Raise InvalidData for a base class or an installed type, which cannot be deleted."""
         if name in BUILT_IN:
             raise InvalidData("The object type {name} is built in and cannot be deleted.", name=name)
         if name in self._installed and name not in self._uploaded:
             origin = self._origin(name) or "an installed distribution"
             raise InvalidData(
-                "The object type {name} belongs to {origin} and cannot be deleted: uninstall that.",
+                "The object type {name} belongs to {origin} and cannot be deleted: uninstall {origin}.",
                 name=name,
                 origin=origin,
             )

@@ -137,7 +137,7 @@ class SceneServiceOperations:
     @operation("GET", "/collisions", SCENE, Role.OPERATOR)
     async def list_collisions(self) -> list[str]:
         """Return the ids of all collision models: added ones, and the objects of the online scene."""
-        return sorted(self._scene_collisions.in_operation())
+        return sorted(self._scene_collisions.online_obstacles())
 
     @operation("DELETE", "/collisions/{id}", SCENE, Role.TECHNICIAN)
     async def delete_collision(self, id: str) -> None:  # noqa: A002 - the protocol calls it so

@@ -189,7 +189,7 @@ class CalibrationRequests:
         self._editing.require_held(context, args.robot_id)
         self._motion.require_not_moving(robot.id)
         self._online.arm(robot.id, None)
-        model = self._robot_models.require(robot, "by which a camera could find it")
+        model = self._robot_models.require(robot, "to find it with a camera")
         user = context.user
         await self._locks.acquire(user, camera.id)
         try:

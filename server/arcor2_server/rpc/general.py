@@ -147,9 +147,9 @@ class GeneralRequests:
         if "RobotHold" in args.events:
             events += [make_event("RobotHold", hold) for hold in self._online.held.states()]
         if "UserPresence" in args.events:
-            events += self._presence.everybody()
+            events += self._presence.all_events()
         if "TaskState" in args.events:
-            events += self._tasks.under_way()
+            events += self._tasks.running_events()
         if "ReachabilityChanged" in args.events:
             self._reachability.schedule()
         if "HistoryChanged" in args.events:

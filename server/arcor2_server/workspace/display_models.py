@@ -1,6 +1,6 @@
-"""Meshes and robot models converted for display, by the compute worker on first use, and stored on disk.
+"""Converts meshes and robot models for display, in the compute worker on first use, and caches them on disk.
 
-A file is named by the hash of the asset and the version of the converter, so that it never becomes outdated. It may be
+A file is named by the hash of the asset and the version of the converter, so it never becomes outdated. It may be
 deleted at any time.
 """
 
@@ -31,7 +31,7 @@ log = structlog.get_logger(__name__)
 SHOWN_AFTER: Final = 1.0
 """Time after which a conversion is shown as a task, s."""
 MAX_SIZE: Final = 1024 * 1024 * 1024
-"""Maximum size on disk, bytes; beyond, the least recently used files are deleted."""
+"""Maximum size of the cache on disk, bytes. Beyond it, the least recently used files are deleted."""
 MAX_REFUSALS: Final = 1000
 _GZIP_LEVEL: Final = 6
 _WORTH: Final = 0.9
@@ -40,7 +40,7 @@ _WORTH: Final = 0.9
 
 @dataclass(frozen=True, slots=True)
 class DisplayModel:
-    """A converted asset: the file, and a compressed copy if it is smaller. etag: identifies the content."""
+    """A converted asset: the file, and a compressed copy if it is much smaller. `etag` identifies the content."""
 
     etag: str
     plain: Path
@@ -48,7 +48,7 @@ class DisplayModel:
 
 
 class DisplayModels:
-    """The converted assets, for use on one event loop. `directory` is created when it is needed."""
+    """The converted assets, for use in one event loop. `directory` is created when it is needed."""
 
     def __init__(self, assets: AssetStore, compute: Compute, tasks: Tasks, directory: Path) -> None:
         self._assets = assets
@@ -59,17 +59,19 @@ class DisplayModels:
         self._refusals: dict[tuple[str, str], Arcor2Error] = {}
 
     async def get(self, key: str) -> DisplayModel:
-        """Return a converted asset. It is converted once for any number of callers.
+        """Return a converted asset. Concurrent callers share one conversion.
 
-        Raise NotFound, InvalidData if it is neither a mesh nor a robot, ComputeStopped, ComputeTimeout, ComputeBusy,
-        NotInstalled or StorageError.
+        Raises:
+            NotFound: There is no such asset.
+            InvalidData: The asset is neither a mesh nor a robot model.
+            StorageError: The result cannot be stored.
+            ComputeStopped, ComputeTimeout, ComputeBusy, NotInstalled: The worker failed.
         """
         asset = self._assets.info(key)
         name = _named(asset)
-        # The ending of the name may say what it is.
-        name_on_disk = (
-            f"{asset.digest}.{CONVERSION}{Path(name).suffix.lower() if Path(name).suffix[1:].isalnum() else ''}"
-        )
+        # The converter may need the extension to recognize the format.
+        extension = Path(name).suffix.lower()
+        name_on_disk = f"{asset.digest}.{CONVERSION}{extension if extension[1:].isalnum() else ''}"
         if (found := await asyncio.to_thread(self._find, name_on_disk)) is not None:
             return found
         if (refusal := self._refusals.get((name_on_disk, name))) is not None:
@@ -82,17 +84,17 @@ class DisplayModels:
         return await asyncio.shield(making)
 
     async def close(self) -> None:
-        """Return up what is being made."""
+        """Cancel the running conversions."""
         making = list(self._making.values())
         for each in making:
             each.cancel()
         await asyncio.gather(*making, return_exceptions=True)
 
-    # ------------------------------------------------------------------------------------------------ inside
+    # ------------------------------------------------------------------------------------------------ internals
     def _made(self, name_on_disk: str, done: asyncio.Task[DisplayModel]) -> None:
         self._making.pop(name_on_disk, None)
         if not done.cancelled():
-            done.exception()  # who asked may have gone
+            done.exception()  # marks it as retrieved, since the callers may be gone
 
     async def _make(self, name_on_disk: str, key: str, name: str) -> DisplayModel:
         task = PrepareAsset(StoredFile(str(self._assets.file(key)), name))
@@ -100,7 +102,7 @@ class DisplayModels:
             with _ShownTask(self._tasks, name) as on_progress:
                 made = await self._compute.run(task, on_progress=on_progress)
         except InvalidData as error:
-            if await asyncio.to_thread(Path(task.file.path).is_file):  # else it is the asset that went meanwhile
+            if await asyncio.to_thread(Path(task.file.path).is_file):  # else the asset was deleted meanwhile
                 self._refusals[name_on_disk, name] = error
             while len(self._refusals) > MAX_REFUSALS:
                 del self._refusals[next(iter(self._refusals))]
@@ -112,13 +114,13 @@ class DisplayModels:
         try:
             return await asyncio.to_thread(self._store, name_on_disk, made)
         except OSError as error:
-            text = f"cannot keep what was prepared in {self._directory}: {error.strerror}"
+            text = f"converted models cannot be stored in {self._directory}: {error.strerror}"
             raise StorageError(text, detail=str(error)) from error
 
     def _find(self, name_on_disk: str) -> DisplayModel | None:
         plain, packed = self._directory / f"{name_on_disk}.glb", self._directory / f"{name_on_disk}.glb.gz"
         try:
-            os.utime(plain)  # asked for now
+            os.utime(plain)  # time of the last use
         except OSError:
             return None
         return DisplayModel(f'"{name_on_disk}"', plain, packed if packed.is_file() else None)
@@ -126,18 +128,18 @@ class DisplayModels:
     def _store(self, name_on_disk: str, made: PreparedAsset) -> DisplayModel:
         self._directory.mkdir(parents=True, exist_ok=True)
         self._make_room(len(made.content))
-        half = self._directory / f"half.{CONVERSION}"  # an incomplete file is never used, and a lost one is made again
+        temporary = self._directory / f"half.{CONVERSION}"
         packed = gzip.compress(made.content, _GZIP_LEVEL, mtime=0)
         if len(packed) < _WORTH * len(made.content):
-            replace_file(self._directory / f"{name_on_disk}.glb.gz", packed, durable=False, temporary=half)
-        replace_file(self._directory / f"{name_on_disk}.glb", made.content, durable=False, temporary=half)
+            replace_file(self._directory / f"{name_on_disk}.glb.gz", packed, durable=False, temporary=temporary)
+        replace_file(self._directory / f"{name_on_disk}.glb", made.content, durable=False, temporary=temporary)
         found = self._find(name_on_disk)
         if found is None:
-            raise FileNotFoundError(2, "it is gone at once")
+            raise FileNotFoundError(2, "the file was deleted meanwhile")
         return found
 
     def _make_room(self, needed: int) -> None:
-        """Drop what other makers made, and what was asked for longest ago where there is too much."""
+        """Delete files of other converter versions, and the least recently used files if the cache is too large."""
         files = []
         for file in self._directory.iterdir():
             if file.name.split(".")[1:2] != [str(CONVERSION)]:
@@ -154,12 +156,12 @@ class DisplayModels:
 
 
 def _named(asset: Asset) -> str:
-    """Return an asset's name as a person knows it."""
+    """Return the file name of an asset, or else its id."""
     return asset.id if isinstance(asset.file_name, Unset) or not asset.file_name else asset.file_name
 
 
 class _ShownTask(contextlib.AbstractContextManager[Callable[[float, str], None]]):
-    """Shows work as a task once it takes longer than a moment."""
+    """Shows a conversion as a task if it takes longer than `SHOWN_AFTER`."""
 
     def __init__(self, tasks: Tasks, name: str) -> None:
         self._tasks = tasks
@@ -187,4 +189,4 @@ class _ShownTask(contextlib.AbstractContextManager[Callable[[float, str], None]]
         if error is None:
             self._task.finish()
         else:
-            self._task.cancel()  # those who asked are told why
+            self._task.cancel()  # the callers receive the error

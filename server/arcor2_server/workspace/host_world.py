@@ -1,4 +1,4 @@
-"""What cell hosts know of the workspace besides the scene: collision models from REST and robot calibrations."""
+"""Sends collision models added over REST and robot calibrations to the cell hosts."""
 
 import asyncio
 from collections.abc import Iterable
@@ -27,14 +27,14 @@ SHAPES: Final = (".stl", ".obj", ".ply", ".off", ".dae", ".zip", ".urdf")
 
 
 class HostWorld:
-    """Keeps the hosts up to date with the workspace.
+    """Keeps the cell hosts up to date with the workspace.
 
     Args:
-        collisions: collision models that were added over REST.
-        robot_calibrations: kinematic calibrations read from controllers.
-        assets: meshes and robot models.
-        scene_host: the online scene.
-        program_host: the running program.
+        collisions: Collision models that were added over REST.
+        robot_calibrations: Kinematic calibrations read from controllers.
+        assets: Meshes and robot models.
+        scene_host: The host of the online scene.
+        program_host: The host of the running program.
     """
 
     def __init__(
@@ -75,11 +75,11 @@ class HostWorld:
         """Return the robot calibrations in force, by object id.
 
         Args:
-            objects: the objects of the scene.
-            overrides: the settings that the project overrides; None: those of the open project.
+            objects: The objects of the scene.
+            overrides: The settings that the project overrides; None for those of the open project.
         """
-        laid = None if overrides is None else list(overrides)
-        found = {obj.id: self._robot_calibrations.in_force(obj, laid) for obj in objects}
+        overrides = None if overrides is None else list(overrides)
+        found = {obj.id: self._robot_calibrations.in_force(obj, overrides) for obj in objects}
         return {key: calibration for key, calibration in found.items() if calibration is not None}
 
     async def calibrations_of_package(self, directory: Path) -> dict[str, KinematicCalibration]:

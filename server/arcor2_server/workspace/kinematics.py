@@ -1,4 +1,4 @@
-"""Kinematics of robots that are offline or compute none themselves, from their models."""
+"""Kinematics from robot models, for robots that are offline or do not compute it themselves."""
 
 from arcor2_hw.collision.description import WorldRobot
 from arcor2_hw.compute.kinematics_tasks import SolveForward, SolveInverse
@@ -17,12 +17,12 @@ from arcor2_server.workspace.scene_collisions import SceneCollisions
 
 
 def _end_effector(name: str, arm_id: str | Unset) -> str:
-    """Return the link of an end effector; in the model of a robot with several arms it carries the arm's name."""
+    """Return the link of an end effector, which in the model of a multi-arm robot starts with the arm's name."""
     return name if isinstance(arm_id, Unset) else f"{arm_id}_{name}"
 
 
 class Kinematics:
-    """Forward and inverse kinematics from the models of robots, computed by the worker."""
+    """Forward and inverse kinematics from the models of robots, computed by the compute worker."""
 
     def __init__(
         self,
@@ -41,15 +41,20 @@ class Kinematics:
         self._scene_collisions = scene_collisions
 
     def solves(self, robot: SceneObject, feature: str) -> bool:
-        """Return whether the device itself answers: it is in operation, and its type has the feature."""
+        """Return whether the robot itself computes kinematics: it is online, and its type has the feature."""
         return self._host.online and getattr(self._types.robot_meta(robot.type).features, feature)
 
     async def inverse(self, robot: SceneObject, args: InverseKinematicsArgs) -> list[Joint]:
-        """Return joints that reach a pose. RequestRefused for a robot without a model, KinematicsError if none exist.
+        """Return joints that reach a pose.
 
-        `avoid_collisions`: with the bodies of the scene, other robots at their present joints, and the robot itself.
+        With `avoid_collisions`, they avoid the bodies of the scene, other robots at their present joints, and
+        collisions of the robot with itself.
+
+        Raises:
+            RequestRefused: The robot has no model.
+            KinematicsError: No such joints exist.
         """
-        model = self._robot_models.require(robot, "from which joints could be computed")
+        model = self._robot_models.require(robot, "to compute inverse kinematics")
         start = None if isinstance(args.start_joints, Unset) else args.start_joints
         if start is None:
             start = await self._robots.present_joints(robot) or None
@@ -59,18 +64,17 @@ class Kinematics:
             return await self._compute.run(task, world={robot.id: WorldRobot(robot.id, model)})
         others = [one for one in self._robots.with_models() if one.id != robot.id]
         joints = {one.id: await self._robots.present_joints(one) for one in others}
-        # Others whose joints are not known are not known to stand anywhere.
+        # Robots with unknown joints are not obstacles.
         known = [one for one in others if joints[one.id]]
         try:
             return await self._compute.run(task, world=self._scene_collisions.world([robot, *known], joints))
         except KinematicsError as error:
-            Arcor2Error.__init__(
-                error, self._scene_collisions.with_names(str(error)), error.detail
-            )  # with its code and reason
+            # Changes only the message, so that the code and the reason of the error remain.
+            Arcor2Error.__init__(error, self._scene_collisions.with_names(str(error)), error.detail)
             raise
 
     async def forward(self, robot: SceneObject, args: ForwardKinematicsArgs) -> Pose:
-        """Return the pose for joints. RequestRefused for a robot without a model, InvalidData for wrong joints."""
-        model = self._robot_models.require(robot, "from which a pose could be computed")
+        """Return the pose for joints. Raise RequestRefused without a model, InvalidData for wrong joints."""
+        model = self._robot_models.require(robot, "to compute forward kinematics")
         task = SolveForward(model, _end_effector(args.end_effector_id, args.arm_id), args.joints)
         return await self._compute.run(task)

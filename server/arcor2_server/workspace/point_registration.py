@@ -8,11 +8,11 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import InvalidData
 
 MIN_POINTS: Final = 3
-"""Points that determine a pose, if they are not in one line."""
+"""Minimum number of points that determine a pose. They must not be in one line."""
 MIN_WIDTH_RATIO: Final = 0.02
-"""Minimum extent of the points across their line, as a fraction of its length, to determine the roll."""
+"""Minimum ratio of width to length of the point set, so that the points are not in one line."""
 MIN_DISTANCE: Final = 1e-4
-"""The least distance that is taken for one, m."""
+"""Minimum extent of the point set, m."""
 
 
 class Fit(Data, frozen=True):
@@ -23,8 +23,8 @@ class Fit(Data, frozen=True):
 
 
 def check_points(points: Sequence[Position], what: str) -> None:
-    """Raise InvalidData unless the points determine a pose: three of them at least, and not in one line."""
-    import numpy as np  # 0.1 s that the server's start does without
+    """Raise InvalidData unless there are at least three points that are not in one line."""
+    import numpy as np  # imported here, since it delays the start of the server by 0.1 s
 
     if len(points) < MIN_POINTS:
         raise InvalidData(
@@ -32,20 +32,24 @@ def check_points(points: Sequence[Position], what: str) -> None:
         )
     array = np.array([tuple(point) for point in points])
     if not np.isfinite(array).all():
-        raise InvalidData("{what}: a point is nowhere, and does not determine a pose.", what=what)
+        raise InvalidData("{what}: a coordinate is not a finite number.", what=what)
     extent = np.linalg.svd(array - array.mean(axis=0), compute_uv=False)
     if extent[0] < MIN_DISTANCE or extent[1] < max(MIN_DISTANCE, MIN_WIDTH_RATIO * extent[0]):
-        raise InvalidData(
-            "{what}: the points lie in one line, or in one place, and do not determine a pose.", what=what
-        )
+        raise InvalidData("{what}: the points are in one line or in one place and do not determine a pose.", what=what)
 
 
 def fit(on_object: Sequence[Position], touched: Sequence[Position]) -> Fit:
-    """Return the pose of an object in the world: that which moves its own points nearest to where they were touched.
+    """Return the pose of an object in the world that fits its points best to the touched positions.
 
-    Least squares over the points (W. Kabsch, Acta Crystallographica A32 (1976) 922, with the sign of the smallest
-    singular value that keeps a rotation from becoming a reflection). Raises InvalidData for lists of different length
-    and for points that do not determine a pose.
+    Least squares (W. Kabsch, Acta Crystallographica A32 (1976) 922), with the sign of the smallest singular value
+    chosen so that the result is a rotation and not a reflection.
+
+    Args:
+        on_object: Points in the frame of the object.
+        touched: Their positions in the world, in the same order.
+
+    Raises:
+        InvalidData: The lists differ in length, or the points do not determine a pose.
     """
     import numpy as np
 

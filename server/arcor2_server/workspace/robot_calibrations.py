@@ -35,13 +35,19 @@ log = structlog.get_logger(__name__)
 
 MAX_CALIBRATIONS: Final = 1000
 """Maximum number of stored calibrations; the oldest are dropped."""
-_THERE: Final = (Connection.ONLINE, Connection.BACK)
+_CONNECTED: Final = (Connection.ONLINE, Connection.BACK)
 
 
 class RobotCalibration(Data, frozen=True):
-    """A calibration read from the controller of an object; `refused` says why it is not used, empty if it is.
+    """A calibration read from a robot controller.
 
-    device: identifies the device by the settings of the object.
+    Attributes:
+        object_id: The id of the robot.
+        name: The name of the robot.
+        device: Identifies the device by the settings of the robot.
+        read: When the calibration was read.
+        calibration: The calibration.
+        refused: Why the calibration is not used, empty if it is used.
     """
 
     object_id: str
@@ -56,9 +62,9 @@ class InForce(enum.StrEnum):
     """The origin of the kinematics of a robot."""
 
     NONE = "none"
-    """It has no model."""
+    """The robot has no model."""
     NOMINAL = "nominal"
-    """Nominal for its type: the tip may be off by millimetres."""
+    """Nominal for its type: the error at the tip may be some millimetres."""
     MEASURED = "measured"
     """Calibrated for this robot, read from its controller."""
 
@@ -109,7 +115,7 @@ class RobotCalibrations:
     def stored(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> RobotCalibration | None:
         """Return the stored calibration of a robot, used or not; None if there is none.
 
-        overrides: of the project that the robot is used in, else those of the open one.
+        `overrides` are those of the project that the robot is used in; None for the open project.
         """
         found = self._stored.get(robot.id)
         return found if found is not None and found.device == self._device(robot, overrides) else None
@@ -126,10 +132,10 @@ class RobotCalibrations:
         if not self._host.online:
             self._asked.clear()
             return
-        there = {state.object_id for state in self._host.board.states() if state.state in _THERE}
-        self._asked &= there
+        connected = {state.object_id for state in self._host.board.states() if state.state in _CONNECTED}
+        self._asked &= connected
         for robot in self._session.require_scene().objects:
-            if robot.id in there - self._asked and self._is_readable(robot):
+            if robot.id in connected - self._asked and self._is_readable(robot):
                 self._asked.add(robot.id)
                 task = asyncio.create_task(self._read(robot), name=f"kinematics of {robot.name}")
                 self._reading.add(task)
@@ -141,13 +147,13 @@ class RobotCalibrations:
             await asyncio.wait(self._reading)
 
     async def close(self) -> None:
-        """Stop when the server ends."""
+        """Cancel the pending reads."""
         reading = list(self._reading)
         for task in reading:
             task.cancel()
         await asyncio.gather(*reading, return_exceptions=True)
 
-    # ------------------------------------------------------------------------------------------------ inside
+    # ------------------------------------------------------------------------------------------------ internals
     def _is_readable(self, robot: SceneObject) -> bool:
         types = self._types
         if not types.derives_from(robot.type, "Robot") or self._robots.model_of_type(robot.type) is None:
@@ -156,7 +162,7 @@ class RobotCalibrations:
         return meta.features.kinematic_calibration is True and not meta.multi_arm
 
     def _device(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> str:
-        """Return an identifier of the robot's device, from its settings that are texts or integers."""
+        """Return an identifier of the robot's device, computed from its settings that are texts or integers."""
         settings = self._robots.settings_of(robot, overrides)
         cell = self._settings.cell
         here = None if cell is None else cell.device(robot.name)
@@ -171,9 +177,9 @@ class RobotCalibrations:
             calibration = await self._host.ask(KinematicCalibration, robot.id, "kinematic_calibration")
         except Arcor2Error as error:
             if self._host.online:
-                log.warning("kinematics not told", robot=robot.name, reason=str(error))
-                used = "those that it told before" if self.in_force(robot) else "nominal ones"
-                self._publish(robot, f"its controller does not tell its calibration, kinematics are {used}. {error}")
+                log.warning("kinematic calibration cannot be read", robot=robot.name, reason=str(error))
+                used = "The stored one is" if self.in_force(robot) else "Nominal kinematics are"
+                self._publish(robot, f"The calibration cannot be read from the controller. {used} used. {error}")
             return
         before = self.stored(robot)
         refused = await self._refused(robot, calibration)
@@ -183,19 +189,25 @@ class RobotCalibrations:
         self._stored[robot.id] = found
         while len(self._stored) > MAX_CALIBRATIONS:
             del self._stored[next(iter(self._stored))]
-        log.info("kinematics read", robot=robot.name, checksum=calibration.checksum, refused=refused, same=same)
+        log.info(
+            "kinematic calibration read",
+            robot=robot.name,
+            checksum=calibration.checksum,
+            refused=refused,
+            same=same,
+        )
         await self._save()
         if same:
             return
         for notify in self.on_change:
             notify(robot)
         if refused:
-            self._publish(robot, f"the calibration in its controller is not used, kinematics are nominal. {refused}")
+            self._publish(robot, f"The calibration in the controller cannot be used. Kinematics are nominal. {refused}")
         else:
-            self._publish(robot, "kinematics are from now on those of the calibration in its controller.", bad=False)
+            self._publish(robot, "The calibration in the controller is now used.", bad=False)
 
     async def _refused(self, robot: SceneObject, calibration: KinematicCalibration) -> str:
-        """Tell why a calibration cannot be used, empty when it can."""
+        """Return why a calibration cannot be used, empty if it can."""
         file = self._robots.model_of_type(robot.type)
         if file is None:
             return f"{robot.name} has no model (URDF)."
@@ -204,12 +216,12 @@ class RobotCalibrations:
             await self._compute.run(DescribeRobot(RobotSource(file, settings=settings, calibration=calibration)))
         except InvalidData as error:
             return str(error)
-        except Arcor2Error as error:  # whoever computes with it will be told
-            log.warning("calibration not looked at", robot=robot.name, reason=str(error))
+        except Arcor2Error as error:  # reported again when the calibration is used
+            log.warning("kinematic calibration not checked", robot=robot.name, reason=str(error))
         return ""
 
     def _publish(self, robot: SceneObject, what: str, *, bad: bool = True) -> None:
-        """Notify all clients which kinematics of a robot are in force, and why."""
+        """Notify all clients which kinematics of a robot are used, and why."""
         level = NotificationLevel.WARN if bad else NotificationLevel.INFO
         self._hub.broadcast(make_event("Notification", NotificationData(f"{robot.name}: {what}", level)))
 
@@ -219,4 +231,4 @@ class RobotCalibrations:
             try:
                 await asyncio.to_thread(write_private, self._path, content)
             except OSError as error:
-                log.error("calibrations not kept", file=str(self._path), reason=str(error))
+                log.error("kinematic calibrations cannot be stored", file=str(self._path), reason=str(error))

@@ -26,7 +26,7 @@ class RobotModels:
         return RobotSource(file, base, self._robots.settings_of(robot), name, calibration)
 
     def require(self, robot: SceneObject, purpose: str) -> RobotSource:
-        """Return the model of a robot; RequestRefused with the purpose if it has none."""
+        """Return the model of a robot. Raise RequestRefused with the purpose if it has none."""
         model = self.find(robot, robot.name)
         if model is None:
             raise RequestRefused("{name} has no model (URDF) {purpose}.", name=robot.name, purpose=purpose)

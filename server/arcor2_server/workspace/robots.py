@@ -40,14 +40,14 @@ class SceneRobots:
 
     # -------------------------------------------------------------------------------- in the scene
     def robot(self, robot_id: str) -> SceneObject:
-        """Return the scene object of a robot; NotFound, RequestRefused when it is none."""
+        """Return the scene object of a robot. Raise NotFound, or RequestRefused if the object is not a robot."""
         found = self._session.scene_object(robot_id)
         if not self._types.derives_from(found.type, "Robot"):
             raise RequestRefused("{name} is not a robot.", name=found.name)
         return found
 
     def arm(self, robot_id: str, arm_id: str | None) -> dict[str, Any]:
-        """Return the argument that names the arm; RequestRefused unless it is set exactly for multi-arm robots."""
+        """Return the argument that names the arm. Raise RequestRefused unless only multi-arm robots have one."""
         robot = self.robot(robot_id)
         multi_arm = self._types.robot_meta(robot.type).multi_arm
         if multi_arm and arm_id is None:
@@ -68,7 +68,7 @@ class SceneRobots:
         if not self._host.online:
             return []
         try:
-            if self._types.robot_meta(robot.type).multi_arm:  # without the name of an arm it returns those of all
+            if self._types.robot_meta(robot.type).multi_arm:  # without an arm it returns the joints of all arms
                 joints: list[Joint] = await self._host.ask(list[Joint], robot.id, "robot_joints")
                 return joints
             return await self.robot_joints(robot.id)
@@ -76,7 +76,7 @@ class SceneRobots:
             return []
 
     async def end_effectors(self, robot_id: str, arm_id: str | None = None) -> set[str]:
-        """Return the names of a robot's end effectors. The robot is asked once while it is connected."""
+        """Return the names of a robot's end effectors, which are cached while the robot is connected."""
         arm = self.arm(robot_id, arm_id)
         key = robot_id, arm_id
         if (known := self._end_effectors.get(key)) is None:
@@ -113,7 +113,7 @@ class SceneRobots:
         ]
 
     def model_of_type(self, type_name: str) -> StoredFile | None:
-        """Return the file of a robot type's model, None when it has none."""
+        """Return the model file of a robot type, None if it has none."""
         name = self._types.robot_meta(type_name).urdf_package_filename
         if isinstance(name, Unset):
             return None
@@ -123,8 +123,8 @@ class SceneRobots:
         """Return the settings of an object by name.
 
         Args:
-            robot: the object.
-            overrides: the settings that a project overrides; None: those of the open project.
+            robot: The object.
+            overrides: The settings that a project overrides; None for those of the open project.
         """
         if overrides is None:
             project = self._session.project
@@ -138,17 +138,18 @@ class SceneRobots:
             try:
                 found[parameter.name] = msgspec.json.decode(parameter.value)
             except msgspec.DecodeError:
-                continue  # the object type's own business
+                continue  # reported by the checks of the scene
         return found
 
     def model_of_uri(self, uri: str) -> RobotSource:
-        """Return the model in the asset that a URI names, by its id or its address here.
+        """Return the model in the asset that a URI names, by its id or its address on this server.
 
-        Nothing is fetched from elsewhere: NotFound.
+        Raises:
+            NotFound: There is no such asset. Other servers are not contacted.
         """
         path = urlsplit(uri).path
         found = _ASSET.search(path)
         for name in (uri, unquote(found[1]) if found else unquote(path.rsplit("/", 1)[-1])):
             if self._assets.exists(name):
                 return RobotSource(StoredFile(str(self._assets.file(name)), name))
-        raise NotFound("There is no asset {uri!r}, which the robot's model should be.", uri=uri)
+        raise NotFound("There is no asset {uri!r} with the model of the robot.", uri=uri)

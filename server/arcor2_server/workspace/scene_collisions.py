@@ -1,4 +1,4 @@
-"""The collision world of the open scene for the compute worker: bodies, robots, gripped parts; line checks."""
+"""The collision world of the open scene for the compute worker (bodies, robots, gripped parts), and line checks."""
 
 import functools
 from collections.abc import Iterator, Mapping
@@ -39,7 +39,7 @@ Joints = Mapping[str, list[Joint]]
 """Present joint values by robot."""
 
 
-def _held(obstacle: Obstacle, robot: str, part: HeldPart) -> Obstacle:
+def _gripped(obstacle: Obstacle, robot: str, part: HeldPart) -> Obstacle:
     return Obstacle.of(obstacle.model, part.pose, obstacle.scale, Attachment(robot, part.link))
 
 
@@ -87,7 +87,7 @@ class SceneCollisions:
 
     # ------------------------------------------------------------------------------------------------ bodies
     def mesh_file(self, asset_id: str) -> StoredFile:
-        """Return the file of a mesh. A missing asset gets an invalid path, so that the worker reports its name."""
+        """Return the file of a mesh. A missing asset has an invalid path, so that the worker reports its name."""
         path = str(self._assets.file(asset_id)) if self._assets.exists(asset_id) else "/nonexistent"
         return StoredFile(path, asset_id)
 
@@ -101,15 +101,14 @@ class SceneCollisions:
         )
         return WorldBody(key, shape, obstacle.pose, obstacle.attachment)
 
-    def in_operation(self) -> dict[str, Obstacle]:
-        """Return all collision models by id: those added over REST, and those of the scene in operation."""
-        return dict(self._of_scene_in_operation()) | self._collisions.obstacles
-
-    def _of_scene_in_operation(self) -> Iterator[tuple[str, Obstacle]]:
-        """Return the collision models of the scene that is online, or of the running program, by id.
+    def online_obstacles(self) -> dict[str, Obstacle]:
+        """Return all collision models by id: those added over REST, and those of the online scene or running program.
 
         A gripped part is in the frame of the link that holds it.
         """
+        return dict(self._of_online_scene()) | self._collisions.obstacles
+
+    def _of_online_scene(self) -> Iterator[tuple[str, Obstacle]]:
         scene = self._session.scene
         if scene is not None and self._scene_host.online:
             board = self._scene_host.board
@@ -126,14 +125,14 @@ class SceneCollisions:
         disabled, held = board.not_in_the_way(), board.held_parts()
         for key, name, one in obstacles:
             if key not in disabled:
-                yield key, _held(one, *held[name]) if name in held else one
+                yield key, _gripped(one, *held[name]) if name in held else one
         for name, (robot, part) in held.items():
             if part.model is not None:
-                yield name, _held(Obstacle.of(part.model.model(), part.pose), robot, part)
+                yield name, _gripped(Obstacle.of(part.model.model(), part.pose), robot, part)
 
     def obstacles(self) -> dict[str, Obstacle]:
         """Return the collision models of the open scene, online or not, and those added over REST."""
-        found = self.in_operation()
+        found = self.online_obstacles()
         scene = self._session.scene
         if scene is not None and not self._scene_host.online:
             for obj in scene.objects:
@@ -145,7 +144,11 @@ class SceneCollisions:
     def world(self, chosen: list[SceneObject], joints: Joints | None = None) -> dict[str, WorldItem]:
         """Return the world description of the open scene with the chosen robots and the parts that they hold.
 
-        joints: of those robots; others are in their middle position. Parts held by other robots are left out.
+        Parts held by other robots are left out.
+
+        Args:
+            chosen: The robots.
+            joints: Joint values by robot. A robot without them is in its middle position.
         """
         present = joints or {}
         found: dict[str, WorldItem] = {}
@@ -163,18 +166,18 @@ class SceneCollisions:
         scene = self._session.scene
         if not text or scene is None:
             return text
-        met = [obj for obj in scene.objects if obj.id in text]
-        for obj in sorted(met, key=lambda obj: len(obj.id), reverse=True):  # an id may be the beginning of another
+        # Longest first, since an id may be the prefix of another.
+        for obj in sorted(scene.objects, key=lambda obj: len(obj.id), reverse=True):
             text = text.replace(obj.id, obj.name)
         return text
 
     # ------------------------------------------------------------------------------------------------ lines
     async def hit(self, start: Position, end: Position) -> Hit | None:
-        """Return the first body of the scene in operation that a straight line hits, None if it is free.
+        """Return the first body of the online scene that a straight line hits, None if the line is free.
 
-        As in the protocol, robots are ignored, since the caller is one of them; the parts that they hold are not.
+        As in the protocol, robots are ignored, since the line is the path of one, but the parts that they hold are not.
         """
-        obstacles = self.in_operation()
+        obstacles = self.online_obstacles()
         inflation = self._collisions.inflation
         found = first_hit(start, end, obstacles.items(), inflation)
         rest = {key: one for key, one in obstacles.items() if not one.is_fixed_primitive}

@@ -11,14 +11,14 @@ from arcor2_server.workspace.robots import SceneRobots
 
 PERIOD: Final = 0.5
 """Period of reading the joints, s."""
-ANSWER_WITHIN: Final = 1.0
+ANSWER_TIMEOUT: Final = 1.0
 """Time limit for reading the joints of a robot, s."""
 STANDSTILL: Final = 0.01
 """Joint change above which a robot counts as moved, rad or m."""
 
 
 class StoppedRobots:
-    """`joints` by robot: those of the last standstill while a robot moves or is disconnected."""
+    """Joints of robots at standstill, by robot. They are kept while a robot moves or is disconnected."""
 
     def __init__(self, host: HostSession, robots: SceneRobots) -> None:
         self._host = host
@@ -27,7 +27,7 @@ class StoppedRobots:
         self.joints: dict[str, list[Joint]] = {}
 
     def forget(self) -> None:
-        """Know nothing of any: they are not in operation."""
+        """Drop all joints, since the scene is offline."""
         self._last_joints.clear()
         self.joints.clear()
 
@@ -55,7 +55,7 @@ class StoppedRobots:
 
     async def _joints_of(self, robot: SceneObject) -> list[Joint]:
         try:
-            async with asyncio.timeout(ANSWER_WITHIN):
+            async with asyncio.timeout(ANSWER_TIMEOUT):
                 return await self._robots.present_joints(robot)
         except TimeoutError:
             return []

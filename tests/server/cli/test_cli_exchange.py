@@ -480,7 +480,7 @@ BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
     "a step to nowhere": (
         "data/project.json",
         lambda project: project["logic"][1].update(end="act_gone"),
-        "data/project.json: logic[1]: The step leads from or to an action act_gone",
+        "data/project.json: logic[1]: The connection leads from or to action act_gone",
     ),
     "one id for two": (
         "data/project.json",
@@ -561,7 +561,7 @@ def _link(archive: zipfile.ZipFile) -> None:
     [
         (lambda archive: archive.writestr("../evil.py", "x"), "outside of it"),
         (lambda archive: archive.writestr("/evil.py", "x"), "outside of it"),
-        (_link, "no file"),
+        (_link, "not a file"),
         (lambda archive: archive.writestr("object_types/extra.py", "x = 1"), "belongs to no object type"),
         (_bomb, "larger than"),
     ],

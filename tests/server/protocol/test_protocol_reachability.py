@@ -255,7 +255,7 @@ async def test_a_gripped_part_counts_online(tmp_path: Path) -> None:
         await until(lambda: told(bob) == {above: "in_collision"})
         (row,) = await alice.ask("Reachability", robot_id=robot, ids=[above])
         assert "part of claw and crate" in row["items"][0]["reason"]
-        assert "part of claw" in stage.services.scene_collisions.in_operation()
+        assert "part of claw" in stage.services.scene_collisions.online_obstacles()
         bob.take()
         await claw("release")
         await until(lambda: told(bob) == {above: "reachable"})

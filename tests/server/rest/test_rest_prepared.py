@@ -130,7 +130,7 @@ async def test_what_takes_long_is_told_as_a_task(
     await put(http, "slow.stl", no_digest(BALL, b"slow"), "slow one.stl")
     await http.get(SHOWN.format("slow.stl"))
     assert began == ["Preparing slow one.stl for the editor"]
-    assert services.tasks.under_way() == []
+    assert services.tasks.running_events() == []
 
 
 async def test_a_worker_that_dies_costs_one_answer_and_is_no_fault_of_the_mesh(

@@ -69,7 +69,7 @@ async def test_locks_of_a_user_who_left_are_listed_and_taken_over(
     await bob.lock(p, tree=True)
     await bob.ask("UpdateActionPointPosition", action_point_id=p, new_position=MOVED)
     # The user who lost the locks learns of it on returning, once.
-    for expected in (["bob took over what you had locked", "scale, p, q"], []):
+    for expected in (["bob released your locks", "scale, p, q"], []):
         again = Person(desk)
         desk._people.append(again)
         await again.ask("RegisterUser", user_name="alice")
@@ -174,7 +174,7 @@ async def test_a_project_that_was_left_open_does_not_block_a_program(tmp_path: P
         back = await stage.newcomer()
         await back.ask("RegisterUser", user_name="alice")
         notice = await happens(back, "Notification", level="Warn")
-        assert notice["message"].startswith("olga took over what you had locked")
+        assert notice["message"].startswith("olga released your locks")
         await back.ask("Undo")
         assert [each.name for each in session.require_project().action_points] == ["ap"]
 

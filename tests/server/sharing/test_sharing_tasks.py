@@ -42,7 +42,7 @@ async def test_a_scene_is_started_and_stopped(tmp_path: Path) -> None:
         ended = await happens(bob, "TaskState", state="finished", kind="scene_stop")
         assert ended["started_by"] == "bob"
         assert "TaskState" not in alice.names()
-        assert stage.services.tasks.under_way() == []
+        assert stage.services.tasks.running_events() == []
 
 
 async def test_a_scene_that_does_not_come_up(tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ async def test_building_and_what_goes_wrong(tmp_path: Path, monkeypatch: pytest.
         with pytest.raises(Refused):
             await alice.ask("UploadPackage", id="pkg_x", data="no base64!")
         assert [(task["kind"], task["state"]) for task in tasks(alice)] == [("upload", "running"), ("upload", "failed")]
-        assert stage.services.tasks.under_way() == []
+        assert stage.services.tasks.running_events() == []
 
 
 async def test_a_task_is_told_at_a_bounded_rate_and_its_end_always() -> None:
@@ -114,7 +114,7 @@ async def test_a_task_is_told_at_a_bounded_rate_and_its_end_always() -> None:
     with pytest.raises(ZeroDivisionError), board.running(TaskKind.CALIBRATION, "Looking"):
         1 / 0  # noqa: B018
     assert b"inside the server" in sent[-1]
-    assert board.under_way() == []
+    assert board.running_events() == []
     board.close()
 
 
@@ -124,13 +124,13 @@ async def test_a_disabled_object_is_not_in_the_way(tmp_path: Path) -> None:
         await stage.place(alice, part="Part", plain="Plain")
         await stage.start(alice)
         services, part = stage.services, stage.ids["part"]
-        assert set(services.scene_collisions.in_operation()) == {part}  # the other one has no model
+        assert set(services.scene_collisions.online_obstacles()) == {part}  # the other one has no model
         await services.online.call(part, "set_enabled", {"state": False})
-        await until(lambda: services.scene_collisions.in_operation() == {})
+        await until(lambda: services.scene_collisions.online_obstacles() == {})
         await services.online.call(part, "set_enabled", {"state": True})
-        await until(lambda: set(services.scene_collisions.in_operation()) == {part})
+        await until(lambda: set(services.scene_collisions.online_obstacles()) == {part})
         await services.online.call(part, "set_enabled", {"state": False})
         await stage.stop(alice)
         await stage.start(alice)  # a new instance counts
-        assert set(services.scene_collisions.in_operation()) == {part}
+        assert set(services.scene_collisions.online_obstacles()) == {part}
         await stage.stop(alice)
