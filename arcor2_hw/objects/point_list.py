@@ -28,7 +28,7 @@ def entries(text: str, separator: str, parameter: str) -> dict[str, list[str]]:
             )
         if name in found:
             raise OutOfRange(
-                "{parameter} must name each point once: {name!r} is in it twice", parameter=parameter, name=name
+                "{parameter} must contain each name once: {name!r} is in it twice", parameter=parameter, name=name
             )
         found[name] = rest.split()
     return found

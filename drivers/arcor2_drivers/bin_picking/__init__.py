@@ -1,1 +1,1 @@
-"""Bin and blister: the next part in a crate by a depth picture, in a grid by counting (docs/devices)."""
+"""Bin and blister: the next part in a crate from a depth image, or in a grid by counting (docs/devices)."""

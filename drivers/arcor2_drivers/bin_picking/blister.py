@@ -1,119 +1,106 @@
-"""A blister, tray or magazine with places in a grid, as an object type: the next part, the next free place."""
+"""Blister: a blister, tray or magazine with places in a grid that counts its parts."""
 
 import math
 from pathlib import Path
 from typing import ClassVar
 
 from arcor2_hw.actions import action
-from arcor2_hw.data.device import Connection, LossReaction
+from arcor2_hw.data.device import LossReaction
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import NotConnected, OutOfRange
 from arcor2_hw.objects import GenericWithPose
-from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.objects.connected import Connected
 
 from .errors import Empty, Full
 from .places import BadState, Places
-from .poses import gripping
+from .poses import grip_pose
 from .settings import BlisterSettings
 
 
-class Blister(GenericWithPose):
-    """A grid of places for parts. It counts; it does not look.
+class Blister(Connected, GenericWithPose):
+    """A grid of places for parts that counts the parts without a sensor.
 
-    A part that was taken, or put, is told by part_taken, part_put: so a part that was not gripped stays the next one.
+    A program reports each part that it took or placed by part_taken or part_put; until then next_part and next_free
+    return the same place.
     """
 
     _ABSTRACT = False
     category = "Containers"
     icon = "blister"
-    loss_reaction: ClassVar[LossReaction] = LossReaction.holds()  # there is no device that could lose us
+    loss_reaction: ClassVar[LossReaction] = LossReaction.holds()  # there is no device
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: BlisterSettings) -> None:
         super().__init__(obj_id, name, pose, settings)
-        self._given = settings
+        self._config = settings
         file = Path(settings.state_file) if settings.state_file else None
         self._places = Places(settings.rows, settings.columns, settings.snake, settings.starts_full, file)
-        self._connected = Connection.OFFLINE
-        self._offered: tuple[int, int] | None = None
-        self._free: tuple[int, int] | None = None
+        self._next_part: tuple[int, int] | None = None
+        self._next_free: tuple[int, int] | None = None
+        self.keep_connection(name)
 
     # -------------------------------------------------------------------------------- connection
-    def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
-        """Read the state from its file, if it has one. Raises NotConnected when that cannot be read or written."""
-        if self._connected is Connection.ONLINE:
-            return
+    def open_link(self, timeout: float) -> None:
+        """Read the state file, if there is one. Raises NotConnected when it cannot be read or written."""
         try:
             self._places.load()
         except (BadState, OSError) as error:
-            self._connected = Connection.FAILED
             raise NotConnected(
-                "{name}: the state file cannot be used: {reason}", self._given.state_file, name=self.name, reason=error
+                "{name}: the state file cannot be used: {reason}", self._config.state_file, name=self.name, reason=error
             ) from error
-        self._connected = Connection.ONLINE
 
-    def disconnect(self) -> None:
-        """Forget what was offered."""
-        self._offered = self._free = None
-        self._connected = Connection.OFFLINE
-
-    @property
-    def connection(self) -> Connection:
-        """Return whether the state is known."""
-        return self._connected
-
-    def _check(self) -> None:
-        if self._connected is not Connection.ONLINE:
-            raise NotConnected("{name} is not connected", name=self.name)
+    def close_link(self) -> None:
+        """Forget which place was returned last."""
+        self._next_part = self._next_free = None
 
     # -------------------------------------------------------------------------------- actions
     @action(quick=True)
     def next_part(self, *, an: str | None = None) -> Pose:
-        """Return the pose of the next part; it stays there until part_taken."""
-        self._check()
+        """Return the pose of the next part; it is the same until part_taken."""
+        self.observing.check()
         found = self._places.next(full=True)
         if found is None:
-            raise Empty("{name} is empty: fill it and tell so by refill", name=self.name)
-        self._offered = found
+            raise Empty("{name} is empty. Fill it, then call refill.", name=self.name)
+        self._next_part = found
         return self._pose_of(*found)
 
     @action(quick=True)
     def part_taken(self, *, an: str | None = None) -> None:
-        """Note that the part that next_part gave is gone."""
-        self._check()
-        if self._offered is None:
-            raise Empty("{name}: no part was given by next_part since the last was taken", name=self.name)
-        self._note(*self._offered, False)
-        self._offered = None
+        """Record that the part at the pose from next_part was taken."""
+        self.observing.check()
+        if self._next_part is None:
+            raise Empty("{name}: part_taken needs a call of next_part first", name=self.name)
+        self._set(*self._next_part, False)
+        self._next_part = None
 
     @action(quick=True)
     def next_free(self, *, an: str | None = None) -> Pose:
-        """Return the pose of the next free place; it stays free until part_put."""
-        self._check()
+        """Return the pose of the next free place; it is the same until part_put."""
+        self.observing.check()
         found = self._places.next(full=False)
         if found is None:
-            raise Full("{name} is full: take it away and tell so by clear", name=self.name)
-        self._free = found
+            raise Full("{name} is full. Empty it, then call clear.", name=self.name)
+        self._next_free = found
         return self._pose_of(*found)
 
     @action(quick=True)
     def part_put(self, *, an: str | None = None) -> None:
-        """Note that a part lies at the place that next_free gave."""
-        self._check()
-        if self._free is None:
-            raise Full("{name}: no place was given by next_free since the last part was put", name=self.name)
-        self._note(*self._free, True)
-        self._free = None
+        """Record that a part was placed at the pose from next_free."""
+        self.observing.check()
+        if self._next_free is None:
+            raise Full("{name}: part_put needs a call of next_free first", name=self.name)
+        self._set(*self._next_free, True)
+        self._next_free = None
 
     @action(quick=True)
     def grip_pose(self, part: Pose, above: float = 0.0, *, an: str | None = None) -> Pose:
-        """Return the pose for the tool at a part or place: z down into it.
+        """Return the pose of the tool for gripping a part or reaching a place: z down into it.
 
-        :param part: what next_part or next_free gave
-        :param above: metres by which the tool is higher, for coming near and going away
+        :param part: pose from next_part or next_free
+        :param above: distance above the grip pose, for approach and departure, m
         """
         assert 0.0 <= above <= 2.0
 
-        return gripping(part, self.pose, 0.0, above)
+        return grip_pose(part, self.pose, 0.0, above)
 
     @action(quick=True)
     def place(self, row: int, column: int, *, an: str | None = None) -> Pose:
@@ -122,37 +109,37 @@ class Blister(GenericWithPose):
         :param row: counted from 0, along y
         :param column: counted from 0, along x
         """
-        self._exists(row, column)
+        self._check_place(row, column)
         return self._pose_of(row, column)
 
     @action(quick=True)
     def set_place(self, row: int, column: int, full: bool, *, an: str | None = None) -> None:
-        """Note that a place has a part, or has none.
+        """Record whether a place has a part.
 
         :param row: counted from 0, along y
         :param column: counted from 0, along x
-        :param full: whether there is a part
+        :param full: whether the place has a part
         """
-        self._check()
-        self._exists(row, column)
-        self._note(row, column, full)
+        self.observing.check()
+        self._check_place(row, column)
+        self._set(row, column, full)
 
     @action(quick=True)
     def refill(self, *, an: str | None = None) -> None:
-        """Note that all places have a part: a full one was put there."""
-        self._check()
-        self._all(True)
+        """Record that all places have a part: the blister was replaced by a full one."""
+        self.observing.check()
+        self._set_all(True)
 
     @action(quick=True)
     def clear(self, *, an: str | None = None) -> None:
-        """Note that all places are free: an empty one was put there."""
-        self._check()
-        self._all(False)
+        """Record that all places are free: the blister was replaced by an empty one."""
+        self.observing.check()
+        self._set_all(False)
 
     @action(quick=True)
     def parts(self, *, an: str | None = None) -> int:
-        """Return how many places have a part."""
-        self._check()
+        """Return the number of parts."""
+        self.observing.check()
         return self._places.count
 
     @action(quick=True)
@@ -163,33 +150,35 @@ class Blister(GenericWithPose):
     @action(quick=True)
     def is_full(self, *, an: str | None = None) -> bool:
         """Return whether every place has a part."""
-        return self.parts() == self._given.rows * self._given.columns
+        return self.parts() == self._config.rows * self._config.columns
 
     # -------------------------------------------------------------------------------- places
-    def _exists(self, row: int, column: int) -> None:
+    def _check_place(self, row: int, column: int) -> None:
         try:
             self._places.full(row, column)
         except IndexError as error:
             raise OutOfRange("{name}: {reason}", name=self.name, reason=error) from None
 
-    def _note(self, row: int, column: int, full: bool) -> None:
+    def _set(self, row: int, column: int, full: bool) -> None:
         try:
             self._places.set(row, column, full)
         except OSError as error:
-            raise self._unkept(error) from error
+            raise self._not_stored(error) from error
 
-    def _all(self, full: bool) -> None:
+    def _set_all(self, full: bool) -> None:
         try:
             self._places.set_all(full)
         except OSError as error:
-            raise self._unkept(error) from error
-        self._offered = self._free = None
+            raise self._not_stored(error) from error
+        self._next_part = self._next_free = None
 
-    def _unkept(self, error: OSError) -> NotConnected:
-        return NotConnected("{name}: the state cannot be kept, and is as before", str(error), name=self.name)
+    def _not_stored(self, error: OSError) -> NotConnected:
+        return NotConnected(
+            "{name}: the state file cannot be written; the state has not changed", str(error), name=self.name
+        )
 
     def _pose_of(self, row: int, column: int) -> Pose:
-        given = self._given
+        given = self._config
         half = math.radians(given.turn) / 2.0
         local = Pose(
             Position(

@@ -1,27 +1,27 @@
-"""What a bin and a blister refuse."""
+"""Errors of bin and blister."""
 
 from arcor2_hw.exceptions import Refused
 
 
 class Empty(Refused):
-    """There is no part left."""
+    """No part is left."""
 
     code = "empty"
 
 
 class Full(Refused):
-    """There is no free place left."""
+    """No free place is left."""
 
     code = "full"
 
 
 class PartsTouch(Refused):
-    """Parts lie so that they cannot be told apart."""
+    """Touching parts cannot be distinguished."""
 
     code = "parts_touch"
 
 
 class BadFit(Refused):
-    """What lies there does not fit the model of the part well enough."""
+    """No object fits the model of the part well enough."""
 
     code = "bad_fit"

@@ -1,4 +1,4 @@
-"""Finding the next part in a crate: from a depth picture to a pose with its quality, or why there is none."""
+"""Find the next part in a crate: from a depth image to a pose with its quality."""
 
 from collections.abc import Callable
 from typing import Final, NamedTuple
@@ -14,60 +14,63 @@ from .errors import BadFit, Empty, PartsTouch
 from .models import Model
 from .poses import upright
 from .registration import Fit, register
-from .segmentation import Crate, Pixels, clusters, look_into, surfaces
+from .segmentation import Crate, Pixels, clusters, segment, surfaces
 
 Floats = npt.NDArray[np.float64]
 
 LEAST_AREA: Final = 0.25
-"""Of the part's smallest side, the area that has to be seen of something to be looked at."""
+"""Smallest visible area of an object, relative to the smallest side of the part."""
 TOO_LARGE: Final = 1.3
-"""Of what is seen of one part, the area beyond which it is more than one."""
+"""Ratio of visible area to that of one part above which it is more than one part."""
 COVERED: Final = 0.8
-"""Of a part, what has to be seen to say that more lies there than this one."""
+"""Fraction of a part that must be visible to conclude that there is more than this part."""
 LEAST_SEEN: Final = 0.3
-"""Of the crate, the part that has to be seen."""
+"""Fraction of the crate that must be visible."""
 MOST_CANDIDATES: Final = 12
+"""Largest number of clusters, and of pieces of a cluster, that are registered."""
 
 
-class Crated(NamedTuple):
-    """A crate's inside, m."""
+class EmptyCrate(NamedTuple):
+    """A crate: its name, for errors, and its inner dimensions, m."""
 
+    name: str
     length: float
     width: float
     height: float
 
 
 class Found(NamedTuple):
-    """The next part: its pose in the crate's frame, 4 × 4, and how well it fits."""
+    """The next part: its pose in the frame of the crate, 4 × 4, and how well it fits."""
 
     pose: Floats
     fit: Fit
 
 
 class View(NamedTuple):
-    """A depth picture (uint16, mm), its lens, and the pose of the camera in the crate's frame, 4 × 4."""
+    """A depth image (uint16, mm), its camera parameters, and the camera's pose in the frame of the crate, 4 × 4."""
 
     depth: npt.NDArray[np.uint16]
     parameters: CameraParameters
     camera: Floats
 
 
-def see(view: View, crate: Crated, tolerance: float) -> Crate:
-    """Look into the crate. Raises NoDepth when too little of it is seen."""
+def see(view: View, crate: EmptyCrate, tolerance: float) -> Crate:
+    """Segment the inside of the crate. Raises NoDepth when too little of it is visible."""
     points = cloud(view.depth, view.parameters)
     points = points @ view.camera[:3, :3].T.astype(np.float32) + view.camera[:3, 3].astype(np.float32)
-    seen = look_into(points, *crate, tolerance)
+    seen = segment(points, crate.length, crate.width, crate.height, tolerance)
     expected = _pixels_of(view, crate)
     if expected < 100 or seen.inside.sum() < LEAST_SEEN * expected:
         raise NoDepth(
-            "the crate is not seen: the camera looks elsewhere, something is between, or one of the poses is wrong",
+            "{crate} is not visible. Check the view of the camera and the poses of camera and crate.",
             f"{int(seen.inside.sum())} of {expected:.0f} points",
+            crate=crate.name,
         )
     return seen
 
 
-def _pixels_of(view: View, crate: Crated) -> float:
-    """Return how many pixels the floor of the crate would fill."""
+def _pixels_of(view: View, crate: EmptyCrate) -> float:
+    """Return how many pixels the floor of the empty crate would cover."""
     distance = float(view.camera[2, 3])
     across = abs(float(view.camera[2, 2]))
     if distance <= 0.0:
@@ -75,37 +78,48 @@ def _pixels_of(view: View, crate: Crated) -> float:
     return view.parameters.fx * view.parameters.fy * crate.length * crate.width * across**3 / distance**2
 
 
-def _things(seen: Crate, view: View, model: Model, tolerance: float) -> list[Pixels]:
+def _objects(seen: Crate, view: View, model: Model, tolerance: float) -> list[Pixels]:
     return [each for each in clusters(seen, tolerance) if _area(each, view) > LEAST_AREA * model.faces[0]]
 
 
-def lies_there(view: View, crate: Crated, model: Model, tolerance: float) -> bool:
-    """Return whether something as large as a part lies in the crate. Raises NoDepth when the crate is not seen."""
-    return bool(_things(see(view, crate, tolerance), view, model, tolerance))
+def has_parts(view: View, crate: EmptyCrate, model: Model, tolerance: float) -> bool:
+    """Return whether the crate contains an object as large as a part. Raises NoDepth when the crate is not visible."""
+    return bool(_objects(see(view, crate, tolerance), view, model, tolerance))
 
 
 def find(
     view: View,
-    crate: Crated,
+    crate: EmptyCrate,
     model: Model,
     tolerance: float,
     min_quality: float,
     go_on: Callable[[], None] = lambda: None,
 ) -> Found:
-    """Find the part that lies highest and fits well.
+    """Find the highest part that fits well.
 
-    go_on: called before each candidate is registered, and may raise to end the search.
-    Raises Empty when nothing lies there, PartsTouch, BadFit; NoDepth when the crate is not seen.
+    Args:
+        view: The depth image.
+        crate: The crate.
+        model: The part.
+        tolerance: Largest distance of a point from the surface of its part, m.
+        min_quality: Smallest quality of a part, 0 to 1.
+        go_on: Called before each candidate is registered; it may raise to end the search.
+
+    Raises:
+        Empty: The crate is empty.
+        PartsTouch: Touching parts cannot be distinguished.
+        BadFit: No object fits well enough.
+        NoDepth: The crate is not visible.
     """
     seen = see(view, crate, tolerance)
-    wholes = _things(seen, view, model, tolerance)
-    if not wholes:
-        raise Empty("the crate is empty")
+    objects = _objects(seen, view, model, tolerance)
+    if not objects:
+        raise Empty("{crate} is empty", crate=crate.name)
     beams = rays(view.parameters, view.depth.shape[1], view.depth.shape[0])
     smallest, largest = model.faces
     best: Fit | None = None
     too_large = False
-    for pixels in sorted(wholes, key=lambda each: -_top(seen, each))[:MOST_CANDIDATES]:
+    for pixels in sorted(objects, key=lambda each: -_top(seen, each))[:MOST_CANDIDATES]:
         go_on()
         fit = register(seen, pixels, model, view.camera, beams, tolerance)
         if fit.quality < min_quality:
@@ -124,12 +138,15 @@ def find(
         too_large = too_large or (fit.larger > TOO_LARGE and fit.covered > COVERED)
         best = fit if best is None else max(best, fit, key=_quality)
     assert best is not None
-    told = f"best quality {best.quality:.2f} (explained {best.explained:.2f}, covered {best.covered:.2f})"
+    detail = f"best quality {best.quality:.2f} (explained {best.explained:.2f}, covered {best.covered:.2f})"
     if too_large:
-        raise PartsTouch("what lies there is larger than one part: parts touch, or something else lies there", told)
+        raise PartsTouch(
+            "{crate}: an object is larger than one part: parts touch, or it is another object", detail, crate=crate.name
+        )
     raise BadFit(
-        "what lies there does not fit the part: quality {quality:.2f}, {min_quality:g} asked for",
-        told,
+        "{crate}: no object fits the part: best quality {quality:.2f}, {min_quality:g} required",
+        detail,
+        crate=crate.name,
         quality=best.quality,
         min_quality=min_quality,
     )
@@ -144,6 +161,6 @@ def _top(crate: Crate, pixels: Pixels) -> float:
 
 
 def _area(pixels: Pixels, view: View) -> float:
-    """Return the area that is seen, m², as if it stood across the line of sight."""
+    """Return the visible area perpendicular to the line of sight, m²."""
     z = view.depth[pixels].astype(np.float64) * 0.001
     return float((z * z).sum() / (view.parameters.fx * view.parameters.fy))

@@ -1,4 +1,4 @@
-"""The model of a part: a box or a mesh, checked, and sampled for registration."""
+"""The model of a part: a box or a mesh, sampled for registration."""
 
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -13,18 +13,26 @@ Floats = npt.NDArray[np.float64]
 LARGEST_FILE: Final = 20_000_000
 MOST_TRIANGLES: Final = 200_000
 SMALLEST_PART: Final = 0.003
+"""Smallest of the two longer sides of a part, m."""
 SAMPLES: Final = 4000
-KINDS: Final = (".stl", ".obj", ".ply")
+"""Number of points sampled from the surface."""
+FORMATS: Final = (".stl", ".obj", ".ply")
 
 
 class BadModel(Exception):
-    """The model is none that could be found."""
+    """The model cannot be used."""
 
 
 class Model(NamedTuple):
-    """A part: sampled points with normals, and triangles to cast rays at.
+    """A part.
 
-    box: whether it looks the same when it is turned by 180°. low, high: corners of its bounding box, m.
+    Attributes:
+        cloud: Points sampled from the surface, with normals.
+        scene: Triangles for ray casting.
+        vertices: Corners of the triangles, n × 3, m.
+        box: Whether a rotation by 180° about an axis does not change it.
+        low: Lower corner of the bounding box, m.
+        high: Upper corner of the bounding box, m.
     """
 
     cloud: Any
@@ -48,7 +56,7 @@ class Model(NamedTuple):
 
 
 def load(settings: BinSettings) -> Model:
-    """Make the model that the settings tell. Raises BadModel."""
+    """Return the model that the settings describe. Raises BadModel."""
     if settings.part_mesh:
         return of_mesh(_read(Path(settings.part_mesh)), box=False)
     size = (settings.part_length, settings.part_width, settings.part_height)
@@ -58,40 +66,42 @@ def load(settings: BinSettings) -> Model:
 
 
 def _read(path: Path) -> Any:
-    if path.suffix.lower() not in KINDS:
-        raise BadModel(f"part_mesh {path.name} must be one of {', '.join(KINDS)}")
+    if path.suffix.lower() not in FORMATS:
+        raise BadModel(f"part_mesh {path.name} must be one of {', '.join(FORMATS)}")
     try:
         size = path.stat().st_size
     except OSError as error:
         raise BadModel(f"part_mesh {path} cannot be read: {error.strerror}") from error
     if size > LARGEST_FILE:
-        raise BadModel(f"part_mesh {path.name} has {size} bytes, {LARGEST_FILE} at most are taken")
+        raise BadModel(f"part_mesh {path.name} has {size} bytes, at most {LARGEST_FILE} are allowed")
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         return o3d.io.read_triangle_mesh(path)
 
 
 def of_mesh(mesh: Any, box: bool) -> Model:
-    """Check a mesh and make a model of it. Raises BadModel."""
+    """Check a mesh and return its model. Raises BadModel."""
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
     triangles = np.asarray(mesh.triangles)
     if not len(triangles):
         raise BadModel("part_mesh has no triangles")
     if len(triangles) > MOST_TRIANGLES:
-        raise BadModel(f"part_mesh has {len(triangles)} triangles, {MOST_TRIANGLES} at most are taken: simplify it")
+        raise BadModel(f"part_mesh has {len(triangles)} triangles, at most {MOST_TRIANGLES} are allowed. Simplify it.")
     if not np.isfinite(vertices).all():
-        raise BadModel("part_mesh has corners that are not numbers")
+        raise BadModel("part_mesh has vertices that are not finite")
     used = vertices[np.unique(triangles)]
     low, high = used.min(axis=0), used.max(axis=0)
     longest = float((high - low).max())
     if longest > LARGEST_PART:
-        raise BadModel(f"part_mesh is {longest:g} m long, {LARGEST_PART:g} m at most: is it in millimetres?")
+        raise BadModel(
+            f"part_mesh is {longest:g} m long, at most {LARGEST_PART:g} m are allowed: is it in millimetres?"
+        )
     if longest < SMALLEST_PART or float(np.sort(high - low)[1]) < SMALLEST_PART:
-        raise BadModel(f"part_mesh is {longest:g} m long; both sides must be {SMALLEST_PART:g} m at least")
+        raise BadModel(f"part_mesh is {longest:g} m long; two sides must be at least {SMALLEST_PART:g} m")
     mesh.compute_triangle_normals()
     o3d.utility.random.seed(1)
     cloud = mesh.sample_points_uniformly(SAMPLES, use_triangle_normal=True)
     if not np.isfinite(np.asarray(cloud.points)).all() or not np.isfinite(np.asarray(cloud.normals)).all():
-        raise BadModel("part_mesh has triangles without an area")
+        raise BadModel("part_mesh has triangles without area")
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(
         o3d.core.Tensor.from_numpy(vertices.astype(np.float32)),

@@ -1,4 +1,4 @@
-"""Places of a grid: which have a part, which is next. Knows nothing of poses; a file may keep it."""
+"""Places: which places of a grid have a part, optionally stored in a file."""
 
 import os
 import tempfile
@@ -11,10 +11,10 @@ VERSION: Final = 1
 
 
 class BadState(Exception):
-    """The file does not hold the state of this grid."""
+    """The file does not contain the state of this grid."""
 
 
-class _Kept(msgspec.Struct, forbid_unknown_fields=True):
+class _Stored(msgspec.Struct, forbid_unknown_fields=True):
     version: int
     rows: int
     columns: int
@@ -22,9 +22,9 @@ class _Kept(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Places:
-    """Rows and columns, counted along the columns; with `snake` every second row backwards.
+    """Places in rows and columns, counted row by row; with `snake`, every second row backwards.
 
-    With a file, every change is on the disk before the call returns.
+    With a file, every change is on disk when the method returns.
     """
 
     def __init__(self, rows: int, columns: int, snake: bool, starts_full: bool, file: Path | None = None) -> None:
@@ -33,31 +33,33 @@ class Places:
         self._full = [starts_full] * (rows * columns)
 
     def load(self) -> None:
-        """Read the file, where there is one. Raises BadState, OSError."""
+        """Read the file, if there is one. Raises BadState, OSError."""
         if self._file is None:
             return
         try:
             data = self._file.read_bytes()
         except FileNotFoundError:
-            self._keep()  # whether it can be written is better known now than after the first part
+            self._store()  # report now, not after the first part, that the file cannot be written
             return
         try:
-            kept = msgspec.json.decode(data, type=_Kept)
+            stored = msgspec.json.decode(data, type=_Stored)
         except msgspec.DecodeError as error:
             raise BadState(f"{self._file} is not readable: {error}") from error
-        if kept.version != VERSION or (kept.rows, kept.columns) != (self.rows, self.columns):
-            raise BadState(f"{self._file} is of {kept.rows} rows and {kept.columns} columns (version {kept.version})")
-        if len(kept.full) != len(self._full) or set(kept.full) - {"0", "1"}:
+        if stored.version != VERSION or (stored.rows, stored.columns) != (self.rows, self.columns):
+            raise BadState(
+                f"{self._file} is of {stored.rows} rows and {stored.columns} columns (version {stored.version})"
+            )
+        if len(stored.full) != len(self._full) or set(stored.full) - {"0", "1"}:
             raise BadState(f"{self._file} does not hold {len(self._full)} places")
-        self._full = [each == "1" for each in kept.full]
+        self._full = [each == "1" for each in stored.full]
 
     @property
     def count(self) -> int:
-        """Return how many places have a part."""
+        """Return the number of parts."""
         return sum(self._full)
 
     def next(self, full: bool) -> tuple[int, int] | None:
-        """Return row and column of the next place with a part, or without; None when there is none."""
+        """Return row and column of the next place with a part (`full`) or without; None when there is none."""
         for number in range(self.rows * self.columns):
             row, column = divmod(number, self.columns)
             if self._snake and row % 2:
@@ -71,13 +73,13 @@ class Places:
         return self._full[self._index(row, column)]
 
     def set(self, row: int, column: int, full: bool) -> None:
-        """Note that a place has a part, or has none. Raises IndexError, OSError; then nothing has changed."""
+        """Set whether a place has a part. Raises IndexError, OSError; nothing has changed then."""
         changed = list(self._full)
         changed[self._index(row, column)] = full
         self._change(changed)
 
     def set_all(self, full: bool) -> None:
-        """Note that all places have a part, or that none has. Raises OSError."""
+        """Set whether all places have a part. Raises OSError; nothing has changed then."""
         self._change([full] * len(self._full))
 
     def _index(self, row: int, column: int) -> int:
@@ -88,19 +90,19 @@ class Places:
     def _change(self, new: list[bool]) -> None:
         before, self._full = self._full, new
         try:
-            self._keep()
+            self._store()
         except OSError:
             self._full = before
             raise
 
-    def _keep(self) -> None:
+    def _store(self) -> None:
         if self._file is None:
             return
-        kept = _Kept(VERSION, self.rows, self.columns, "".join("1" if each else "0" for each in self._full))
+        stored = _Stored(VERSION, self.rows, self.columns, "".join("1" if each else "0" for each in self._full))
         descriptor, name = tempfile.mkstemp(dir=self._file.parent, prefix=f".{self._file.name}.")
         try:
             with os.fdopen(descriptor, "wb") as file:
-                file.write(msgspec.json.encode(kept))
+                file.write(msgspec.json.encode(stored))
                 file.flush()
                 os.fsync(file.fileno())
             Path(name).replace(self._file)

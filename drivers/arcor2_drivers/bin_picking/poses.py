@@ -1,4 +1,4 @@
-"""Poses for gripping: the tool's z into the part, its x along the part."""
+"""Poses of the tool for gripping."""
 
 from typing import TYPE_CHECKING, Final
 
@@ -9,13 +9,17 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 UPRIGHT: Final = 0.3
-"""Length of an axis seen from above below which it does not tell how the part is turned."""
+"""Smallest horizontal component of an axis of the part from which its rotation is derived."""
 
 
-def gripping(part: Pose, base: Pose, top: float, above: float) -> Pose:
-    """Return the tool's pose over a part: z against the base's z, x along the part's x, or y where x stands upright.
+def grip_pose(part: Pose, base: Pose, top: float, above: float) -> Pose:
+    """Return the pose of the tool at a part: z opposite to the base's, x along a horizontal axis of the part.
 
-    part, base: in the world. top: m by which the point to grip is higher than the part's origin. above: m above that.
+    Args:
+        part: Pose of the part in the world.
+        base: Pose of the crate or blister in the world.
+        top: Height of the grip point above the origin of the part, m.
+        above: Distance above the grip point, m.
     """
     import numpy as np
 
@@ -30,7 +34,7 @@ def gripping(part: Pose, base: Pose, top: float, above: float) -> Pose:
 
 
 def upright(rotation: "npt.NDArray[np.float64]") -> "npt.NDArray[np.float64]":
-    """Give, of the four ways in which a box looks the same, the one with z most upward and x most along x."""
+    """Return, of the four equivalent rotations of a box, the one z most upwards, x closest to the crate's x."""
     import numpy as np
 
     turns = [np.diag(signs) for signs in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))]

@@ -1,7 +1,7 @@
-"""Registration: the pose of a model in a cluster of points, and how well the picture agrees with it.
+"""Registration: the pose of a model in a cluster of points, and its quality.
 
-Points are registered onto the model, not the model onto the points: what is not seen of a part pulls at nothing then.
-The quality comes from the picture: the model is rendered at the pose that was found and compared with the depth.
+The points are registered onto the model, not the model onto the points, so that hidden surfaces of a part have no
+influence. For the quality, the model is rendered at the found pose and compared with the depth image.
 """
 
 from collections.abc import Callable
@@ -18,30 +18,39 @@ from .segmentation import Crate, Pixels
 Floats = npt.NDArray[np.float64]
 
 MOST_POINTS: Final = 3000
-TRIED: Final = 4
-"""Hypotheses that are refined, of those that fit best as they are."""
+"""Largest number of points that are registered."""
+REFINED: Final = 4
+"""Number of hypotheses, best first, that are refined."""
 ITERATIONS: Final = 30
+"""Largest number of iterations of a round of ICP."""
 ROUNDS: Final = ((3.0, 2.0), (1.5, 1.0))
-"""Of each round of ICP, in tolerances: how far a point looks for the surface, and Tukey's constant."""
+"""Search radius and Tukey's constant of each round of ICP, both in multiples of the tolerance."""
 WORTH_POLISHING: Final = 0.5
+"""Smallest quality of a pose that is refined by small steps."""
 STEPS: Final = (0.001, 0.0005, 0.00025)
-"""m"""
+"""Step lengths, m."""
 TURN_PER_STEP: Final = 12.0
-"""rad per m: 0.7° per mm."""
+"""Rotation per step length, rad/m: 0.7° per mm."""
 MOST_STEPS: Final = 4
+"""Largest number of steps of one length."""
 MARGIN: Final = 6
-"""Pixels about a cluster that are compared with the model too."""
+"""Width of the margin around a cluster that is compared with the model, pixels."""
 NEAREST: Final = 0.01
+"""Smallest distance of a point from the camera, m."""
 LEAST_SEEN: Final = 0.5
-"""Of the pixels in which the model should be seen, those that have to have a depth."""
+"""Smallest fraction of valid depth among the pixels in which the model is expected."""
 
 
 class Fit(NamedTuple):
-    """A model at a pose in the crate's frame.
+    """A pose of the model, and how well it fits.
 
-    quality: 0 to 1, `explained` times `covered`. explained: of the cluster's pixels, those that lie on the model.
-    covered: of the pixels in which the model should be seen, those in which it is. larger: how many times larger the
-    cluster is than that. error: m, mean distance from the model.
+    Attributes:
+        pose: Pose in the frame of the crate, 4 × 4.
+        quality: `explained` times `covered`, 0 to 1.
+        explained: Fraction of the pixels of the cluster that agree with the model.
+        covered: Fraction of the pixels in which the model is expected that agree with it.
+        larger: Ratio of the number of pixels of the cluster to that of the visible model.
+        error: Mean distance from the model, m.
     """
 
     pose: Floats
@@ -55,7 +64,13 @@ class Fit(NamedTuple):
 def register(crate: Crate, pixels: Pixels, model: Model, camera: Floats, rays: Any, tolerance: float) -> Fit:
     """Find the model in a cluster.
 
-    camera: pose of the optical frame in the crate's frame, 4 × 4. rays: height × width × 2, at 1 m.
+    Args:
+        crate: The segmented crate.
+        pixels: The cluster, height × width.
+        model: The model.
+        camera: Pose of the camera in the frame of the crate, 4 × 4.
+        rays: x and y of the ray of each pixel at 1 m, height × width × 2.
+        tolerance: Largest distance of a point from the surface of its part, m.
     """
     points = crate.points[pixels].astype(np.float64)
     if len(points) > MOST_POINTS:
@@ -68,9 +83,9 @@ def register(crate: Crate, pixels: Pixels, model: Model, camera: Floats, rays: A
     floor = float(np.median(crate.points[pixels][:, 2] - crate.height[pixels]))
     starts = _starts(points, model, floor - 2.0 * tolerance)
     starts.sort(key=lambda pose: _distance(tree, sparse, pose, tolerance))
-    judge = _Judge(crate, pixels, model, camera, rays, tolerance)
+    judge = _Evaluator(crate, pixels, model, camera, rays, tolerance)
     fits = []
-    for start in starts[:TRIED]:
+    for start in starts[:REFINED]:
         pose = _refined(points, model, start, tolerance)
         fits.append(judge(pose))
         if fits[-1].quality > 0.95:
@@ -82,9 +97,9 @@ def register(crate: Crate, pixels: Pixels, model: Model, camera: Floats, rays: A
 
 
 def _polished(fit: Fit, judge: Callable[[Floats], Fit], points: Floats) -> Fit:
-    """Slide and turn a model on its plane until no step makes the picture agree better.
+    """Shift and rotate a model horizontally until no step improves its quality.
 
-    A flat top gives ICP nothing to hold on to along itself; its outline in the picture does.
+    ICP does not determine the position along a flat top; the outline in the depth image does.
     """
     middle = np.median(points, axis=0)
     for step in STEPS:
@@ -98,7 +113,7 @@ def _polished(fit: Fit, judge: Callable[[Floats], Fit], points: Floats) -> Fit:
 
 
 def _moves(step: float) -> list[tuple[float, float, float]]:
-    """Return x, y in m and the turn in rad of each move of one step; a turn moves a part's ends about as far."""
+    """Return the moves of one step: x and y, m, and rotation, rad, which moves the ends of a part about as far."""
     turn = step * TURN_PER_STEP
     return [(step, 0, 0), (-step, 0, 0), (0, step, 0), (0, -step, 0), (0, 0, turn), (0, 0, -turn)]
 
@@ -111,9 +126,12 @@ def _shifted(pose: Floats, middle: Floats, move: tuple[float, float, float]) -> 
 
 
 def _starts(points: Floats, model: Model, lowest: float) -> list[Floats]:
-    """Return poses to begin with: each side of the bounding box upwards, turned as the rectangle about the points is.
+    """Return initial poses: each side of the bounding box up, rotated like the minimum rectangle around the points.
 
-    lowest: m, the height below which nothing can be: there is the floor.
+    Args:
+        points: Points of the cluster, n × 3, m.
+        model: The model.
+        lowest: Height of the floor, m; no pose is below it.
     """
     (x, y), _, angle = cv2.minAreaRect((points[:, :2] * 1000.0).astype(np.float32))
     top = float(np.percentile(points[:, 2], 97))
@@ -133,7 +151,7 @@ def _starts(points: Floats, model: Model, lowest: float) -> list[Floats]:
 
 
 def _sides(box: bool) -> list[Floats]:
-    """Return the rotations that bring each axis of the model upwards; of a box, one of the two opposite sides."""
+    """Return the rotations that turn each side of the model up; for a box, only one of two opposite sides."""
     up = np.eye(3)
     y_up = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     x_up = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
@@ -147,14 +165,14 @@ def _about_z(angle: float) -> Floats:
 
 
 def _distance(tree: Any, points: Floats, pose: Floats, tolerance: float) -> float:
-    """Return how far the points are from the model on the whole; what is further than 3 tolerances counts as that."""
+    """Return the mean distance of the points from the model, m; each is limited to 3 tolerances."""
     local = (points - pose[:3, 3]) @ pose[:3, :3]
     _, squares = tree.knn_search(o3d.core.Tensor.from_numpy(local.astype(np.float32)), 1)
     return float(np.minimum(np.sqrt(squares.numpy()), 3.0 * tolerance).mean())
 
 
 def _refined(points: Floats, model: Model, start: Floats, tolerance: float) -> Floats:
-    """Return the pose after ICP, points onto model, point to plane with Tukey's weights."""
+    """Return the pose after ICP of the points onto the model, point to plane with Tukey weights."""
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     model_from_crate = np.linalg.inv(start)
     registration = o3d.pipelines.registration
@@ -172,8 +190,8 @@ def _refined(points: Floats, model: Model, start: Floats, tolerance: float) -> F
     return np.asarray(np.linalg.inv(model_from_crate))
 
 
-class _Judge:
-    """Compares the model, rendered at a pose, with what is seen of one cluster."""
+class _Evaluator:
+    """Compares the model, rendered at a pose, with the depth of a cluster."""
 
     def __init__(self, crate: Crate, pixels: Pixels, model: Model, camera: Floats, rays: Any, tolerance: float) -> None:
         rows, columns = np.nonzero(pixels)
@@ -182,11 +200,11 @@ class _Judge:
         self._crate, self._pixels, self._model, self._rays = crate, pixels, model, rays
         self._camera, self._camera_from_crate = camera, np.linalg.inv(camera)
         self._tolerance = tolerance
-        # Where the rays of the picture's middle row and column pass; distortion is within the margin.
+        # The rays of the middle row and column; the error by distortion is smaller than MARGIN.
         self._across, self._down = rays[rays.shape[0] // 2, :, 0], rays[:, rays.shape[1] // 2, 1]
 
     def __call__(self, pose: Floats) -> Fit:
-        """Return the model at a pose with its quality."""
+        """Return a pose with its quality."""
         where = self._about(pose)
         reach = self._rendered(pose, where)
         towards = self._camera_from_crate[2]
@@ -203,7 +221,7 @@ class _Judge:
         return Fit(pose, explained * covered, explained, covered, self._count / max(seen, 1), error)
 
     def _rendered(self, pose: Floats, where: tuple[slice, slice]) -> Any:
-        """Return the depth at which each pixel of a rectangle should see the model, m; infinite where it should not."""
+        """Return the depth of the model in each pixel of a rectangle, m; infinite where it is not visible."""
         part_from_camera = (np.linalg.inv(pose) @ self._camera).astype(np.float32)
         beams = self._rays[where]
         both = np.empty((*beams.shape[:2], 6), np.float32)
@@ -212,7 +230,7 @@ class _Judge:
         return self._model.scene.cast_rays(o3d.core.Tensor.from_numpy(both))["t_hit"].numpy()
 
     def _about(self, pose: Floats) -> tuple[slice, slice]:
-        """Return the rectangle about the cluster and about where the model should be seen."""
+        """Return the rectangle around the cluster and the expected model."""
         top, bottom, left, right = self._bounds
         in_crate = self._model.vertices @ pose[:3, :3].T + pose[:3, 3]
         seen = (in_crate - self._camera[:3, 3]) @ self._camera[:3, :3]

@@ -1,4 +1,4 @@
-"""Segmentation: the points inside a crate, without its floor, in clusters that may each be a part."""
+"""Segmentation: clusters of points in a crate above its floor, each of which may be a part."""
 
 from typing import Final, NamedTuple
 
@@ -11,25 +11,29 @@ Floats = npt.NDArray[np.float32]
 Pixels = npt.NDArray[np.bool_]
 
 WALL: Final = 0.004
-"""m along the walls that are left out: there the wall is seen, give or take the noise."""
+"""Width of the ignored margin along the walls, m: its points may belong to the wall."""
 ABOVE_RIM: Final = 0.1
-"""m that a heap may stand above the crate."""
+"""Largest height of a heap above the rim, m."""
 FLOOR_SEARCH: Final = 0.02
-"""m about where the floor should be in which it is looked for: a crate is not put down to the millimetre."""
+"""Largest distance of the real floor from its expected height, m."""
 FLOOR_TILT: Final = np.cos(np.radians(5.0))
+"""Cosine of the largest tilt of the floor."""
 FLOOR_PART: Final = 0.05
-"""Part of what is seen in the crate that has to be floor to believe in it."""
+"""Smallest fraction of the points in the crate that a detected floor must have."""
 FLOOR_SAMPLES: Final = 4000
+"""Number of points used to detect the floor."""
 VOXEL: Final = 0.002
+"""Voxel size for clustering, m."""
 NEIGHBOURS: Final = 5
-"""Voxels within reach for one to belong to a cluster and not to the noise."""
+"""Number of neighbours from which a voxel belongs to a cluster and is not noise."""
 REACH: Final = 0.0055
+"""Largest distance between neighbours, m."""
 STEP: Final = 0.004
-"""m between neighbouring pixels at which one thing ends and another begins."""
+"""Height difference between neighbouring pixels that separates two surfaces, m."""
 
 
 class Crate(NamedTuple):
-    """What is seen in a crate: points in its frame, which pixels lie inside, how high each is above the floor."""
+    """Points in the frame of the crate, pixels inside the crate, and heights above the floor, m."""
 
     points: Floats
     inside: Pixels
@@ -37,8 +41,8 @@ class Crate(NamedTuple):
     floor_seen: bool
 
 
-def look_into(points: Floats, length: float, width: float, height: float, tolerance: float) -> Crate:
-    """Find the inside and the floor of a crate, whose origin is in the middle of the floor. NaN: nothing is seen."""
+def segment(points: Floats, length: float, width: float, height: float, tolerance: float) -> Crate:
+    """Find inside and floor of a crate. Its frame is at the centre of its floor; NaN: no point."""
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     with np.errstate(invalid="ignore"):
         inside = (np.abs(x) < length / 2.0 - WALL) & (np.abs(y) < width / 2.0 - WALL)
@@ -51,7 +55,7 @@ def look_into(points: Floats, length: float, width: float, height: float, tolera
 
 
 def _floor(low: Floats, seen: int, tolerance: float) -> Floats | None:
-    """Return the plane of the floor, normal upwards; None when too little of it is seen."""
+    """Return the plane of the floor, normal up; None when too little of it is visible."""
     if len(low) < 50:
         return None
     step = max(1, len(low) // FLOOR_SAMPLES)
@@ -66,7 +70,7 @@ def _floor(low: Floats, seen: int, tolerance: float) -> Floats | None:
 
 
 def clusters(crate: Crate, tolerance: float) -> list[Pixels]:
-    """Return the pixels of each thing above the floor; things that touch in space are one."""
+    """Return the pixels of each object above the floor; touching objects are one."""
     with np.errstate(invalid="ignore"):
         above = crate.inside & (crate.height > tolerance)
     rows, columns = np.nonzero(above)
@@ -87,7 +91,7 @@ def clusters(crate: Crate, tolerance: float) -> list[Pixels]:
 
 
 def surfaces(crate: Crate, pixels: Pixels) -> list[Pixels]:
-    """Take a cluster apart where one pixel is by STEP higher than the next: parts that lie on one another."""
+    """Split a cluster at height differences above STEP: into parts that are on top of each other."""
     z = np.where(pixels, crate.height, np.nan).astype(np.float32)
     with np.errstate(invalid="ignore"):
         edge = np.zeros(pixels.shape, np.bool_)

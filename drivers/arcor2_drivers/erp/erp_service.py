@@ -137,16 +137,19 @@ class ErpService(Connected, Generic):
         if state.since is not None:
             due = datetime.fromisoformat(state.since) + timedelta(seconds=self._config.waiting_alarm)
             if datetime.now(UTC) >= due:
-                text = f"{state.waiting} results have waited since {state.since}: {state.last_error or 'being sent'}"
-                remedy = "see that the service runs and can be reached; nothing is lost, and nothing has to be repeated"
+                why = state.last_error or "delivery is running"
+                text = f"{state.waiting} results have been waiting since {state.since}: {why}"
+                remedy = "check that the service is running and reachable; the results are delivered then"
                 found.append(Alarm(WAITING, Severity.WARNING, text, remedy, due.isoformat(timespec="microseconds")))
             if sender.unauthorized:
-                remedy = "renew token_file or client_certificate, then connect again"
+                remedy = "renew token_file or client_certificate, then go online again"
                 found.append(Alarm(NOT_AUTHORIZED, Severity.ERROR, sender.unauthorized, remedy, state.since))
         if refused := self._outbox.refused():
             first = refused[0]
             text = f"the service refused {len(refused)} results, the first of order {first.order_id}: {first.why}"
-            remedy = "correct it at the service and resend_refused, or acknowledge: then it is kept but not sent"
+            remedy = (
+                "fix it at the service and run resend_refused, or acknowledge: the results are then stored but not sent"
+            )
             found.append(Alarm(REFUSED, Severity.ERROR, text, remedy, first.since))
         return found
 
@@ -157,7 +160,7 @@ class ErpService(Connected, Generic):
             NotFound: There is no such alarm, or it ends only with its cause.
         """
         if code != REFUSED or not self._outbox.acknowledge_refused():
-            raise NotFound("{device} has no alarm {code!r} to be acknowledged", device=self.who, code=code)
+            raise NotFound("{device} has no alarm {code!r} that can be acknowledged", device=self.who, code=code)
 
     # -------------------------------------------------------------------------------- outbox
     def outbox(self) -> Reading[OutboxState]:
@@ -268,7 +271,7 @@ class ErpService(Connected, Generic):
             left = deadline - time.monotonic()
             if left <= 0.0:
                 raise DeviceTimeout(
-                    "{device}: {waiting} results still wait after {timeout:g} s",
+                    "{device}: {waiting} results are still waiting after {timeout:g} s",
                     state.last_error,
                     device=self.who,
                     waiting=state.waiting,
@@ -337,7 +340,7 @@ class ErpService(Connected, Generic):
         received = service.read(answer, NextOrder, what)
         if received.key != key:
             raise DeviceFault(
-                "{device} answered {what} for another question",
+                "{device} answered {what} with the key of another request",
                 received.key[:80],
                 "receipt",
                 device=self.who,
@@ -347,7 +350,7 @@ class ErpService(Connected, Generic):
         order = None if data is None else Order(data.id, data.product, data.quantity)
         if order is not None and not (order.id and order.product and 0 < order.quantity <= LARGEST_QUANTITY):
             self._outbox.end_request(None)
-            raise DeviceFault("{device} gave an order that makes no sense", str(order), "order", device=self.who)
+            raise DeviceFault("{device} sent an invalid order", str(order), "order", device=self.who)
         self._outbox.end_request(order)
         self.observing.settled()
         return order

@@ -107,7 +107,7 @@ class Outbox:
             except BlockingIOError:
                 self._release()
                 raise Refused(
-                    "{device}: its outbox is open in another program", str(self.file), device=self._who
+                    "{device}: another program has opened the outbox", str(self.file), device=self._who
                 ) from None
             except (OSError, sqlite3.Error) as e:
                 self._release()
@@ -115,7 +115,7 @@ class Outbox:
             self._database = database
             try:
                 if database.execute("PRAGMA user_version").fetchone()[0] not in (0, _VERSION):
-                    raise sqlite3.DatabaseError("it was written by a later version")
+                    raise sqlite3.DatabaseError("it was written by a newer version of this software")
                 database.execute("PRAGMA journal_mode = WAL")
                 database.execute("PRAGMA synchronous = FULL")
                 database.executescript(_SCHEMA)
@@ -154,7 +154,7 @@ class Outbox:
 
     def _broken(self, error: Exception) -> StorageError:
         return StorageError(
-            "{device}: its outbox cannot be read or written: {reason}", str(self.file), device=self._who, reason=error
+            "{device}: the outbox cannot be read or written: {reason}", str(self.file), device=self._who, reason=error
         )
 
     @contextlib.contextmanager

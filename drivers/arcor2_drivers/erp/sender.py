@@ -121,7 +121,7 @@ class Sender:
         return 0.0 if pause is None else pause.until
 
     def _deliver(self, message: Message) -> None:
-        what = f"POST {message.path} of order {message.order_id}"
+        what = f"POST {message.path} for order {message.order_id}"
         self._has_retry_after = False
         try:
             answer = self._service.request("POST", message.path, message.key, message.body)
@@ -138,7 +138,7 @@ class Sender:
             self._order_pauses.pop(message.order_id, None)
             self.last_error = self.unauthorized = ""
             return
-        text = f"{self._who} answered {what} by {answer.text}"
+        text = f"{self._who} answered {what} with {answer.text}"
         if answer.status in (*UNAUTHORIZED, *UNAVAILABLE) or 300 <= answer.status < 400:
             self.unauthorized = text if answer.status in UNAUTHORIZED else ""
             self._has_retry_after = answer.retry_after > 0.0
@@ -155,7 +155,11 @@ class Sender:
         receipt: Receipt = self._service.read(answer, Receipt, what)
         if receipt.key != message.key:
             raise DeviceFault(
-                "{device} answered {what} for another message", receipt.key[:80], "receipt", device=self._who, what=what
+                "{device} confirmed {what} with the key of another message",
+                receipt.key[:80],
+                "receipt",
+                device=self._who,
+                what=what,
             )
 
     def _report(self, text: str) -> None:

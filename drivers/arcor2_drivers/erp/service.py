@@ -98,7 +98,7 @@ class Access(NamedTuple):
             if settings.token_file:
                 token = Path(settings.token_file).read_text("ascii").strip()
                 if not token.isprintable() or not 0 < len(token) <= LONGEST_TOKEN or " " in token:
-                    raise ValueError("it holds no token")
+                    raise ValueError("it contains no valid token")
                 headers["Authorization"] = f"Bearer {token}"
             if not settings.url.startswith("https"):
                 return cls(headers, False)
@@ -155,7 +155,11 @@ class Service:
                 limits=httpx.Limits(max_connections=1, max_keepalive_connections=1, keepalive_expiry=KEEP_ALIVE),
             )
         headers = {"Content-Type": "application/json", "Idempotency-Key": key} if key else {}
-        late = f"{self._who} did not answer {method} {path} within {limit:g} s"
+
+        def late(detail: str) -> DeviceTimeout:
+            text = "{device} did not answer {method} {path} within {limit:g} s"
+            return DeviceTimeout(text, detail, device=self._who, method=method, path=path, limit=limit)
+
         try:
             with self._client.stream(method, path, content=body or None, headers=headers, timeout=limit) as response:
                 data = b""
@@ -169,15 +173,19 @@ class Service:
                             path=path,
                         )
                     if time.monotonic() > deadline:
-                        raise DeviceTimeout(late, "the answer came too slowly")
+                        raise late("the answer came too slowly")
                 return Answer(response.status_code, data, parse_retry_after(response.headers.get("Retry-After", "")))
         except httpx.ConnectError as e:
             raise NotConnected("{device} cannot be reached", str(e), device=self._who) from e
         except httpx.TimeoutException as e:
-            raise DeviceTimeout(late, type(e).__name__) from e
+            raise late(type(e).__name__) from e
         except (httpx.HTTPError, httpx.InvalidURL, httpx.StreamError) as e:
             raise ConnectionLost(
-                "{device}: {method} {path} broke off", str(e), device=self._who, method=method, path=path
+                "{device}: the connection was lost during {method} {path}",
+                str(e),
+                device=self._who,
+                method=method,
+                path=path,
             ) from e
 
     def close(self) -> None:
@@ -208,14 +216,14 @@ class Service:
             return
         if answer.status in UNAUTHORIZED:
             raise Refused(
-                "{device} does not let us in: token_file or client_certificate is not valid",
+                "{device} rejected the credentials. Check token_file and client_certificate.",
                 answer.text,
                 device=self._who,
             )
         if 400 <= answer.status < 500 and answer.status not in RETRIED:
-            raise Refused("{device} refuses {what}: {text}", answer.text, device=self._who, what=what, text=answer.text)
+            raise Refused("{device} refused {what}: {text}", answer.text, device=self._who, what=what, text=answer.text)
         raise DeviceFault(
-            "{device} cannot do {what} now: {text}",
+            "{device} cannot execute {what} now: {text}",
             answer.text,
             answer.status,
             device=self._who,
@@ -229,7 +237,7 @@ class Service:
             return msgspec.json.decode(answer.body, type=form)
         except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as e:
             raise DeviceFault(
-                "{device} gave no sensible answer to {what}",
+                "{device} sent an invalid answer to {what}",
                 f"{e}: {answer.body[:200]!r}",
                 "answer",
                 device=self._who,

@@ -53,11 +53,11 @@ class ErpSettings(Settings):
         super().__post_init__()
         parts = check_url("url", self.url, "http", "https")
         if self.token_file and parts.scheme == "http" and not is_loopback(parts.hostname or ""):
-            raise OutOfRange("token_file needs a url that starts with https: a token is not sent unencrypted")
+            raise OutOfRange("token_file needs a url that starts with https, because a token is not sent unencrypted")
         if parts.scheme == "http" and (self.ca_file or self.client_certificate):
             raise OutOfRange("ca_file and client_certificate need a url that starts with https")
         if bool(self.client_certificate) != bool(self.client_key):
-            raise OutOfRange("client_key must be given with client_certificate, and only with it")
+            raise OutOfRange("client_certificate and client_key must be set together")
         self.token_file = secret_file("token_file", self.token_file, parts.hostname)
         for name in ("outbox", "ca_file", "client_certificate", "client_key"):
             setattr(self, name, device_file(name, getattr(self, name)))

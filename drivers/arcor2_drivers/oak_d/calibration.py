@@ -10,6 +10,8 @@ if TYPE_CHECKING:
 
 SUPPORTED: Final = 12
 """Number of lens coefficients that CameraParameters holds; the two after them describe a tilted sensor."""
+INVALID: Final = "calibration"
+"""Fault code of a missing or invalid calibration."""
 
 
 def parameters(
@@ -34,9 +36,11 @@ def parameters(
         matrix = handler.getCameraIntrinsics(socket, width, height)
         coefficients = [0.0] * 4 if undistorted else list(handler.getDistortionCoefficients(socket))
     except RuntimeError as error:
-        raise _fault(who, f"the calibration of the colour camera is not there: {error}") from error
+        raise DeviceFault(
+            "{device} has no calibration of its colour camera", str(error), INVALID, device=who
+        ) from error
     if any(coefficients[SUPPORTED:]):
-        raise _fault(who, "the lens is calibrated with a tilted sensor, which the 12 coefficients do not cover")
+        raise DeviceFault("{device}: a calibration with a tilted sensor is not supported", "", INVALID, device=who)
     coefficients = coefficients[:SUPPORTED]
     for count in (5, 8):
         if len(coefficients) > count and not any(coefficients[count:]):
@@ -44,7 +48,8 @@ def parameters(
             break
     fx, fy, cx, cy = matrix[0][0], matrix[1][1], matrix[0][2], matrix[1][2]
     if not (fx > 0.0 and fy > 0.0 and 0.0 < cx < width and 0.0 < cy < height):
-        raise _fault(who, f"focal lengths {fx:g}, {fy:g} and centre {cx:g}, {cy:g} are no camera's")
+        found = f"focal lengths {fx:g}, {fy:g}, centre {cx:g}, {cy:g}"
+        raise DeviceFault("{device}: the calibration is invalid", found, INVALID, device=who)
     return CameraParameters(fx, fy, cx, cy, coefficients)
 
 
@@ -55,8 +60,4 @@ def handler_of(who: str, eeprom: dict[str, Any]) -> "dai.CalibrationHandler":
     try:
         return dai.CalibrationHandler.fromJson(eeprom)
     except (RuntimeError, TypeError, ValueError) as error:
-        raise _fault(who, f"the calibration is not readable: {error}") from error
-
-
-def _fault(who: str, problem: str) -> DeviceFault:
-    return DeviceFault("{device}: {problem}", "", "calibration", device=who, problem=problem)
+        raise DeviceFault("{device}: the calibration cannot be read", str(error), INVALID, device=who) from error

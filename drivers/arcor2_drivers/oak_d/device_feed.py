@@ -34,7 +34,7 @@ def find(who: str, address: str, timeout: float) -> dai.DeviceInfo:
     matching = [info for info in found if address in ("", info.getDeviceId(), info.name)]
     if len(matching) > 1:
         raise NotConnected(
-            "{device}: there are {count} cameras; give the device id of one",
+            "{device}: {count} cameras found. Set address to the device id of one.",
             _listed(found),
             device=who,
             count=len(matching),
@@ -47,7 +47,11 @@ def find(who: str, address: str, timeout: float) -> dai.DeviceInfo:
         except OSError as e:
             raise NotConnected("{device} cannot be reached", str(e), device=who) from e
         return dai.DeviceInfo(address)
-    raise NotConnected("{device} is not there: is it plugged in, and free?", _listed(found), device=who)
+    raise NotConnected(
+        "{device} was not found. Check the cable, and that no other program uses the camera.",
+        _listed(found),
+        device=who,
+    )
 
 
 def _listed(found: list[dai.DeviceInfo]) -> str:
@@ -79,10 +83,10 @@ def boot(who: str, info: dai.DeviceInfo, timeout: float) -> dai.Device:
     thread.join(timeout)
     if not result:
         late.set()
-        raise DeviceTimeout("{device} has not started within {timeout:.1f} s", device=who, timeout=timeout)
+        raise DeviceTimeout("{device} did not start within {timeout:.1f} s", device=who, timeout=timeout)
     if isinstance(result[0], BaseException):
         raise NotConnected(
-            "{device} cannot be opened; another program may use it", str(result[0]), device=who
+            "{device} cannot be opened. Check that no other program uses the camera.", str(result[0]), device=who
         ) from result[0]
     return result[0]
 
@@ -127,7 +131,7 @@ class DeviceFeed:
             self._pipeline.start()
         except RuntimeError as e:
             self.close()
-            raise DeviceFault("{device} cannot be set up", str(e), "pipeline", device=who) from e
+            raise DeviceFault("{device}: the pipeline cannot be created", str(e), "pipeline", device=who) from e
         except BaseException:
             self.close()
             raise
@@ -156,7 +160,7 @@ class DeviceFeed:
         try:
             self._control.send(control)
         except RuntimeError as e:
-            raise Refused("{device} does not take the exposure", str(e), device=self.who) from e
+            raise Refused("{device} rejected the exposure", str(e), device=self.who) from e
 
     def close(self) -> None:
         """Close; does nothing when closed."""

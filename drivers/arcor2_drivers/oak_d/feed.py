@@ -47,8 +47,8 @@ class Shot(NamedTuple):
 
             from PIL import Image
 
-            with Image.open(io.BytesIO(data.tobytes())) as picture:
-                return np.asarray(picture.convert("RGB"))
+            with Image.open(io.BytesIO(data.tobytes())) as image:
+                return np.asarray(image.convert("RGB"))
         bgr = data.reshape(self.color.getHeight(), self.color.getWidth(), 3)
         return np.ascontiguousarray(bgr[:, :, ::-1])
 

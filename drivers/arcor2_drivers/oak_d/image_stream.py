@@ -30,8 +30,11 @@ class ImageStream(Connected):
     """A connection that receives images. A driver calls `use_camera` in `__init__`."""
 
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {
-        "hot": AlarmText("the camera is too hot", "let air pass it, or mount it on metal", Severity.WARNING),
-        "frozen": AlarmText("the camera repeats an old picture", "disconnect and connect; switch it off and on"),
+        "hot": AlarmText("the camera is too hot", "improve its ventilation, or mount it on metal", Severity.WARNING),
+        "frozen": AlarmText(
+            "the camera repeats an old image",
+            "go offline and online again; if that does not help, switch it off and on",
+        ),
     }
     images_received: int = 0
     """Number of images received since the object was created."""
@@ -104,7 +107,7 @@ class ImageStream(Connected):
         age = float("inf") if shot is None else time.monotonic() - shot.monotonic
         if shot is None or age > max_age:
             raise Stale(
-                "{device}: the newest picture is {age:.2f} s old, {max_age:g} s at most are asked for",
+                "{device}: the newest image is {age:.2f} s old, at most {max_age:g} s are allowed",
                 device=self.who,
                 age=age,
                 max_age=max_age,
@@ -120,7 +123,7 @@ class ImageStream(Connected):
             ConnectionLost: The connection was lost.
         """
         deadline = time.monotonic() + timeout
-        go_on = self.begin("waiting for a picture")
+        go_on = self.begin("waiting for an image")
         with self._new_image:
             while True:
                 go_on()
@@ -132,7 +135,7 @@ class ImageStream(Connected):
                 self._new_image.wait(left)
         age = "never" if newest is None else f"{time.monotonic() - newest.monotonic:.2f} s ago"
         raise Stale(
-            "{device} gave no new picture within {timeout:g} s; the last was taken {age}",
+            "{device} sent no new image within {timeout:g} s; the last was taken {age}",
             device=self.who,
             timeout=timeout,
             age=age,
@@ -151,9 +154,8 @@ class ImageStream(Connected):
         shot = None
         while shot is None or time.monotonic() - shot.monotonic > self._config.max_age:
             if (left := deadline - time.monotonic()) <= 0.0:
-                old = "no" if shot is None else "only an old"
                 raise DeviceTimeout(
-                    "{device} sent {old} picture within {timeout:.1f} s", device=self.who, old=old, timeout=timeout
+                    "{device} sent no current image within {timeout:.1f} s", device=self.who, timeout=timeout
                 )
             shot = feed.next(min(RECEIVE_TIMEOUT, left)) or shot
         self._store(shot)
@@ -176,14 +178,12 @@ class ImageStream(Connected):
             return DeviceFeed(self.who, self._config, timeout)
         except ModuleNotFoundError as e:
             raise NotConnected(
-                "{device}: depthai is not installed here; it comes with the extra `depthai` (arcor2-hw[depthai])",
+                "{device}: depthai is not installed. Install the extra `depthai`: arcor2-hw[depthai].",
                 str(e),
                 device=self.who,
             ) from e
         except ImportError as e:
-            raise NotConnected(
-                "{device}: depthai is installed and cannot be loaded: {reason}", device=self.who, reason=e
-            ) from e
+            raise NotConnected("{device}: depthai cannot be loaded: {reason}", device=self.who, reason=e) from e
 
     def watch(self, stopping: threading.Event) -> None:
         """Receive images until `stopping` is set. Raises DeviceTimeout when none come."""
@@ -196,9 +196,9 @@ class ImageStream(Connected):
                 self._store(shot)
             elif present - self._received_at > self._config.frame_timeout:
                 raise DeviceTimeout(
-                    "{device} has sent no picture for {present:.1f} s",
+                    "{device} has sent no image for {age:.1f} s",
                     device=self.who,
-                    present=present - self._received_at,
+                    age=present - self._received_at,
                 )
             if present - checked_at > CHECK_PERIOD:
                 checked_at = present

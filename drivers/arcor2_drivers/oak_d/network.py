@@ -82,7 +82,7 @@ class NetworkSource:
             link = socket.create_connection(self._address, left)
         except TimeoutError:
             raise DeviceTimeout(
-                "{device} did not take the connection within {left:.1f} s", device=self.who, left=left
+                "{device} did not accept the connection within {left:.1f} s", device=self.who, left=left
             ) from None
         except OSError as e:
             raise NotConnected("{device} cannot be reached", str(e), device=self.who) from e
@@ -92,14 +92,18 @@ class NetworkSource:
         kind, header, payload = self._receive(deadline)
         if kind is not Kind.HELLO:
             raise DeviceFault(
-                "{device} does not say hello but {name}", "", "protocol", device=self.who, name=kind.name.lower()
+                "{device} sent {name} instead of hello: is it a network source?",
+                "",
+                "protocol",
+                device=self.who,
+                name=kind.name.lower(),
             )
         try:
             self.hello = read_header(header, Hello)
             self.eeprom = msgspec.json.decode(payload, type=dict[str, Any])
         except (BadStream, msgspec.DecodeError) as e:
             raise DeviceFault(
-                "{device}: the hello is not readable: {reason}", "", "protocol", device=self.who, reason=e
+                "{device}: the hello is invalid: {reason}", "", "protocol", device=self.who, reason=e
             ) from e
 
     def start(self, client: str) -> None:
@@ -123,10 +127,10 @@ class NetworkSource:
             self._send(Kind.CONTROL, {"exposure": exposure})
             answered = self._answered.wait_for(lambda: self._statuses > before or self._refusal, timeout)
             if self._refusal:
-                raise Refused("{device} refuses: {refusal}", device=self.who, refusal=self._refusal)
+                raise Refused("{device} rejected the exposure: {refusal}", device=self.who, refusal=self._refusal)
             if not answered:
                 raise DeviceTimeout(
-                    "{device} did not answer to set_exposure within {timeout:g} s", device=self.who, timeout=timeout
+                    "{device} did not confirm the exposure within {timeout:g} s", device=self.who, timeout=timeout
                 )
 
     def _ask_clock(self) -> None:
@@ -163,7 +167,7 @@ class NetworkSource:
         if kind is Kind.CLOCK:
             clock, now = read_header(header, Clock), time.monotonic()
             if clock.asked > now or not math.isfinite(clock.at):
-                raise BadStream("the clock was never asked that")
+                raise BadStream("an answer to a clock request that was not sent")
             self._offsets.append((now - clock.asked, (now + clock.asked) / 2.0 - clock.at))
         elif kind is Kind.STATUS:
             self._on_status(read_header(header, Status))
@@ -175,7 +179,7 @@ class NetworkSource:
                 self._refusal = read_header(header, Refusal).reason[:200]
                 self._answered.notify_all()
         else:
-            raise BadStream(f"a {kind.name.lower()} was not to be expected")
+            raise BadStream(f"an unexpected message of kind {kind.name.lower()}")
 
     def _frame(self, header: FrameHeader, payload: memoryview) -> SourceFrame:
         size = self.hello.width * self.hello.height
@@ -184,7 +188,7 @@ class NetworkSource:
             or header.color_bytes < 1
             or header.color_bytes + header.depth_bytes != len(payload)
         ):
-            raise BadStream(f"a frame of {header.color_bytes} + {header.depth_bytes} bytes of {header.color} came")
+            raise BadStream(f"a frame of {header.color_bytes} + {header.depth_bytes} bytes of {header.color}")
         if header.color == "bgr" and header.color_bytes != 3 * size:
             raise BadStream(f"colour has {header.color_bytes} bytes, not {3 * size}")
         if header.depth_bytes not in (0, 2 * size):
@@ -193,7 +197,7 @@ class NetworkSource:
         # The estimated offset is wrong by up to half the round-trip time; a frame must not come from the future.
         moment = min(header.stamp + offset, time.monotonic())
         if not math.isfinite(moment):
-            raise BadStream(f"a frame's stamp is {header.stamp}")
+            raise BadStream(f"a frame with the time stamp {header.stamp}")
         return SourceFrame(header, moment, payload[: header.color_bytes], payload[header.color_bytes :])
 
     def _receive(self, deadline: float) -> tuple[Kind, bytes, memoryview]:
@@ -232,10 +236,11 @@ class NetworkSource:
             except OSError as e:
                 raise ConnectionLost("{device}: the connection was lost", str(e), device=self.who) from e
             if received == 0:
-                why = f"it said: {self._refusal}" if self._refusal else "the source closed it"
+                why = f"the source refused: {self._refusal}" if self._refusal else "the source closed the connection"
                 raise ConnectionLost("{device}: the connection was lost: {reason}", device=self.who, reason=why)
             count += received
 
     def _silent(self, between: bool) -> DeviceError:
-        what = "sends nothing" if between else "stopped in the middle of a message"
-        return DeviceTimeout("{device} {what}", device=self.who, what=what)
+        if between:
+            return DeviceTimeout("{device} sends nothing", device=self.who)
+        return DeviceTimeout("{device} stopped in the middle of a message", device=self.who)

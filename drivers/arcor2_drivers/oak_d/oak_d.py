@@ -192,12 +192,12 @@ class OakD(ImageStream, Camera):
         if white > self._config.white_limit:
             exposed = "" if shot.exposure is None else f" with an exposure of {shot.exposure * 1e3:g} ms"
             raise Overexposed(
-                "{device}: {white:.0%} of the picture are white{exposed}", device=self.who, white=white, exposed=exposed
+                "{device}: {white:.0%} of the image is white{exposed}", device=self.who, white=white, exposed=exposed
             )
         if (mean := float(sample.mean())) < BLACK:
             raise DeviceFault(
-                "{device}: the picture is black: the lens is covered, or there is no light",
-                f"mean {mean:.1f} of 255",
+                "{device}: the image is black. Check that the lens is not covered and the light is on.",
+                f"mean brightness {mean:.1f} of 255",
                 "dark",
                 device=self.who,
             )
@@ -207,8 +207,8 @@ class OakD(ImageStream, Camera):
         if valid < LEAST_DEPTH:
             near, far = self.depth_range()
             raise NoDepth(
-                "{device}: {valid:.1%} of the picture have a depth: the lens is covered, stereo "
-                "is off, or nothing is within {near:g} and {far:g} m",
+                "{device}: only {valid:.1%} of the image has valid depth. Check that the lens is not covered, that "
+                "stereo is on, and that objects are {near:g} to {far:g} m away.",
                 device=self.who,
                 valid=valid,
                 near=near,

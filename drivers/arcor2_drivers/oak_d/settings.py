@@ -69,7 +69,9 @@ class OakDSettings(Settings):
                 "frame_timeout must be more than two images ({fps:.3f} s) and at most 10 s", fps=2.0 / self.fps
             )
         if not 0.0 < self.white_limit <= 1.0:
-            raise OutOfRange("white_limit must be within 0 and 1, not {white_limit!r}", white_limit=self.white_limit)
+            raise OutOfRange(
+                "white_limit must be above 0 and at most 1, not {white_limit!r}", white_limit=self.white_limit
+            )
 
     @property
     def network(self) -> tuple[str, int] | None:

@@ -62,7 +62,7 @@ class Hello(msgspec.Struct, frozen=True):
 
     def __post_init__(self) -> None:
         if not (16 <= self.width <= 8192 and 16 <= self.height <= 8192 and 0.0 < self.fps <= 1000.0):
-            raise ValueError(f"{self.width} x {self.height} at {self.fps:g} Hz is no camera's mode")
+            raise ValueError(f"{self.width} x {self.height} at {self.fps:g} Hz is not a valid mode")
 
 
 class FrameHeader(msgspec.Struct, frozen=True):
@@ -100,15 +100,15 @@ def read_prefix(data: bytes | bytearray) -> Prefix:
     """Decode the first 16 bytes of a message. Raises BadStream."""
     magic, version, kind, header, payload, checksum = PREFIX.unpack_from(data)
     if magic != MAGIC:
-        raise BadStream(f"it does not speak this protocol: a message begins with {bytes(magic)!r}")
+        raise BadStream(f"not this protocol: a message starts with {bytes(magic)!r}")
     if version != VERSION:
-        raise BadStream(f"it speaks version {version} of the protocol, not {VERSION}")
+        raise BadStream(f"version {version} of the protocol, not {VERSION}")
     if header > LONGEST_HEADER or payload > LONGEST_PAYLOAD:
         raise BadStream(f"a message of {header} and {payload} bytes is too long")
     try:
         found = Kind(kind)
     except ValueError:
-        raise BadStream(f"there is no message of kind {kind}") from None
+        raise BadStream(f"a message of unknown kind {kind}") from None
     return Prefix(found, header, payload, bytes(data[: _CHECKED.size]), checksum)
 
 
@@ -123,7 +123,7 @@ def read_header(header: bytes | bytearray, kind: type[H]) -> H:
     try:
         return msgspec.json.decode(header, type=kind)
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        raise BadStream(f"a header is not readable: {error}") from error
+        raise BadStream(f"an invalid header: {error}") from error
 
 
 def encode(kind: Kind, header: dict[str, object]) -> bytes:

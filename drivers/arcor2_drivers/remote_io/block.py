@@ -1,4 +1,4 @@
-"""Block: control of a remote I/O block by its watchdog, its points and its pulses. A mixin of both object types."""
+"""Block: state, watchdog, points and pulses of a remote I/O block. A mixin of both object types."""
 
 import contextlib
 import random
@@ -28,7 +28,7 @@ DIAGNOSES: Final = {registers.SUPPLY_MISSING: "supply_missing", registers.OVERLO
 
 
 class Block(ModbusDevice[Image]):
-    """A block that is read each 20 ms; while we have control its watchdog is triggered."""
+    """A block that is read every 20 ms. While we have control, each reading also triggers its watchdog if it is due."""
 
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(LONGEST_WATCHDOG / 1000.0)
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {
@@ -50,11 +50,11 @@ class Block(ModbusDevice[Image]):
             baudrate=settings.baudrate,
             exceptions=REFUSALS,
         )
-        # A reading that is repeated with the line drained in between, behind another request of the same kind.
+        # Two readings, each repeated once after draining the line.
         self.answers_within = 6.0 * settings.request_timeout
         self.use_link(self.link)
         self.edge_listeners = EdgeListeners()
-        self._watchdog = registers.watchdog_address(settings.watchdog)
+        self._watchdog = registers.WATCHDOG + registers.WATCHDOG_SIZE * settings.watchdog
         self._number = random.randint(1, 0xFFFF)  # distinguishes our watchdog from another host's
         digital = {name: point for name, point in points.items() if point.kind in ("DI", "DO")}
         self._digital = {name: Debounced(name, point.io.debounce) for name, point in digital.items()}
@@ -64,7 +64,7 @@ class Block(ModbusDevice[Image]):
 
     # -------------------------------------------------------------------------------- state
     def open_link(self, timeout: float) -> Snapshot[Image]:
-        """Open the connection; the points have no value yet."""
+        """Open the connection and forget the values of the points."""
         for each in self._digital.values():
             each.forget()
         return super().open_link(timeout)
@@ -79,7 +79,7 @@ class Block(ModbusDevice[Image]):
             ) from error
 
     def on_state(self, snapshot: Snapshot[Image]) -> None:
-        """Debounce the points."""
+        """Debounce the digital points."""
         self._edges = []
         for name, each in self._digital.items():
             point = self.block_points[name]
@@ -91,7 +91,7 @@ class Block(ModbusDevice[Image]):
         for edge in self._edges:
             self.edge_listeners.notify(edge)
         if self.in_control and time.monotonic() - self._triggered >= self._s.watchdog_ms / 5000.0:
-            self._twice(lambda: self.link.write_registers(self._watchdog + registers.TRIGGER, self._number))
+            self.retry_once(lambda: self.link.write_registers(self._watchdog + registers.TRIGGER, self._number))
             self._triggered = time.monotonic()
 
     def fault_of(self, state: Image) -> int:
@@ -99,7 +99,7 @@ class Block(ModbusDevice[Image]):
         return state.diagnosis
 
     def alarms(self) -> list[Alarm]:
-        """Return what the block reports as wrong; each alarm ends with its cause."""
+        """Return an alarm for each diagnosis bit that is set."""
         diagnosis = self.fresh().diagnosis
         for bit, code in DIAGNOSES.items():
             self.set_alarm(code, bool(diagnosis & bit))
@@ -114,7 +114,7 @@ class Block(ModbusDevice[Image]):
         stored = self.link.read_holding_registers(self._watchdog, len(armed))
         if stored != armed:
             raise Refused(
-                "{device}: its watchdog stores {stored} after {armed} was written",
+                "{device}: the watchdog contains {stored} after {armed} was written",
                 device=self.who,
                 stored=stored,
                 armed=armed,
@@ -122,18 +122,18 @@ class Block(ModbusDevice[Image]):
         self._triggered = time.monotonic()
 
     def disarm(self) -> None:
-        """Put our outputs into their safe state and switch the watchdog off."""
+        """Switch our outputs to their safe state and the watchdog off."""
         self.link.write_registers(self._watchdog + registers.COMMAND, registers.RELEASE)
 
     def owner_of(self, state: Image) -> str | None:
-        """Return whose number is on our watchdog while it runs."""
+        """Return who triggers our watchdog, by the number stored in it; None when it is not running."""
         running, number = state.watchdog(self._s.watchdog)
         if running is not WatchdogState.RUNNING:
             return None
         return US if number == self._number else f"another host (number {number} on watchdog {self._s.watchdog})"
 
     def why_control_ended(self, state: Image) -> str:
-        """Return why the watchdog does not run for us any more."""
+        """Return why the watchdog does not run for us any more; empty while it does."""
         running, _ = state.watchdog(self._s.watchdog)
         if running is WatchdogState.EXPIRED:
             return "the block's watchdog has expired; its outputs are in their safe state until control is taken"
@@ -154,17 +154,15 @@ class Block(ModbusDevice[Image]):
         """Switch a digital output."""
         self.send(f"writing {name}", lambda: self.link.write_coil(self.block_points[name].channel, value))
 
-    def switch_twice(self, name: str, value: bool) -> None:
-        """Switch a digital output; send it again when no answer came. Only where repeating it does no harm."""
-        self._twice(lambda: self.switch(name, value))
-
-    def _twice(self, write: Callable[[], None]) -> None:
-        with contextlib.suppress(DeviceTimeout):
-            return write()
-        return write()
+    def retry_once(self, write: Callable[[], None]) -> None:
+        """Write, and write again when no answer came. Use it only where a repetition does no harm."""
+        try:
+            write()
+        except DeviceTimeout:
+            write()
 
     def pulse_output(self, name: str, duration: float) -> None:
-        """Switch a digital output on for `duration` s, timed by the block; return when it is off again."""
+        """Switch a digital output on for `duration` s, timed by the block, and wait until it is off again."""
         within(f"{self.who}: duration", duration, 0.01, registers.LONGEST_PULSE, "s")
         channel, what = self.block_points[name].channel, f"the pulse of {name}"
         self.require_control(f"pulsing {name}")
@@ -186,15 +184,15 @@ class Block(ModbusDevice[Image]):
                 self.link.write_registers(registers.PULSE + channel, round(1000.0 * duration))
             self.wait(over, duration + self.answers_within, what, go_on)
         except DeviceTimeout:
-            with contextlib.suppress(DeviceError):  # the block ends it by itself
+            with contextlib.suppress(DeviceError):  # the block's own timer ends the pulse
                 self.link.write_registers(registers.PULSE + channel, 0)
             raise
         finally:
             self._pulsing.discard(channel)
 
     def stop(self) -> None:
-        """End with Cancelled what waits, and return when the outputs that were being pulsed are off."""
+        """End the calls that wait, with Cancelled, and end all pulses."""
         self.stop_waiting()
-        with self._one_pulse:  # a pulse that has not started yet does not start any more
+        with self._one_pulse:  # a pulse that has not started yet is cancelled
             for channel in sorted(self._pulsing):
                 self.link.write_registers(registers.PULSE + channel, 0)

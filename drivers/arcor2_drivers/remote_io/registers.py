@@ -1,7 +1,7 @@
 """The register map (docs/devices/remote-io.md) as data. Pure functions."""
 
 import enum
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from arcor2_hw.objects.small import OnLoss
@@ -18,6 +18,9 @@ PULSE: Final = 16
 """Holding register of the pulse of DO0."""
 LONGEST_PULSE: Final = 60.0
 """Longest pulse of the block, s."""
+WATCHDOG: Final = 64
+WATCHDOG_SIZE: Final = 16
+"""First holding register of watchdog 0, and number of registers of a watchdog."""
 TRIGGER: Final = 1
 COMMAND: Final = 2
 ACKNOWLEDGE: Final = 1
@@ -67,20 +70,12 @@ def decode(words: Sequence[int]) -> Image:
     return Image(words)
 
 
-def watchdog_address(index: int) -> int:
-    """Return the first holding register of a watchdog."""
-    return 64 + 16 * index
-
-
-def arming(points: Iterable["Point"], time_ms: int, number: int) -> list[int]:
+def arming(points: Collection["Point"], time_ms: int, number: int) -> list[int]:
     """Return the ten registers that start a watchdog which guards the outputs among the points."""
-    digital = {"guarded": 0, "switched": 0, "safe": 0}
-    analog = {"guarded": 0, "switched": 0}
-    for point in points:
-        if point.kind in ("DO", "AO"):
-            masks, bit = (digital if point.kind == "DO" else analog), 1 << point.channel
-            masks["guarded"] |= bit
-            masks["switched"] |= bit * (point.io.on_loss is not OnLoss.HOLD)
-            if point.io.on_loss is OnLoss.ON:
-                masks["safe"] |= bit
-    return [time_ms, number, 0, *digital.values(), *analog.values(), 0, 0]
+
+    def outputs(kind: str, *on_loss: OnLoss) -> int:
+        return sum(1 << point.channel for point in points if point.kind == kind and point.io.on_loss in on_loss)
+
+    switched = (OnLoss.OFF, OnLoss.ON)
+    digital = (outputs("DO", *OnLoss), outputs("DO", *switched), outputs("DO", OnLoss.ON))
+    return [time_ms, number, 0, *digital, outputs("AO", *OnLoss), outputs("AO", *switched), 0, 0]

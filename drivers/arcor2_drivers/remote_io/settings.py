@@ -4,42 +4,53 @@ import dataclasses
 from collections.abc import Collection, Mapping
 from typing import Annotated, Final
 
+from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import MachineState, Settings
+from arcor2_hw.objects.point_list import entries, io_point
 from arcor2_hw.objects.settings import Range, check_host, check_serial_port, within
 
 from .points import Point, parse_address, parse_points
 from .registers import WATCHDOGS
 
 LONGEST_WATCHDOG: Final = 5000
-"""Longest watchdog time, ms; the types declare it as their reaction to a loss (`loss_reaction`)."""
+"""Longest watchdog time, ms; declared in `loss_reaction`."""
 LONGEST_REQUEST: Final = 0.5
-"""Longest time for a request, s: disconnecting may have to wait for one."""
+"""Longest timeout of a request, s: disconnecting may have to wait for a request."""
 BAUDRATES: Final = (9600, 19200, 38400, 57600, 115200)
-COLORS: Final = ("red", "amber", "green", "blue", "white")
 DEFAULT_PATTERNS: Final = (
     "execute=green; starting=green blinking; completing=green; complete=green blinking; "
     "idle=white; resetting=white blinking; held=amber; holding=amber blinking; unholding=amber blinking; "
     "suspended=amber; suspending=amber blinking; unsuspending=amber blinking; stopped=amber; "
     "stopping=amber blinking; aborting=red blinking; aborted=red blinking; clearing=red"
 )
-"""Patterns of the states, as far as the tower has the colours (meaning of colours: IEC 60204-1, 10.3)."""
+"""Default patterns; those with missing colours are left out (meaning of colours: IEC 60204-1, 10.3)."""
 Pattern = Mapping[str, bool]
 """The colours that are lit, each with whether it blinks."""
 
 
+class LampColor(StrEnum):
+    """Colours of lamps."""
+
+    RED = "red"
+    AMBER = "amber"
+    GREEN = "green"
+    BLUE = "blue"
+    WHITE = "white"
+
+
 @dataclasses.dataclass
 class BlockSettings(Settings):
-    """Where a block is, and how long it may take.
+    """Address of a block, its watchdog, and time limits.
 
     :param host: address or name of the block on Modbus TCP; empty for a serial line
     :param port: port of its Modbus TCP server
     :param serial_port: serial port of a block on Modbus RTU; empty for TCP
     :param baudrate: bits per second on the serial line (8 data bits, no parity, 1 stop bit)
     :param unit_id: Modbus unit id
-    :param watchdog: number of the block's watchdog to use; each object on the same block uses another
-    :param watchdog_ms: ms without a request after which the block puts our outputs into their safe state
-    :param request_timeout: seconds the block has to answer one request
+    :param watchdog: number of the watchdog to use; objects on the same block must use different ones
+    :param watchdog_ms: time without a request after which the block switches our outputs to their safe state, ms
+    :param request_timeout: time the block has to answer one request, s
     """
 
     host: str = ""
@@ -55,7 +66,7 @@ class BlockSettings(Settings):
         super().__post_init__()
         self.serial_port = self.serial_port.strip()
         if bool(self.host.strip()) == bool(self.serial_port):
-            raise OutOfRange("host must be the address of the block, or serial_port its serial port: one of the two")
+            raise OutOfRange("host must be the address of the block, or serial_port its serial port; set one of them")
         if self.serial_port:
             check_serial_port("serial_port", self.serial_port)
         else:
@@ -67,7 +78,7 @@ class BlockSettings(Settings):
                 baudrate=self.baudrate,
             )
         within("unit_id", self.unit_id, 1 if self.serial_port else 0, 247 if self.serial_port else 255)
-        # A repeated reading must not trip the watchdog: two time-outs, one to drain a serial line, and one to spare.
+        # A repeated reading takes two timeouts, and one more to drain a serial line; the watchdog must not expire then.
         within("request_timeout", self.request_timeout, 0.05, min(LONGEST_REQUEST, self.watchdog_ms / 4000.0), "s")
 
 
@@ -89,7 +100,7 @@ class RemoteIOSettings(BlockSettings):
 
 @dataclasses.dataclass
 class TowerLightSettings(BlockSettings):
-    """A block, the outputs of a tower light's lamps, and the patterns they show.
+    """The outputs of the lamps of a tower light on a block, and the pattern for each machine state.
 
     :param red: output of the red lamp, as DO0; empty when there is none
     :param amber: output of the amber lamp
@@ -98,8 +109,8 @@ class TowerLightSettings(BlockSettings):
     :param white: output of the white lamp
     :param buzzer: output of the buzzer
     :param on_loss: colour that is lit when the connection to the block is lost; empty for none
-    :param blink_period: seconds from one flash to the next
-    :param patterns: what show_state shows: "execute=green; aborted=red+amber blinking; idle=off"; empty for the default
+    :param blink_period: time from one flash to the next, s
+    :param patterns: of show_state: "execute=green; aborted=red+amber blinking; idle=off"; empty for the default
     """
 
     red: str = ""
@@ -116,68 +127,56 @@ class TowerLightSettings(BlockSettings):
         super().__post_init__()
         fitted = self.lamps()
         if not fitted:
-            raise OutOfRange("one of {colors} must be the output of a lamp", colors=", ".join(COLORS))
+            raise OutOfRange("one of {colors} must be the output of a lamp", colors=", ".join(LampColor))
         if self.on_loss and self.on_loss not in fitted:
             raise OutOfRange(
-                "on_loss must be one of {fitted} or empty, not {on_loss!r}",
-                fitted=", ".join(fitted),
-                on_loss=self.on_loss,
+                "on_loss must be one of {colors} or empty, not {color!r}", colors=", ".join(fitted), color=self.on_loss
             )
         parse_patterns(self.patterns, fitted)
         self.points()
 
     def lamps(self) -> list[str]:
-        """Return the colours that the tower has."""
-        return [color for color in COLORS if getattr(self, color)]
+        """Return the colours of the lamps that the tower has."""
+        return [str(color) for color in LampColor if getattr(self, color)]
 
     def points(self) -> dict[str, Point]:
-        """Return lamps and buzzer as points. Raises OutOfRange naming the parameter."""
-        used: dict[str, str] = {}
-        for name in (*COLORS, "buzzer"):
-            terminal = getattr(self, name)
-            if not terminal:
+        """Return lamps and buzzer as points. Raises OutOfRange, which names the parameter."""
+        points: dict[str, Point] = {}
+        for name in (*LampColor, "buzzer"):
+            if not (terminal := getattr(self, name)):
                 continue
-            if parse_address(terminal, name)[0] != "DO":
+            kind, channel = parse_address(terminal, name)
+            if kind != "DO":
                 raise OutOfRange(
                     "{name} must be a digital output such as DO0, not {terminal}", name=name, terminal=terminal
                 )
-            if terminal in used.values():
-                raise OutOfRange(
-                    "{name} must be an output of its own: {terminal} is used by another lamp",
-                    name=name,
-                    terminal=terminal,
-                )
-            used[name] = terminal
-        safe = {name: "on" if name == self.on_loss else "off" for name in used}
-        return parse_points("; ".join(f"{name}={terminal} on_loss={safe[name]}" for name, terminal in used.items()))
+            if terminal in (point.address for point in points.values()):
+                raise OutOfRange("{name} must not use {terminal}: another lamp uses it", name=name, terminal=terminal)
+            options = ["on_loss=on"] if name == self.on_loss else []
+            points[name] = Point(io=io_point(name, kind, options, name), kind=kind, channel=channel)
+        return points
 
 
 def parse_patterns(text: str, fitted: Collection[str]) -> dict[str, Pattern]:
-    """Return the lamps by state: "execute=green; aborted=red+amber blinking; idle=off". Raises OutOfRange."""
+    """Return the pattern of each state in "execute=green; aborted=red+amber blinking; idle=off". Raises OutOfRange."""
     given = bool(text.strip())
-    states = [state.name.lower() for state in MachineState]
     patterns: dict[str, Pattern] = {}
-    for entry in filter(None, (part.strip() for part in (text if given else DEFAULT_PATTERNS).split(";"))):
-        head, *words = entry.split()
-        state, sign, lamps = head.partition("=")
-        if not sign or not lamps or words not in ([], ["blinking"]):
+    for state, (lamps, *words) in entries(text if given else DEFAULT_PATTERNS, ";", "patterns").items():
+        if words not in ([], ["blinking"]):
             raise OutOfRange(
-                "patterns must be a list of state=colour or state=colour blinking, not {entry!r}", entry=entry
+                "patterns: {state} may be followed only by blinking, not {words}", state=state, words=" ".join(words)
             )
-        if state not in states:
-            raise OutOfRange(
-                "patterns must name a state of {states}, not {state!r}", states=", ".join(states), state=state
-            )
-        if state in patterns:
-            raise OutOfRange("patterns must name each state once: {state!r} is in it twice", state=state)
+        if state.upper() not in MachineState.__members__:
+            states = ", ".join(MachineState.__members__).lower()
+            raise OutOfRange("patterns must name a state of {states}, not {state!r}", states=states, state=state)
         colors = [] if lamps == "off" else lamps.split("+")
         unknown = [color for color in colors if color not in fitted]
         if unknown and given:
             raise OutOfRange(
-                "patterns must show {state} by {fitted} or off, not {unknown!r}",
+                "patterns: {color!r} for {state} is not one of {colors}, off",
+                color=unknown[0],
                 state=state,
-                fitted=", ".join(fitted),
-                unknown=unknown[0],
+                colors=", ".join(fitted),
             )
         if not unknown:
             patterns[state] = dict.fromkeys(colors, bool(words))

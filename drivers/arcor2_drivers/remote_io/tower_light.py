@@ -4,6 +4,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Mapping
+from functools import partial
 from typing import ClassVar, Final
 
 from arcor2_hw.actions import StrEnum, action
@@ -13,19 +14,10 @@ from arcor2_hw.objects.point_actions import MARGIN
 
 from .block import Block
 from .registers import LONGEST_PULSE
-from .settings import Pattern, TowerLightSettings, parse_patterns
+from .settings import LampColor, Pattern, TowerLightSettings, parse_patterns
 
 DARK: Final[Pattern] = {}
-
-
-class LampColor(StrEnum):
-    """The colours a tower may have."""
-
-    RED = "red"
-    AMBER = "amber"
-    GREEN = "green"
-    BLUE = "blue"
-    WHITE = "white"
+"""The pattern with all lamps off."""
 
 
 class ShownState(StrEnum):
@@ -72,7 +64,7 @@ class TowerLight(Block, Generic):
         self.use_block(settings, settings.points())
 
     def arm(self) -> None:
-        """Take control; a pattern from before a loss is not shown again."""
+        """Take control; a pattern from before a connection loss is not shown again."""
         with self._showing:
             self._pattern, self._lit = DARK, {}
         super().arm()
@@ -87,8 +79,8 @@ class TowerLight(Block, Generic):
     def show(self, color: LampColor, blinking: bool = False, *, an: str | None = None) -> None:
         """Light one lamp and switch the others off.
 
-        :param color: which lamp
-        :param blinking: let it blink
+        :param color: colour of the lamp
+        :param blinking: whether the lamp blinks
         """
         if color not in self._lamps:
             raise OutOfRange(
@@ -103,7 +95,7 @@ class TowerLight(Block, Generic):
     def show_state(self, state: ShownState, *, an: str | None = None) -> None:
         """Show the state of a machine by its pattern.
 
-        :param state: which state
+        :param state: state of the machine
         """
         if state not in self._patterns:
             raise OutOfRange("{device} has no pattern for the state {state}", device=self.who, state=state)
@@ -118,7 +110,7 @@ class TowerLight(Block, Generic):
     def buzz(self, duration: float, *, an: str | None = None) -> None:
         """Sound the buzzer for a time, and return when it is silent again.
 
-        :param duration: how long, s
+        :param duration: duration, s
         """
         assert 0.01 <= duration <= 60.0
 
@@ -134,16 +126,16 @@ class TowerLight(Block, Generic):
             self._switch_lamps(dict.fromkeys(self._lamps, False) | dict.fromkeys(pattern, True))
 
     def after_reading(self) -> None:
-        """Let lamps blink."""
+        """Switch the blinking lamps."""
         super().after_reading()
-        with self._showing, contextlib.suppress(NotInControl):  # released or lost meanwhile
+        with self._showing, contextlib.suppress(NotInControl):  # control may end at any time
             if self._lit and self.in_control:
                 phase = int((time.monotonic() - self._since) / self._half_period)
                 self._switch_lamps({color: phase % 2 == 0 for color, blinks in self._pattern.items() if blinks})
 
     def _switch_lamps(self, wanted: Mapping[str, bool]) -> None:
-        # Lamps go off before others go on: two colours at once may mean something else.
+        # First off, then on: two colours at the same time may have another meaning.
         for color, on in sorted(wanted.items(), key=lambda lamp: lamp[1]):
             if self._lit.get(color) is not on:
-                self.switch_twice(color, on)
+                self.retry_once(partial(self.switch, color, on))
                 self._lit[color] = on

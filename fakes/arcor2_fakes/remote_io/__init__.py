@@ -1,7 +1,7 @@
-"""Fake remote I/O block on Modbus TCP or RTU, as docs/devices/remote-io.md says, in real time.
+"""Fake remote I/O block on Modbus TCP or RTU (docs/devices/remote-io.md), in real time.
 
-`python -m arcor2_fakes.remote_io --help`. The control channel sets inputs; outputs, pulses and the four watchdogs work
-as in the block.
+`python -m arcor2_fakes.remote_io --help`. The control channel sets the inputs. Outputs, pulses and the four watchdogs
+work as in the block.
 
 Not modelled: filters and delays of real inputs, noise and settling of analogue values, loads on the outputs, rejection
 of a second TCP client, RTU timing (silent intervals), broadcast writes, and Modbus over TLS.

@@ -1,4 +1,4 @@
-"""Starts the fake remote I/O block: `python -m arcor2_fakes.remote_io`."""
+"""Start the fake remote I/O block: `python -m arcor2_fakes.remote_io`."""
 
 from __future__ import annotations
 
@@ -35,21 +35,19 @@ def truth(block: Block) -> dict[str, Any]:
 
 
 def outputs(block: Block) -> dict[str, Any]:
-    """Return only the outputs, for the cell, which reads them a hundred times per second."""
+    """Return only the outputs; the cell reads them 100 times per second."""
     block.advance()
     return {"outputs": list(block.outputs), "analog_outputs": list(block.analog_outputs)}
 
 
 def register_commands(fake: Fake, block: Block, port: TcpWire | PtyLine) -> None:
-    """Register what tests and the cell can do to the block."""
+    """Register the commands of the control channel."""
 
     def set_input(number: int, on: bool) -> None:
-        if number not in range(DIGITAL):
-            raise ValueError(f"number is 0 to {DIGITAL - 1}")
-        block.inputs[number] = bool(on)
+        set_inputs({str(number): on})
 
     def set_inputs(inputs: dict[str, bool]) -> None:
-        """Switch several inputs at one instant, as {"3": true}."""
+        """Switch several inputs at the same time, as {"3": true}."""
         wanted = {int(number): bool(on) for number, on in inputs.items()}
         if not wanted.keys() <= set(range(DIGITAL)):
             raise ValueError(f"numbers are 0 to {DIGITAL - 1}")

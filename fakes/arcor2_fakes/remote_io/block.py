@@ -1,4 +1,4 @@
-"""The block: inputs, outputs, timed pulses and four watchdogs, without Modbus."""
+"""The block without Modbus: inputs, outputs, timed pulses and four watchdogs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class WatchdogState(IntEnum):
 
 @dataclass
 class Watchdog:
-    """A watchdog: the outputs it guards, and their safe states when its host is silent."""
+    """A watchdog: the outputs that it guards, and their safe states (bit masks)."""
 
     time_ms: int = 0
     number: int = 0
@@ -40,13 +40,17 @@ class Watchdog:
     state: WatchdogState = WatchdogState.OFF
     expires: float = 0.0
 
+    def set_safe(self, number: int, raw: int) -> None:
+        """Set the safe value of an analogue output."""
+        self.ao_safe[number] = raw
+
 
 class Locked(ValueError):
     """An expired watchdog holds this output in its safe state."""
 
 
 class Block:
-    """Time passes in `advance`, which applies what is due; callers call it before every access."""
+    """The block. Callers call `advance` before every access, which applies the changes that are due."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -70,7 +74,7 @@ class Block:
         self._pulses: dict[int, float] = {}
 
     def advance(self) -> None:
-        """Apply in order what is due: ends of pulses, watchdogs that expire."""
+        """Apply in order the ends of pulses and the expired watchdogs that are due."""
         now = self._clock()
         due: list[tuple[float, int, int]] = [(end, 0, number) for number, end in self._pulses.items() if end <= now]
         due += [

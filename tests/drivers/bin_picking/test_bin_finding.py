@@ -100,13 +100,13 @@ def test_what_is_refused(picture: Photographer, make: Callable[..., Bin]) -> Non
     assert crate.is_empty(picture())
     one, other = at(0.0, 0.0, FLAT), at(0.0, PART[1], FLAT)
     both = picture(part("one", one), part("other", other))
-    with pytest.raises(PartsTouch, match=r"^crate: what lies there is larger than one part"):
+    with pytest.raises(PartsTouch, match=r"^crate: an object is larger than one part"):
         crate.next_part(both)
     assert not crate.is_empty(both)
     wrong = at(0.0, 0.0, FLAT, turned(z=20))
-    with pytest.raises(BadFit, match=r"^crate: what lies there does not fit the part: quality 0\.\d\d, 0\.9 asked for"):
+    with pytest.raises(BadFit, match=r"^crate: no object fits the part: best quality 0\.\d\d, 0\.9 required"):
         crate.next_part(picture(part("wrong", wrong, (0.06, 0.04, 0.03))))
-    with pytest.raises(NoDepth, match=r"^crate: the crate is not seen"):
+    with pytest.raises(NoDepth, match=r"^crate: the crate is not visible"):
         crate.next_part(picture(camera=Pose(Position(0.6, 0.5, 0.7), Orientation(1, 0, 0, 0))))
     # Two touch, a third lies free: that one is to be had.
     free = at(-0.11, 0.0, FLAT, turned(z=90))
@@ -164,11 +164,11 @@ def test_pictures_that_are_none(picture: Photographer, make: Callable[..., Bin])
     crate, photo = make(), picture()
     with pytest.raises(InvalidData, match=r"^crate: the image has no note on how it was taken"):
         crate.next_part(Image.fromarray(np.asarray(photo)))
-    with pytest.raises(OutOfRange, match=r"^crate: depth must be a picture of 16 bits"):
+    with pytest.raises(OutOfRange, match=r"^crate: depth must be an image with 16 bits"):
         crate.next_part(PictureNote.of(photo).put_on(Image.new("RGB", (64, 48))))
     old = PictureNote.of(photo)
     ancient = PictureNote(old.parameters, old.pose, "2020-01-01T00:00:00+00:00", old.camera)
-    with pytest.raises(Stale, match=r"^crate: the picture of camera is"):
+    with pytest.raises(Stale, match=r"^crate: the image of camera is"):
         crate.next_part(ancient.put_on(photo))
     crate.disconnect()
     with pytest.raises(NotConnected, match=r"^crate is not connected"):

@@ -76,7 +76,7 @@ def test_results_that_wait_too_long_are_an_alarm(
 
 def test_one_outbox_is_open_in_one_place(fake: FakeProcess, erp: ErpService, make: Callable[..., ErpService]) -> None:
     second = make(fake.ready["url"])
-    with pytest.raises(Refused, match="open in another program"):
+    with pytest.raises(Refused, match="another program has opened the outbox"):
         second.connect(0.5)
     make(fake.ready["url"], station="other").connect()
     erp.disconnect()

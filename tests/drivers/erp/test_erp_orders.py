@@ -135,7 +135,7 @@ def test_a_closed_order_is_told_after_its_results(fake: FakeProcess, erp: ErpSer
 def test_an_answer_for_another_question_is_no_order(fake: FakeProcess, erp: ErpService) -> None:
     fake.control.do("add_order", order="A-1", product="PCB", quantity=1)
     fake.control.do("mistake", count=1)
-    with pytest.raises(DeviceError, match="another question"):
+    with pytest.raises(DeviceError, match="key of another request"):
         erp.next_order()
     assert erp.next_order()[1] == "A-1"
 

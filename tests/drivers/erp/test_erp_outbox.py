@@ -47,7 +47,7 @@ def test_production_goes_on_with_the_service_down(fake: FakeProcess, erp: ErpSer
     state = erp.outbox().value
     assert state.waiting == 30
     assert "planning at http" in state.last_error
-    with pytest.raises(DeviceTimeout, match="30 results still wait"):
+    with pytest.raises(DeviceTimeout, match="30 results are still waiting"):
         erp.wait_until_sent(0.1)
     fake.control.do("heal")
     erp.wait_until_sent(10.0)

@@ -111,13 +111,13 @@ def test_beside_a_block_on_the_same_device(
         ({}, "^one of red, amber, green, blue, white must be the output of a lamp"),
         ({"red": "DI0"}, "^red must be a digital output"),
         ({"red": "DO99"}, "^red must use DO0 to DO15"),
-        ({"red": "DO1", "green": "DO1"}, "^green must be an output of its own"),
+        ({"red": "DO1", "green": "DO1"}, "^green must not use DO1"),
         ({"red": "DO1", "on_loss": "green"}, "^on_loss must be one of red"),
         ({"red": "DO1", "blink_period": 0.0}, "^blink_period must be 0.2 to 10"),
-        ({"red": "DO1", "patterns": "idle"}, "^patterns must be a list of state=colour"),
+        ({"red": "DO1", "patterns": "idle"}, "^patterns must be a list of name="),
         ({"red": "DO1", "patterns": "sleeping=red"}, "^patterns must name a state of .*'sleeping'"),
-        ({"red": "DO1", "patterns": "idle=red; idle=off"}, "^patterns must name each state once"),
-        ({"red": "DO1", "patterns": "idle=green blinking"}, "^patterns must show idle by red or off, not 'green'"),
+        ({"red": "DO1", "patterns": "idle=red; idle=off"}, "^patterns must contain each name once"),
+        ({"red": "DO1", "patterns": "idle=green blinking"}, "^patterns: 'green' for idle is not one of red, off"),
     ],
 )
 def test_tower_settings_name_the_parameter(settings: dict[str, Any], told: str) -> None:
