@@ -1,4 +1,4 @@
-"""Starts the world of the cell: `python -m arcor2_fakes.cell`."""
+"""Start the simulated cell: `python -m arcor2_fakes.cell`."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from arcor2_fakes.control import ControlServer, parse_address
 from arcor2_fakes.process import announce, run, wait_for_end
 
 GONE_STATUS = 3
-_PICTURE_PERIOD = 0.1  # s; the camera renders anew when something was moved
+_PICTURE_PERIOD = 0.1  # s; the camera renders a new image when something has moved
 NAMES = {"io": "I/O block", "printer": "label printer", "arm": "two-axis robot"}
-_ROBOT_RATE = 100.0  # Hz; a tool at 1 m/s is known to a centimetre, a resting one exactly
+_ROBOT_RATE = 100.0  # Hz; error of the position: 1 cm at 1 m/s
 
 app = App(name="arcor2_fakes.cell", help="The small world of boards that the fakes share.", version_flags=[])
 
 
 class Cell:
-    """The world of now between its devices; `renew` puts another one in its place."""
+    """The world and its devices; `renew` replaces the world."""
 
     def __init__(self, layout: Layout, boards: list[Board], fakes: dict[str, Fake]) -> None:
         self._layout = layout
@@ -38,7 +38,7 @@ class Cell:
         self.world = World(layout, boards, self._devices)
 
     def register(self, control: ControlServer) -> None:
-        """Make what a test can do to the world known to the control channel."""
+        """Register the commands of the control channel."""
 
         async def gripper(works: bool) -> None:
             async with self._lock:
@@ -61,7 +61,7 @@ class Cell:
                 await self.world.remove(code)
 
         async def renew(boards: int, seed: int) -> None:
-            """Put other boards in place of all there are, and end what was stuck."""
+            """Replace all boards, and end the simulated faults of sensors."""
             if not 0 <= boards <= MAX_BOARDS:
                 raise ValueError(f"boards is 0 to {MAX_BOARDS}")
             drawn = draw_boards(boards, seed)
@@ -76,7 +76,7 @@ class Cell:
         control.source("truth", lambda: self.world.truth())
 
     async def follow(self) -> str:
-        """Let the world follow the devices; gives the reason when it can't any more."""
+        """Update the world from the devices; return the reason when that fails."""
         began = time.monotonic()
         try:
             await self._fakes["robot"].client.subscribe(self._robot.take, rate=_ROBOT_RATE)
@@ -99,7 +99,7 @@ class Cell:
 
 
 async def first_of(*waits: Any) -> Any:
-    """Return the result of whichever ends first; the others are cancelled."""
+    """Return the result of the awaitable that ends first, and cancel the others."""
     tasks = [asyncio.ensure_future(wait) for wait in waits]
     try:
         done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -113,7 +113,7 @@ async def first_of(*waits: Any) -> Any:
 async def live(
     layout: Layout, boards: list[Board], addresses: dict[str, str], control: ControlServer, patience: float
 ) -> str:
-    """Run the world until a fake has gone; gives a sentence that says which."""
+    """Run the world until a fake ends; return a sentence that names it."""
     async with contextlib.AsyncExitStack() as stack:
         fakes: dict[str, Fake] = {}
         for name, address in addresses.items():
@@ -145,25 +145,25 @@ def main(
     control: str = "127.0.0.1:0",
     patience: Annotated[float, Parameter(validator=validators.Number(gte=0))] = 30.0,
 ) -> int:
-    """Start the world; it prints one line `ready {json}` with its address and ends on SIGTERM.
+    """Start the cell; it prints one line `ready {json}` with its address and ends on SIGTERM.
 
-    Exit status: 0 told to end, 1 the control port is taken, 2 a wrong argument or layout, 3 a fake can't be reached or
-    has gone.
+    Exit status: 0 on SIGTERM, 1 if the control port is in use, 2 for a wrong argument or layout, 3 if a fake cannot be
+    reached or has ended.
 
     Args:
-        layout: JSON file of the cell's places.
+        layout: JSON file with the layout of the cell.
         robot: HOST:PORT of the fake robot controller's control channel.
         tester: HOST:PORT of the fake tester's control channel.
         reader: HOST:PORT of the fake reader's control channel.
-        conveyor: HOST:PORT of the fake conveyor's control channel, where the layout has a belt.
-        io: HOST:PORT of the fake remote I/O block's control channel, where it has light barriers or a tower light.
-        printer: HOST:PORT of the fake label printer's control channel, where it has a place for labelling.
-        arm: HOST:PORT of the fake two-axis robot's control channel, where it has a place for labelling.
-        camera: HOST:PORT of the fake camera's control channel, where it has one.
-        boards: how many boards come.
-        seed: decides the boards: their codes, and which are bad.
-        control: HOST:PORT of the world's own control channel; port 0 takes a free one.
-        patience: how long to wait for each fake that isn't there yet, s.
+        conveyor: HOST:PORT of the fake conveyor's control channel, if the layout has a belt.
+        io: HOST:PORT of the fake remote I/O block's control channel, if it has light barriers or a tower light.
+        printer: HOST:PORT of the fake label printer's control channel, if it has a place for labelling.
+        arm: HOST:PORT of the fake two-axis robot's control channel, if it has a place for labelling.
+        camera: HOST:PORT of the fake camera's control channel, if it has one.
+        boards: number of boards.
+        seed: seed of the boards: their codes and defects.
+        control: HOST:PORT of the control channel of the cell; port 0 takes a free one.
+        patience: time to wait for each fake to start, s.
     """
     given = {
         **{"robot": robot, "tester": tester, "reader": reader},

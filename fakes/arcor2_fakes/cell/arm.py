@@ -1,8 +1,8 @@
-"""The robot's arm as a camera sees it: tubes about a UR's published Denavit-Hartenberg frames, at its live joints.
+"""The shape of the robot arm for the camera: tubes around the Denavit-Hartenberg frames of a UR, at the present joints.
 
-Source of the lengths: Universal Robots, "DH Parameters for calculations of kinematics and dynamics". The tubes' radii
-and how far the arms are offset along their joints are stated here: they are facts of this fake, not of the vendor's
-parts. An elbow is a ball, a tube between two joints ends in balls; foot and tool flange are flat.
+Source of the lengths: Universal Robots, "DH Parameters for calculations of kinematics and dynamics". The radii of the
+tubes and the offsets of the arms along their joints are estimated. Elbows and the ends of tubes are spheres; foot and
+tool flange are flat.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ COLOR: Final = (184, 189, 199)
 _ALPHA: Final = (np.pi / 2, 0.0, 0.0, np.pi / 2, -np.pi / 2, 0.0)
 _CLEARANCE: Final = 0.005
 _FLANGE: Final = 0.94
-"""The flange's radius, of the last wrist's."""
+"""Ratio of the radius of the flange to that of the last wrist."""
 _GRIPPER: Final = (0.07, 0.045)
 
 
 @dataclass(frozen=True)
 class Tubes:
-    """Radii of foot, shoulder, upper arm, forearm and wrists, and the two arms' offsets along their joints, m."""
+    """Radii of foot, shoulder, upper arm, forearm and wrists, and offsets of both arms along their joints, m."""
 
     foot: float
     shoulder: float
@@ -46,9 +46,9 @@ TUBES: Final = {
 
 
 def things(model: str, base_link: Matrix, q: Sequence[float], tip: Matrix) -> dict[str, dict[str, Any]]:
-    """Return the links and the gripper as a fake camera takes them, by name.
+    """Return links and gripper by name, in the format of the fake camera.
 
-    `base_link` in the world; `q` in rad; `tip` on the flange, up to which the gripper reaches.
+    `base_link` is in the world, `q` in rad; the gripper extends from the flange to `tip`.
     """
     frames = _frames(model, base_link, q)
     length, tube = MODELS[model], TUBES[model]
@@ -73,16 +73,16 @@ def things(model: str, base_link: Matrix, q: Sequence[float], tip: Matrix) -> di
 
 
 def pose_of(matrix: Matrix) -> dict[str, Any]:
-    """Return a transform as the fakes write a pose."""
+    """Return a transform in the JSON format of a pose."""
     w, x, y, z = mat2quat(matrix[:3, :3])
     return {"position": [float(v) for v in matrix[:3, 3]], "orientation": [float(v) for v in (x, y, z, w)]}
 
 
 def _frames(model: str, base_link: Matrix, q: Sequence[float]) -> list[Matrix]:
-    """Return the foot's frame and of each joint the frame that turns with it, z along its axis."""
+    """Return the frame of the foot, and for each joint the frame that rotates with it, z along its axis."""
     length = MODELS[model]
     frames = [base_link]
-    frame = base_link @ _about_z(np.pi)  # the controller's base is turned by half a turn
+    frame = base_link @ _about_z(np.pi)  # the base frame of the controller is rotated by 180°
     offsets = (length.d1, 0.0, 0.0, length.d4, length.d5, length.d6)
     arms = (0.0, length.a2, length.a3, 0.0, 0.0, 0.0)
     for angle, d, a, alpha in zip(q, offsets, arms, _ALPHA, strict=True):

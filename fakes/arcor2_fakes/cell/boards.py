@@ -1,4 +1,4 @@
-"""The boards of a run, drawn from its seed."""
+"""The boards of a run, drawn from a seed."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Board(msgspec.Struct, frozen=True):
 
 
 def draw_boards(count: int, seed: int) -> list[Board]:
-    """Draw so many boards, the first on top. From two boards on there is at least one good and one bad.
+    """Draw boards, the first on top. Of two or more boards, at least one is good and one is bad.
 
-    Codes and defects are drawn apart, so that a code tells nothing of its board.
+    Codes and defects are independent.
     """
     codes = random.Random(f"codes {seed}").sample(range(10**6), count)
     fate = random.Random(f"defects {seed}")

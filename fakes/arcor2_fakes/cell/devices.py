@@ -1,4 +1,4 @@
-"""The world's side of the fakes' control channels: what it hears of them, and what it does to them."""
+"""Clients of the control channels of the fakes: what the world reads from them and sends to them."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from arcor2_fakes.control import ControlClient, ControlError
 
 _RETRY_PERIOD = 0.1
 _CONNECT_WITHIN = 1.0
-_MOTION_RATE = 100.0  # Hz; a belt at 0.5 m/s is known to 5 mm while it runs, a standing one exactly
-_OUTPUT_RATE = 10.0  # Hz; lamps are looked at, nothing follows from them
+_MOTION_RATE = 100.0  # Hz; error of the position of a belt: 5 mm at 0.5 m/s
+_OUTPUT_RATE = 10.0  # Hz; lamps are only displayed
 
 
 class DeviceGone(Exception):
-    """A fake can't be reached, has ended, or speaks of something else; the text names it and its address."""
+    """A fake cannot be reached, has ended, or sends unexpected data; the message names it and its address."""
 
 
 class Fake:
-    """The control channel of one fake, by the name the operator knows it by."""
+    """The control channel of a fake, and its name for messages."""
 
     def __init__(self, name: str, address: str, client: ControlClient) -> None:
         self.name = name
@@ -34,10 +34,10 @@ class Fake:
 
     @classmethod
     async def connect(cls, name: str, address: str, patience: float) -> Fake:
-        """Connect, waiting for a fake that is still starting.
+        """Connect; wait for a fake that is still starting.
 
         Raises:
-            DeviceGone: nobody listens there within `patience` seconds.
+            DeviceGone: It cannot be reached within `patience` s.
         """
         deadline = asyncio.get_running_loop().time() + patience
         while True:
@@ -49,13 +49,13 @@ class Fake:
                 await asyncio.sleep(_RETRY_PERIOD)
 
     async def gone(self) -> str:
-        """Return, with a sentence that says so, when the fake has gone."""
+        """Wait until the fake ends, and return a sentence that says so."""
         await self.client.wait_closed()
         return f"the {self.name} at {self.address} has gone"
 
 
 class FakeDevices:
-    """Does to the fakes what the world does to the devices."""
+    """Sends the effects of the world to the fakes."""
 
     def __init__(self, fakes: Mapping[str, Fake], sensor: int | None) -> None:
         self._robot, self._tester, self._reader = fakes["robot"], fakes["tester"], fakes["reader"]
@@ -64,11 +64,11 @@ class FakeDevices:
         self._sensor = sensor
 
     async def put_into_tester(self, board: Board) -> str | None:
-        """Lay a board into the fixture; gives the reason if that is impossible."""
+        """Put a board into the fixture; return the reason if that is impossible."""
         return await self._try(self._tester, "put_board", code=board.code, defect=board.defect)
 
     async def take_from_tester(self) -> str | None:
-        """Take the board out of the fixture; gives the reason if that is impossible."""
+        """Take the board out of the fixture; return the reason if that is impossible."""
         return await self._try(self._tester, "take_board")
 
     async def present(self, code: str | None) -> None:
@@ -81,18 +81,18 @@ class FakeDevices:
             await self._do(self._robot, "set_input", bit=self._sensor, on=held)
 
     async def set_barrier(self, number: int, interrupted: bool) -> None:
-        """Set the input that a light barrier is wired to."""
+        """Set the input to which a light barrier is connected."""
         if self._io is not None:
             await self._do(self._io, "set_input", number=number, on=interrupted)
 
     async def aim(self, layout: Layout) -> None:
-        """Let the camera look from where it hangs."""
+        """Set the pose of the camera."""
         if self._camera is not None and layout.camera is not None:
             pose = {"position": layout.camera.pose.position, "orientation": layout.camera.pose.orientation}
             await self._do(self._camera, "camera", pose=pose)
 
     async def show(self, seen: dict[str, dict[str, Any]]) -> None:
-        """Let the camera see these things, told only of what is different."""
+        """Set the objects in front of the camera; only changes are sent."""
         if self._camera is None:
             return
         others, moved = sight.changes(self._seen, seen)
@@ -122,7 +122,7 @@ class FakeDevices:
 
 
 class RobotFeed:
-    """The newest sample of the robot, and every one in between at which the outputs changed."""
+    """The newest sample of the robot, and every sample before it at which the outputs changed."""
 
     def __init__(self) -> None:
         self._samples: list[Robot] = []
@@ -130,13 +130,13 @@ class RobotFeed:
         self._problem: DeviceGone | None = None
 
     def take(self, truth: Any) -> None:
-        """Take what the fake controller has pushed."""
+        """Store a sample from the fake controller."""
         try:
             sample = msgspec.convert(truth, Robot)
         except msgspec.ValidationError as e:
             self._problem = DeviceGone(f"the robot's truth is not that of a controller: {e}")
         else:
-            # The world may be busy with a device: positions in between don't matter, switching does.
+            # While the world is busy with a device, positions may be skipped, but no change of an output.
             if self._samples and self._samples[-1].digital_outputs == sample.digital_outputs:
                 self._samples.pop()
             self._samples.append(sample)
@@ -153,7 +153,7 @@ class RobotFeed:
 
 
 class _Truth(msgspec.Struct):
-    """What the world reads of what a fake tells; each fake tells some of it."""
+    """The state of a fake, as far as the world uses it; each fake sends some of the fields."""
 
     belt: float = 0.0
     angles: dict[str, float] = {}
@@ -162,7 +162,7 @@ class _Truth(msgspec.Struct):
 
 
 class DeviceFeed:
-    """What was last heard of the devices beside the robot."""
+    """The last states of all devices except the robot."""
 
     def __init__(self, layout: Layout) -> None:
         self.inputs = Inputs()
@@ -170,7 +170,7 @@ class DeviceFeed:
         self._problem: DeviceGone | None = None
 
     async def follow(self, fakes: Mapping[str, Fake]) -> None:
-        """Subscribe to what those of the devices tell that are there."""
+        """Subscribe to the states of the devices of the cell."""
         followed = {
             "conveyor": ("motion", _MOTION_RATE, self._belt),
             "arm": ("motion", _MOTION_RATE, self._angles),
@@ -194,7 +194,7 @@ class DeviceFeed:
                 raise DeviceGone(f"the {fake.name} at {fake.address}: {e}") from e
 
     def check(self) -> None:
-        """Raise `DeviceGone` if a device tells something else than one of its kind."""
+        """Raise `DeviceGone` if a device has sent unexpected data."""
         if self._problem is not None:
             raise self._problem
 

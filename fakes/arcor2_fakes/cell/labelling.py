@@ -1,4 +1,4 @@
-"""The place under the label printer: a label that comes out lies on the board there until an arm has pressed it on."""
+"""The place under the label printer, where a label lands on a board and an arm presses it on."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from arcor2_fakes.cell.things import Label, Printed, Thing
 
 
 class LabelNest:
-    """One board at a time. `spilled` are labels that came out with no bare board below."""
+    """The place for one board. `spilled` counts the labels without a bare board below."""
 
     def __init__(self, layout: Labelling) -> None:
         self.layout = layout
@@ -22,12 +22,12 @@ class LabelNest:
         self.roller: tuple[float, float, float] | None = None
 
     def holds(self, world_from_board: Matrix) -> bool:
-        """Say whether a board there is in the nest."""
+        """Return whether a board at a pose is in the nest."""
         return self.layout.place.holds(world_from_board)
 
     def printed(self, labels: list[Printed]) -> list[tuple[Thing, str]]:
-        """Take what the printer has printed in its life; gives the boards that got one now, and what to say of it."""
-        if self._last is None:  # what came out before the world began lies elsewhere
+        """Update from all labels of the printer; return the boards that received one now, and events."""
+        if self._last is None:  # labels printed before the world started do not count
             self._last = max((label.number for label in labels), default=0)
         happened = []
         for label in labels:
@@ -42,9 +42,9 @@ class LabelNest:
         return happened
 
     def wiped(self, angles: tuple[float, float]) -> Thing | None:
-        """Let the arm's roller be where its joints put it; gives the board whose label is pressed on by that.
+        """Update the position of the roller; return the board whose label was pressed on now.
 
-        A label is pressed on when the roller has gone over it from one end to the other.
+        A label is pressed on when the roller has moved over it from one end to the other.
         """
         wipe = self.layout.press
         self.roller = here = self._roller(angles)
@@ -64,7 +64,7 @@ class LabelNest:
         return None
 
     def taken(self) -> str:
-        """Take the board out; gives what to say of it. A label that only lies there does not come along."""
+        """Take the board out; return an event if it loses a label that was not pressed on."""
         thing, self.thing = self.thing, None
         assert thing is not None, "there is a board to be taken"
         if thing.label is not None and not thing.label.pressed:

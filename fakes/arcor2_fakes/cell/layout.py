@@ -20,25 +20,25 @@ POSE is ``{"position": [x, y, z], "orientation": [x, y, z, w]}``, the orientatio
 [0, 0, 0, 1].
 PLACE is ``"pose": POSE, "tolerance": {"position": 0.005, "height": 0.01, "tilt": 0.1, "turn": 0.2}``.
 
-- `robot.base` is the robot's `base_link` in the world. The controller's own base is turned by 180° about z from it; the
-  world knows that.
-- `gripper.output` is the number of the digital output of the controller that closes the gripper, `gripper.sensor` the
-  digital input that says that something is held (null: no such sensor), `gripper.tip` the pose of the grip point on the
-  flange, z pointing out. It is a fact of the cell; which TCP the controller has been told does not matter.
-- The pose of a place is that of a board lying there: origin where it is gripped, z up. The tip's z points against it.
-- A board let go, or a tip that is to grip, is at a place when it is no more than `position` away from it sideways, no
-  more than `position` below and `height` above it, when its z deviates by `tilt` at most and, if `turn` is given, when
-  it is turned about z by `turn` at most.
-- Instead of a `feeder`, boards may come on a `belt`; its pose is that of a board at the stop at its end, x the way it
-  runs. A light barrier is interrupted (its input of the I/O block is on) while a board is at `at`, m before the stop
-  and so 0 or negative.
+- `robot.base` is the pose of the robot's `base_link` in the world. The base frame of the controller is rotated by 180°
+  about z; the world takes that into account.
+- `gripper.output` is the number of the digital output of the controller that closes the gripper, `gripper.sensor` that
+  of the digital input that is on while a part is gripped (null: no sensor), `gripper.tip` the pose of the grip point on
+  the flange, z out. It does not depend on the TCP that is set in the controller.
+- The pose of a place is that of a board on it: origin at the grip point, z up. The z axis of the tip points down.
+- A released board, or a gripping tip, is at a place when it is at most `position` away horizontally, at most `position`
+  below and `height` above it, when the angle between the z axes is at most `tilt` and, if `turn` is given, the rotation
+  about z at most `turn`.
+- Instead of a `feeder` there may be a `belt`; its pose is that of a board at the stop at its end, x in the direction of
+  travel. A light barrier is interrupted (its input of the I/O block is on) while a board is at `at`: position along x
+  from the stop, m, 0 or negative.
 - `labelling` is the place under the label printer, and the arm whose roller presses labels on from `begin` to `end`.
 - `camera` has the pose of a camera's optical frame (x right, y down, z forward), the size of a `board`, and `things`
-  that it sees besides: boxes with `name`, `pose` of the middle, `size` and `color`; and `markers` (ArUco, 4×4_50) with
-  `id`, `pose` of the middle (x right, y up, z out of the marker) and `size`, the side of the black square.
-- `robot.model` (ur3e, ur5e, ur10e) is there when the camera shall see the arm.
-- `tower` names the outputs of the I/O block that lamps hang on. What a cell does not have is left out.
-- `reader` is the place where a board, held or on the feeder, is in the reader's view; `tester` is the fixture.
+  that it also sees: boxes with `name`, `pose` of the centre, `size` and `color`; and `markers` (ArUco, 4×4_50) with
+  `id`, `pose` of the centre (x right, y up, z out of the marker) and `size`, the side of the black square.
+- `robot.model` (ur3e, ur5e, ur10e) is set if the camera sees the arm.
+- `tower` maps lamps to outputs of the I/O block. Omit what the cell does not have.
+- `reader` is the place where the reader sees a board, gripped or in the feeder; `tester` is the fixture.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ Bit = Annotated[int, Meta(ge=0, le=17)]
 
 
 class LayoutError(ValueError):
-    """The layout can't be read or describes no cell; the text names the file and the field."""
+    """The layout cannot be read or is invalid; the message names the file and the field."""
 
 
 class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -76,14 +76,14 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if abs(math.hypot(*self.orientation) - 1.0) > 1e-3:
-            raise ValueError("orientation is no unit quaternion x, y, z, w")
+            raise ValueError("orientation must be a unit quaternion x, y, z, w")
 
     def matrix(self) -> Matrix:
-        """Return the pose as a transform. Not to be changed: it is kept."""
+        """Return the pose as a transform; do not modify it, because it is cached."""
         return _matrices(self)[0]
 
     def inverse(self) -> Matrix:
-        """Return the inverse transform. Not to be changed: it is kept."""
+        """Return the inverse transform; do not modify it, because it is cached."""
         return _matrices(self)[1]
 
 
@@ -96,7 +96,7 @@ def _matrices(pose: Pose) -> tuple[Matrix, Matrix]:
 
 
 class Tolerance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How far from a place something may be and still be there."""
+    """Largest deviation from a place."""
 
     position: Length
     height: Length
@@ -104,7 +104,7 @@ class Tolerance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     turn: Angle | None = None
 
     def allows(self, place_from_board: Matrix, along: float = 0.0) -> bool:
-        """Say whether a board at this pose is close enough, to what is `along` m along the place's x axis."""
+        """Return whether a board at a pose is close enough to the point `along` m along the x axis of the place."""
         x, y, z = place_from_board[:3, 3]
         if math.hypot(x - along, y) > self.position or not -self.position <= z <= self.height:
             return False
@@ -114,18 +114,18 @@ class Tolerance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Place(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Somewhere a board can be."""
+    """A place for a board."""
 
     pose: Pose
     tolerance: Tolerance
 
     def holds(self, world_from_board: Matrix) -> bool:
-        """Say whether a board at this pose is at this place."""
+        """Return whether a board at a pose is at this place."""
         return self.tolerance.allows(self.pose.inverse() @ world_from_board)
 
 
 class Feeder(Place, frozen=True, forbid_unknown_fields=True):
-    """A magazine that brings the next board to the same pick place."""
+    """A magazine that moves the next board to the pick place."""
 
     refill_time: Duration = 0.3
 
@@ -138,7 +138,7 @@ class Barrier(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Belt(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A belt with a stop at its end and a loader at its beginning."""
+    """A belt with a loader at its start and a stop at its end."""
 
     pose: Pose
     tolerance: Tolerance
@@ -150,11 +150,11 @@ class Belt(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if not self.board_length <= self.pitch <= self.length:
-            raise ValueError("pitch is at least the board_length and at most the length")
+            raise ValueError("pitch must be at least board_length and at most length")
 
 
 class Arm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A planar two-axis robot; links in m, servos by their id on the bus."""
+    """A planar two-axis robot: lengths of its links, m, and ids of its servos on the bus."""
 
     base: Pose
     links: tuple[Length, Length]
@@ -162,7 +162,7 @@ class Arm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Press(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The way over a label that presses it on, in the world."""
+    """The path of the roller over a label, in the world."""
 
     begin: tuple[float, float, float]
     end: tuple[float, float, float]
@@ -170,7 +170,7 @@ class Press(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if math.dist(self.begin, self.end) <= 2.0 * self.tolerance:
-            raise ValueError("begin and end are farther apart than twice the tolerance")
+            raise ValueError("the distance from begin to end must be more than twice the tolerance")
 
 
 class Labelling(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -182,7 +182,7 @@ class Labelling(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Fixture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A box that the camera sees and that never moves; its pose is that of its middle, its colour red, green, blue."""
+    """A fixed box that the camera sees; `pose` is that of its centre, `color` is R, G, B."""
 
     name: str
     pose: Pose
@@ -191,7 +191,7 @@ class Fixture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An ArUco marker (4×4_50) somewhere in the cell; its pose is that of its middle, z out of it."""
+    """An ArUco marker (4×4_50); `pose` is that of its centre, z out of the marker."""
 
     id: Annotated[int, Meta(ge=0, le=49)]
     pose: Pose
@@ -199,7 +199,7 @@ class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A camera: the pose of its optical frame, what stands before it, and how large a board is."""
+    """A camera: the pose of its optical frame, the fixed objects that it sees, and the size of a board."""
 
     pose: Pose
     board: tuple[Length, Length, Length]
@@ -208,7 +208,7 @@ class Camera(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Robot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the robot stands, and which it is, for who looks at it."""
+    """Pose of the robot, and its model for the camera."""
 
     base: Pose
     model: Literal["ur3e", "ur5e", "ur10e"] | None = None
@@ -242,10 +242,10 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if (self.feeder is None) == (self.belt is None):
-            raise ValueError("boards come from a feeder or on a belt: one of the two")
+            raise ValueError("the layout must have either a feeder or a belt")
 
     def needs(self) -> list[str]:
-        """Return which devices beside robot, tester and reader the cell needs."""
+        """Return the devices that the cell needs in addition to robot, tester and reader."""
         needed = {
             "conveyor": self.belt is not None,
             "io": bool(self.tower) or (self.belt is not None and bool(self.belt.barriers)),
@@ -260,7 +260,7 @@ def read_layout(path: Path) -> Layout:
     """Read a layout from a JSON file.
 
     Raises:
-        LayoutError: there is no such file, it is no JSON, or a field is missing, unknown or out of range.
+        LayoutError: The file is missing or invalid.
     """
     try:
         return msgspec.json.decode(path.read_bytes(), type=Layout)
@@ -271,7 +271,7 @@ def read_layout(path: Path) -> Layout:
 
 
 def from_rotation_vector(pose: tuple[float, float, float, float, float, float]) -> Matrix:
-    """Return the transform of a controller's pose: position and rotation vector."""
+    """Return the transform of a position and rotation vector."""
     angle = math.hypot(*pose[3:])
     rotation = np.eye(3) if angle < 1e-12 else axangle2mat(pose[3:], angle)
     return _transform(pose[:3], rotation)

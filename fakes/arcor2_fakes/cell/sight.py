@@ -1,4 +1,4 @@
-"""What the camera sees: the fixed things of the cell and its boards, in the form in which the fake camera is told."""
+"""The objects in front of the camera: fixed objects and boards, in the format of the fake camera."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from arcor2_fakes.cell.arm import pose_of
 from arcor2_fakes.cell.layout import Camera, Matrix, Pose
 
 GREEN, LABELLED = (40, 110, 20), (205, 215, 215)
-"""A bare board, and one whose label covers it, as red, green, blue."""
+"""Colours of a bare and of a labelled board: R, G, B."""
 PAPER = 1.5
-"""The side of a marker's paper, of its black square's: it has a white margin."""
+"""Ratio of the side of the paper of a marker to that of its black square."""
 THICKNESS = 0.001
-"""m, of the paper; the marker's pose is that of its face."""
+"""Thickness of the paper, m; the pose of a marker is at its surface."""
 MOVED = 0.0005
-"""m; less than that is not worth a new picture."""
+"""Smallest displacement that is sent to the camera, m."""
 
 
 def fixed(camera: Camera) -> list[dict[str, Any]]:
-    """Return the things that never move."""
+    """Return the fixed objects."""
     found = [
         {"name": thing.name, "pose": _pose(thing.pose), "size": thing.size, "color": thing.color}
         for thing in camera.things
@@ -40,7 +40,7 @@ def fixed(camera: Camera) -> list[dict[str, Any]]:
 
 
 def board(camera: Camera, code: str, world_from_board: Matrix, labelled: bool) -> dict[str, Any]:
-    """Return a board; its pose is that of its top, where it is gripped."""
+    """Return a board whose grip point, at the top, is at a pose."""
     pose = pose_of(world_from_board @ _down(camera.board[2] / 2.0))
     return {"name": code, "pose": pose, "size": camera.board, "color": LABELLED if labelled else GREEN}
 
@@ -48,13 +48,15 @@ def board(camera: Camera, code: str, world_from_board: Matrix, labelled: bool) -
 def changes(
     before: dict[str, dict[str, Any]], after: dict[str, dict[str, Any]]
 ) -> tuple[bool, dict[str, dict[str, Any]]]:
-    """Return whether other things stand there or look different now, and else the poses of those that were moved."""
-    if {name: _look(thing) for name, thing in before.items()} != {name: _look(thing) for name, thing in after.items()}:
+    """Return whether objects were added, removed or changed, and otherwise the poses of the moved objects."""
+    if {name: _appearance(thing) for name, thing in before.items()} != {
+        name: _appearance(thing) for name, thing in after.items()
+    }:
         return True, {}
     return False, {name: thing["pose"] for name, thing in after.items() if _far(before[name]["pose"], thing["pose"])}
 
 
-def _look(thing: dict[str, Any]) -> dict[str, Any]:
+def _appearance(thing: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in thing.items() if key != "pose"}
 
 

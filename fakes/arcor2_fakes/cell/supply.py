@@ -1,4 +1,4 @@
-"""Where boards come from: a magazine that brings one after another to the same place, or a belt."""
+"""The supply of boards: a magazine or a belt."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _TOUCHING = 1e-6
 
 
 class Supply(Protocol):
-    """What the world asks of a supply; times in s since the world began, poses in the world."""
+    """A supply of boards; times are in s since the start of the world, poses in the world."""
 
     place: str
-    """What the place of its boards is called."""
+    """Name of the place of its boards."""
 
     def advance(self, now: float, counts: float | None) -> list[tuple[Thing, str, str]]:
-        """Let time pass up to `now` and the belt be at `counts`; gives what happened: who, to which place, why."""
+        """Advance to the time `now` and the belt position `counts`; return events: board, place, reason."""
         ...
 
     def top(self) -> Thing | None:
@@ -27,32 +27,32 @@ class Supply(Protocol):
         ...
 
     def under(self, world_from_gripped: Matrix) -> tuple[Thing, Matrix] | None:
-        """Return the board that jaws there get hold of, and its pose."""
+        """Return the board between jaws at a pose, and its pose."""
         ...
 
     def seen_by(self, window: Place) -> Thing | None:
-        """Return the board that lies in a reader's view."""
+        """Return the board in the view of a reader."""
         ...
 
     def take(self, thing: Thing) -> None:
-        """Take a board away."""
+        """Remove a board."""
         ...
 
     def accepts(self, world_from_board: Matrix) -> bool:
-        """Say whether a board let go here comes down on the supply."""
+        """Return whether a board released at a pose lands on the supply."""
         ...
 
     def put(self, thing: Thing, world_from_board: Matrix) -> str | None:
-        """Lay a board down; gives the reason if there is no room for it."""
+        """Put a board down; return the reason if there is no space."""
         ...
 
     def pose(self, thing: Thing) -> Matrix | None:
-        """Return where a board lies; nothing for one that is still to come."""
+        """Return the pose of a board; None if it has not arrived yet."""
         ...
 
 
 class Magazine:
-    """A stack; the next board comes to the pick place some time after the last one was taken."""
+    """A stack; the next board arrives at the pick place some time after the last one was taken."""
 
     place = "feeder"
 
@@ -62,7 +62,7 @@ class Magazine:
         self._now = self._refilled_at = 0.0
 
     def advance(self, now: float, counts: float | None) -> list[tuple[Thing, str, str]]:  # noqa: ARG002 - no belt
-        """Let time pass."""
+        """Advance to the time `now`."""
         self._now = now
         return []
 
@@ -71,41 +71,41 @@ class Magazine:
         return self._things[0] if self._things and self._now >= self._refilled_at else None
 
     def under(self, world_from_gripped: Matrix) -> tuple[Thing, Matrix] | None:
-        """Return the top board when the jaws are at it."""
+        """Return the top board if the jaws are at it."""
         top = self.top()
         return (top, self._feeder.pose.matrix()) if top is not None and self.accepts(world_from_gripped) else None
 
     def seen_by(self, window: Place) -> Thing | None:
-        """Return the top board when the pick place is in view."""
+        """Return the top board if the pick place is in view."""
         return self.top() if window.holds(self._feeder.pose.matrix()) else None
 
     def take(self, thing: Thing) -> None:
-        """Take a board away; if it was the top one, the next is on its way."""
+        """Remove a board; if it was the top one, the next one arrives after a while."""
         if thing is self.top():
             self._refilled_at = self._now + self._feeder.refill_time
         self._things.remove(thing)
 
     def accepts(self, world_from_board: Matrix) -> bool:
-        """Say whether a board let go here lies at the pick place."""
+        """Return whether a board released at a pose lands at the pick place."""
         return self._feeder.holds(world_from_board)
 
-    def put(self, thing: Thing, world_from_board: Matrix) -> str | None:  # noqa: ARG002 - it slides into place
-        """Lay a board back."""
+    def put(self, thing: Thing, world_from_board: Matrix) -> str | None:  # noqa: ARG002 - it slides to the pick place
+        """Put a board back."""
         if self.top() is not None:
             return "over the feeder, where the next board lies already"
         self._things.insert(0, thing)
         self._refilled_at = self._now
         return None
 
-    def pose(self, thing: Thing) -> Matrix | None:  # noqa: ARG002 - all at one place
+    def pose(self, thing: Thing) -> Matrix | None:  # noqa: ARG002 - all boards are at one place
         """Return the pick place."""
         return self._feeder.pose.matrix()
 
 
 class BoardBelt:
-    """Boards on a belt that ends at a stop. A loader lays the next one on at the far end whenever there is room.
+    """Boards on a belt that ends at a stop. A loader adds the next one at the start as soon as there is space.
 
-    A board's place is `s`, m before the stop, negative; those that have run up wait there while the belt slips beneath.
+    The position of a board is `s`, m from the stop, negative. Boards at the stop wait while the belt slips below them.
     """
 
     place = "belt"
@@ -117,7 +117,7 @@ class BoardBelt:
         self._counts: float | None = None
 
     def advance(self, now: float, counts: float | None) -> list[tuple[Thing, str, str]]:  # noqa: ARG002 - moved by counts
-        """Let the boards ride along."""
+        """Move the boards with the belt."""
         belt, happened = self._belt, []
         if counts is not None:
             moved = 0.0 if self._counts is None else (counts - self._counts) / belt.counts_per_metre
@@ -138,11 +138,11 @@ class BoardBelt:
         return happened
 
     def places(self) -> list[tuple[Thing, float]]:
-        """Return the boards on the belt and where each is, m before the stop, negative."""
+        """Return the boards on the belt and their positions, m from the stop, negative."""
         return list(self._on)
 
     def interrupts(self, at: float) -> bool:
-        """Say whether a board stands in the beam at `at`, m before the stop, negative."""
+        """Return whether a board interrupts the beam at `at`, m from the stop, negative."""
         return any(abs(s - at) <= self._belt.board_length / 2.0 for _, s in self._on)
 
     def _pose(self, s: float) -> Matrix:
@@ -152,11 +152,11 @@ class BoardBelt:
         return pose
 
     def top(self) -> Thing | None:
-        """Return the board that lies at the stop."""
+        """Return the board at the stop."""
         return self._on[0][0] if self._on and self._on[0][1] >= -_TOUCHING else None
 
     def under(self, world_from_gripped: Matrix) -> tuple[Thing, Matrix] | None:
-        """Return the board that the jaws are at, wherever it has come to lie."""
+        """Return the board at the jaws, anywhere on the belt."""
         local = self._belt.pose.inverse() @ world_from_gripped
         for thing, s in self._on:
             if self._belt.tolerance.allows(local, s):
@@ -168,18 +168,18 @@ class BoardBelt:
         return next((thing for thing, s in self._on if window.holds(self._pose(s))), None)
 
     def take(self, thing: Thing) -> None:
-        """Take a board away, from the belt or out of the loader."""
+        """Remove a board from the belt or the loader."""
         self._on = [(other, s) for other, s in self._on if other is not thing]
         self._loader = [other for other in self._loader if other is not thing]
 
     def accepts(self, world_from_board: Matrix) -> bool:
-        """Say whether a board let go here comes down on the belt."""
+        """Return whether a board released at a pose lands on the belt."""
         local = self._belt.pose.inverse() @ world_from_board
         s = float(local[0, 3])
         return -self._belt.length <= s <= self._belt.tolerance.position and self._belt.tolerance.allows(local, s)
 
     def put(self, thing: Thing, world_from_board: Matrix) -> str | None:
-        """Lay a board on the belt."""
+        """Put a board on the belt."""
         s = min(float((self._belt.pose.inverse() @ world_from_board)[0, 3]), 0.0)
         if any(abs(s - other) < self._belt.board_length - _TOUCHING for _, other in self._on):
             return "onto a board that lies on the belt"
@@ -187,5 +187,5 @@ class BoardBelt:
         return None
 
     def pose(self, thing: Thing) -> Matrix | None:
-        """Return where a board lies on the belt."""
+        """Return the pose of a board on the belt."""
         return next((self._pose(s) for other, s in self._on if other is thing), None)

@@ -1,4 +1,4 @@
-"""Things in the world and what is sensed of the fakes at one instant."""
+"""Data of the world: states of the devices at one instant, labels, events and boards."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ControllerPose = tuple[float, float, float, float, float, float]
 
 
 class Robot(msgspec.Struct, frozen=True):
-    """One sample of the robot: the TCP in the controller's base, on the flange, the digital outputs as bits, joints."""
+    """A sample of the robot: TCP in the controller's base, TCP on the flange, outputs (bit mask), joints, rad."""
 
     tcp_pose: ControllerPose
     tcp_offset: ControllerPose
@@ -23,28 +23,28 @@ class Robot(msgspec.Struct, frozen=True):
     q: tuple[float, ...] = ()
 
     def base_from_flange(self) -> Matrix:
-        """Return the flange, which stands where it stands whatever TCP somebody has set."""
+        """Return the pose of the flange, which does not depend on the TCP that is set."""
         flange: Matrix = from_rotation_vector(self.tcp_pose) @ np.linalg.inv(from_rotation_vector(self.tcp_offset))
         return flange
 
 
 class Printed(msgspec.Struct, frozen=True):
-    """A label that has come out of the printer; printers number theirs."""
+    """A label from the printer, with its number."""
 
     number: int
     fields: list[dict[str, Any]]
 
     @property
     def code(self) -> str:
-        """Return what its bar code says, or nothing."""
+        """Return the content of its barcode; None if it has none."""
         return next((str(field["text"]) for field in self.fields if field.get("barcode")), "")
 
 
 class Inputs(msgspec.Struct):
-    """What the world has last heard of the devices that a cell may have beside its robot."""
+    """The last states of the devices that a cell may have in addition to its robot."""
 
     belt: float | None = None
-    """Counts of the conveyor's drive."""
+    """Position of the conveyor drive, counts."""
     printed: list[Printed] = []
     arm: tuple[float, float] | None = None
     """Angles of the two-axis robot, rad."""
@@ -53,7 +53,7 @@ class Inputs(msgspec.Struct):
 
 
 class Event(msgspec.Struct, frozen=True):
-    """Something that happened to a board, seconds after the world began."""
+    """An event of a board, `time` s after the start of the world."""
 
     time: float
     place: str
@@ -61,14 +61,14 @@ class Event(msgspec.Struct, frozen=True):
 
 
 class Label(msgspec.Struct):
-    """A label on a board; until it is pressed on, it only lies there."""
+    """A label on a board; it is loose until it is pressed on."""
 
     code: str
     pressed: bool = False
 
 
 class Thing:
-    """A board in the world, where it is, and what happened to it."""
+    """A board in the world, its place, and its events."""
 
     def __init__(self, board: Board) -> None:
         self.board = board

@@ -1,4 +1,4 @@
-"""What happens to the boards: gripped, carried, let go, tested, counted. Knows no socket and no clock."""
+"""World: boards are gripped, moved, released, tested and counted. Independent of sockets and clocks."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from arcor2_fakes.cell.things import Event, Inputs, Robot, Thing
 
 PLACES = ("feeder", "belt", "gripper", "tester", "label", "good", "bad", "lost", "removed")
 
-# The controller's base is base_link turned by half a turn about z.
+# The base frame of the controller is base_link rotated by 180° about z.
 _BASE_LINK_FROM_BASE = compose((0.0, 0.0, 0.0), euler2mat(0.0, 0.0, np.pi), np.ones(3))
-# The tip's z points down at a board whose z points up.
+# The z axis of the tip points down, that of a board up.
 _TIP_FROM_GRIPPED = compose((0.0, 0.0, 0.0), euler2mat(np.pi, 0.0, 0.0), np.ones(3))
 
 
 class Devices(Protocol):
-    """What the world does to the devices."""
+    """The effects of the world on the devices."""
 
     async def put_into_tester(self, board: Board) -> str | None:
-        """Lay a board into the fixture; gives the reason if that is impossible."""
+        """Put a board into the fixture; return the reason if that is impossible."""
         ...
 
     async def take_from_tester(self) -> str | None:
-        """Take the board out of the fixture; gives the reason if that is impossible."""
+        """Take the board out of the fixture; return the reason if that is impossible."""
         ...
 
     async def present(self, code: str | None) -> None:
@@ -45,15 +45,15 @@ class Devices(Protocol):
         ...
 
     async def set_barrier(self, number: int, interrupted: bool) -> None:
-        """Set the input of the I/O block that a light barrier is wired to."""
+        """Set the input of the I/O block to which a light barrier is connected."""
         ...
 
 
 class World:
     """The boards of one run.
 
-    `step` is called with each sample of the robot, in order, and with what was last heard of the other devices; what
-    takes time (jaws, the feeder) advances with it.
+    Call `step` with each sample of the robot, in order, and with the last states of the other devices. It also advances
+    what takes time: jaws and feeder.
     """
 
     def __init__(self, layout: Layout, boards: list[Board], devices: Devices) -> None:
@@ -78,7 +78,7 @@ class World:
         self._robot: Robot | None = None
         self._world_from_tip: Matrix | None = None
         self._now = 0.0
-        self._closing = False  # what the output last told the jaws
+        self._closing = False  # last value of the output of the gripper
         self._jaws_due: float | None = None
         self.jaws_closed = False
         self.gripper_works = True
@@ -89,7 +89,7 @@ class World:
         self._barriers_told: dict[int, bool] = {}
 
     async def begin(self) -> None:
-        """Bring the devices in step with the world; call it once, before the first `step`."""
+        """Synchronize the devices with the world; call it once, before the first `step`."""
         await self._tell_sensor()
         await self._tell_barriers()
         await self._devices.present(None)
@@ -97,7 +97,7 @@ class World:
     # ------------------------------------------------------------------------------------------------ time
 
     async def step(self, now: float, robot: Robot, inputs: Inputs | None = None) -> None:
-        """Let the world follow the robot and the other devices; `now` in seconds since the world began."""
+        """Update the world from the robot and the other devices; `now` is in s since the start of the world."""
         self._now = now
         self._inputs = inputs = inputs or Inputs()
         for thing, place, why in self._supply.advance(now, inputs.belt):
@@ -108,7 +108,7 @@ class World:
             pressed = None if inputs.arm is None else self._nest.wiped(inputs.arm)
             if pressed is not None:
                 self._note(pressed, "the label was pressed on")
-        if robot != self._robot:  # an arm at rest costs nothing
+        if robot != self._robot:  # nothing to do while the arm is stopped
             self._robot = robot
             self._world_from_tip = self._world_from_base @ robot.base_from_flange() @ self._flange_from_tip
         await self._drive_jaws(bool(robot.digital_outputs >> self._layout.gripper.output & 1))
@@ -117,7 +117,7 @@ class World:
 
     async def _drive_jaws(self, closing: bool) -> None:
         if not self.gripper_works:
-            self._closing, self._jaws_due = self.jaws_closed, None  # once repaired they follow the output again
+            self._closing, self._jaws_due = self.jaws_closed, None  # after a repair they follow the output again
             return
         gripper = self._layout.gripper
         if closing != self._closing:
@@ -129,7 +129,7 @@ class World:
                 await self._grip()
             elif not self._closing and self.jaws_closed:
                 await self._let_go("let go")
-            self.jaws_closed = self._closing  # last, so that who sees it sees what came of it
+            self.jaws_closed = self._closing  # last: a client that sees the event also sees its effects
 
     # ------------------------------------------------------------------------------------------------ gripping
 
@@ -223,7 +223,7 @@ class World:
                 await self._devices.set_barrier(number, interrupted)
 
     async def _show(self) -> None:
-        """Let the reader see the board in its view, if there is one."""
+        """Show the reader the board in its view, if there is one."""
         window, code = self._layout.reader, None
         if self._held is not None and window.holds(self._tip() @ self._tip_from_board):
             code = self._held.board.code
@@ -236,25 +236,25 @@ class World:
     # ------------------------------------------------------------------------------------------------ told by a test
 
     async def drop(self) -> None:
-        """Let the held board slip out of the jaws.
+        """Let the gripped board slip out of the jaws.
 
         Raises:
-            ValueError: nothing is held.
+            ValueError: No board is gripped.
         """
         if self._held is None:
-            raise ValueError("nothing is held")
+            raise ValueError("no board is gripped")
         await self._let_go("slipped out of the gripper")
 
     async def stick_sensor(self, value: bool | None) -> None:
-        """Let the gripper's sensor always show this; None lets it show the truth again."""
+        """Freeze the value of the gripper's sensor; None: it works again."""
         self._sensor_stuck = value
         await self._tell_sensor()
 
     async def stick_barrier(self, number: int, value: bool | None) -> None:
-        """Let a light barrier always show this; None lets it show the truth again.
+        """Freeze the value of a light barrier; None: it works again.
 
         Raises:
-            ValueError: no light barrier is wired to that input.
+            ValueError: No light barrier is connected to that input.
         """
         belt = self._layout.belt
         wired = [barrier.input for barrier in belt.barriers] if belt is not None else []
@@ -267,10 +267,10 @@ class World:
         await self._tell_barriers()
 
     async def remove(self, code: str) -> None:
-        """Take a board away by hand, for good.
+        """Remove a board by hand, permanently.
 
         Raises:
-            ValueError: there is no such board, or it can't be reached.
+            ValueError: There is no such board, or it cannot be reached.
         """
         thing = next((thing for thing in self._things if thing.board.code == code), None)
         if thing is None:
@@ -285,7 +285,7 @@ class World:
         await self._tell_sensor()
 
     async def clear_tester(self) -> str | None:
-        """Take what lies in the tester out of it; gives the reason if that is impossible."""
+        """Take the board out of the tester, if there is one; return the reason if that is impossible."""
         if self._in_tester is None:
             return None
         refused = await self._devices.take_from_tester()
@@ -296,7 +296,7 @@ class World:
     # ------------------------------------------------------------------------------------------------ truth
 
     def truth(self) -> dict[str, Any]:
-        """Return what is so."""
+        """Return the real state, for tests."""
         counts = Counter(thing.place for thing in self._things)
         tip = self._world_from_tip
         return {
@@ -326,7 +326,7 @@ class World:
         }
 
     def pose(self, thing: Thing) -> Matrix | None:
-        """Return where a board is; nothing for one that is still to come or was taken away."""
+        """Return the pose of a board; None if it has not arrived yet or was removed."""
         if thing is self._held:
             held: Matrix = self._tip() @ self._tip_from_board
             return held
@@ -345,7 +345,7 @@ class World:
         return None if pose is None else (float(pose[0, 3]), float(pose[1, 3]), float(pose[2, 3]))
 
     def seen(self) -> dict[str, dict[str, Any]]:
-        """Return what stands before the camera by name, as a fake camera takes it; nothing where there is none."""
+        """Return the objects in front of the camera by name, for the fake camera; empty without a camera."""
         camera = self._layout.camera
         if camera is None:
             return {}
@@ -365,7 +365,7 @@ class World:
         return found
 
     def _stations(self) -> dict[str, Any]:
-        """Return what only some cells have."""
+        """Return the state of the stations that only some cells have."""
         found: dict[str, Any] = {"robot_base": msgspec.to_builtins(self._layout.robot.base)}
         if self._layout.camera is not None:
             found["camera"] = msgspec.to_builtins(self._layout.camera.pose)

@@ -164,7 +164,7 @@ async def test_other_sabotage(cell: Cell) -> None:
     assert cell.robot.inputs == 1
     await cell.world.do("drop")
     assert cell.robot.inputs == 0
-    with pytest.raises(ControlError, match="nothing is held"):
+    with pytest.raises(ControlError, match="no board is gripped"):
         await cell.world.do("drop")
     last = (await cell.world.do("truth"))["boards"][-1]["code"]
     await cell.world.do("remove_board", code=last)

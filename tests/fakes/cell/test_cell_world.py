@@ -275,7 +275,7 @@ async def test_sabotage() -> None:
     await cell.at(*READER)
     await cell.world.drop()
     assert cell.places == "lost feeder feeder"
-    with pytest.raises(ValueError, match="nothing is held"):
+    with pytest.raises(ValueError, match="no board is gripped"):
         await cell.world.drop()
     await cell.world.remove("C")
     assert cell.places == "lost feeder removed"
