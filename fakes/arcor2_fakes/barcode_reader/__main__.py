@@ -1,4 +1,4 @@
-"""Starts the fake barcode reader: `python -m arcor2_fakes.barcode_reader`."""
+"""Start the fake barcode reader: `python -m arcor2_fakes.barcode_reader`."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def truth(reader: Reader, line: Line) -> dict[str, Any]:
 
 
 def register_commands(fake: Fake, reader: Reader) -> None:
-    """Register what tests and the cell can do to the reader."""
+    """Register the commands of the control channel."""
 
     def health(value: Health) -> None:
         if value not in HEALTH:
@@ -60,12 +60,12 @@ def main(
 
     Args:
         tcp: HOST:PORT to serve instead of a pty; port 0 takes a free one.
-        link: symbolic link to keep on the pty, whose own path changes when it is unplugged and plugged.
+        link: symbolic link to the pty, whose path changes when it is unplugged and plugged in.
         control: HOST:PORT of the control channel; port 0 takes a free one.
         crlf: end answers with CR LF instead of CR.
         stx: frame answers with STX and ETX.
-        timeout: how long the reader tries to read, s.
-        seed: decides how long each reading takes.
+        timeout: time limit of a reading, s.
+        seed: seed of the decoding times.
     """
 
     async def body(fake: Fake) -> None:
@@ -83,7 +83,7 @@ def main(
             await line.plug()
 
         async def power_cycle() -> None:
-            """Switch off and on: the port goes and comes, a reading is forgotten."""
+            """Switch off and on: the port disappears for a moment, a reading is cancelled."""
             reader.close()
             await line.unplug()
             reader.drop_input()

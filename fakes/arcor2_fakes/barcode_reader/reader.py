@@ -1,4 +1,4 @@
-"""The reader itself: commands in, answers out, in time. Knows neither pty nor socket."""
+"""The reader without its port: commands, decoding times and answers."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ HEALTH: tuple[Health, ...] = get_args(Health)
 
 _READ_TIME = (0.05, 0.15)
 _DIRTY_FACTOR = 5.0
-_TRANSIT = 0.005  # between decoding and the first byte on the line; a LOFF in that time comes too late
+_TRANSIT = 0.005  # between decoding and the first byte of the answer; a LOFF in that time has no effect
 _MAX_LINE = 128
 _COMMANDS = ("LON", "LOFF", "VER", "STAT", "RST")
 _RESERVED = frozenset({*_COMMANDS, "ERROR"})
 
 
 class Framing(msgspec.Struct, frozen=True):
-    """How answers are framed."""
+    """Framing of answers."""
 
     line_feed: bool = False
     stx: bool = False
 
     def wrap(self, text: str) -> bytes:
-        """Return an answer as it goes on the line."""
+        """Return an answer with its framing."""
         body = text.encode("ascii")
         if self.stx:
             body = b"\x02" + body + b"\x03"
@@ -36,19 +36,19 @@ class Framing(msgspec.Struct, frozen=True):
 
 
 class BadCode(ValueError):
-    """No barcode can hold this text."""
+    """A barcode cannot contain this text."""
 
 
 def check_code(code: str) -> str:
-    """Return the code back if a reader can send it.
+    """Return the code if a reader can send it.
 
     Raises:
-        BadCode: it is empty, too long, not printable ASCII, or a word of the protocol.
+        BadCode: It is empty, too long, not printable ASCII, or a word of the protocol.
     """
     if not 1 <= len(code) <= _MAX_LINE or not (code.isascii() and code.isprintable()):
-        raise BadCode(f"a code has 1 to {_MAX_LINE} printable ASCII characters, not {code!r}")
+        raise BadCode(f"a code must have 1 to {_MAX_LINE} printable ASCII characters, not {code!r}")
     if code in _RESERVED:
-        raise BadCode(f"a code is never one of {', '.join(sorted(_RESERVED))}")
+        raise BadCode(f"a code must not be one of {', '.join(sorted(_RESERVED))}")
     return code
 
 
@@ -56,9 +56,9 @@ class Reader:
     """A fixed-mount reader.
 
     Args:
-        send: puts bytes on the line.
-        seed: decides how long each reading takes.
-        timeout: the reader's own time-out, s.
+        send: Sends bytes.
+        seed: Seed of the decoding times.
+        timeout: Time limit of a reading, s.
     """
 
     identity = ("Fake Optics", "BR-20", "FB0001", "2.01")
@@ -73,13 +73,13 @@ class Reader:
         self._too_long = False
         self._decoding: asyncio.TimerHandle | None = None
         self._time_out: asyncio.TimerHandle | None = None
-        self._under_way: set[asyncio.TimerHandle] = set()  # codes decoded and not sent yet
+        self._under_way: set[asyncio.TimerHandle] = set()  # decoded codes that are not sent yet
         self.received: deque[str] = deque(maxlen=50)
         self.sent: deque[str] = deque(maxlen=50)
         self.as_delivered()
 
     def as_delivered(self) -> None:
-        """Be without any past: healthy, nothing in view, nothing under way."""
+        """Reset everything: healthy, no code in view, no reading."""
         self.close()
         self.drop_input()
         self._random = random.Random(self._seed)
@@ -92,7 +92,7 @@ class Reader:
     # ------------------------------------------------------------------------------------------------ the line's side
 
     def feed(self, data: bytes) -> None:
-        """Take bytes from the line."""
+        """Receive bytes."""
         for byte in data:
             if byte == 0x0D:
                 line, too_long = bytes(self._line), self._too_long
@@ -106,7 +106,7 @@ class Reader:
                     self._too_long = True
 
     def drop_input(self) -> None:
-        """Forget the part of a line that has come so far."""
+        """Discard an incomplete line."""
         self._line.clear()
         self._too_long = False
 
@@ -137,7 +137,7 @@ class Reader:
         self._stop_reading()
         self.reading = True
         self._time_out = self._loop.call_later(self._timeout, self._give_up)
-        self._look()
+        self._start_decoding()
 
     def _stop_reading(self) -> None:
         self.reading = False
@@ -146,8 +146,8 @@ class Reader:
                 timer.cancel()
         self._decoding = self._time_out = None
 
-    def _look(self) -> None:
-        """Begin to decode what is in view."""
+    def _start_decoding(self) -> None:
+        """Start to decode the code in view."""
         if self._decoding is not None:
             self._decoding.cancel()
             self._decoding = None
@@ -174,32 +174,32 @@ class Reader:
 
     @property
     def code(self) -> str | None:
-        """The code that lies in front."""
+        """Return the code in front of the reader."""
         return self._code
 
     def present(self, code: str | None) -> None:
-        """Lay a code in front of the reader, or nothing.
+        """Set the code in front of the reader; None: there is none.
 
         Raises:
-            BadCode: no reader could send that.
+            BadCode: A reader cannot send it.
         """
         code = None if code is None else check_code(code)
         if code != self._code:
             self._code = code
-            self._look()
+            self._start_decoding()
 
     def set_health(self, health: Health) -> None:
-        """Change the reader's condition; it counts from the next look on."""
+        """Set the condition of the reader, from the next reading on."""
         self.health = health
         if health == "FAIL":
-            self._look()
+            self._start_decoding()
 
     def delay_next(self, delay: float) -> None:
-        """Let the next decoded code reach the line so many seconds late, whatever the host has asked for since."""
+        """Delay the next decoded code, even if the host has sent another command since."""
         self._extra_delay = delay
 
     def close(self) -> None:
-        """Cancel everything that is under way."""
+        """Cancel the reading."""
         self._stop_reading()
         for timer in self._under_way:
             timer.cancel()

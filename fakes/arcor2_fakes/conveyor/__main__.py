@@ -1,4 +1,4 @@
-"""Starts the fake conveyor: `python -m arcor2_fakes.conveyor`."""
+"""Start the fake conveyor: `python -m arcor2_fakes.conveyor`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ app = App(name="arcor2_fakes.conveyor", help="Fake conveyor: CiA 402 drive on CA
 
 
 def register_commands(control: ControlServer, node: Node) -> None:
-    """Register what tests and the cell can do to the drive."""
+    """Register the commands of the control channel."""
 
     def emergency(code: int, stands: bool = False) -> None:
         if not isinstance(code, int) or not 1 <= code <= 0xFFFF:
@@ -62,12 +62,12 @@ def main(
     """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
 
     Args:
-        host: address the CAN adapters are served on.
-        port: port they are served on; 0 takes a free one.
-        socketcand_port: port on which the same bus is served by socketcand, as can0; 0 takes a free one.
+        host: address of the CAN adapters.
+        port: TCP port of the CAN adapters; 0 takes a free one.
+        socketcand_port: TCP port of a socketcand server for the same bus, as can0; 0 takes a free one.
         control: HOST:PORT of the control channel; port 0 takes a free one.
         node: CANopen node id of the drive.
-        time_scale: how many times faster than real the belt moves; heartbeats and boot-up stay in real time.
+        time_scale: how many times faster than real time the belt moves; heartbeats and boot-up stay in real time.
     """
 
     async def body(fake: Fake) -> None:

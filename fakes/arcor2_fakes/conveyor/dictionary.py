@@ -1,4 +1,4 @@
-"""The object dictionary of the drive: what each index reads and writes, and the SDO aborts for what it does not."""
+"""The object dictionary of the drive, and the SDO aborts for invalid accesses."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Abort(Exception):
 
 @dataclass(frozen=True)
 class Entry:
-    """One subindex: a struct format (or "s" for a text), how to read it, how to write it (None: read only)."""
+    """A subindex: struct format ("s": text), and functions that read and write it (None: read only)."""
 
     form: str
     read: Callable[[], int | str]
@@ -37,13 +37,13 @@ class Dictionary:
         self.entries: dict[tuple[int, int], Entry] = {}
 
     def read(self, index: int, subindex: int) -> bytes:
-        """Return the value's bytes. Raises Abort."""
+        """Return the bytes of a value. Raises Abort."""
         entry = self._entry(index, subindex)
         value = entry.read()
         return value.encode() if isinstance(value, str) else struct.pack("<" + entry.form, value)
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
-        """Take a value. Raises Abort."""
+        """Write a value. Raises Abort."""
         entry = self._entry(index, subindex)
         if entry.write is None:
             raise Abort(READ_ONLY)
@@ -79,7 +79,7 @@ _MODES_HAD = 1 << 0 | 1 << 2 | 1 << 5  # 6502h: bits of pp, pv, hm
 
 
 def add_drive(dictionary: Dictionary, drive: Drive) -> None:
-    """Enter what CiA 402 defines."""
+    """Add the entries of CiA 402."""
     entries = dictionary.entries
     for index, (form, name, lowest) in _PARAMETERS.items():
 

@@ -1,4 +1,4 @@
-"""The drive: power state machine and motion of CiA 402-2. Knows nothing of CAN; `advance` tells it the time."""
+"""The drive: power state machine and motion of CiA 402-2, without CAN. `advance` advances the time."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 SWITCH_AT = 4000
-"""Counts above the place of power-on where the home switch becomes active."""
+"""Position of the home switch above the position at power-on, counts."""
 FOLLOWING_ERROR, HEARTBEAT_ERROR = 0x8611, 0x8130
 
 
 class State(enum.IntEnum):
-    """Power states with the bits they show in the status word (mask 6Fh)."""
+    """Power states with their bits in the status word (mask 6Fh)."""
 
     SWITCH_ON_DISABLED = 0x40
     READY_TO_SWITCH_ON = 0x21
@@ -35,7 +35,7 @@ class Mode(enum.IntEnum):
 
 @dataclass
 class Parameters:
-    """What the dictionary holds for the drive; counts, counts/s, counts/s²."""
+    """Parameters of the drive from the dictionary; counts, counts/s, counts/s²."""
 
     abort_option: int = 0
     target_position: int = 0
@@ -56,7 +56,7 @@ _MOVING = (_P.OPERATION_ENABLED, _P.QUICK_STOP_ACTIVE, _P.FAULT_REACTION_ACTIVE)
 
 
 class Drive:
-    """The drive with its belt. `emergency(code)` is called when a fault arises, with 0 when it is reset."""
+    """The drive with its belt. It calls `emergency` with the code of a fault, and with 0 when the fault is reset."""
 
     def __init__(self, emergency: Callable[[int], None], belt: float = 0.0) -> None:
         self.parameters = Parameters()
@@ -69,7 +69,7 @@ class Drive:
         self.homing_fails = False
         self.handshake_stuck = False
         self.jammed = False
-        self.belt = belt  # counts, whatever the drive believes
+        self.belt = belt  # real position, counts
         self.velocity = 0.0
         self._offset = belt
         self._emergency = emergency
@@ -81,12 +81,12 @@ class Drive:
     # -------------------------------------------------------------------------------- what the dictionary shows
     @property
     def position(self) -> int:
-        """Position actual value (6064h)."""
+        """Return the position actual value (6064h)."""
         return round(self.belt - self._offset)
 
     @property
     def statusword(self) -> int:
-        """Status word (6041h)."""
+        """Return the status word (6041h)."""
         word = int(self.state) | 0x0210  # remote, voltage enabled
         if self._reached:
             word |= 1 << 10
@@ -99,7 +99,7 @@ class Drive:
         return word
 
     def set_mode(self, mode: int) -> None:
-        """Modes of operation (6060h). Raises ValueError for one the drive does not have."""
+        """Set the mode of operation (6060h). Raises ValueError for an unsupported mode."""
         wanted = Mode(mode)
         if wanted is not self.mode:
             self.mode, self._target, self._homing = wanted, None, ""
@@ -107,7 +107,7 @@ class Drive:
 
     # -------------------------------------------------------------------------------- control word
     def control(self, word: int) -> None:
-        """Control word (6040h)."""
+        """Execute a control word (6040h)."""
         before, self.controlword = self.controlword, word
         rising = word & ~before
         if self.state is _P.FAULT:
@@ -155,19 +155,19 @@ class Drive:
 
     # -------------------------------------------------------------------------------- stops
     def quick_stop(self) -> None:
-        """Stop on the quick-stop ramp and switch the torque off then (605Ah = 2)."""
+        """Stop on the quick-stop ramp, then switch the torque off (605Ah = 2)."""
         if self.state is _P.OPERATION_ENABLED:
             self.state = _P.QUICK_STOP_ACTIVE
 
     def fault(self, code: int, *, stands: bool = False) -> None:
-        """Have a fault: stop on the quick-stop ramp, then be in Fault."""
+        """Raise a fault: stop on the quick-stop ramp, then enter the state Fault."""
         self.error_code, self.cause_stands = code, stands
         if self.state is not _P.FAULT:
             self.state = _P.FAULT_REACTION_ACTIVE if self.state in _MOVING else _P.FAULT
         self._emergency(code)
 
     def connection_aborted(self) -> None:
-        """Do what 6007h says when the master is lost or the node leaves Operational."""
+        """React as configured in 6007h: the master is lost, or the node leaves Operational."""
         option = self.parameters.abort_option
         if self.state is not _P.OPERATION_ENABLED or option == 0:
             return
@@ -180,7 +180,7 @@ class Drive:
 
     # -------------------------------------------------------------------------------- motion
     def advance(self, dt: float) -> None:
-        """Let `dt` s pass."""
+        """Advance the time by `dt` s."""
         if self.state not in _MOVING:
             return
         p = self.parameters
@@ -221,7 +221,7 @@ class Drive:
             return
         self._reached = False
         wanted = math.copysign(allowed, left)
-        # Twice as much for slowing down lets the ramp be followed in steps.
+        # Decelerating at up to twice the rate compensates for the discrete time steps.
         faster = abs(wanted) > abs(self.velocity)
         self._ramp(wanted, self.parameters.acceleration if faster else 2.0 * slow, dt)
 

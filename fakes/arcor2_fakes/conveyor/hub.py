@@ -1,4 +1,4 @@
-"""The CAN bus and its adapters: each TCP client is a Lawicel adapter (slcan), the drive hangs on the bus itself."""
+"""The CAN bus: each TCP client is a Lawicel adapter (slcan); the drive is connected directly."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ Receive = Callable[[int, bytes], None]
 
 
 class Member(Protocol):
-    """Who hangs on the bus."""
+    """A node on the bus."""
 
     def deliver(self, identifier: int, data: bytes) -> None:
-        """Take a frame that another has sent."""
+        """Receive a frame from another node."""
         ...
 
 
 class Adapter:
-    """One client: takes its commands apart, hands it what the others send while its channel is open."""
+    """A client: its commands are parsed, and it receives the frames of other nodes while its channel is open."""
 
     def __init__(self, hub: Hub, connection: Connection) -> None:
         self._hub, self._connection = hub, connection
@@ -38,7 +38,7 @@ class Adapter:
         connection.closed = lambda: hub.adapters.discard(self)
 
     def deliver(self, identifier: int, data: bytes) -> None:
-        """Return the client a frame from the bus."""
+        """Send the client a frame from the bus."""
         if self.open:
             self._connection.send(f"t{identifier:03X}{len(data)}{data.hex().upper()}".encode() + OK)
 
@@ -71,7 +71,7 @@ class Adapter:
 
 
 class Hub:
-    """The bus. A frame reaches every adapter but its sender's, and what `listen` was called with."""
+    """The bus. A frame reaches all adapters except that of its sender, and all functions passed to `listen`."""
 
     def __init__(self, host: str, port: int) -> None:
         self.wire = TcpWire("can", host, port, self._opened)
@@ -80,12 +80,12 @@ class Hub:
         self._listeners: list[Receive] = []
 
     def listen(self, receive: Receive) -> None:
-        """Have `receive` called with every frame that an adapter sends."""
+        """Call `receive` with every frame that an adapter sends."""
         self._listeners.append(receive)
 
     def transmit(self, identifier: int, data: bytes, sender: Member | None = None) -> None:
-        """Put a frame on the bus; without a sender it is the drive's."""
-        if not _FIRST_PDO <= identifier < _FIRST_SDO:  # they would push out all others
+        """Send a frame; without a sender it comes from the drive."""
+        if not _FIRST_PDO <= identifier < _FIRST_SDO:  # they would displace all others
             self.frames.append(
                 {"time": time.monotonic(), "id": identifier, "data": data.hex(), "from_host": sender is not None}
             )

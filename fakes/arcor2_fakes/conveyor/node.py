@@ -1,4 +1,4 @@
-"""The CANopen node (CiA 301) around the drive: NMT, SDO server, heartbeat both ways, EMCY, boot-up."""
+"""The CANopen node (CiA 301) of the drive: NMT, SDO server, heartbeat producer and consumer, EMCY, boot-up."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _REGISTER = {0x2: 1 << 1, 0x3: 1 << 2, 0x4: 1 << 3, 0x81: 1 << 4}  # 1001h: curr
 
 
 class Node:
-    """The node, booted when it is made. `run` is its life; it must run in the event loop that the hub runs in."""
+    """The node. `run` must run in the event loop of the hub."""
 
     def __init__(self, hub: Hub, number: int, time_scale: float = 1.0) -> None:
         self.number = number
@@ -63,7 +63,7 @@ class Node:
     def _set_consumer(self, value: int) -> None:
         if value >> 24 or (value & 0xFFFF and not 1 <= value >> 16 <= 127):
             raise Abort(BAD_VALUE)
-        self._consumer, self._heard = value, None  # monitoring begins with the first heartbeat
+        self._consumer, self._heard = value, None  # monitoring starts with the first heartbeat
 
     def _set_heartbeat(self, value: int) -> None:
         self._heartbeat_ms, self._next_heartbeat = value, 0.0
@@ -74,7 +74,7 @@ class Node:
 
     # -------------------------------------------------------------------------------- life
     async def run(self) -> None:
-        """Boot, then move and watch until cancelled."""
+        """Boot, then advance the drive and monitor heartbeats until cancelled."""
         loop = asyncio.get_running_loop()
         before = loop.time()
         while True:
@@ -106,7 +106,7 @@ class Node:
         self.drive.connection_aborted()
 
     def power_cycle(self, belt: float | None = None) -> None:
-        """Be switched off and on: what is volatile is gone; the belt stands, or was pushed to `belt` counts."""
+        """Switch off and on: volatile values are lost; the belt is stopped, or was moved to `belt` counts."""
         belt = self.drive.belt if belt is None else float(belt)
         self.drive = Drive(self._emergency, belt)
         self.writes.clear()
@@ -197,11 +197,11 @@ class Node:
 
     # -------------------------------------------------------------------------------- truth
     def motion(self) -> dict[str, float]:
-        """Return where the belt is and how fast it goes, in counts: for a world that asks a hundred times a second."""
+        """Return position and velocity of the belt, counts and counts/s; the cell reads them 100 times per second."""
         return {"belt": self.drive.belt, "velocity": self.drive.velocity}
 
     def truth(self) -> dict[str, Any]:
-        """Return what is really so, whatever the wire says."""
+        """Return the real state, for tests."""
         drive = self.drive
         return {
             "state": drive.state.name.lower(),

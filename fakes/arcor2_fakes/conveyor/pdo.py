@@ -1,4 +1,4 @@
-"""The drive's transmit PDOs (CiA 301, 7.5.2): what is mapped, when they are sent, and which changes are refused."""
+"""The transmit PDOs of the drive (CiA 301, 7.5.2): mapping, transmission, and rejected configurations."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MAPPABLE = {0x603F: 16, 0x6041: 16, 0x6061: 8, 0x6064: 32, 0x606C: 32}
 
 
 class Tpdo:
-    """One PDO. `send(cob_id, data)` puts it on the bus; `tick` is called often while the node is Operational."""
+    """A PDO. Call `tick` frequently while the node is Operational; it sends with `send(cob_id, data)`."""
 
     def __init__(self, number: int, node: int, default: tuple[int, ...], send: Callable[[int, bytes], None]) -> None:
         self.sent = 0
@@ -30,7 +30,7 @@ class Tpdo:
         self._last = b""
 
     def enter(self, dictionary: Dictionary) -> None:
-        """Enter communication and mapping parameters."""
+        """Add the communication and mapping parameters to the dictionary."""
         self._dictionary = dictionary
         communication, mapping = 0x1800 + self._number, 0x1A00 + self._number
         entries = dictionary.entries
@@ -47,7 +47,7 @@ class Tpdo:
             )
 
     def tick(self, now: float) -> None:
-        """Send when the event timer has run out, or the status word has changed."""
+        """Send if the event timer has expired or the status word has changed."""
         if self._cob_id & _INVALID or not self._count:
             return
         data = b"".join(self._dictionary.read(each >> 16, each >> 8 & 0xFF) for each in self._mapping[: self._count])
@@ -56,7 +56,7 @@ class Tpdo:
         if not changed and not (self._period_ms and now >= self._due):
             return
         period = self._period_ms / 1000.0
-        # After a stall it goes on from now: what was not sent in time is not sent at all.
+        # After a stall, missed transmissions are not made up for.
         self._due = self._due + period if now - self._due < period else now + period
         self._last = data
         self.sent += 1

@@ -1,7 +1,7 @@
-"""socketcand's raw mode over TCP: each client is one more member of the hub's bus.
+"""The raw mode of socketcand over TCP: each client is another node on the bus of the hub.
 
-`< hi >` greets; `< open can0 >` and `< rawmode >` are answered `< ok >`; then `< send 123 2 1 ff >` puts a frame on the
-bus and `< frame 123 1.5 01FF >` tells one. From general knowledge of the protocol.
+The server sends `< hi >` first and answers `< open can0 >` and `< rawmode >` by `< ok >`. Then `< send 123 2 1 ff >`
+sends a frame, and `< frame 123 1.5 01FF >` reports one. No specification of the protocol was available.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _HIGHEST_ID = 0x7FF
 
 
 class Client:
-    """One client: waits for the bus to be opened, then takes and gives frames."""
+    """A client: opens the bus, then sends and receives frames."""
 
     def __init__(self, server: Server, connection: Connection) -> None:
         self._server, self._connection = server, connection
@@ -30,7 +30,7 @@ class Client:
         self._say("hi")
 
     def deliver(self, identifier: int, data: bytes) -> None:
-        """Return the client a frame from the bus."""
+        """Send the client a frame from the bus."""
         if self.open:
             self._say(f"frame {identifier:03X} {time.time():.6f} {data.hex().upper()}")
 
@@ -70,7 +70,7 @@ class Client:
 
 
 class Server:
-    """Listen beside the hub's own port."""
+    """The socketcand server of the bus."""
 
     def __init__(self, hub: Hub, host: str, port: int, bus: str = "can0") -> None:
         self.hub, self.bus = hub, bus

@@ -1,4 +1,4 @@
-"""Starts the fake planning service: `python -m arcor2_fakes.erp`."""
+"""Start the fake planning service: `python -m arcor2_fakes.erp`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ app = App(name="arcor2_fakes.erp", help="Fake production planning service (ERP) 
 
 
 def truth(planning: Planning, port: Port) -> dict[str, Any]:
-    """Return what the service really knows, whatever its answers say."""
+    """Return the real state of the service."""
     return {
         "orders": msgspec.to_builtins(list(planning.orders.values())),
         "results": list(planning.results),
@@ -31,7 +31,7 @@ def truth(planning: Planning, port: Port) -> dict[str, Any]:
 
 
 def register_commands(control: ControlServer, planning: Planning, port: Port) -> None:
-    """Make what a planner and a test can do to the service."""
+    """Register the commands of the control channel."""
 
     def add_order(order: str, product: str, quantity: int = 1) -> None:
         planning.add_order(order, product, quantity)
@@ -45,7 +45,7 @@ def register_commands(control: ControlServer, planning: Planning, port: Port) ->
 
     control.command("add_order", add_order)
     control.command("forbid", forbid)
-    control.command("forget", planning.forget)
+    control.command("forget", planning.reset)
     control.command("lose_answers", port.lose_answers)
     control.command("mistake", port.mistake)
     control.command("fail", fail)
@@ -70,10 +70,10 @@ def main(
     Args:
         listen: HOST:PORT of the service; port 0 takes a free one.
         control: HOST:PORT of the control channel; port 0 takes a free one.
-        order: ID=PRODUCT:QUANTITY, an order that is planned from the start; repeatable.
-        token: bearer token that a client has to send; empty for none.
-        store: file that keeps orders and results beyond the process; not given, they are kept in memory.
-        certificate: PEM file; the service is on HTTPS then.
+        order: ID=PRODUCT:QUANTITY, an initial order; repeatable.
+        token: bearer token that clients must send; empty for none.
+        store: file for orders and results; by default they are stored in memory.
+        certificate: PEM file; the service uses HTTPS then.
         key: PEM file of the certificate's private key.
     """
     try:

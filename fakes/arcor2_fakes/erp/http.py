@@ -1,4 +1,4 @@
-"""HTTP/1.1 as the service speaks it: requests taken apart, answers put together. Pure.
+"""Codec for HTTP/1.1 requests and answers. Pure functions.
 
 Source: RFC 9112 (message syntax), RFC 9110 (semantics). Bodies by Content-Length only.
 """
@@ -32,7 +32,7 @@ REASONS: Final = {
 
 
 class BadRequest(ValueError):
-    """What came is no request that is served; the connection cannot go on. `status` is to be answered."""
+    """The request is invalid; the connection must be closed after an answer with `status`."""
 
     def __init__(self, status: int, text: str) -> None:
         super().__init__(text)
@@ -41,7 +41,7 @@ class BadRequest(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """One request; names of headers in lower case."""
+    """A request; names of headers are in lower case."""
 
     method: str
     path: str
@@ -50,19 +50,19 @@ class Request:
 
 
 class Requests:
-    """Takes bytes as they come and gives whole requests."""
+    """Splits received bytes into requests."""
 
     def __init__(self) -> None:
-        self._came = b""
+        self._buffer = b""
 
     def feed(self, data: bytes) -> Iterator[Request]:
-        """Return the requests that are complete now. Raises BadRequest."""
-        self._came += data
+        """Return the requests that are complete. Raises BadRequest."""
+        self._buffer += data
         while (request := self._next()) is not None:
             yield request
 
     def _next(self) -> Request | None:
-        head, found, rest = self._came.partition(b"\r\n\r\n")
+        head, found, rest = self._buffer.partition(b"\r\n\r\n")
         if not found:
             if len(head) > LONGEST_HEAD:
                 raise BadRequest(400, "the head of the request is too long")
@@ -80,7 +80,7 @@ class Requests:
             raise BadRequest(413, f"a body has at most {LONGEST_BODY} bytes")
         if len(rest) < length:
             return None
-        self._came = rest[length:]
+        self._buffer = rest[length:]
         return Request(method, path, headers, rest[:length])
 
 

@@ -1,4 +1,4 @@
-"""What the service knows: orders, to whom they went, results, and the keys of what was taken. Knows no socket."""
+"""The state of the service: orders, results, and the keys of accepted requests. Independent of HTTP."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LONGEST_KEY: Final = 200
 
 
 class Problem(Exception):
-    """The service does not do what was asked, and nothing has changed; `status` is the HTTP status."""
+    """The request is rejected and nothing has changed; `status` is the HTTP status."""
 
     def __init__(self, status: int, text: str) -> None:
         super().__init__(text)
@@ -24,7 +24,7 @@ class Problem(Exception):
 
 
 class Order(msgspec.Struct):
-    """So many pieces of a product; `station` has it, empty while nobody does."""
+    """An order. `station` works on it; empty while it is not assigned."""
 
     id: str
     product: str
@@ -32,8 +32,8 @@ class Order(msgspec.Struct):
     station: str = ""
     closed: bool = False
 
-    def told(self) -> dict[str, Any]:
-        """Return it as the wire tells it."""
+    def to_json(self) -> dict[str, Any]:
+        """Return the order as JSON data."""
         return {"id": self.id, "product": self.product, "quantity": self.quantity}
 
 
@@ -58,7 +58,7 @@ class _Closing(msgspec.Struct):
 
 
 class _Event(msgspec.Struct, omit_defaults=True):
-    """One line of the store: an order that came, or a request that was taken."""
+    """A line of the store: a new order or an accepted request."""
 
     order: Order | None = None
     key: str = ""
@@ -67,9 +67,10 @@ class _Event(msgspec.Struct, omit_defaults=True):
 
 
 class Planning:
-    """Orders and results. Everything that was taken is taken once per key.
+    """Orders and results. Each key is accepted once.
 
-    store: file that keeps it beyond the process; None keeps it in memory.
+    Args:
+        store: File for orders and results; None: they are stored in memory.
     """
 
     def __init__(self, store: Path | None = None) -> None:
@@ -90,14 +91,14 @@ class Planning:
             self._store.close()
 
     def add_order(self, order: str, product: str, quantity: int) -> None:
-        """Plan an order. Raises ValueError."""
+        """Add an order. Raises ValueError."""
         if not order or not product or order in self.orders or not 1 <= quantity <= 100_000:
-            raise ValueError("an order has an id of its own, a product, and a quantity of 1 to 100000")
+            raise ValueError("an order needs a unique id, a product, and a quantity of 1 to 100000")
         self.orders[order] = Order(order, product, int(quantity))
-        self._keep(_Event(order=self.orders[order]))
+        self._append(_Event(order=self.orders[order]))
 
-    def forget(self) -> None:
-        """Begin anew, with no order and no result."""
+    def reset(self) -> None:
+        """Delete all orders and results."""
         self.orders.clear()
         self.results.clear()
         self.taken.clear()
@@ -107,8 +108,8 @@ class Planning:
             self._store.truncate(0)
 
     # -------------------------------------------------------------------------------- requests
-    def do(self, request: Request) -> tuple[int, dict[str, Any]]:
-        """Do what is asked; gives status and body. Raises Problem."""
+    def execute(self, request: Request) -> tuple[int, dict[str, Any]]:
+        """Execute a request and return status and body. Raises Problem."""
         if request.path == "/status":
             self._method(request, "GET")
             return 200, {"service": NAME, "version": VERSION}
@@ -125,13 +126,13 @@ class Planning:
         if key in self.taken:
             path, before, answer = self.taken[key]
             if (path, before) != (request.path, body):
-                raise Problem(409, f"the key {key} was used for something else")
+                raise Problem(409, f"the key {key} was used for another request")
             self.repeated += 1
             return 200, {**answer, "repeated": True}
         answer = self._take(key, request.path, body)
         if answer.get("order", True) is None:
-            return 200, answer  # nothing has changed, so the key stays free
-        self._keep(_Event(key=key, path=request.path, body=body))
+            return 200, answer  # nothing has changed, so the key can be used again
+        self._append(_Event(key=key, path=request.path, body=body))
         return 201, answer
 
     @staticmethod
@@ -153,31 +154,31 @@ class Planning:
         for order in self.orders.values():
             if not order.station and not order.closed:
                 order.station = station
-                return {"order": order.told()}
+                return {"order": order.to_json()}
         return {"order": None}
 
     def _result(self, body: str) -> dict[str, Any]:
         result = msgspec.json.decode(body, type=_Result)
-        self._known(result.order)
+        self._find(result.order)
         self.results.append(msgspec.structs.asdict(result))
         return {"number": len(self.results)}
 
     def _close_order(self, body: str) -> dict[str, Any]:
         closing = msgspec.json.decode(body, type=_Closing)
-        self._known(closing.order).closed = True
+        self._find(closing.order).closed = True
         return {}
 
     _DO: Final = {"/orders/next": _next_order, "/results": _result, "/orders/close": _close_order}
 
-    def _known(self, order: str) -> Order:
+    def _find(self, order: str) -> Order:
         if order not in self.orders:
             raise Problem(404, f"there is no order {order}")
         if order in self.forbidden:
-            raise Problem(422, f"the order {order} takes nothing")
+            raise Problem(422, f"the order {order} is forbidden")
         return self.orders[order]
 
     # -------------------------------------------------------------------------------- storage
-    def _keep(self, event: _Event) -> None:
+    def _append(self, event: _Event) -> None:
         if self._store is not None:
             self._store.write(msgspec.json.encode(event) + b"\n")
             self._store.flush()

@@ -1,4 +1,4 @@
-"""The service's port: requests come, answers go, or what the faults make of them."""
+"""The HTTP port of the service, and its simulated faults."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from arcor2_fakes.erp.planning import Planning, Problem
 from arcor2_fakes.wire import Connection, TcpWire
 
 LONGEST_OFF: Final = 60.0
-"""Time a power cycle may take, s."""
+"""Longest power cycle, s."""
 
 
 class TlsWire(TcpWire):
-    """A wire with TLS when there is a context."""
+    """A TCP port with optional TLS."""
 
     def __init__(
         self, host: str, port: int, context: ssl.SSLContext | None, opened: Callable[[Connection], None]
@@ -28,7 +28,7 @@ class TlsWire(TcpWire):
         self._context = context
 
     async def listen(self) -> str:
-        """Open the port and give the address. Raises `OSError` when it is taken."""
+        """Open the port and return the address. Raises `OSError` when it is in use."""
         if self._context is None:
             return await super().listen()
         if self._server is None:
@@ -39,9 +39,14 @@ class TlsWire(TcpWire):
 
 
 class Port:
-    """Serves the planning on a port.
+    """Serves the planning over HTTP.
 
-    token: what a client has to send as bearer token; empty for anybody.
+    Args:
+        planning: The state of the service.
+        host: Address to listen on.
+        port: TCP port; 0 takes a free one.
+        token: Bearer token that clients must send; empty for none.
+        context: TLS context; None for plain HTTP.
     """
 
     def __init__(self, planning: Planning, host: str, port: int, token: str, context: ssl.SSLContext | None) -> None:
@@ -49,34 +54,36 @@ class Port:
         self.wire = TlsWire(host, port, context, self._opened)
         self.received: deque[dict[str, Any]] = deque(maxlen=1000)
         self.total = 0
-        self.changed: Callable[[], None] = lambda: None  # called when something was taken
+        self.changed: Callable[[], None] = lambda: None  # called after each accepted request
         self._lost_answers = self._mistakes = 0
-        self._failing: tuple[int, float, str, bool] | None = None  # status, s to wait, path, after it was done
+        self._failing: tuple[int, float, str, bool] | None = (
+            None  # status, Retry-After (s), path, whether the request is executed
+        )
         self._failures = 0
         self._starting: asyncio.Future[None] | None = None
 
-    # -------------------------------------------------------------------------------- what can go wrong
+    # -------------------------------------------------------------------------------- faults
     def lose_answers(self, count: int = 1) -> None:
-        """Do the next `count` POSTs, and reset the connection instead of answering."""
+        """Execute the next `count` POSTs, and reset the connection instead of answering."""
         self._lost_answers = int(count)
 
     def mistake(self, count: int = 1) -> None:
-        """Answer the next `count` POSTs, which are not done, as if they had another key."""
+        """Answer the next `count` POSTs with a wrong key, without executing them."""
         self._mistakes = int(count)
 
     def fail(self, status: int, count: int = 1, retry_after: float = 0.0, path: str = "", done: bool = False) -> None:
-        """Answer the next `count` requests (-1: all) of a path (empty: all) with a status; `done`: after doing them."""
+        """Answer the next `count` requests (-1: all) of a path (empty: all) with a status; `done`: execute them."""
         if status not in REASONS:
             raise ValueError(f"status is one of {', '.join(map(str, REASONS))}")
         self._failing, self._failures = (int(status), float(retry_after), path, bool(done)), int(count)
 
     def heal(self) -> None:
-        """Lose and fail no more."""
+        """End all simulated faults."""
         self._lost_answers = self._failures = self._mistakes = 0
         self._failing = None
 
     def power_cycle(self, seconds: float = 1.0) -> None:
-        """Be off for a while: connections are reset, the port is closed; what was taken is kept."""
+        """Switch off for `seconds`: connections are reset and the port is closed; stored data survive."""
         if not 0.0 <= seconds <= LONGEST_OFF:
             raise ValueError(f"seconds is 0 to {LONGEST_OFF:g}")
         self.wire.refuse()
@@ -114,7 +121,7 @@ class Port:
         )
         failing = self._failure(request)
         if failing is not None and not failing[3]:
-            self._tell_failure(connection, failing)
+            self._send_failure(connection, failing)
             return
         if self._mistakes > 0 and request.method == "POST":
             self._mistakes -= 1
@@ -122,13 +129,13 @@ class Port:
             return
         try:
             self._authorised(request)
-            status, body = self._planning.do(request)
+            status, body = self._planning.execute(request)
             if status == 201:
                 self.changed()
         except Problem as problem:
             status, body = problem.status, {"error": str(problem)}
         if failing is not None:
-            self._tell_failure(connection, failing)
+            self._send_failure(connection, failing)
         elif self._lost_answers > 0 and request.method == "POST":
             self._lost_answers -= 1
             connection.reset()
@@ -142,7 +149,7 @@ class Port:
         return self._failing
 
     @staticmethod
-    def _tell_failure(connection: Connection, failing: tuple[int, float, str, bool]) -> None:
+    def _send_failure(connection: Connection, failing: tuple[int, float, str, bool]) -> None:
         status, retry_after, _, _ = failing
         headers = {"Retry-After": f"{retry_after:.0f}"} if retry_after else {}
         connection.send(answer(status, {"error": REASONS[status]}, headers))

@@ -1,11 +1,11 @@
-"""Fake functional tester: a board test station on Modbus TCP, as docs/devices/functional-tester.md says, in real time.
+"""Fake functional tester: a board test station on Modbus TCP (docs/devices/functional-tester.md), in real time.
 
-`python -m arcor2_fakes.functional_tester --help`. The result follows from the board that lies in the fixture: values
-are measured on it (with a noise drawn from the seed) and compared with limits; the wire tells nothing of the board.
+`python -m arcor2_fakes.functional_tester --help`. The result depends on the board in the fixture: values are
+measured on it (with noise drawn from the seed) and compared with limits. The protocol does not reveal the board.
 
-Not modelled: test programs with limits of their own (all of 1 to 9 measure the same), an effect of the key switch on
-commands (the mode is only shown), suspending, a door that jams, a board put in turned, Modbus over TLS or RTU, and more
-than one request under way on one connection.
+Not modelled: test programs with limits of their own (1 to 9 are the same), an effect of the key switch on
+commands (the mode is only displayed), suspending, a door that jams, a rotated board, Modbus over TLS or RTU, and more
+than one pending request on a connection.
 """
 
 WIRE = "Modbus TCP"

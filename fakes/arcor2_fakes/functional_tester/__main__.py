@@ -1,4 +1,4 @@
-"""Starts the fake functional tester: `python -m arcor2_fakes.functional_tester`."""
+"""Start the fake functional tester: `python -m arcor2_fakes.functional_tester`."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def truth(station: Station, registers: RegisterMap, port: ModbusPort) -> dict[st
 
 
 def register_commands(fake: Fake, station: Station, registers: RegisterMap, port: ModbusPort) -> None:
-    """Register what tests and the cell can do to the station."""
+    """Register the commands of the control channel."""
 
     def put_board(code: str, defect: str | None = None) -> None:
         board = msgspec.convert({"code": code, "defect": defect}, Board)
@@ -63,7 +63,7 @@ def register_commands(fake: Fake, station: Station, registers: RegisterMap, port
         station.mode = _MODES[mode]
 
     def command(name: str) -> str:
-        """Press a button at the station itself."""
+        """Press a button on the station."""
         try:
             number = Command[name.upper()]
         except KeyError:
@@ -119,9 +119,9 @@ def main(
         host: address to serve Modbus TCP on.
         port: port to serve Modbus TCP on; 0 takes a free one.
         control: HOST:PORT of the control channel; port 0 takes a free one.
-        seed: decides the noise of the measured values.
-        test_time: how long a test takes, s.
-        time_scale: how many times faster than real the station moves.
+        seed: seed of the noise of measured values.
+        test_time: duration of a test, s.
+        time_scale: how many times faster than real time the station moves.
     """
 
     async def body(fake: Fake) -> None:

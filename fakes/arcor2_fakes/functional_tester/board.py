@@ -1,4 +1,4 @@
-"""Boards under test: the defects one can have, what the station measures on each, and the limits it judges by."""
+"""Boards under test: their defects, the values measured on them, and the limits of the test."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ import msgspec
 Defect = Literal["short", "open", "leakage"]
 
 # Mean supply voltage (V), supply current (A) and contact resistance (Ω) of each kind of board. A short pulls the supply
-# down into its current limit, an open circuit draws next to nothing through a contact that isn't one, leakage adds
-# current.
+# down to its current limit, an open circuit has almost no current and a high resistance, leakage adds current.
 _NOMINAL: dict[Defect | None, tuple[float, float, float]] = {
     None: (5.0, 0.120, 0.050),
     "short": (3.1, 1.950, 0.048),
     "open": (5.1, 0.002, 47.0),
     "leakage": (4.98, 0.190, 0.052),
 }
-_SPREAD = 0.02  # greatest relative deviation of a reading; the limits below leave room for it on every side
+_SPREAD = 0.02  # largest relative deviation of a reading; smaller than the distance to the limits below
 
 VOLTAGE_LIMITS = (4.75, 5.25)
 CURRENT_LIMITS = (0.100, 0.150)
@@ -40,7 +39,7 @@ class Measured(msgspec.Struct, frozen=True):
     contact_resistance: float = 0.0
 
     def within_limits(self) -> bool:
-        """Say whether the test program passes a board with these values."""
+        """Return whether the values are within the limits."""
         return (
             VOLTAGE_LIMITS[0] <= self.supply_voltage <= VOLTAGE_LIMITS[1]
             and CURRENT_LIMITS[0] <= self.supply_current <= CURRENT_LIMITS[1]
@@ -49,5 +48,5 @@ class Measured(msgspec.Struct, frozen=True):
 
 
 def measure(board: Board, noise: random.Random) -> Measured:
-    """Measure a board; `noise` supplies the scatter of the readings."""
+    """Return the values measured on a board with random noise."""
     return Measured(*(mean * (1.0 + noise.uniform(-_SPREAD, _SPREAD)) for mean in _NOMINAL[board.defect]))

@@ -12,15 +12,15 @@ from arcor2_fakes.functional_tester.registers import IDENTITY, CheckedReadDiscre
 from arcor2_fakes.functional_tester.station import Station
 from arcor2_fakes.modbus import tcp_wire
 
-_FRAMES_KEPT = 20
+_STORED_FRAMES = 20
 
 
 class ModbusPort:
-    """The Modbus TCP port of the station. Must be made inside the event loop."""
+    """The Modbus TCP port of the station. Create it inside the event loop."""
 
     def __init__(self, host: str, port: int, station: Station, registers: RegisterMap) -> None:
         self._station = station
-        self.frames: deque[dict[str, object]] = deque(maxlen=_FRAMES_KEPT)
+        self.frames: deque[dict[str, object]] = deque(maxlen=_STORED_FRAMES)
         self._server = ModbusTcpServer(
             registers.device(),
             identity=IDENTITY,

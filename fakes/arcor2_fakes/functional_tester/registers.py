@@ -1,4 +1,4 @@
-"""The register map on Modbus: what the host reads from the station and writes to it."""
+"""The Modbus register map of the station."""
 
 from __future__ import annotations
 
@@ -33,26 +33,26 @@ _DOOR_COMMANDS = {0: None, 1: True, 2: False}  # leave, open, close
 
 
 class RegisterMap:
-    """Connects the station with the registers of a simulated Modbus device."""
+    """Maps the station to the registers of a simulated Modbus device."""
 
     def __init__(self, station: Station) -> None:
         self._station = station
         self.power_on()
 
     def power_on(self) -> None:
-        """Be as after switching on: nothing written, nothing acknowledged."""
+        """Reset to the state after power-on: nothing is written or acknowledged."""
         self._acknowledged = 0
         self._answer = Answer.ACCEPTED
         self.last_command: int | None = None
         self._written = False
 
     def device(self) -> SimDevice:
-        """Return the device for the Modbus server; its registers live as long as the server."""
+        """Return the device for the Modbus server."""
         return SimDevice(
             UNIT_ID,
             simdata=(
-                # There are no coils. Every address is defined all the same, so that each request gets as far as the
-                # action, which answers it with "illegal function".
+                # There are no coils. All addresses are defined nevertheless, so that every request reaches the action,
+                # which answers it with "illegal function".
                 [SimData(0, values=[False] * 65536, datatype=DataType.BITS)],
                 [SimData(0, values=[False] * 16, datatype=DataType.BITS)],
                 [SimData(0, values=self._initial_holding(), datatype=DataType.REGISTERS)],
@@ -76,7 +76,7 @@ class RegisterMap:
         registers: list[int],
         set_values: list[int] | list[bool] | None,
     ) -> ExcCodes | None:
-        """Refresh the registers before a read, take what a write commands."""
+        """Update the registers before a read, execute a write."""
         if function_code in _COIL_FUNCTIONS:
             return ExcCodes.ILLEGAL_FUNCTION
         self._station.advance()
@@ -150,7 +150,7 @@ def _float(value: float) -> tuple[int, int]:
 
 
 class CheckedReadDiscreteInputs(ReadDiscreteInputsRequest):
-    """Reads discrete inputs and refuses those beyond the last; the simulated device rounds up to 16 of them."""
+    """A read of discrete inputs that rejects addresses beyond the last one, unlike pymodbus, which rounds up to 16."""
 
     async def datastore_update(self, context: object, device_id: int) -> ModbusPDU:
         """Answer the request."""

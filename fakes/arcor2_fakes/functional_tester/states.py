@@ -4,7 +4,7 @@ from enum import IntEnum
 
 
 class State(IntEnum):
-    """PackML states the station has (PackTags numbers)."""
+    """PackML states of the station (PackTags numbers)."""
 
     CLEARING = 1
     STOPPED = 2
@@ -23,7 +23,7 @@ class State(IntEnum):
 
 
 class Command(IntEnum):
-    """Commands the station takes (PackTags `CntrlCmd`)."""
+    """Commands of the station (PackTags `CntrlCmd`)."""
 
     RESET = 1
     START = 2
@@ -35,7 +35,7 @@ class Command(IntEnum):
 
 
 class Answer(IntEnum):
-    """What became of a command."""
+    """Answers to a command."""
 
     ACCEPTED = 0
     WRONG_STATE = 1

@@ -1,4 +1,4 @@
-"""The station itself: PackML states, door, clamp, tests and faults in time. Knows nothing of Modbus."""
+"""The station without Modbus: PackML states, door, clamp, tests and faults."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from arcor2_fakes.functional_tester.states import State as State
 
 
 class Refusal(ValueError):
-    """The physical world can't do that now, e.g. put a board through a closed door."""
+    """The operation is physically impossible now, such as putting a board through a closed door."""
 
 
 class Result(msgspec.Struct, frozen=True):
-    """One finished test."""
+    """A finished test."""
 
     number: int
     code: str
@@ -34,7 +34,7 @@ DOOR_MAY_MOVE = frozenset({State.STOPPED, State.IDLE, State.COMPLETE, State.ABOR
 DOOR_TIME = 0.5
 TEST_PROGRAMS = range(1, 10)
 
-# An acting state: how long it lasts in seconds, and the state it ends in. Execute lasts as long as the test.
+# Acting states: duration, s, and following state. Execute lasts as long as the test.
 _ACTING: dict[State, tuple[float, State]] = {
     State.CLEARING: (0.2, State.STOPPED),
     State.STARTING: (0.3, State.EXECUTE),
@@ -52,14 +52,14 @@ _ENDED = frozenset({State.STOPPING, State.STOPPED})
 class Station:
     """A tester with one fixture behind a door.
 
-    Time is worked off lazily: `advance` applies in order everything that fell due since the last call, and every other
-    method begins with it. So the station needs no task of its own and a test can run it on a clock of its own.
+    `advance` applies in order all changes that are due since the last call; every other method calls it first. The
+    station thus needs no task, and tests can use their own clock.
 
     Args:
-        seed: decides the noise of the measured values.
+        seed: seed of the noise of measured values.
         test_time: duration of Execute, s.
-        time_scale: how many times faster than real the machine moves. The life counter and the host watchdog, which
-            concern the link, stay in real time.
+        time_scale: how many times faster than real time the machine moves. The life counter and the host watchdog
+            use real time.
         clock: seconds on a monotonic clock.
     """
 
@@ -78,13 +78,13 @@ class Station:
         self.as_delivered()
 
     def as_delivered(self) -> None:
-        """Be without any past: closed, empty, nothing tested."""
+        """Reset everything: door closed, fixture empty, nothing tested."""
         self._now = self._clock()
-        self._door_at = 0.0  # 0 closed, 1 open, as it was at _door_since
+        self._door_at = 0.0  # 0 closed, 1 open, at the time _door_since
         self._door_since = self._now
         self._door_target: float | None = None
         self._board: Board | None = None
-        self._board_seen = True  # False when the sensor has lost the board that lies there
+        self._board_seen = True  # False when the sensor does not detect the board
         self.emergency_stop_pressed = False
         self.mode = 1
         self._power_on()
@@ -93,7 +93,7 @@ class Station:
         self._started = self._last_request = self._now
         self.state = State.STOPPED
         self._due: float | None = None  # when the acting state ends
-        self._test_left = 0.0  # of Execute, kept while held
+        self._test_left = 0.0  # of Execute, while held
         self._program = 1
         self.clamped = False
         self.fault = Fault.NONE
@@ -104,7 +104,7 @@ class Station:
         self.results: list[Result] = []
 
     def power_cycle(self) -> None:
-        """Be switched off and on: the board stays, the door stands where it was; what was counted and set is gone."""
+        """Switch off and on: board and door stay as they are; counters and settings are reset."""
         self.advance()
         self._door_at, self._door_since, self._door_target = self._door_position(), self._now, None
         self._power_on()
@@ -114,11 +114,11 @@ class Station:
     # ------------------------------------------------------------------------------------------------ time
 
     def advance(self) -> None:
-        """Let everything happen that fell due since the last call, in order."""
+        """Apply in order all changes that are due since the last call."""
         now = self._clock()
         while (event := self._next_event()) is not None and event[0] <= now:
             due, happen = event
-            self._now = max(due, self._now)  # a fault armed late is due in the past
+            self._now = max(due, self._now)  # a fault that was armed late may be due in the past
             happen()
         self._now = now
 
@@ -127,7 +127,7 @@ class Station:
         if self._due is not None:
             events.append((self._due, self._end_acting))
             if self._armed is not None and self.state is State.EXECUTE:
-                # Half-way through what is left, so that the fault comes in the middle of a test.
+                # In the middle of the remaining time, so that the fault occurs during a test.
                 events.append((self._due - 0.5 * self._test_left, self._fire_armed))
         if (arrival := self._door_arrival()) is not None:
             events.append((arrival, self._end_door))
@@ -165,12 +165,12 @@ class Station:
     # ------------------------------------------------------------------------------------------------ the host's side
 
     def request_arrived(self) -> None:
-        """Note that the host is alive; call it for every request."""
+        """Reset the host watchdog; call it for every request."""
         self.advance()
         self._last_request = self._now
 
     def command(self, code: int) -> Answer:
-        """Take a command and say what becomes of it."""
+        """Execute a command and return the answer."""
         self.advance()
         try:
             command = Command(code)
@@ -188,7 +188,7 @@ class Station:
         return handlers[command]()
 
     def move_door(self, *, opening: bool) -> None:
-        """Drive the door; where it may not move now it stays as it is."""
+        """Open or close the door, if it may move now."""
         self.advance()
         if self.state in DOOR_MAY_MOVE and not self.emergency_stop_pressed:
             self._halt_door()
@@ -257,17 +257,17 @@ class Station:
 
     @property
     def door_open(self) -> bool:
-        """Whether the end position switch "open" is made."""
+        """Return the end position switch "open"."""
         return self._door_position() == 1.0
 
     @property
     def door_closed(self) -> bool:
-        """Whether the end position switch "closed" is made."""
+        """Return the end position switch "closed"."""
         return self._door_position() == 0.0
 
     @property
     def door(self) -> str:
-        """Open, closed, opening, closing, or stopped in between."""
+        """Return the state of the door: open, closed, opening, closing or stopped."""
         if self._door_target is not None:
             return "opening" if self._door_target else "closing"
         return {0.0: "closed", 1.0: "open"}.get(self._door_at, "between")
@@ -298,29 +298,29 @@ class Station:
 
     @property
     def board(self) -> Board | None:
-        """The board that lies in the fixture."""
+        """Return the board in the fixture."""
         return self._board
 
     @property
     def board_present(self) -> bool:
-        """What the board sensor says."""
+        """Return the value of the board sensor."""
         return self._board is not None and self._board_seen
 
     @property
     def life(self) -> int:
-        """Tenths of a second since power on."""
+        """Return the time since power-on, 0.1 s."""
         return int((self._now - self._started) * 10.0)
 
     def put_board(self, board: Board) -> None:
-        """Lay a board into the fixture.
+        """Put a board into the fixture.
 
         Raises:
-            Refusal: the door is not open, or there is a board already.
+            Refusal: The door is not open, or there is a board already.
         """
         self.advance()
         self._reach_in()
         if self._board is not None:
-            raise Refusal(f"board {self._board.code} lies in the fixture already")
+            raise Refusal(f"board {self._board.code} is already in the fixture")
         self._board = board
         self._board_seen = True
 
@@ -328,7 +328,7 @@ class Station:
         """Take the board out of the fixture.
 
         Raises:
-            Refusal: the door is not open, or there is no board.
+            Refusal: The door is not open, or there is no board.
         """
         self.advance()
         self._reach_in()
@@ -352,24 +352,24 @@ class Station:
         """Press or release the emergency stop button."""
         self.advance()
         if pressed:
-            self._bring_about(Fault.EMERGENCY_STOP)
+            self._cause(Fault.EMERGENCY_STOP)
         self.emergency_stop_pressed = pressed
 
     def inject(self, fault: Fault, *, armed: bool = False) -> None:
-        """Bring a fault about: at once, or armed, in the middle of the next (or the running) test."""
+        """Raise a fault: now, or armed, in the middle of the present or next test."""
         self.advance()
         if armed:
             self._armed = fault
         else:
-            self._bring_about(fault)
+            self._cause(fault)
 
     def _fire_armed(self) -> None:
         assert self._armed is not None
         fault, self._armed = self._armed, None
-        self._bring_about(fault)
+        self._cause(fault)
 
-    def _bring_about(self, fault: Fault) -> None:
-        """Make the cause of a fault real as far as the sensors show it, and let the station react."""
+    def _cause(self, fault: Fault) -> None:
+        """Simulate the cause of a fault at the sensors, and react to it."""
         if fault is Fault.EMERGENCY_STOP:
             self.emergency_stop_pressed = True
             self._halt_door()

@@ -1,4 +1,4 @@
-"""Starts the fake label printer: `python -m arcor2_fakes.label_printer`."""
+"""Start the fake label printer: `python -m arcor2_fakes.label_printer`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FULL_ROLL = 10_000
 
 
 def truth(printer: LabelPrinter, line: Line) -> dict[str, Any]:
-    """Return the real state of the printer, and the labels that came out."""
+    """Return the real state of the printer, and the printed labels."""
     return {
         "labels": msgspec.to_builtins(list(printer.labels)),
         "counter": printer.counter,
@@ -36,7 +36,7 @@ def truth(printer: LabelPrinter, line: Line) -> dict[str, Any]:
 
 
 def register_commands(fake: Fake, printer: LabelPrinter) -> None:
-    """Register what tests and the cell can do to the printer."""
+    """Register the commands of the control channel."""
 
     def switch(name: str) -> Any:
         def apply(on: bool) -> None:
@@ -76,11 +76,11 @@ def main(
 
     Args:
         tcp: HOST:PORT to serve instead of a pty (9100 on real printers); port 0 takes a free one.
-        link: symbolic link to keep on the pty, whose own path changes when it is unplugged and plugged.
+        link: symbolic link to the pty, whose path changes when it is unplugged and plugged in.
         control: HOST:PORT of the control channel; port 0 takes a free one.
-        duration: how long a label takes, s.
-        labels: how many are on the roll.
-        mute: answer nothing while out of media or with the head open; else report it by the flags of ~HS.
+        duration: printing time of a label, s.
+        labels: number of labels on the roll.
+        mute: do not answer while out of media or with the head open; otherwise report it in the flags of ~HS.
     """
 
     async def body(fake: Fake) -> None:

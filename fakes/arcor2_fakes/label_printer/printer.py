@@ -1,4 +1,4 @@
-"""The printer itself: status asked, formats queued, labels printed in time. Knows neither pty nor socket."""
+"""The printer without its port: status requests, queue of formats, printing in time."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import msgspec
 from arcor2_fakes.label_printer.zpl import Format, Stream
 
 BUFFER: Final = 8
-"""Formats kept; more are thrown away, as by a printer whose host does not look at the buffer full flag."""
+"""Largest number of queued formats; more are discarded, as by a printer whose host ignores the buffer-full flag."""
 
 
 class Label(msgspec.Struct, frozen=True):
-    """A label that has come out."""
+    """A printed label."""
 
     number: int
     zpl: str
@@ -27,10 +27,10 @@ class LabelPrinter:
     """A thermal transfer printer.
 
     Args:
-        send: puts bytes on the line.
-        printed: called when a label has come out.
-        duration: how long a label takes, s.
-        mute: whether the printer answers nothing while it has no media or its head is open.
+        send: Sends bytes.
+        printed: Called for each printed label.
+        duration: Printing time of a label, s.
+        mute: Whether the printer does not answer while it has no media or its head is open.
     """
 
     identity = ("ZT411-203dpi", "V92.21.39Z", 8, 65536)
@@ -44,7 +44,7 @@ class LabelPrinter:
         self._loop = asyncio.get_running_loop()
         self._stream = Stream()
         self._queue: deque[Format] = deque()
-        self._left = 0  # labels of the format being printed that are still to come
+        self._left = 0  # remaining labels of the present format
         self._timer: asyncio.TimerHandle | None = None
         self.mute = mute
         self.media = labels
@@ -56,17 +56,17 @@ class LabelPrinter:
 
     @property
     def partial(self) -> bool:
-        """Return whether half a format is in the printer."""
+        """Return whether a format was received partially."""
         return self._stream.partial
 
     @property
     def waiting(self) -> int:
-        """Count the formats that are not printed."""
+        """Return the number of formats that are not printed."""
         return len(self._queue)
 
     # ------------------------------------------------------------------------------------------------ the line's side
     def feed(self, data: bytes) -> None:
-        """Take bytes from the line."""
+        """Receive bytes."""
         for item in self._stream.feed(data):
             if isinstance(item, Format):
                 self.received.append("format")
@@ -80,7 +80,7 @@ class LabelPrinter:
                 self._obey(item)
 
     def drop_input(self) -> None:
-        """Forget half a format."""
+        """Discard a format that was received partially."""
         self._stream.clear()
 
     def _obey(self, command: str) -> None:
@@ -114,14 +114,14 @@ class LabelPrinter:
         return self.media > 0 and not (self.paused or self.head_open or self.ribbon_out or self.hot)
 
     def go_on(self) -> None:
-        """Print what waits, if nothing stands against it."""
+        """Print the queued formats, if possible."""
         if self._timer is None and self._queue and self._able:
             if self._left == 0:
                 self._left = self._queue[0].quantity
             self._timer = self._loop.call_later(self._duration, self._finish_label)
 
     def hold(self) -> None:
-        """Stop printing; a label that is not finished is printed again from its start."""
+        """Stop printing; an unfinished label is printed again."""
         if self._timer is not None and not self._able:
             self._timer.cancel()
             self._timer = None
@@ -146,7 +146,7 @@ class LabelPrinter:
         self.go_on()
 
     def renew(self, labels: int) -> None:
-        """Be as delivered, with so many labels on the roll."""
+        """Reset everything, with a number of labels on the roll."""
         self.power_cycle()
         self.media, self.counter = labels, 0
         self.head_open = self.ribbon_out = self.hot = self.forgetful = False
@@ -154,7 +154,7 @@ class LabelPrinter:
         self.received.clear()
 
     def power_cycle(self) -> None:
-        """Switch off and on: what waits is gone, the odometer stays."""
+        """Switch off and on: the queue is lost, the odometer stays."""
         self.close()
         self._queue.clear()
         self._left = 0
@@ -162,7 +162,7 @@ class LabelPrinter:
         self.paused = False
 
     def close(self) -> None:
-        """Cancel what is under way."""
+        """Cancel printing."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None

@@ -1,4 +1,4 @@
-"""The printer's side of ZPL: a byte stream cut into commands, and a format taken apart into its fields.
+"""ZPL on the side of the printer: split bytes into commands, and a format into its fields.
 
 Source: ZPL II programming guide: ^XA, ^XZ, ^FO, ^FH, ^FD, ^FS, ^BC, ^PQ, ~HS, ~HI, and SGD getvar.
 """
@@ -17,7 +17,7 @@ _HEX: Final = 2
 
 
 class Field(msgspec.Struct, frozen=True):
-    """One field of a label: where it is (dots), whether it is a bar code, and its text."""
+    """A field of a label: position (dots), whether it is a barcode, and text."""
 
     x: int
     y: int
@@ -26,7 +26,7 @@ class Field(msgspec.Struct, frozen=True):
 
 
 class Format(msgspec.Struct, frozen=True):
-    """What lay between ^XA and ^XZ."""
+    """The content between ^XA and ^XZ."""
 
     zpl: str
     fields: list[Field]
@@ -34,7 +34,7 @@ class Format(msgspec.Struct, frozen=True):
 
 
 class Stream:
-    """Cuts what comes into ``~HS``, ``~HI``, ``getvar NAME`` and formats."""
+    """Splits received bytes into ``~HS``, ``~HI``, ``getvar NAME`` and formats."""
 
     def __init__(self) -> None:
         self._format: bytearray | None = None
@@ -42,16 +42,16 @@ class Stream:
 
     @property
     def partial(self) -> bool:
-        """Return whether a format has begun and not ended."""
+        """Return whether a format was received partially."""
         return self._format is not None
 
     def clear(self) -> None:
-        """Forget what is half there."""
+        """Discard an incomplete command."""
         self._format = None
         self._rest.clear()
 
     def feed(self, data: bytes) -> list[str | Format]:
-        """Return what is complete now, in order."""
+        """Return the complete commands, in order."""
         found: list[str | Format] = []
         for byte in data:
             self._rest.append(byte)
@@ -61,7 +61,7 @@ class Stream:
         return found
 
     def _step(self) -> str | Format | None:
-        """Look whether the latest byte completes something. A ~ command counts everywhere, also inside a format."""
+        """Check whether the last byte completes a command. A ~ command counts everywhere, also inside a format."""
         rest = self._rest
         if len(rest) >= 3 and rest[-3] == 0x7E:
             command = bytes(rest[-3:]).decode("latin-1")
@@ -87,7 +87,7 @@ class Stream:
 
 
 def parse(body: bytes) -> Format:
-    """Take a format apart. Unknown commands are ignored, as a printer does."""
+    """Parse a format. Unknown commands are ignored, as by a printer."""
     text = body.decode("latin-1")
     fields: list[Field] = []
     quantity, x, y, barcode, escape = 1, 0, 0, False, ""
@@ -113,7 +113,7 @@ def _numbers(argument: str, count: int) -> list[int]:
 
 
 def _data(text: str, escape: str, barcode: bool) -> str:
-    """Return what is printed: hexadecimal escapes replaced, then, in Code 128, the invocation codes."""
+    """Return the printed text: without hexadecimal escapes and, in Code 128, without invocation codes."""
     raw = bytearray()
     position = 0
     while position < len(text):

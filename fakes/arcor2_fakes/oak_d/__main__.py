@@ -1,4 +1,4 @@
-"""Starts the fake camera: `python -m arcor2_fakes.oak_d`."""
+"""Start the fake camera: `python -m arcor2_fakes.oak_d`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from arcor2_fakes.wire import TcpWire
 app = App(name="arcor2_fakes.oak_d", help="Fake OAK-D: rendered colour and depth over TCP.", version_flags=[])
 
 LOOKING_DOWN: Final = Pose((0.0, 0.0, 0.8), (1.0, 0.0, 0.0, 0.0))
-"""Over the middle of the table, the picture's top towards +y."""
+"""Default pose of the camera: above the centre of the table, the top of the image towards +y."""
 SWITCHES: Final = {
     "lens_covered": "covered",
     "depth_off": "depth_off",
@@ -33,7 +33,7 @@ SWITCHES: Final = {
 
 
 class StartScene(msgspec.Struct, forbid_unknown_fields=True):
-    """The file given by --scene."""
+    """The content of the file of --scene."""
 
     things: list[dict[str, Any]] = []
     camera: dict[str, Any] | None = None
@@ -41,7 +41,7 @@ class StartScene(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def read_scene(path: Path | None) -> Scene:
-    """Read what stands there at the start. Raises ValueError naming the file."""
+    """Read the initial scene. Raises ValueError, which names the file."""
     try:
         given = StartScene() if path is None else msgspec.json.decode(path.read_bytes(), type=StartScene)
         scene = Scene(LOOKING_DOWN, given.table_height)
@@ -54,7 +54,7 @@ def read_scene(path: Path | None) -> Scene:
 
 
 def register_commands(control: ControlServer, camera: Camera, wire: TcpWire, boot_time: float) -> None:
-    """Make what the world and a test can do."""
+    """Register the commands of the control channel."""
     scene = camera.scene
 
     def switch(attribute: str) -> Any:
@@ -90,7 +90,7 @@ def register_commands(control: ControlServer, camera: Camera, wire: TcpWire, boo
     control.command("move", move)
     control.command("overheat", lambda temperature=96.0: camera.heat(temperature))
     control.command("power_cycle", power_cycle)
-    control.command("heal", heal)  # the device's own faults too
+    control.command("heal", heal)  # also the faults of the device
 
 
 @app.default
@@ -112,14 +112,14 @@ def main(
     Args:
         listen: HOST:PORT of the stream; port 0 takes a free one.
         control: HOST:PORT of the control channel; port 0 takes a free one.
-        scene: JSON file {"things": [...], "camera": POSE, "table_height": m} of what is there at the start.
-        fps: frames a second while somebody watches.
-        width: pixels.
-        height: pixels.
-        noise: how much of the usual noise there is; 0 for none.
-        boot_time: s for which a power cycle lasts.
-        time_scale: how many times faster than in reality it boots.
-        seed: of the noise.
+        scene: JSON file {"things": [...], "camera": POSE, "table_height": m} of the initial scene.
+        fps: frames per second while a client is connected.
+        width: width of the images, pixels.
+        height: height of the images, pixels.
+        noise: factor of the usual noise; 0 for none.
+        boot_time: duration of a power cycle, s.
+        time_scale: how many times faster than real time it boots.
+        seed: seed of the noise.
     """
     try:
         start_scene = read_scene(scene)

@@ -1,4 +1,4 @@
-"""The camera: clients that watch, frames at the rate of the clock, settings and what a test makes it do wrong."""
+"""The camera: clients, frames, settings and simulated faults."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from arcor2_fakes.wire import Connection
 IDENTITY: Final = {"vendor": "Luxonis", "model": "OAK-D (fake)", "serial": "FAKE000000000001", "firmware": "fake 1.0"}
 NORMAL_EXPOSURE: Final = 0.01
 EXPOSURES: Final = (0.000001, 0.033)
-"""s, of the OAK-D's colour camera."""
+"""Shortest and longest exposure time of the colour camera, s."""
 DEPTH_RANGE: Final = (0.2, 10.0)
 STATUS_PERIOD: Final = 1.0
 ROOM_TEMPERATURE: Final = 48.0
-"""deg C of the chip at work in a room."""
+"""Usual temperature of the chip, °C."""
 SHUTDOWN: Final = 105.0
-"""deg C at which the chip switches itself off."""
+"""Temperature at which the chip switches itself off, °C."""
 OVEREXPOSED: Final = 12.0
 
 log = logging.getLogger(__name__)
 
 
 class Client:
-    """One that is connected; it watches from its start on."""
+    """A connected client; it receives frames from its start message on."""
 
     def __init__(self, connection: Connection) -> None:
         self.connection = connection
@@ -40,7 +40,7 @@ class Client:
 
 
 class Camera:
-    """The camera without its port. `render` gives the pictures of a moment, `warm` readies that: on other threads."""
+    """The camera without its port. `render` returns images, `warm` prepares it; both run on other threads."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class Camera:
 
     # ------------------------------------------------------------------------------------------------ clients
     def opened(self, connection: Connection) -> None:
-        """Greet a client."""
+        """Send a new client the hello."""
         client = Client(connection)
         questions = Questions(lambda kind, header: self._asked(client, kind, header))
 
@@ -99,13 +99,13 @@ class Camera:
 
     @property
     def watchers(self) -> list[Client]:
-        """Return those that watch."""
+        """Return the clients that receive frames."""
         return [client for client in self._clients if client.color is not None]
 
     def _asked(self, client: Client, kind: Kind, header: dict[str, Any]) -> None:
         if kind is Kind.START:
             if header.get("color") not in ("bgr", "jpeg"):
-                raise BadMessage("color is bgr or jpeg")
+                raise BadMessage("color must be bgr or jpeg")
             client.name, client.color = str(header.get("client", "")), header["color"]
             self._say_status(client)
             self._news.set()
@@ -121,9 +121,9 @@ class Camera:
             else:
                 self._say(client, Kind.REFUSED, {"reason": f"exposure {exposure!r} is not within {EXPOSURES} s"})
                 return
-            self.tell_status()
+            self.send_status()
         else:
-            raise BadMessage(f"a client does not send {kind.name}")
+            raise BadMessage(f"a client must not send {kind.name}")
 
     def _say(self, client: Client, kind: Kind, header: dict[str, Any], payload: bytes = b"") -> bool:
         return client.connection.send(encode(kind, header, payload, wrong_checksum=self.wrong_checksum))
@@ -131,23 +131,23 @@ class Camera:
     def _say_status(self, client: Client) -> None:
         self._say(client, Kind.STATUS, {"temperature": self.temperature, "exposure": self.exposure})
 
-    def tell_status(self) -> None:
-        """Tell all that watch how the camera is."""
+    def send_status(self) -> None:
+        """Send the status to all clients that receive frames."""
         self._told_status = time.monotonic()
         for client in self.watchers:
             self._say_status(client)
 
     # ------------------------------------------------------------------------------------------------ frames
     def clock(self) -> float:
-        """Return the camera's own clock, s since it was switched on."""
+        """Return the clock of the camera: time since power-on, s."""
         return time.monotonic() - self._booted
 
     def start(self) -> None:
-        """Begin."""
+        """Start sending frames."""
         self._task = asyncio.create_task(self._run(), name="frames")
 
     async def stop(self) -> None:
-        """End."""
+        """Stop sending frames."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
@@ -169,11 +169,11 @@ class Camera:
             try:
                 color, depth = await asyncio.to_thread(self._render, self.scene, variant, bright, self.covered)
                 self._send(last, color, b"" if self.depth_off else depth)
-            except ValueError as e:  # a mesh or a marker that is none
+            except ValueError as e:  # an invalid mesh or marker
                 log.error("the scene cannot be seen: %s", e)
                 await asyncio.sleep(0.5)
             if time.monotonic() - self._told_status > STATUS_PERIOD:
-                self.tell_status()
+                self.send_status()
             due = max(due + 1.0 / self.fps, time.monotonic() - 1.0 / self.fps)
             await asyncio.sleep(max(0.0, due - time.monotonic()))
 
@@ -190,22 +190,22 @@ class Camera:
 
     # ------------------------------------------------------------------------------------------------ the world's side
     def heat(self, temperature: float) -> None:
-        """Heat the chip, deg C; at SHUTDOWN it switches itself off until `power_cycle`."""
+        """Set the chip temperature, °C; at SHUTDOWN it switches itself off until `power_cycle`."""
         if not -40.0 <= temperature <= 150.0:
-            raise ValueError("temperature is -40 to 150")
+            raise ValueError("temperature must be -40 to 150")
         self.temperature = float(temperature)
-        self.tell_status()
+        self.send_status()
         if self.temperature >= SHUTDOWN:
             self.switch_off()
 
     def switch_off(self) -> None:
-        """Be without power."""
+        """Simulate power loss."""
         self.off = True
         for client in tuple(self._clients):
             client.connection.reset()
 
     def switch_on(self) -> None:
-        """Have power again: clock, numbers and exposure begin anew, and it has cooled down."""
+        """Restore power: clock, frame numbers, exposure and temperature are reset."""
         self.off = False
         self._booted = time.monotonic()
         self.frames = 0
@@ -215,7 +215,7 @@ class Camera:
         self._news.set()
 
     def truth(self) -> dict[str, Any]:
-        """Return what is really so."""
+        """Return the real state, for tests."""
         return {
             "things": msgspec.to_builtins(self.scene.things),
             "camera": msgspec.to_builtins(self.scene.camera),

@@ -1,7 +1,7 @@
-"""The colour camera's lens: intrinsics, distortion, the EEPROM's JSON, and the ray of every pixel.
+"""The lens of the colour camera: intrinsics, distortion, JSON of the EEPROM, and the ray of every pixel.
 
 Source of the distortion: OpenCV's documentation of the camera model (k1, k2, p1, p2, k3 and the rational terms). Source
-of the EEPROM's JSON: the form that depthai's CalibrationHandler writes, version 7.
+of the EEPROM's JSON: the format that the CalibrationHandler of depthai writes, version 7.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float32]
 ITERATIONS: Final = 12
 NEAREST: Final = 0.05
-"""m before the lens within which a solid may fill the picture."""
+"""Distance below which a solid may fill the image, m."""
 MARGIN: Final = 6.0
-"""Pixels by which distortion may bend an edge beyond its corners."""
+"""Largest displacement of an edge beyond its corners by distortion, pixels."""
 
 
 class Lens:
-    """A pinhole camera with distortion, for pictures of width × height."""
+    """A pinhole camera with distortion, for images of width × height."""
 
     def __init__(self, width: int, height: int) -> None:
         scale = width / 1280.0
@@ -30,7 +30,7 @@ class Lens:
         self.distortion: Final = (0.08, -0.14, 0.0004, -0.0006, 0.05)
 
     def rays(self) -> Floats:
-        """Return the direction (x, y, 1) of every pixel's ray in the optical frame, height × width × 3."""
+        """Return the direction (x, y, 1) of the ray of every pixel in the optical frame, height × width × 3."""
         k1, k2, p1, p2, k3 = self.distortion
         u, v = np.meshgrid(np.arange(self.width), np.arange(self.height))
         xd, yd = (u - self.cx) / self.fx, (v - self.cy) / self.fy
@@ -45,7 +45,7 @@ class Lens:
         return np.stack([x, y, np.ones_like(x)], axis=-1).astype(np.float32)
 
     def bounds(self, camera_from_solid: npt.NDArray[np.float64], vertices: Floats) -> tuple[slice, slice] | None:
-        """Return rows and columns in which a solid can be seen; None when it cannot."""
+        """Return the rows and columns in which a solid is visible; None when it is not."""
         low, high = vertices.min(axis=0), vertices.max(axis=0)
         corners = np.array(
             [[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]] for i, j, k in np.ndindex(2, 2, 2)]
@@ -57,7 +57,7 @@ class Lens:
             return slice(0, self.height), slice(0, self.width)
         k1, k2, p1, p2, k3 = self.distortion
         x, y = points[:, 0] / points[:, 2], points[:, 1] / points[:, 2]
-        r2 = np.minimum(x * x + y * y, 1.0)  # beyond, the polynomial means nothing, and the picture has long ended
+        r2 = np.minimum(x * x + y * y, 1.0)  # beyond, the polynomial is invalid and outside of the image
         radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
         u = self.fx * (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)) + self.cx
         v = self.fy * (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y) + self.cy
@@ -66,7 +66,7 @@ class Lens:
         return None if left >= right or top >= bottom else (slice(top, bottom), slice(left, right))
 
     def eeprom(self, serial: str) -> dict[str, Any]:
-        """Return the calibration as a device's EEPROM has it."""
+        """Return the calibration in the format of the EEPROM."""
         nowhere = {"x": 0.0, "y": 0.0, "z": 0.0}
         alone = {
             "lengthUnit": 1,

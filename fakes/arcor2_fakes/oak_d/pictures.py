@@ -1,4 +1,4 @@
-"""Pictures of a moment: rendered when the scene has changed, with noise laid over once for each of its variants."""
+"""Images of an instant: rendered when the scene has changed; noise is added once for each of its variants."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ JPEG_QUALITY = 90
 
 
 class Pictures:
-    """Renders on whichever thread asks, one at a time."""
+    """Renders images on the calling thread, one at a time."""
 
     def __init__(self, lens: Lens, noise: float, seed: int) -> None:
         self._lens, self._noise, self._seed = lens, noise, seed
@@ -26,9 +26,10 @@ class Pictures:
         self.rendered = 0
 
     def take(self, scene: Scene, number: int, exposure: float, covered: bool) -> tuple[Callable[[str], bytes], bytes]:
-        """Return the colour picture in a form that is asked for (bgr, jpeg), and the depth picture.
+        """Return the colour image, coded as bgr or jpeg, and the depth image.
 
-        Raises ValueError when something of the scene cannot be rendered.
+        Raises:
+            ValueError: An object of the scene cannot be rendered.
         """
         from arcor2_fakes.oak_d import sensor
 
@@ -51,7 +52,7 @@ class Pictures:
         return color, depth
 
     def warm(self) -> None:
-        """Load Open3D before somebody waits for a picture: it takes a second, three on a busy machine."""
+        """Load Open3D before the first image is needed: it takes 1 s, or 3 s on a busy machine."""
         from arcor2_fakes.oak_d import render, sensor
 
         with self._one:

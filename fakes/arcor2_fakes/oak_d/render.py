@@ -1,4 +1,4 @@
-"""Rendering: rays cast at the scene, a colour and a depth for every pixel, without noise."""
+"""Rendering by ray casting: colour and depth of every pixel, without noise."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ MOST_SOLIDS: Final = 500
 
 
 class View(NamedTuple):
-    """What the camera would see without noise: colour as B, G, R, depth in m, 0 where there is nothing."""
+    """A view without noise: colour as B, G, R; depth in m, 0 where there is nothing."""
 
     color: Bytes
     depth: Floats
 
 
 class Solid(NamedTuple):
-    """A thing as triangles in its own frame, with the picture on its top, if any."""
+    """An object as triangles in its own frame, with the image on its top, if any."""
 
     vertices: Floats
     triangles: npt.NDArray[np.uint32]
@@ -44,23 +44,23 @@ class Solid(NamedTuple):
 
 
 def load_mesh(path: str) -> Solid:
-    """Read a mesh, in metres. Raises ValueError when it is none."""
+    """Read a mesh, in metres. Raises ValueError when it is invalid."""
     mesh = o3d.io.read_triangle_mesh(Path(path))
     vertices = np.asarray(mesh.vertices, dtype=np.float32)
     if not len(mesh.triangles) or not np.isfinite(vertices).all():
-        raise ValueError(f"{path} is no mesh")
+        raise ValueError(f"{path} is not a mesh")
     return Solid(vertices, np.asarray(mesh.triangles, dtype=np.uint32))
 
 
 def box(size: tuple[float, float, float]) -> Solid:
-    """Return a box about its middle, 12 triangles."""
+    """Return a box with its centre at the origin, 12 triangles."""
     mesh = o3d.geometry.TriangleMesh.create_box(*size)
     vertices = np.asarray(mesh.vertices) - np.asarray(size) / 2.0
     return Solid(vertices.astype(np.float32), np.asarray(mesh.triangles, dtype=np.uint32))
 
 
 def round_body(radius: float, length: float, ball: bool) -> Solid:
-    """Return a cylinder about z, its middle at the origin, with half balls beyond both ends or flat."""
+    """Return a cylinder along z with its centre at the origin, with flat or hemispherical ends."""
     tilts = np.linspace(0.0, np.pi / 2.0, RINGS + 1) if ball else np.array([0.0])
     upper = [(length / 2.0 + radius * np.sin(tilt), radius * np.cos(tilt)) for tilt in tilts]
     if not ball:
@@ -85,7 +85,7 @@ def _dictionary(name: str) -> Any:
 
 
 def solid_of(thing: Thing) -> Solid:
-    """Return the triangles of a thing. Raises ValueError for a mesh or a marker that is none."""
+    """Return the triangles of an object. Raises ValueError for an invalid mesh or marker."""
     if thing.mesh is not None:
         return load_mesh(thing.mesh)
     if (form := thing.capsule or thing.cylinder) is not None:
@@ -114,7 +114,7 @@ def solid_of(thing: Thing) -> Solid:
 
 
 class Renderer:
-    """Casts the rays of one lens: at what stood still from one view to the next once, at the rest where it can be seen.
+    """Casts the rays of a lens. Objects that do not move are rendered once.
 
     Not thread-safe.
     """
@@ -127,7 +127,7 @@ class Renderer:
         self._behind: tuple[tuple[Pose, float, frozenset[Thing]], View] | None = None
 
     def view(self, camera: Pose, table_height: float, things: tuple[Thing, ...]) -> View:
-        """Return what is seen from the camera's pose. Raises ValueError for a thing that cannot be drawn."""
+        """Return the view from the pose of the camera. Raises ValueError for an object that cannot be rendered."""
         world_from_camera = camera.matrix()
         table = _Part(box(TABLE), Pose((0.0, 0.0, table_height - TABLE[2] / 2.0)).matrix(), TABLE_COLOR)
         still = frozenset(things) & frozenset(self._last)
@@ -163,7 +163,7 @@ class Renderer:
 
 
 class _Part(NamedTuple):
-    """A solid that stands somewhere."""
+    """A solid with its pose."""
 
     solid: Solid
     pose: Matrix
@@ -171,7 +171,7 @@ class _Part(NamedTuple):
 
 
 class _Cast:
-    """Parts at which rays are cast."""
+    """A set of solids for ray casting."""
 
     def __init__(self, parts: list[_Part]) -> None:
         self._parts = parts
@@ -191,13 +191,13 @@ class _Cast:
         self._offsets = np.asarray(offsets, dtype=np.int32)
 
     def into(self, view: View, rays: Floats, world_from_camera: Matrix, mask: npt.NDArray[np.bool_]) -> None:
-        """Draw what is seen at some pixels."""
+        """Render some pixels."""
         directions = rays[mask] @ world_from_camera[:3, :3].T.astype(np.float32)
         both = np.empty((len(directions), 6), np.float32)
         both[:, :3] = world_from_camera[:3, 3]
         both[:, 3:] = directions
         hit = self._scene.cast_rays(o3d.core.Tensor.from_numpy(both))
-        # A ray is as long as 1 m along the optical axis, so that how far it went is the depth.
+        # The component of each ray along the optical axis is 1 m, so its parameter is the depth.
         reach: Floats = hit["t_hit"].numpy()
         there = np.isfinite(reach)
         geometry = np.where(there, hit["geometry_ids"].numpy(), 0)
@@ -213,7 +213,7 @@ class _Cast:
 
 
 def _shades(vertices: Floats, triangles: npt.NDArray[np.uint32]) -> npt.NDArray[np.float64]:
-    """Return how bright each triangle is."""
+    """Return the brightness of each triangle."""
     a, b, c = (vertices[triangles[:, i]].astype(np.float64) for i in range(3))
     normals = np.cross(b - a, c - a)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
@@ -230,7 +230,7 @@ def _print(
     pose: Matrix,
     pixel: float,
 ) -> None:
-    """Put a solid's picture on its top, where `found` are the rays that met it: each pixel the mean of four rays."""
+    """Draw the image on the top of a solid, where the rays `found` hit it; each pixel is the mean of four rays."""
     assert solid.texture is not None
     height, width = solid.texture.shape
     level = float(solid.vertices[:, 2].max())

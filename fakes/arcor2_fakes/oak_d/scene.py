@@ -1,4 +1,4 @@
-"""What stands before the camera: a table and named things. Knows neither rendering nor the wire."""
+"""The scene in front of the camera: a table and named objects."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if not all(map(math.isfinite, self.position)):
-            raise ValueError("position is not finite")
+            raise ValueError("position must be finite")
         if not abs(math.hypot(*self.orientation) - 1.0) <= 1e-3:
-            raise ValueError("orientation is no unit quaternion x, y, z, w")
+            raise ValueError("orientation must be a unit quaternion x, y, z, w")
 
     def matrix(self) -> Matrix:
         """Return the pose as a transform."""
@@ -45,7 +45,7 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An ArUco marker in the middle of the top; `size` is the side of its black square, m."""
+    """An ArUco marker at the centre of the top; `size` is the side of its black square, m."""
 
     id: Annotated[int, Meta(ge=0, le=1023)]
     size: Length
@@ -53,7 +53,7 @@ class Marker(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Charuco(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A ChArUco board in the middle of the top; sides of a square and of its marker, m."""
+    """A ChArUco board at the centre of the top; sides of a square and of its marker, m."""
 
     columns: Annotated[int, Meta(ge=2, le=50)]
     rows: Annotated[int, Meta(ge=2, le=50)]
@@ -63,9 +63,9 @@ class Charuco(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Thing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A box, cylinder or capsule with its pose at its middle, or a mesh with its pose at the mesh's origin.
+    """A box, cylinder or capsule whose pose is at its centre, or a mesh whose pose is at the origin of the mesh.
 
-    cylinder and capsule: radius and length along z, without a capsule's half balls.
+    `cylinder` and `capsule` are radius and length along z, without the hemispheres of a capsule.
     """
 
     name: str
@@ -80,17 +80,17 @@ class Thing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if not self.name:
-            raise ValueError("a thing needs a name")
+            raise ValueError("an object needs a name")
         if sum(form is not None for form in (self.size, self.mesh, self.cylinder, self.capsule)) != 1:
             raise ValueError(f"{self.name}: either size, mesh, cylinder or capsule")
         if self.size is None and (self.marker or self.charuco):
-            raise ValueError(f"{self.name}: only a box carries a marker")
+            raise ValueError(f"{self.name}: only a box can have a marker")
         if self.mesh is not None and not (Path(self.mesh).is_file() and Path(self.mesh).stat().st_size <= LARGEST_MESH):
-            raise ValueError(f"{self.name}: mesh {self.mesh} is no file of at most {LARGEST_MESH} bytes")
+            raise ValueError(f"{self.name}: mesh {self.mesh} must be a file of at most {LARGEST_MESH} bytes")
 
 
 class Scene:
-    """The table, the things, the camera. `version` grows with every change that the camera could see."""
+    """Table, objects and camera. `version` increases with every visible change."""
 
     def __init__(self, camera: Pose, table_height: float) -> None:
         self._versions = itertools.count(1)
@@ -101,33 +101,33 @@ class Scene:
 
     @property
     def things(self) -> tuple[Thing, ...]:
-        """Return the things."""
+        """Return the objects."""
         return tuple(self._things.values())
 
     def replace(self, things: Iterable[Any], table_height: float | None = None) -> None:
-        """Let these stand there instead of all others. Raises ValueError when one is none."""
+        """Replace all objects. Raises ValueError for an invalid one."""
         new = [msgspec.convert(each, Thing) for each in things]
         by_name = {each.name: each for each in new}
         if len(by_name) < len(new) or len(new) > MOST_THINGS:
-            raise ValueError(f"at most {MOST_THINGS} things, each with a name of its own")
+            raise ValueError(f"at most {MOST_THINGS} objects with unique names are allowed")
         if table_height is not None:
             self.table_height = float(table_height)
         self._things = by_name
         self._changed()
 
     def place(self, thing: Any) -> None:
-        """Add a thing, or let it stand in the place of the one with its name."""
+        """Add an object, or replace the one with its name."""
         found = msgspec.convert(thing, Thing)
         if len(self._things) >= MOST_THINGS and found.name not in self._things:
-            raise ValueError(f"at most {MOST_THINGS} things")
+            raise ValueError(f"at most {MOST_THINGS} objects are allowed")
         self._things[found.name] = found
         self._changed()
 
     def move(self, poses: dict[str, Any]) -> None:
-        """Move things. Raises LookupError when one does not stand there; then none is moved."""
+        """Move objects. Raises LookupError if one does not exist; none is moved then."""
         new = {name: msgspec.convert(pose, Pose) for name, pose in poses.items()}
         if unknown := set(new) - set(self._things):
-            raise LookupError(f"no thing {', '.join(sorted(unknown))}")
+            raise LookupError(f"no object {', '.join(sorted(unknown))}")
         moved = {name: pose for name, pose in new.items() if self._things[name].pose != pose}
         for name, pose in moved.items():
             self._things[name] = msgspec.structs.replace(self._things[name], pose=pose)
@@ -135,9 +135,9 @@ class Scene:
             self._changed()
 
     def remove(self, name: str) -> None:
-        """Take a thing away. Raises LookupError."""
+        """Remove an object. Raises LookupError."""
         if name not in self._things:
-            raise LookupError(f"no thing {name}")
+            raise LookupError(f"no object {name}")
         del self._things[name]
         self._changed()
 

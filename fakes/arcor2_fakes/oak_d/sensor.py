@@ -1,4 +1,4 @@
-"""The sensor: noise, exposure and what a lens or a matcher does wrong, laid over a rendered view."""
+"""The sensor: adds noise, exposure and the errors of lens and stereo matching to a rendered view."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import numpy.typing as npt
 from arcor2_fakes.oak_d.render import Bytes, View
 
 NORMAL_EXPOSURE: Final = 0.01
-"""s at which a picture is as bright as the scene."""
+"""Exposure time at which an image is as bright as the scene, s."""
 DEPTH_RANGE: Final = (0.2, 10.0)
-"""m, of a stereo pair with extended disparity."""
+"""Depth range of a stereo pair with extended disparity, m."""
 DEPTH_NOISE: Final = 0.0018
-"""Standard deviation in m at 1 m; it grows with the square of the distance, as disparity's does."""
+"""Standard deviation of depth at 1 m, m; it grows with the square of the distance, as for stereo."""
 COLOR_NOISE: Final = 2.0
 VARIANTS: Final = 6
-"""Different noises; a standing scene costs nothing once each was laid over it."""
+"""Number of noise patterns; an unchanged scene is rendered once with each."""
 HOLES: Final = 0.003
-"""Part of the pixels that have no depth for no reason."""
+"""Fraction of pixels without depth at random."""
 EDGE: Final = 0.02
-"""m between neighbours beyond which the matcher finds nothing for half of them."""
+"""Depth difference between neighbours above which half of the pixels have no depth, m."""
 
 
 class Sensor:
-    """Makes pictures of views of one size. Not thread-safe."""
+    """Converts views of one size to images. Not thread-safe."""
 
     def __init__(self, width: int, height: int, noise: float, seed: int) -> None:
         rng = np.random.default_rng(seed)
@@ -42,7 +42,7 @@ class Sensor:
         self._coin = rng.random(shape, np.float32) < 0.5 * min(noise, 1.0)
 
     def color(self, view: View, variant: int, exposure: float, covered: bool) -> Bytes:
-        """Return the colour picture, B, G, R."""
+        """Return the colour image, B, G, R."""
         if covered:
             base: npt.NDArray[np.int16] = np.full(view.color.shape, 4, np.int16)
         elif exposure == NORMAL_EXPOSURE:
@@ -54,7 +54,7 @@ class Sensor:
         return np.asarray(np.clip(base, 0, 255), dtype=np.uint8)
 
     def depth(self, view: View, variant: int, covered: bool) -> npt.NDArray[np.uint16]:
-        """Return the depth picture, mm, 0 where there is none."""
+        """Return the depth image, mm, 0 where there is none."""
         z = view.depth
         if covered:
             return np.zeros(z.shape, np.uint16)

@@ -1,4 +1,4 @@
-"""The stream of a network source, version 1, as the source speaks it. Numbers are big-endian.
+"""Codec of the network stream, version 1, on the side of the source. Numbers are big-endian.
 
     offset  size  field
     0       4     "OAKS"
@@ -20,11 +20,11 @@
 | 6    | status  | to client | temperature (deg C), exposure (s or null)                         |                   |
 | 7    | refused | to client | reason                                                            |                   |
 
-The source says hello when a client has connected and nothing more until start. `stamp` is when the exposure ended, on
-the source's clock (s, monotonic). Colour is rows of B, G, R, or a JPEG file; depth is rows of 16-bit mm, little-endian
-as the sensor gives it, 0 where there is none; a frame without depth has depth_bytes 0. Status comes with start, with
-every change and once a second. A control is answered by a status. CRC covers the framing alone: TCP has one for the
-rest, and one over 4.6 MB a frame costs more than the picture.
+The source sends hello when a client has connected, and nothing else until start. `stamp` is the end of the exposure on
+the clock of the source (s, monotonic). Colour is rows of B, G, R, or a JPEG file. Depth is rows of 16-bit mm,
+little-endian, 0 where there is none; a frame without depth has depth_bytes 0. The source sends status after start, on
+every change and once per second, and as the answer to control. The CRC does not cover the payload: TCP has a checksum,
+and a CRC of 4.6 MB per frame takes longer than rendering.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ VERSION: Final = 1
 FIXED: Final = struct.Struct(">4sBBHII")
 LONGEST_HEADER: Final = 4096
 LONGEST_QUESTION: Final = 0
-"""Bytes of payload that a client may send: none of its messages has one."""
+"""Longest payload from a client, bytes: its messages have none."""
 
 
 class Kind(enum.IntEnum):
-    """What a message is."""
+    """Kind of a message."""
 
     HELLO = 1
     START = 2
@@ -58,7 +58,7 @@ class Kind(enum.IntEnum):
 
 
 class BadMessage(Exception):
-    """What came is no message."""
+    """The bytes are not a valid message."""
 
 
 def encode(kind: Kind, header: dict[str, Any], payload: bytes = b"", *, wrong_checksum: bool = False) -> bytes:
@@ -70,19 +70,19 @@ def encode(kind: Kind, header: dict[str, Any], payload: bytes = b"", *, wrong_ch
 
 
 class Questions:
-    """Takes apart what a client sends; `take` is called with each message."""
+    """Splits the bytes from a client into messages, and calls `take` with each."""
 
     def __init__(self, take: Callable[[Kind, dict[str, Any]], None]) -> None:
         self._take = take
         self._rest = b""
 
     def feed(self, data: bytes) -> None:
-        """Take bytes. Raises BadMessage; nothing sensible can follow."""
+        """Receive bytes. Raises BadMessage; the connection must be closed then."""
         self._rest += data
         while len(self._rest) >= FIXED.size:
             magic, version, kind, length, payload, check = FIXED.unpack_from(self._rest)
             if magic != MAGIC or version != VERSION or length > LONGEST_HEADER or payload > LONGEST_QUESTION:
-                raise BadMessage("no message of version 1")
+                raise BadMessage("not a message of version 1")
             if len(self._rest) < FIXED.size + length:
                 return
             header = self._rest[FIXED.size : FIXED.size + length]

@@ -1,4 +1,4 @@
-"""Starts the fake PLC: `python -m arcor2_fakes.opcua_plc`."""
+"""Start the fake PLC: `python -m arcor2_fakes.opcua_plc`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ JOBS = {1: 1.0, 2: 3.0, 3: 20.0}
 
 
 class OneUser(UserManager):
-    """Lets one user in by password; with an empty name everybody."""
+    """Accepts one user by password; with an empty name everybody."""
 
     def __init__(self, name: str, password: str) -> None:
         self._name, self._password = name, password
@@ -40,28 +40,28 @@ class OneUser(UserManager):
         password: str | None = None,
         certificate: Any = None,  # noqa: ARG002
     ) -> User | None:
-        """Return the user, None for nobody."""
+        """Return the user; None: rejected."""
         if not self._name or (username, password) == (self._name, self._password):
             return User(role=UserRole.User)
         return None
 
 
 class Plc:
-    """The PLC: its program on its variables."""
+    """The PLC: its program and its variables."""
 
     def __init__(self, server: Server, program: Program) -> None:
         self.space, self.program = Space(server), program
         self.cycles = 0
 
     async def run(self) -> None:
-        """Scan for ever."""
+        """Scan periodically."""
         loop = asyncio.get_running_loop()
         while True:
             await self.scan(loop.time())
             await asyncio.sleep(SCAN)
 
     async def scan(self, time: float) -> None:
-        """Read what the host wrote, run the program, tell what came of it."""
+        """Read the variables of the host, run the program, and write its variables."""
         space, program = self.space, self.program
         names = ("Owner", "HostLife", "Number", "Request")
         gone = program.scan(Host(*(space.value(f"Handshake.{name}") for name in names)), time)
@@ -70,7 +70,7 @@ class Plc:
             for name in OFF_ON_LOSS:
                 await space.set(f"Cell.{name}", POINTS[name][2])
         await space.set("Handshake.PlcLife", program.life)
-        # Busy falls last: who sees it fall finds how the job ended.
+        # Busy falls last: a client that sees it fall can read the result of the job.
         await space.set("Handshake.Code", program.code)
         await space.set("Handshake.Done", program.step is Step.DONE)
         await space.set("Handshake.Error", program.step is Step.ERROR)
@@ -78,7 +78,7 @@ class Plc:
         self.cycles += 1
 
     def truth(self) -> dict[str, Any]:
-        """Return what the PLC really does."""
+        """Return the real state of the PLC."""
         program, space = self.program, self.space
         return {
             "step": program.step.value,
@@ -94,7 +94,7 @@ class Plc:
         }
 
     async def restart(self) -> None:
-        """Begin as after switching on."""
+        """Restart, as after power-on."""
         self.program.restart()
         for name in ("Owner", "HostLife", "Number"):
             await self.space.set(f"Handshake.{name}", 0)
@@ -104,7 +104,7 @@ class Plc:
 
 
 def register_commands(control: ControlServer, plc: Plc, proxy: Proxy) -> None:
-    """Register what tests and the cell can do to the PLC."""
+    """Register the commands of the control channel."""
     program, space = plc.program, plc.space
 
     async def set_point(name: str, value: Any) -> None:
@@ -129,7 +129,7 @@ def register_commands(control: ControlServer, plc: Plc, proxy: Proxy) -> None:
 
     async def power_cycle(seconds: float = 0.5) -> None:
         if not 0.0 <= seconds <= 60.0:
-            raise ValueError("seconds is 0 to 60")
+            raise ValueError("seconds must be 0 to 60")
         proxy.wire.refuse()
         proxy.wire.reset()
         await plc.restart()
@@ -149,7 +149,7 @@ def register_commands(control: ControlServer, plc: Plc, proxy: Proxy) -> None:
 
 
 async def make_server(user: str, password: str, certificate: Path | None, key: Path | None) -> Server:
-    """Make the OPC UA stack, not started, on a port of its own choice."""
+    """Return the OPC UA stack on a free port; it is not started."""
     server = Server(user_manager=OneUser(user, password) if user else None)
     await server.init()
     server.set_endpoint("opc.tcp://127.0.0.1:0")
@@ -185,15 +185,15 @@ def main(
         listen: HOST:PORT of the OPC UA server; port 0 takes a free one.
         control: HOST:PORT of the control channel; port 0 takes a free one.
         time_scale: how many times faster than real time the jobs are.
-        patience: s without a life sign of the host after which it is gone; not scaled.
-        user: name of the only user that is let in; empty for everybody.
+        patience: time without a life sign after which the host counts as disconnected, s; not scaled.
+        user: name of the only accepted user; empty for everybody.
         password: password of that user.
-        certificate: PEM or DER file; the server signs and encrypts then, and takes nothing else.
+        certificate: PEM or DER file; the server then accepts only signed and encrypted connections.
         key: PEM file of the certificate's private key.
     """
 
     async def body(fake: Fake) -> None:
-        logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # broken connections are what a fake is for
+        logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # broken connections are expected
         server = await make_server(user, password, certificate, key)
         jobs = {number: seconds / time_scale for number, seconds in JOBS.items()}
         plc = Plc(server, Program(jobs, 0.1 / time_scale, patience))

@@ -1,4 +1,4 @@
-"""The PLC's program: a handshake for jobs, supervised by the host's life sign. Knows neither OPC UA nor a clock."""
+"""The program of the PLC: a handshake for jobs, supervised by the life sign of the host. Pure logic."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ ABORTED: Final = 90
 HOST_GONE: Final = 91
 UNKNOWN_JOB: Final = 92
 LIFE_STEP: Final = 0.1
-"""Time between two counts of the PLC's own life sign, s."""
+"""Period of the life sign of the PLC, s."""
 
 
 class Step(enum.StrEnum):
-    """Where the handshake is."""
+    """Step of the handshake."""
 
     IDLE = "idle"
     BUSY = "busy"
@@ -25,7 +25,7 @@ class Step(enum.StrEnum):
 
 @dataclasses.dataclass
 class Host:
-    """What the host writes."""
+    """Variables that the host writes."""
 
     owner: int = 0
     life: int = 0
@@ -34,10 +34,12 @@ class Host:
 
 
 class Program:
-    """One scan after another.
+    """The program, executed by `scan`.
 
-    jobs: duration of each job, s, by number. ramp: s a job takes to stop. patience: s without a new count of the host's
-    life sign after which the host is gone.
+    Args:
+        jobs: Duration of each job by number, s.
+        ramp: Time a job takes to stop, s.
+        patience: Time without a change of the life sign of the host after which it counts as disconnected, s.
     """
 
     def __init__(self, jobs: dict[int, float], ramp: float, patience: float) -> None:
@@ -61,11 +63,11 @@ class Program:
 
     @property
     def moving(self) -> bool:
-        """Return whether something moves."""
+        """Return whether a job moves something."""
         return self.step in (Step.BUSY, Step.STOPPING)
 
     def scan(self, host: Host, time: float) -> bool:
-        """Run once; tell whether the host has just been lost, so that the outputs take their state on loss."""
+        """Run once; return whether the host was lost in this scan, so that outputs take their state on loss."""
         if self.live and time - self._counted >= LIFE_STEP:
             self.life, self._counted = (self.life + 1) % 65536, time
         gone = self._supervise(host, time)
@@ -121,7 +123,7 @@ class Program:
             self.done.append(self._number)
 
     def restart(self) -> None:
-        """Begin as after switching on: nothing moves, nobody has control; the counters go on from 0."""
+        """Restart, as after power-on: nothing moves, nobody has control, the counters start from 0."""
         self.step, self.code, self.life, self.owner = Step.IDLE, 0, 0, 0
         self.stuck = self.deaf = self.stranger = self._requested = False
         self.live, self.next_error = True, 0

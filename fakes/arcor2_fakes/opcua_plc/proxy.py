@@ -1,4 +1,4 @@
-"""The public port of the PLC: carries bytes to the OPC UA stack behind it and back, with the faults of a wire."""
+"""The public port of the PLC: a proxy to the OPC UA stack that simulates faults."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ CHUNK = 65536
 
 
 class Proxy:
-    """Passes connections on to 127.0.0.1:`inner`."""
+    """Forwards connections to 127.0.0.1:`inner`."""
 
     def __init__(self, host: str, port: int, inner: int) -> None:
         self.wire = TcpWire("opcua", host, port, self._opened)
@@ -44,7 +44,7 @@ class Proxy:
             finally:
                 onward.cancel()
         except ConnectionError:
-            pass  # the stack behind has gone
+            pass  # the stack has closed the connection
         finally:
             writer.close()
             connection.close()

@@ -1,4 +1,4 @@
-"""The PLC's variables in OPC UA: what the host writes, what the program tells, the points."""
+"""The variables of the PLC in OPC UA: handshake and points."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ POINTS: Final[dict[str, tuple[ua.VariantType, bool, Any]]] = {
 }
 """Type of each point, whether the host writes it, and its value at power on."""
 OFF_ON_LOSS: Final = ("Lamp", "Speed")
-"""Outputs that go to zero when the host is gone; the others hold."""
+"""Outputs that are set to 0 when the host is lost; the others hold their value."""
 
 
 class Space:
-    """The variables. What the host has written is kept in `written`, in order."""
+    """The variables. `written` stores the writes of the host in order."""
 
     def __init__(self, server: Server) -> None:
         self._server = server
@@ -50,7 +50,7 @@ class Space:
         self._names: dict[ua.NodeId, str] = {}
 
     async def build(self) -> None:
-        """Make the variables."""
+        """Create the variables."""
         index = await self._server.register_namespace(NAMESPACE)
         for folder, variables in (("Handshake", HANDSHAKE), ("Cell", POINTS)):
             parent = await self._server.nodes.objects.add_folder(
@@ -76,7 +76,7 @@ class Space:
                 continue
             kind, _, quality = self._kept[name]
             self._kept[name] = (kind, item.Value.Value.Value, quality)
-            if name != "Handshake.HostLife":  # it is written all the time
+            if name != "Handshake.HostLife":  # it changes periodically
                 self.written.append((name, item.Value.Value.Value))
 
     def value(self, name: str) -> Any:
@@ -84,7 +84,7 @@ class Space:
         return self._kept[name][1]
 
     async def set(self, name: str, value: Any, status: int | None = None) -> None:
-        """Return a variable a value, with its source time; nothing happens when it has it."""
+        """Set a variable with its source time, if its value changes."""
         kind, before, code = self._kept[name]
         now = code if status is None else ua.StatusCode(ua.UInt32(status))
         if before != value or now != code:
@@ -99,5 +99,5 @@ class Space:
         )
 
     async def remove(self, name: str) -> None:
-        """Take a variable away, as a program download without it does."""
+        """Remove a variable, as a program download without it does."""
         await self._server.delete_nodes([self.nodes[name]])

@@ -1,4 +1,4 @@
-"""Starts the fake scale: `python -m arcor2_fakes.scale`."""
+"""Start the fake scale: `python -m arcor2_fakes.scale`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def truth(balance: Balance, line: Line) -> dict[str, Any]:
 
 
 def register_commands(fake: Fake, balance: Balance) -> None:
-    """Register what tests and the cell can do to the scale."""
+    """Register the commands of the control channel."""
 
     def vibrate(on: bool) -> None:
         balance.vibrating = bool(on)
@@ -74,11 +74,11 @@ def main(
 
     Args:
         tcp: HOST:PORT to serve instead of a pty; port 0 takes a free one.
-        link: symbolic link to keep on the pty, whose own path changes when it is unplugged and plugged.
+        link: symbolic link to the pty, whose path changes when it is unplugged and plugged in.
         control: HOST:PORT of the control channel; port 0 takes a free one.
-        capacity: greatest load, kg.
-        settling: how long the value moves after the load has changed, s.
-        stability_timeout: how long S, T and Z wait for a stable value, s.
+        capacity: largest load, kg.
+        settling: time until the value is stable after a change of the load, s.
+        stability_timeout: time limit of S, T and Z for a stable value, s.
     """
 
     async def body(fake: Fake) -> None:

@@ -1,4 +1,4 @@
-"""The balance itself: MT-SICS commands in, answers out, in time. Knows neither pty nor socket.
+"""The balance without its port: MT-SICS commands and answers in time.
 
 Source: MT-SICS interface commands, levels 0 and 1: @, I2, I3, I4, S, SI, Z, ZI, T, TI, TA, TAC; errors ES, ET, EL.
 """
@@ -14,7 +14,7 @@ from typing import Final
 UNITS: Final = {"g": 1e3, "kg": 1.0, "mg": 1e6, "lb": 2.20462262}
 DECIMALS: Final = {"g": 2, "kg": 5, "mg": 0, "lb": 4}
 ZERO_RANGE: Final = 0.02
-"""of the capacity, around the zero point of switching on"""
+"""Zero range around the zero point at power-on, relative to the capacity."""
 _LONGEST_LINE: Final = 64
 _LOOK: Final = 0.01
 _AT_ONCE: Final = ("@", "I2", "I3", "I4", "SI", "ZI", "TI", "TA", "TAC")
@@ -25,10 +25,10 @@ class Balance:
     """A platform balance.
 
     Args:
-        send: puts bytes on the line.
-        capacity: kg; more is overload.
-        settling: how long the value moves after the load has changed, s.
-        stability_timeout: how long S, T and Z wait for a stable value, s.
+        send: Sends bytes.
+        capacity: Largest load, kg.
+        settling: Time until the value is stable after a change of the load, s.
+        stability_timeout: Time limit of S, T and Z for a stable value, s.
     """
 
     identity = ("MS3002S 3.2 kg", "2.10 10.28.0.493.142", "B021002593")
@@ -57,7 +57,7 @@ class Balance:
 
     # ------------------------------------------------------------------------------------------------ the line's side
     def feed(self, data: bytes) -> None:
-        """Take bytes from the line; a command ends with CR LF."""
+        """Receive bytes; a command ends with CR LF."""
         for byte in data:
             if byte == 0x0A:
                 line, too_long = bytes(self._buffer), self._too_long
@@ -73,7 +73,7 @@ class Balance:
                 self._too_long = True
 
     def drop_input(self) -> None:
-        """Forget the part of a line that has come so far."""
+        """Discard an incomplete line."""
         self._buffer.clear()
         self._too_long = False
 
@@ -89,14 +89,14 @@ class Balance:
             self._next()
 
     def cancel(self) -> None:
-        """Forget every command that waits for its answer."""
+        """Discard all pending commands."""
         self._waiting.clear()
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
     def _next(self) -> None:
-        """Answer in order; a command that waits for stability keeps the others waiting."""
+        """Answer in order; a command that waits for stability delays the following ones."""
         self._timer = None
         while self._waiting:
             command = self._waiting[0]
@@ -114,7 +114,7 @@ class Balance:
         self._send(text.encode("ascii") + b"\r\n")
 
     def _excuse(self, command: str) -> str:
-        """Return the answer of a command that cannot be done whatever is waited for; empty when it can."""
+        """Return the answer to a command that fails regardless of stability; empty otherwise."""
         if self.next_error:
             return self.next_error
         if self.busy:
@@ -149,7 +149,7 @@ class Balance:
     def _measured(self, word: str) -> str:
         stable, gross = self.stable, self.shown()
         if word in _WHEN_STABLE and not stable:
-            return f"{word} I"  # the time to become stable has run out
+            return f"{word} I"  # not stable in time
         mark = "S" if stable else "D"
         if word in ("S", "SI"):
             return f"S {mark} {self._field(gross - self.zero - self.tare)}"
@@ -160,18 +160,18 @@ class Balance:
         return f"{word} {mark} {self._field(self.tare)}"
 
     def _field(self, kilograms: float) -> str:
-        """Return the value, right-aligned in ten places, and the unit."""
+        """Return the value, right-aligned in ten characters, and the unit."""
         text = f"{kilograms * UNITS[self.unit]:.{DECIMALS[self.unit]}f}"
         return f"{text.removeprefix('-') if float(text) == 0.0 else text:>10} {self.unit}"
 
     # ------------------------------------------------------------------------------------------------ the world's side
     @property
     def stable(self) -> bool:
-        """Return whether the shown value stands."""
+        """Return whether the displayed value is stable."""
         return not self.vibrating and self._loop.time() - self._changed >= self._settling
 
     def shown(self) -> float:
-        """Return the gross weight as the sensor shows it now, kg."""
+        """Return the present gross weight at the sensor, kg."""
         since = self._loop.time() - self._changed
         ripple = 0.003 * math.sin(60.0 * self._loop.time()) if self.vibrating else 0.0
         if since >= self._settling:
@@ -179,13 +179,13 @@ class Balance:
         return self.load + (self._from - self.load) * math.exp(-5.0 * since / self._settling) + ripple
 
     def put(self, kilograms: float) -> None:
-        """Lay a load on the pan, instead of what was there. Raises ValueError for no mass at all."""
+        """Replace the load on the pan, kg. Raises ValueError."""
         if not math.isfinite(kilograms):
-            raise ValueError("kg is a finite number")
+            raise ValueError("kg must be a finite number")
         self._from, self._changed, self.load = self.shown(), self._loop.time(), kilograms
 
     def renew(self) -> None:
-        """Be as delivered: nothing on the pan, nothing asked, nothing wrong."""
+        """Reset everything: empty pan, no pending command, no fault."""
         self.cancel()
         self.drop_input()
         self.received.clear()
@@ -195,7 +195,7 @@ class Balance:
         self._changed = -math.inf
 
     def power_cycle(self) -> None:
-        """Switch off and on: the tare is gone, the load is the new zero if it is small, and the balance says hello."""
+        """Switch off and on: the tare is lost, a small load is the new zero, and the balance sends its greeting."""
         self.cancel()
         self.drop_input()
         self.tare = 0.0

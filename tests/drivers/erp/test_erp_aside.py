@@ -33,7 +33,7 @@ def test_what_the_service_refuses_is_kept_aside_and_named(fake: FakeProcess, erp
     assert [result["serial"] for result in fake.truth()["results"]] == ["S-2"]
     refused = erp.refused()
     assert [(each.order_id, each.why) for each in refused] == [
-        ("A-1", "422: the order A-1 takes nothing"),
+        ("A-1", "422: the order A-1 is forbidden"),
         ("C-9", "404: there is no order C-9"),
     ]
     (alarm,) = erp.alarms()
