@@ -18,8 +18,8 @@ prints a board on the top. The noise of depth grows with the square of the dista
 some other pixels.
 
 Not modelled: XLink and USB, booting of firmware beyond its time, the two mono cameras and their disparity (depth is
-rendered in the view of the colour camera), rolling shutter, motion blur, focus, settling of auto exposure, reflections and
-shadows, IR projector, IMU, on-device neural networks, exclusive use by one host.
+rendered in the view of the colour camera), rolling shutter, motion blur, focus, settling of auto exposure, reflections
+and shadows, IR projector, IMU, on-device neural networks, exclusive use by one host.
 """
 
 WIRE = "frames over TCP"

@@ -1,6 +1,6 @@
 """Crates rendered with noise, and the pictures of them as a camera gives them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -85,14 +85,19 @@ def picture() -> Photographer:
 
 
 @pytest.fixture
-def make() -> Callable[..., Bin]:
+def make() -> Iterator[Callable[..., Bin]]:
+    made: list[Bin] = []
+
     def build(**settings: Any) -> Bin:
         sizes = dict(zip(("part_length", "part_width", "part_height"), PART, strict=True))
         if settings.get("part_mesh"):
             sizes = {}
         given = BinSettings(LENGTH, WIDTH, HEIGHT, **{**sizes, **settings})
         found = Bin("bin_id", "crate", CRATE, given)
+        made.append(found)
         found.connect()
         return found
 
-    return build
+    yield build
+    for each in made:
+        each.disconnect()

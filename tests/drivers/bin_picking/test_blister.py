@@ -1,6 +1,6 @@
 """A blister counts: parts and places in their order, in its own frame, kept over a restart if told to."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +17,21 @@ TRAY = Pose(Position(0.4, 0.1, 0.05), Orientation(0.0, 0.0, np.sin(np.pi / 4), n
 
 
 @pytest.fixture
-def make() -> Callable[..., Blister]:
+def make() -> Iterator[Callable[..., Blister]]:
+    made: list[Blister] = []
+
     def build(rows: int = 2, columns: int = 3, **settings: Any) -> Blister:
         given = BlisterSettings(
             rows, columns, 0.04, 0.03, **{"origin_x": 0.01, "origin_y": 0.02, "origin_z": 0.005, **settings}
         )
         found = Blister("tray_id", "tray", TRAY, given)
+        made.append(found)
         found.connect()
         return found
 
-    return build
+    yield build
+    for each in made:
+        each.disconnect()
 
 
 def local(pose: Pose) -> tuple[float, ...]:
