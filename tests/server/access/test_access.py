@@ -1,4 +1,4 @@
-"""Who gets in, in which role, by which door; and how one who was let in is put out again."""
+"""Tokens, roles and ports: who is admitted with which role, and how access is revoked."""
 
 import asyncio
 import contextlib
@@ -59,7 +59,7 @@ async def closed_with(socket: ClientConnection) -> int | None:
 
 
 # ------------------------------------------------------------------------------------------------ the file
-def test_a_secret_is_nowhere_kept(tmp_path: Path) -> None:
+def test_tokens_are_stored_only_as_hashes(tmp_path: Path) -> None:
     made, secret = TokenFile(tmp_path).add("tablet 1", Role.OPERATOR, days=2)
     assert len(secret) >= 43
     assert secret not in (tmp_path / FILE).read_text()
@@ -70,7 +70,7 @@ def test_a_secret_is_nowhere_kept(tmp_path: Path) -> None:
     assert other.find("") is None
 
 
-def test_a_token_ends(tmp_path: Path) -> None:
+def test_a_token_expires(tmp_path: Path) -> None:
     tokens = TokenFile(tmp_path)
     made, secret = tokens.add("tablet", Role.OPERATOR)
     with pytest.raises(Exception, match="already"):
@@ -114,7 +114,7 @@ def test_a_revoked_token_does_not_come_back_from_the_copy(tmp_path: Path) -> Non
     assert TokenFile(tmp_path).find(secret) is None
 
 
-def test_tokens_that_cannot_be_read_do_not_open_the_server(tmp_path: Path) -> None:
+def test_unreadable_tokens_admit_nobody(tmp_path: Path) -> None:
     for name in (FILE, COPY):
         (tmp_path / name).write_text("{")
     access = Access(ServerSettings(data_dir=tmp_path))
@@ -127,7 +127,7 @@ def test_tokens_that_cannot_be_read_do_not_open_the_server(tmp_path: Path) -> No
     assert list(tmp_path.glob("tokens.damaged-*.json"))
 
 
-async def test_damaged_files_do_not_keep_the_server_from_starting(tmp_path: Path) -> None:
+async def test_the_server_starts_with_damaged_token_files(tmp_path: Path) -> None:
     data = tmp_path / "data"
     _, secret = TokenFile(data).add("tablet", Role.PROGRAMMER)
     damaged = [FILE, "markers.json", "arm-calibrations.json", "journal.sqlite"]
@@ -154,7 +154,7 @@ async def test_damaged_files_do_not_keep_the_server_from_starting(tmp_path: Path
 
 # ------------------------------------------------------------------------------------------------ the websocket
 @pytest.mark.parametrize("way", ["header", "query", "message"])
-async def test_a_token_lets_in_with_its_role(server: ServerProcess, way: str) -> None:
+async def test_a_token_admits_with_its_role(server: ServerProcess, way: str) -> None:
     secret = token(server, "Operator 1", Role.OPERATOR)
     url = f"{server.url}/?token={secret}" if way == "query" else server.url
     headers = bearer(secret) if way == "header" else {}
@@ -169,7 +169,7 @@ async def test_a_token_lets_in_with_its_role(server: ServerProcess, way: str) ->
         assert "technician" in await talker.refused("NewScene", {"name": "scene"})
 
 
-async def test_who_is_not_let_in_is_told_nothing(server: ServerProcess) -> None:
+async def test_refused_clients_receive_no_data(server: ServerProcess) -> None:
     async with (
         connect(server.url) as stranger,
         connect(server.url, additional_headers=bearer(token(server, "technician", Role.TECHNICIAN))) as known,
@@ -195,7 +195,7 @@ async def test_a_wrong_token_is_refused(server: ServerProcess) -> None:
         await talker.granted("Authenticate", {"token": secret})
 
 
-async def test_guessing_has_an_end(server: ServerProcess) -> None:
+async def test_token_guessing_is_limited(server: ServerProcess) -> None:
     right = token(server, "right", Role.OPERATOR)
     async with rest(server) as http:
         statuses = [(await http.get("/api/devices", headers=bearer("wrong"))).status_code for _ in range(12)]
@@ -223,7 +223,7 @@ async def test_a_revoked_token_ends_its_connections(server: ServerProcess) -> No
 
 
 # ------------------------------------------------------------------------------------------------ REST
-async def test_rest_asks_for_token_and_role(server: ServerProcess) -> None:
+async def test_rest_requires_token_and_role(server: ServerProcess) -> None:
     operator, programmer = token(server, "o", Role.OPERATOR), token(server, "p", Role.PROGRAMMER)
     async with rest(server) as http:
         assert (await http.get("/healthz/ready")).status_code == 200
@@ -237,7 +237,7 @@ async def test_rest_asks_for_token_and_role(server: ServerProcess) -> None:
         assert (await http.put("/object-types", json=body, headers=bearer(programmer))).status_code != 403
 
 
-async def test_without_tokens_this_machine_may_do_everything(tmp_path: Path) -> None:
+async def test_without_tokens_local_clients_have_all_rights(tmp_path: Path) -> None:
     async with running(tmp_path / "data") as server:
         async with talking(server.url, "anybody") as talker:
             await talker.granted("NewScene", {"name": "scene"})
@@ -259,7 +259,7 @@ def test_other_machines_are_not_served_without_tokens(tmp_path: Path) -> None:
     assert len(ended.stderr.splitlines()) == 1
 
 
-def test_a_proxy_lets_other_machines_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_trusted_proxy_admits_other_machines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = ServerSettings(data_dir=tmp_path, trusted_proxies=("127.0.0.1",))
     assert not Access(settings).open_to_all
     assert Access(msgspec.structs.replace(settings, trusted_proxies=())).open_to_all
@@ -269,7 +269,7 @@ def test_a_proxy_lets_other_machines_in(tmp_path: Path, monkeypatch: pytest.Monk
     assert "proxy" in ended.stderr
 
 
-async def test_only_a_trusted_proxy_states_who_connects(tmp_path: Path) -> None:
+async def test_only_a_trusted_proxy_can_forward_client_addresses(tmp_path: Path) -> None:
     TokenFile(tmp_path / "data").add("first", Role.OPERATOR)
     stated = bearer("wrong") | {"X-Forwarded-For": "198.51.100.7"}
     for proxies, address in (("10.0.0.2", "127.0.0.1"), ("10.0.0.0/8,127.0.0.1", "198.51.100.7")):
@@ -283,7 +283,7 @@ async def test_only_a_trusted_proxy_states_who_connects(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("address", ["nowhere", "127.0.0.1:", "127.0.0.1:99999"])
-def test_an_address_that_is_none_is_a_usage_error(tmp_path: Path, address: str) -> None:
+def test_an_invalid_address_is_a_usage_error(tmp_path: Path, address: str) -> None:
     ended = start(tmp_path, "--legacy-listen", address)
     assert ended.returncode == ExitStatus.USAGE
     assert len(ended.stderr.splitlines()) == 1
@@ -295,7 +295,7 @@ def test_clients_without_token_are_never_programmers(tmp_path: Path) -> None:
         LegacyListener("127.0.0.1", 1, Role.PROGRAMMER)
 
 
-def test_a_certificate_that_cannot_be_used_is_named(tmp_path: Path) -> None:
+def test_an_unusable_certificate_is_named(tmp_path: Path) -> None:
     file = tmp_path / "c.pem"
     file.write_text("nothing")
     ended = start(tmp_path, "--tls", str(file), str(file))
@@ -308,7 +308,7 @@ def trusting(file: Path) -> ssl.SSLContext:
     return ssl.create_default_context(cafile=str(file))
 
 
-async def test_tls_by_a_certificate_made_here(tmp_path: Path) -> None:
+async def test_tls_with_a_generated_certificate(tmp_path: Path) -> None:
     secret = TokenFile(tmp_path / "data").add("first", Role.OPERATOR)[1]
     async with running(tmp_path / "data", "--self-signed") as server:
         assert server.url.startswith("wss://")
@@ -326,7 +326,7 @@ async def test_tls_by_a_certificate_made_here(tmp_path: Path) -> None:
         assert file.read_bytes() == made  # whoever has trusted it goes on doing so
 
 
-async def test_old_clients_have_a_door_of_their_own(tmp_path: Path) -> None:
+async def test_legacy_clients_have_a_separate_port(tmp_path: Path) -> None:
     TokenFile(tmp_path / "data").add("first", Role.PROGRAMMER)
     arguments = ("--self-signed", "--legacy-listen", "127.0.0.2:0", "--legacy-role", "standard_user")
     async with running(tmp_path / "data", *arguments) as server:
@@ -341,7 +341,7 @@ async def test_old_clients_have_a_door_of_their_own(tmp_path: Path) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ the command line
-def test_tokens_by_the_command_line(tmp_path: Path) -> None:
+def test_tokens_are_managed_by_the_command_line(tmp_path: Path) -> None:
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "arcor2_server.cli.main", "token", *arguments, "--data-dir", str(tmp_path)]
         return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
@@ -364,7 +364,7 @@ def test_tokens_by_the_command_line(tmp_path: Path) -> None:
     assert TokenFile(tmp_path).all() == []
 
 
-async def test_who_ran_a_package_over_rest_is_whose_token_it_was(server: ServerProcess) -> None:
+async def test_a_run_over_rest_is_recorded_under_the_token_name(server: ServerProcess) -> None:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         archive.writestr("script.py", "import time\ntime.sleep(30)\n")

@@ -1,4 +1,4 @@
-"""Every command, and every refusal by role, leaves one line in the log."""
+"""Every command and every refusal by role is one line in the audit log."""
 
 import json
 from pathlib import Path
@@ -54,7 +54,7 @@ async def test_commands_and_refusals_are_logged_once(tmp_path: Path) -> None:
     assert eva not in printed
 
 
-def test_requests_that_are_no_commands_exist() -> None:
+def test_requests_excluded_from_the_audit_log_exist() -> None:
     """A request that is renamed must not become a silent one."""
     assert {*RPCS, "Version"} >= audit.READING | audit.OF_THE_SCREEN
     assert {name for name, rpc in RPCS.items() if rpc.dry_run and not audit.is_command(rpc)} == set()

@@ -1,4 +1,4 @@
-"""Secret settings: never sent, never in a document, and yet the device gets them."""
+"""Secret settings reach the device, and are never sent to clients or stored in documents."""
 
 import asyncio
 import contextlib
@@ -269,7 +269,7 @@ async def test_data_with_secrets_in_clear_is_migrated(tmp_path: Path) -> None:
     assert references[0] == references[1]
 
 
-async def test_what_a_reference_may_stand_for(tmp_path: Path) -> None:
+async def test_a_secret_reference_is_resolved_only_for_its_setting(tmp_path: Path) -> None:
     async with running_server(ServerSettings(data_dir=tmp_path)) as services:
         secrets = services.secrets
         (first,) = secrets.hide("YuMi", [setting("password", CODE)])
@@ -357,7 +357,7 @@ async def test_a_secret_is_not_sent_to_another_host(tmp_path: Path) -> None:
         await call("StopScene")
 
 
-async def test_which_secrets_the_cell_host_gets(tmp_path: Path) -> None:
+async def test_the_cell_host_gets_only_the_secrets_it_needs(tmp_path: Path) -> None:
     settings = ServerSettings(data_dir=tmp_path)
     async with running_server(settings) as services:
         secrets = services.secrets
@@ -396,7 +396,7 @@ async def test_which_secrets_the_cell_host_gets(tmp_path: Path) -> None:
         assert secrets.values_for(scene_with(host, unbound)) == {"obj_1": ObjectSecrets({"password": OTHER})}
 
 
-async def test_a_default_that_is_secret_is_not_sent(tmp_path: Path) -> None:
+async def test_a_secret_default_is_not_sent(tmp_path: Path) -> None:
     async with running_server(ServerSettings(data_dir=tmp_path)) as services:
         (password,) = [each for each in services.types.meta("YuMi").settings if each.name == "password"]
         assert isinstance(password, ParameterMeta)

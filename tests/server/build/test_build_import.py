@@ -1,4 +1,4 @@
-"""A package goes back into scene, project and types; what must not be overwritten is named, what is foul refused."""
+"""Import of packages: scene, project and types are restored, conflicts named, malicious files refused."""
 
 import asyncio
 import io
@@ -89,7 +89,7 @@ def untimed(document: Any) -> Any:
 
 
 # ------------------------------------------------------------------------------------------------ what comes back
-async def test_all_of_a_package_comes_back(here: Any, packed: bytes) -> None:
+async def test_a_package_is_imported_completely(here: Any, packed: bytes) -> None:
     ids = await here.package_import.import_package(packed, NOTHING)
     assert (ids.scene_id, ids.project_id) == ("scn_1", "pro_1")
     assert msgspec.to_builtins(ids) == {"sceneId": "scn_1", "projectId": "pro_1"}
@@ -108,7 +108,7 @@ async def test_all_of_a_package_comes_back(here: Any, packed: bytes) -> None:
     assert {meta.type for meta in here.hub.told[0].data} == {"Arm", "table"}
 
 
-async def test_a_helper_module_without_a_class_comes_back(here: Any, packed: bytes) -> None:
+async def test_a_helper_module_without_a_class_is_imported(here: Any, packed: bytes) -> None:
     arm = f"from .sort_tools import FASTEST\n{workplace.ARM}"
     helper = b"import math\n\nFASTEST = math.inf\n"
     given = changed(packed, object_types__arm_py=arm.encode(), object_types__sort_tools_py=helper)
@@ -136,7 +136,7 @@ async def test_from_a_file(here: Any, packed: bytes, tmp_path: Path) -> None:
         await here.package_import.import_package(tmp_path / "none.zip", NOTHING)
 
 
-async def test_twice_changes_nothing(here: Any, packed: bytes) -> None:
+async def test_importing_twice_changes_nothing(here: Any, packed: bytes) -> None:
     await here.package_import.import_package(packed, NOTHING)
     revision, before = here.storage.revision, await here.storage.project("pro_1")
     await here.package_import.import_package(packed, NOTHING)
@@ -144,7 +144,7 @@ async def test_twice_changes_nothing(here: Any, packed: bytes) -> None:
     assert await here.storage.project("pro_1") == before
 
 
-async def test_what_fails_on_the_way_leaves_nothing(here: Any, packed: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_failed_import_leaves_nothing(here: Any, packed: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     async def full(project: Project) -> Project:
         assert [one.name for one in await here.storage.scenes()], "what was written before is seen within"
         raise StorageError("The disk is full.")
@@ -172,7 +172,7 @@ async def test_camel_case_documents_are_read(here: Any, packed: bytes) -> None:
     assert untimed(await here.storage.project("pro_1")) == the_project()
 
 
-async def test_a_script_by_hand_comes_back(here: Any, packed: bytes) -> None:
+async def test_a_handwritten_script_is_imported(here: Any, packed: bytes) -> None:
     project = replace(the_project(), has_logic=False, logic=[])
     by_hand = changed(packed, data__project_json=msgspec.json.encode(project), script_py=b"print('by hand')\n")
     await here.package_import.import_package(by_hand, NOTHING)
@@ -216,14 +216,14 @@ def workplace_actions() -> dict[str, str]:
     return {action.name: action.id for point in the_project().action_points for action in point.actions}
 
 
-async def test_an_edited_script_that_is_not_understood_changes_nothing(here: Any, packed: bytes) -> None:
+async def test_an_edited_script_that_cannot_be_read_changes_nothing(here: Any, packed: bytes) -> None:
     source = files_in(packed)["script.py"].replace(b"    while True:\n", b"    while True:\n        print(1)\n")
     with pytest.raises(NotUnderstood, match=r"line \d+: print"):
         await here.package_import.import_package(changed(packed, script_py=source), FROM_SCRIPT)
     assert here.storage.revision == 0
 
 
-async def test_a_script_by_hand_has_no_logic_to_go_back_to(here: Any, packed: bytes) -> None:
+async def test_a_handwritten_script_has_no_logic(here: Any, packed: bytes) -> None:
     project = msgspec.json.encode(replace(the_project(), has_logic=False, logic=[]))
     with pytest.raises(InvalidProject, match="has no logic"):
         await here.package_import.import_package(changed(packed, data__project_json=project), FROM_SCRIPT)
@@ -256,7 +256,7 @@ def _other_model(services: Any) -> Any:
         (_other_model, "overwrite_collision_models", r"The collision model of table .*overwriteCollisionModels "),
     ],
 )
-async def test_what_differs_is_named_and_kept(
+async def test_differences_are_named_and_nothing_is_overwritten(
     here: Any, packed: bytes, change: Callable[[Any], Any], option: str, named: str
 ) -> None:
     await here.package_import.import_package(packed, NOTHING)
@@ -286,14 +286,14 @@ async def test_all_conflicts_are_named_at_once(here: Any, packed: bytes) -> None
         assert what in str(caught.value)
 
 
-async def test_a_name_that_is_taken_is_a_conflict(here: Any, packed: bytes) -> None:
+async def test_a_used_name_is_a_conflict(here: Any, packed: bytes) -> None:
     await here.storage.put_scene(replace(workplace.scene(), id="scn_other"))
     with pytest.raises(Conflict, match="Another scene is named workplace"):
         await here.package_import.import_package(packed, ALL)
 
 
 @pytest.mark.parametrize("what", ["scene", "project"])
-async def test_what_is_open_is_not_replaced(here: Any, packed: bytes, what: str) -> None:
+async def test_an_open_document_is_not_replaced(here: Any, packed: bytes, what: str) -> None:
     await here.package_import.import_package(packed, NOTHING)
     here.session.scene = workplace.scene()
     here.session.project = the_project() if what == "project" else None
@@ -391,7 +391,7 @@ def _renamed_action() -> bytes:
         ({"data__models__chair_json": b"{}"}, "belongs to none"),
     ],
 )
-async def test_an_unsound_package_is_refused_whole(
+async def test_an_invalid_package_is_refused_completely(
     here: Any, packed: bytes, contents: dict[str, bytes | None], text: str
 ) -> None:
     with pytest.raises(InvalidPackage) as caught:
@@ -430,13 +430,13 @@ FILE, LINK = stat.S_IFREG | 0o644, stat.S_IFLNK | 0o777
     ],
     ids=["empty", "text", "up", "root", "backslash", "drive", "link", "inner-up", "many"],
 )
-async def test_a_foul_zip_is_refused(here: Any, foul: bytes) -> None:
+async def test_a_malicious_zip_is_refused(here: Any, foul: bytes) -> None:
     with pytest.raises(InvalidPackage):
         await here.package_import.import_package(foul, ALL)
     assert here.storage.revision == 0
 
 
-async def test_a_zip_bomb_is_refused_while_it_is_read(here: Any) -> None:
+async def test_a_zip_bomb_is_refused_during_reading(here: Any) -> None:
     bomb = _zip(("script.py", bytes(package.MAX_READ + 1), FILE))
     assert len(bomb) < 100_000
     with pytest.raises(InvalidPackage, match="larger than"):
@@ -449,7 +449,7 @@ async def test_a_zip_bomb_is_refused_while_it_is_read(here: Any) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-async def test_one_file_twice_is_refused(here: Any) -> None:
+async def test_a_duplicate_file_is_refused(here: Any) -> None:
     with pytest.raises(InvalidPackage, match="twice"):
         await here.package_import.import_package(_zip(("script.py", b"", FILE), ("./script.py", b"", FILE)), ALL)
 
@@ -518,7 +518,7 @@ class Tool(Counting, AbstractTool):
 '''
 
 
-async def test_bases_mixins_and_further_modules_go_along_and_come_back(
+async def test_bases_mixins_and_modules_are_packed_and_imported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sources = {"AbstractTool": BASE, "Counting": MIXIN, "Sums": HELPER, "Tool": TOOL}
@@ -553,9 +553,7 @@ async def test_bases_mixins_and_further_modules_go_along_and_come_back(
             await other.build.publish("pro_t")
 
 
-async def test_the_facts_of_a_stored_type_say_which_parameters_have_a_name_only(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_stored_types_mark_keyword_only_parameters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given = "def use(self, part: int, *, force: float = 0.5, an: str | None = None) -> int:"
     source = TOOL.replace("def use(self, *, an: str | None = None) -> int:", given)
     assert source != TOOL

@@ -1,4 +1,4 @@
-"""Every driver that is installed can go into a package: its folder is whole and needs nothing beside it."""
+"""Every installed driver can be packed: its folder is complete and needs nothing else."""
 
 from pathlib import Path
 

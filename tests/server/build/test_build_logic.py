@@ -1,4 +1,4 @@
-"""Programs do what the logic says: random graphs are run both ways, and shapes that people draw are looked at."""
+"""Programs do what their logic defines: random graphs are run both ways, and typical shapes compared as text."""
 
 import random
 import sys
@@ -27,7 +27,7 @@ from tests.server.build.projects import DECLARED, SCENE, TYPES, Draft, random_dr
     st.sampled_from([1, 2, 3, 20]),
     st.booleans(),
 )
-def test_a_program_does_what_the_logic_says(
+def test_a_program_does_what_its_logic_defines(
     seed: int, size: int, joining: float, ending: float, window: int, choices: bool
 ) -> None:
     draft = random_draft(random.Random(seed), size, joining, ending, window)
@@ -45,7 +45,7 @@ def _oracle(seed: int) -> Any:
     return results
 
 
-def test_big_random_graphs() -> None:
+def test_large_random_graphs() -> None:
     rng = random.Random(7)
     for size in (200, 400):
         for joining, window in ((0.3, 5), (0.6, 50), (0.05, 3)):
@@ -77,7 +77,7 @@ thing.do(an="d")"""
     )
 
 
-def test_branches_that_both_end_stand_side_by_side() -> None:
+def test_branches_that_both_end_become_if_and_else() -> None:
     draft = Draft().way(START, "a").branch("a", "b", "c").chain("b", END).chain("c", END)
     assert (
         loop(draft.script())
@@ -106,7 +106,7 @@ if r_c == True:
     )
 
 
-def test_a_branch_that_leads_straight_to_the_join_is_left_out() -> None:
+def test_an_empty_branch_is_omitted() -> None:
     draft = Draft().way(START, "a").branch("a", "d", "c").chain("c", "d").chain("d", END)
     assert (
         loop(draft.script())
@@ -119,7 +119,7 @@ thing.do(an="d")"""
     )
 
 
-def test_more_than_two_ways_make_an_elif() -> None:
+def test_more_than_two_branches_become_elif() -> None:
     draft = Draft().action("a", "x", "y").chain(START, "a").chain("b", "e").chain("c", "e").chain("d", "e", END)
     draft.way("a", "b", ("a", "x", True)).way("a", "c", ("a", "y", True)).way("a", "d", ("a", "y", False))
     assert (
@@ -137,7 +137,7 @@ thing.do(an="e")"""
     )
 
 
-def test_a_join_that_can_be_passed_by_is_guarded_and_stands_once() -> None:
+def test_a_join_that_can_be_bypassed_is_written_once() -> None:
     draft = (
         Draft().way(START, "a").branch("a", "b", "c").branch("b", "d", "e").chain("c", "e", "f", END).chain("d", "f")
     )
@@ -176,7 +176,7 @@ def nested(depth: int) -> Draft:
 
 
 @pytest.mark.parametrize("depth", [MAX_NESTING, MAX_NESTING + 1, 3 * MAX_NESTING, 400])
-def test_too_deep_branches_are_moved_out(depth: int) -> None:
+def test_deeply_nested_branches_become_functions(depth: int) -> None:
     draft = nested(depth)
     deepest = max(len(line) - len(line.lstrip()) for line in draft.script().splitlines()) // 4
     assert deepest <= MAX_NESTING + 4
@@ -222,7 +222,7 @@ def ladder(count: int) -> Draft:
 @pytest.mark.parametrize(
     ("make", "count"), [(diamonds, 18), (diamonds, 300), (exits, 300), (ladder, 200), (chain, 1000)]
 )
-def test_long_logic(make: Any, count: int) -> None:
+def test_a_long_chain_is_built(make: Any, count: int) -> None:
     draft = make(count)
     for seed in range(3):
         same_runs(draft, _oracle(seed), 1000)
@@ -252,7 +252,7 @@ def _steps(draft: Draft) -> int:
 
 
 @pytest.mark.parametrize("make", [chain, diamonds, exits, ladder, nested])
-def test_the_time_of_a_build_is_linear(make: Any) -> None:
+def test_build_time_grows_linearly(make: Any) -> None:
     small, large = _steps(make(60)), _steps(make(480))
     assert large / small < 8 * 1.35, f"eight times the actions take {large / small:.1f} times the steps"
 
@@ -309,13 +309,13 @@ def _linked_to_itself() -> Draft:
         (_linked_to_itself(), "'a' uses a result of 'a'"),
     ],
 )
-def test_what_is_no_program_is_refused_by_name(draft: Draft, text: str) -> None:
+def test_invalid_logic_is_refused_by_name(draft: Draft, text: str) -> None:
     with pytest.raises(InvalidProject) as caught:
         draft.script()
     assert text in str(caught.value)
 
 
-def test_what_cannot_be_reached_is_left_out() -> None:
+def test_unreachable_actions_are_omitted() -> None:
     draft = Draft().chain(START, "a", END).chain("lost", "also lost")
     assert "lost" not in draft.script()
     assert run(draft.script(), _oracle(0), 2) == [("a", ()), ("a", ())]
@@ -332,7 +332,7 @@ def choosing(*values: int | str | None) -> Draft:
     return draft.chain("z", END)
 
 
-def test_a_choice_of_numbers_reads_like_one() -> None:
+def test_a_choice_between_numbers_reads_well() -> None:
     draft = choosing(0, None, 2)
     assert (
         loop(draft.script())
@@ -350,20 +350,20 @@ thing.do(an="z")"""
     same_runs(draft, _oracle(1), 60)
 
 
-def test_a_choice_of_texts() -> None:
+def test_a_choice_between_texts() -> None:
     draft = choosing("low", "high", None)
     assert 'if r == "low":' in draft.script()
     same_runs(draft, _oracle(2), 60)
 
 
-def test_otherwise_the_end() -> None:
+def test_a_default_branch_to_the_end() -> None:
     draft = Draft(methods={"a": "count"}).action("a", "r").way(START, "a").action("b")
     draft.way("a", "b", ("a", "r", 1)).way("a", END).way("b", END)
     assert loop(draft.script()).splitlines()[1:] == ["if r == 1:", '    thing.do(an="b")']
     same_runs(draft, _oracle(3), 40)
 
 
-def test_otherwise_something_more() -> None:
+def test_a_default_branch_with_actions() -> None:
     draft = Draft(methods={"a": "count"}).action("a", "r").way(START, "a").action("b").chain("b", "z", END)
     draft.way("a", "z", ("a", "r", 1)).way("a", "b")
     assert loop(draft.script()).splitlines()[1:3] == ["if r != 1:", '    thing.do(an="b")']
@@ -382,20 +382,20 @@ def test_otherwise_something_more() -> None:
         (choosing(0, 1.5, None), "compares with true, false, an integer or a text"),  # type: ignore[arg-type]
     ],
 )
-def test_choices_that_are_refused(draft: Draft, text: str) -> None:
+def test_invalid_choices_are_refused(draft: Draft, text: str) -> None:
     with pytest.raises(InvalidProject) as caught:
         draft.script()
     assert "'a'" in str(caught.value)
     assert text in str(caught.value)
 
 
-def test_a_truth_value_has_no_otherwise() -> None:
+def test_a_boolean_has_no_default_branch() -> None:
     draft = Draft().action("a", "r").way(START, "a").action("b").way("a", "b", ("a", "r", True)).way("a", END)
     with pytest.raises(InvalidProject, match="one of its connections has no condition"):
         draft.chain("b", END).script()
 
 
-def test_only_some_results_can_be_branched_on() -> None:
+def test_branching_requires_a_supported_result_type() -> None:
     draft = choosing("low", None)
     project = draft.project()
     types = {"Thing": TypeFacts("object_types.thing", {**DECLARED, "sort": ObjectAction("sort", returns=["double"])})}

@@ -1,4 +1,4 @@
-"""Packages: what is in them, that they run by themselves, that type checkers and zip tools accept them."""
+"""Content of packages: they run by themselves, and type checkers and zip tools accept them."""
 
 import asyncio
 import contextlib
@@ -60,7 +60,7 @@ def test_a_script_and_its_points_read_well(made_of: Ingredients) -> None:
         assert files[name].decode() == Path(__file__).with_name(golden).read_text()
 
 
-def test_content(made_of: Ingredients) -> None:
+def test_a_package_contains_everything_it_needs(made_of: Ingredients) -> None:
     files = files_of(made_of)
     assert set(files) == {
         "script.py",
@@ -86,7 +86,7 @@ def test_content(made_of: Ingredients) -> None:
     assert recorded["distributions"] == {"msgspec": msgspec.__version__}
 
 
-def test_a_zip_is_the_same_bytes_each_time_and_gives_back_all(made_of: Ingredients) -> None:
+def test_a_zip_is_reproducible_and_complete(made_of: Ingredients) -> None:
     files = files_of(made_of)
     shuffled = dict(sorted(files.items(), key=lambda entry: hash(entry[0])))
     packed = package.to_zip(files)
@@ -97,7 +97,7 @@ def test_a_zip_is_the_same_bytes_each_time_and_gives_back_all(made_of: Ingredien
 
 
 @pytest.mark.parametrize("path", ["../evil.py", "/etc/passwd", "a/../../b", "a\\..\\b", ""])
-def test_no_file_leaves_its_package(path: str, tmp_path: Path) -> None:
+def test_no_file_is_written_outside_the_package(path: str, tmp_path: Path) -> None:
     with pytest.raises(InvalidPackage):
         package.to_zip({path: b""})
     with pytest.raises(InvalidPackage):
@@ -106,7 +106,7 @@ def test_no_file_leaves_its_package(path: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("module", ["../evil", "", "a.b", "a/b", "ä"])
-def test_no_file_is_named_by_a_bad_type(module: str, made_of: Ingredients) -> None:
+def test_invalid_type_names_name_no_file(module: str, made_of: Ingredients) -> None:
     made_of.types.append(PackageType("Bad", module, "x = 1"))
     with pytest.raises(InvalidProject, match="Bad"):
         files_of(made_of)
@@ -116,7 +116,7 @@ def test_no_file_is_named_by_a_bad_type(module: str, made_of: Ingredients) -> No
     "line",
     ["from acme_devices.acme_reader import codes", "import acme_devices.other", "from acme_devices import other"],
 )
-def test_a_driver_that_would_run_the_hubs_code_is_refused(line: str, driver: PackageType, made_of: Ingredients) -> None:
+def test_a_driver_that_imports_server_code_is_refused(line: str, driver: PackageType, made_of: Ingredients) -> None:
     assert driver.folder is not None
     (driver.folder / "codes.py").write_text(f"def late():\n    {line}\n")
     with pytest.raises(InvalidProject, match=r"AcmeReader: codes\.py imports acme_devices"):
@@ -126,7 +126,7 @@ def test_a_driver_that_would_run_the_hubs_code_is_refused(line: str, driver: Pac
         files_of(made_of)
 
 
-def test_links_out_of_a_drivers_folder_are_not_followed(
+def test_links_out_of_a_driver_folder_are_not_followed(
     driver: PackageType, made_of: Ingredients, tmp_path: Path
 ) -> None:
     assert driver.folder is not None
@@ -135,7 +135,7 @@ def test_links_out_of_a_drivers_folder_are_not_followed(
     assert not [name for name in files_of(made_of) if name.endswith("innocent.txt")]
 
 
-def test_two_drivers_with_folders_of_one_name(driver: PackageType, made_of: Ingredients, tmp_path: Path) -> None:
+def test_two_drivers_with_folders_of_the_same_name(driver: PackageType, made_of: Ingredients, tmp_path: Path) -> None:
     other = tmp_path / "other" / "acme_reader"
     other.mkdir(parents=True)
     (other / "__init__.py").write_text("class Other: ...\n")
@@ -146,7 +146,7 @@ def test_two_drivers_with_folders_of_one_name(driver: PackageType, made_of: Ingr
 
 
 @pytest.mark.parametrize("above", ["acme_devices", "acme_reader"])
-def test_a_module_called_like_its_folder(made_of: Ingredients, tmp_path: Path, above: str) -> None:
+def test_a_module_with_the_name_of_its_folder(made_of: Ingredients, tmp_path: Path, above: str) -> None:
     folder = tmp_path / "like" / above / "acme_reader"
     folder.mkdir(parents=True)
     (folder / "__init__.py").write_text("")
@@ -213,7 +213,7 @@ def test_a_type_checker_accepts_a_package(directory: Path, pytestconfig: pytest.
     assert '"GoodPoses" has no attribute "nope"' in done.stdout
 
 
-def test_versions_that_differ_are_named(directory: Path) -> None:
+def test_differing_versions_are_named(directory: Path) -> None:
     assert package_versions.check_versions(directory) == []
     file = directory / "versions.json"
     built = json.loads(file.read_bytes())
@@ -233,19 +233,19 @@ def test_versions_that_differ_are_named(directory: Path) -> None:
     assert package_versions.check_versions(directory) == []
 
 
-def test_compiled_modules_that_stand_alone_have_their_distribution() -> None:
+def test_single_compiled_modules_have_a_distribution() -> None:
     assert package_versions.present({"rtde_control", "pymodbus", "json"}).distributions.keys() == {
         "ur-rtde",
         "pymodbus",
     }
 
 
-def test_what_is_ours_in_older_sources_is_no_version_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_our_modules_in_older_sources_are_no_foreign_dependency(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(package_versions, "_distributions", lambda: {"arcor2": "pymodbus", "arcor2_web": "pymodbus"})
     assert package_versions.present({"arcor2", "arcor2_web", "arcor2_object_types"}).distributions == {}
 
 
-def test_a_package_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_appears_atomically(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sync = os.fsync
     left = iter((None, OSError(28, "No space left on device")))
 
@@ -271,7 +271,7 @@ async def service(
         yield services.build, services.storage
 
 
-async def test_a_build_lands_among_the_packages(service: tuple[BuildService, Storage], tmp_path: Path) -> None:
+async def test_a_build_is_listed_among_the_packages(service: tuple[BuildService, Storage], tmp_path: Path) -> None:
     build, storage = service
     await storage.put_project(workplace.project())
     package_id = await build.build("pro_1", "Boards")
@@ -289,7 +289,7 @@ async def test_a_build_lands_among_the_packages(service: tuple[BuildService, Sto
         assert json.loads(archive.read("package.json"))["name"] == "Sort boards"
 
 
-async def test_the_event_loop_goes_on_during_a_build(service: tuple[BuildService, Storage]) -> None:
+async def test_a_build_does_not_block_the_event_loop(service: tuple[BuildService, Storage]) -> None:
     build, storage = service
     project = workplace.project()
     long = [workplace.action(f"a{n}", "obj_flow/finish") for n in range(1500)]
@@ -331,7 +331,7 @@ async def test_projects_without_logic(service: tuple[BuildService, Storage], tmp
     assert not (tmp_path / "data" / "packages").exists()
 
 
-async def test_what_is_missing_is_named(service: tuple[BuildService, Storage]) -> None:
+async def test_missing_parts_are_named(service: tuple[BuildService, Storage]) -> None:
     build, storage = service
     with pytest.raises(NotFound, match="pro_none"):
         await build.build("pro_none", "x")

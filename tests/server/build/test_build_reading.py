@@ -1,4 +1,4 @@
-"""A script goes back into the project that it was made from; edited by hand, into the project that it says."""
+"""Scripts are read back into projects, unchanged or edited by hand."""
 
 import dataclasses
 import random
@@ -39,7 +39,9 @@ def _oracle(seed: int) -> Any:
     st.sampled_from([1, 2, 3, 20]),
     st.booleans(),
 )
-def test_there_and_back(seed: int, size: int, joining: float, ending: float, window: int, choices: bool) -> None:
+def test_a_script_round_trips_to_the_same_project(
+    seed: int, size: int, joining: float, ending: float, window: int, choices: bool
+) -> None:
     draft = random_draft(random.Random(seed), size, joining, ending, window)
     if choices:
         draft = with_choices(draft, random.Random(seed))
@@ -161,7 +163,7 @@ def test_calls_in_another_order() -> None:
     assert len(kept) == len(before.logic) - 3
 
 
-def test_a_new_action_lies_where_it_acts() -> None:
+def test_a_new_action_is_placed_at_its_point() -> None:
     project = read(
         (GOOD, GOOD + '            robot.drop(aps.feeder.position, 0.3, an="let go")\n'),
         (BACK, BACK + '        again = reader.scan(1.0, an="once more")\n'),
@@ -175,21 +177,21 @@ def test_a_new_action_lies_where_it_acts() -> None:
     assert {("into good box", "let go", ""), ("let go", "back", ""), ("once more", END, "")} <= set(steps_of(project))
 
 
-def test_a_removed_action_is_gone_and_the_rest_closes_up() -> None:
+def test_a_removed_action_connects_its_neighbours() -> None:
     project = read((ABOVE, ""))
     assert "above feeder" not in actions_of(project)
     assert ("scan code", "pick", "") in steps_of(project)
     assert len(actions_of(project)) == len(actions_of(workplace.project())) - 1
 
 
-def test_another_name_makes_another_action() -> None:
+def test_a_new_name_creates_a_new_action() -> None:
     project = read(('an="pick"', 'an="grip"'))
     assert "pick" not in actions_of(project)
     assert actions_of(project)["grip"].id != "act_pick"
     assert point_of(project, "grip") == "acp_feeder"
 
 
-def test_what_no_script_shows_stays() -> None:
+def test_data_that_scripts_do_not_show_is_kept() -> None:
     before = workplace.project()
     idle = [workplace.action("idle", "obj_flow/finish"), workplace.action("idler", "obj_flow/finish")]
     first = replace(before.action_points[0], actions=[*before.action_points[0].actions, *idle])
@@ -233,7 +235,7 @@ def test_new_branches() -> None:
     assert kept["lit_known?_into good box"] in project.logic
 
 
-def test_a_result_of_another_name() -> None:
+def test_a_renamed_result() -> None:
     project = read(
         ("known = reader.known(code, ", "fine = reader.known(label, "),
         ("code = reader.scan(", "label = reader.scan("),
@@ -245,7 +247,7 @@ def test_a_result_of_another_name() -> None:
     assert project.logic == workplace.project().logic
 
 
-def test_a_result_whose_name_build_had_to_change_keeps_it() -> None:
+def test_a_result_keeps_its_name_when_the_build_changed_it() -> None:
     before = workplace.project()
     points = [
         replace(
@@ -262,7 +264,7 @@ def test_a_result_whose_name_build_had_to_change_keeps_it() -> None:
     assert from_script(source, workplace.scene(), before, workplace.FACTS) == before
 
 
-def test_conditions_one_after_the_other_are_one_branching() -> None:
+def test_consecutive_conditions_become_one_branch() -> None:
     body = """\
         left = flow.repeat(boards, an="boards left?")
         if left == False:
@@ -400,7 +402,7 @@ def test_a_script_of_the_original_is_read() -> None:
         ("    boards = 2\n", "    boards = (2  #!\n", "never closed"),
     ],
 )
-def test_what_is_not_understood_is_named_with_its_line(old: str, new: str, text: str) -> None:
+def test_unsupported_code_is_named_with_its_line(old: str, new: str, text: str) -> None:
     source = edited((old, new))
     line = next(number for number, content in enumerate(source.splitlines(), 1) if "#!" in content)
     with pytest.raises(NotUnderstood) as caught:
@@ -410,7 +412,7 @@ def test_what_is_not_understood_is_named_with_its_line(old: str, new: str, text:
     assert text in str(caught.value)
 
 
-def test_a_result_that_is_not_always_there_is_named() -> None:
+def test_a_result_that_may_be_missing_is_named() -> None:
     source = edited(
         (GOOD, GOOD + '            label = reader.scan(1.0, an="label")\n'),
         (BACK, '        reader.known(label, an="late")\n'),
@@ -421,7 +423,7 @@ def test_a_result_that_is_not_always_there_is_named() -> None:
 
 
 @pytest.mark.parametrize("source", ["", "\0", "def main(res):\n    pass\n", "(" * 5000, "def main():\n    pass\n"])
-def test_what_is_no_script_at_all(source: str) -> None:
+def test_files_that_are_not_scripts_are_refused(source: str) -> None:
     with pytest.raises(NotUnderstood):
         from_script(source, workplace.scene(), workplace.project(), workplace.FACTS)
 
@@ -454,7 +456,7 @@ def test_a_project_without_action_points_has_no_place_for_actions() -> None:
         from_script(source, workplace.scene(), bare, workplace.FACTS)
 
 
-def test_parameters_that_have_a_name_only() -> None:
+def test_keyword_only_parameters_are_read() -> None:
     facts = {**workplace.FACTS, "Arm": replace_facts(frozenset({("pick", "speed"), ("pick", "grip")}))}
     source = edited((PICK, PICK.replace("grip=", "speed=0.5, grip=")))
     project = from_script(source, workplace.scene(), workplace.project(), facts)
@@ -463,7 +465,7 @@ def test_parameters_that_have_a_name_only() -> None:
         from_script(source.replace("speed=0.5", "0.5"), workplace.scene(), workplace.project(), facts)
 
 
-def test_former_names_are_read_as_the_present_ones() -> None:
+def test_former_names_are_read_as_current_names() -> None:
     pick = workplace.FACTS["Arm"].actions["pick"]
     parameters = [replace(each, former_names=[f"old_{each.name}"]) for each in pick.parameters]
     renamed = {"pick": replace(pick, former_names=["grab"], parameters=parameters)}
@@ -478,7 +480,7 @@ def replace_facts(keyword_only: frozenset[tuple[str, str]]) -> TypeFacts:
     return dataclasses.replace(workplace.FACTS["Arm"], keyword_only=keyword_only)
 
 
-def test_scripts_of_odd_shapes_are_refused_or_read_never_a_crash() -> None:
+def test_unusual_scripts_are_read_or_refused() -> None:
     sums = "+".join(["1.0"] * 1500)
     for changes, line in (
         ((PICK, f'        robot.pick(aps.feeder.poses.default, {sums}, an="pick")\n'), "is no truth value"),

@@ -1,4 +1,4 @@
-"""Built packages run in a real cell host: long ones, and those whose script is written by hand."""
+"""Built packages run in a real cell host: long ones, and those with a handwritten script."""
 
 import itertools
 import os
@@ -99,7 +99,7 @@ async def test_a_thousand_distinct_actions_run(server: Server) -> None:
 
 
 @serving()
-async def test_a_script_by_hand_runs_and_is_debugged(server: Server) -> None:
+async def test_a_handwritten_script_runs_and_can_be_debugged(server: Server) -> None:
     files = await build(server.services.settings.data_dir, by_hand(), BY_HAND)
     assert files["script.py"].decode() == BY_HAND
     await upload(server, files)
@@ -125,7 +125,7 @@ async def test_a_script_by_hand_runs_and_is_debugged(server: Server) -> None:
 
 
 @serving()
-async def test_a_script_by_hand_that_fails_and_one_that_is_stopped(server: Server) -> None:
+async def test_handwritten_scripts_that_fail_or_are_stopped(server: Server) -> None:
     body = BY_HAND.replace("    good = 0\n", "    robot.pick(aps.feeder.poses.default, grip=Grip.SOFT)\n    good = 0\n")
     await upload(server, await build(server.services.settings.data_dir, by_hand(), body))
     await server.ask("RunPackage", {"id": "pkg_1"})
@@ -147,14 +147,12 @@ async def test_a_script_by_hand_that_fails_and_one_that_is_stopped(server: Serve
     assert server.services.execution.last_error is None
 
 
-async def test_a_script_by_hand_is_checked_before_a_build(tmp_path: Path) -> None:
+async def test_a_handwritten_script_is_checked_before_a_build(tmp_path: Path) -> None:
     with pytest.raises(InvalidProject, match=r"script\.py, line 3"):
         await build(tmp_path, by_hand(), "a = 1\n\nb = (\n")
 
 
-async def test_an_editor_and_a_type_checker_know_what_a_script_works_with(
-    tmp_path: Path, pytestconfig: pytest.Config
-) -> None:
+async def test_editors_and_type_checkers_understand_a_script(tmp_path: Path, pytestconfig: pytest.Config) -> None:
     directory = tmp_path / "package"
     package.write(await build(tmp_path, by_hand(), BY_HAND), directory)
     wrong = {

@@ -1,4 +1,4 @@
-"""Names, arguments and text of scripts: what may collide, what is refused, how it is laid out."""
+"""Names, arguments and layout of scripts: collisions and refusals."""
 
 import ast
 from typing import Any
@@ -40,7 +40,7 @@ def read_points(project: Project) -> Any:
     return names["ActionPoints"](_Resources())
 
 
-def test_points_of_similar_names_keep_their_own_poses() -> None:
+def test_points_with_similar_names_keep_their_poses() -> None:
     similar = ["ap1", "ap_1", "Ap1", "ap__1", "ap1_poses", "action_points", "pose", "resources"]
     project = Project(
         "p",
@@ -64,7 +64,7 @@ anything = st.text(max_size=12) | st.sampled_from(
 
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.tuples(anything, st.lists(anything, max_size=3)), max_size=6))
-def test_whatever_points_are_called_each_is_reached(drawn: list[tuple[str, list[str]]]) -> None:
+def test_points_with_any_name_are_accessible(drawn: list[tuple[str, list[str]]]) -> None:
     project = Project(
         "p",
         "scn_1",
@@ -86,7 +86,7 @@ def test_whatever_points_are_called_each_is_reached(drawn: list[tuple[str, list[
 
 
 # ------------------------------------------------------------------------------------------------ names
-def test_colliding_names_are_kept_apart() -> None:
+def test_colliding_names_are_made_unique() -> None:
     scene = Scene(
         "s",
         id="scn_1",
@@ -125,7 +125,7 @@ def test_colliding_names_are_kept_apart() -> None:
 
 
 @given(st.lists(st.text(max_size=8), max_size=20))
-def test_claimed_names_are_identifiers_and_differ(texts: list[str]) -> None:
+def test_generated_names_are_unique_identifiers(texts: list[str]) -> None:
     names = Names(["taken"])
     claimed = [names.claim(text) for text in texts]
     assert len(set(claimed)) == len(claimed)
@@ -133,7 +133,7 @@ def test_claimed_names_are_identifiers_and_differ(texts: list[str]) -> None:
     assert all(class_name(text).isidentifier() for text in texts)
 
 
-def test_names_stay_as_they_are_where_they_can() -> None:
+def test_valid_names_are_kept() -> None:
     assert [identifier(name) for name in ("ap1", "_x", "Größe", "1st", "a b", "if")] == [
         "ap1", "_x", "Gr__e", "_1st", "a_b", "if_",
     ]  # fmt: skip
@@ -153,7 +153,7 @@ strings = st.text() | st.sampled_from(["it's", 'say "hi"', "both ' and \"", "# n
 
 @settings(max_examples=150, deadline=None)
 @given(st.lists(strings, min_size=1, max_size=6))
-def test_the_text_means_what_the_tree_says(values: list[str]) -> None:
+def test_formatted_code_equals_its_syntax_tree(values: list[str]) -> None:
     declared = ObjectAction("say", parameters=[])
     actions, logic = [], []
     names = list(dict.fromkeys(values))
@@ -176,7 +176,7 @@ def test_the_text_means_what_the_tree_says(values: list[str]) -> None:
     assert calls == names
 
 
-def test_a_long_call_is_broken_by_arguments() -> None:
+def test_a_long_call_is_wrapped_at_arguments() -> None:
     project = workplace.project()
     text = "x" * 100
     project.action_points[0].actions[0] = workplace.action(
@@ -241,7 +241,7 @@ def _with(name: str, *arguments: tuple[str, str, str], method: str = "", results
         (_with("known?", ("code", "link", '"act_scan_code/default/0"')), "'known?'"),
     ],
 )
-def test_a_wrong_action_is_refused_by_name(project: Project, text: str) -> None:
+def test_an_invalid_action_is_refused_by_name(project: Project, text: str) -> None:
     with pytest.raises(InvalidProject) as caught:
         script.from_logic(workplace.scene(), project, workplace.FACTS)
     assert text in str(caught.value)
@@ -257,7 +257,7 @@ def test_joints_of_another_robot_are_refused() -> None:
         script.from_logic(scene, project, workplace.FACTS)
 
 
-def test_two_actions_of_one_name_are_refused() -> None:
+def test_two_actions_with_the_same_name_are_refused() -> None:
     project = workplace.project()
     first, second = project.action_points
     actions = [msgspec.structs.replace(one, name="pick") for one in second.actions]

@@ -1,4 +1,4 @@
-"""Packages that run, on disk and in a cell host, as clients see them."""
+"""Packages on disk and in a cell host, as clients see them."""
 
 import asyncio
 import base64
@@ -72,7 +72,7 @@ async def until_stopped(server: Server, client: Recorder | None = None) -> list[
 
 
 @serving()
-async def test_a_run_as_clients_see_it(server: Server) -> None:
+async def test_clients_see_each_state_of_a_run(server: Server) -> None:
     write(server, 'for n in ("a", "b"): lamp.blink(2, an=n)')
     await server.ask("RunPackage", {"id": "pkg_1"})
     action = ["ActionStateBefore", "ActionStateAfter"]
@@ -100,7 +100,7 @@ async def test_a_run_as_clients_see_it(server: Server) -> None:
 
 
 @serving()
-async def test_pause_step_resume_stop_and_what_each_state_forbids(server: Server) -> None:
+async def test_each_run_state_allows_its_requests(server: Server) -> None:
     write(server, 'for n in ("a", "b"): lamp.blink(2, an=n)\nlamp.wait(an="c")')
     idle = ("StopPackage", "PausePackage", "ResumePackage", "StepAction")
     for name in idle:
@@ -128,7 +128,7 @@ async def test_pause_step_resume_stop_and_what_each_state_forbids(server: Server
 
 
 @serving()
-async def test_a_host_killed_in_a_run(server: Server) -> None:
+async def test_a_killed_host_ends_the_run(server: Server) -> None:
     write(server, 'lamp.wait(an="a")')
     await server.ask("RunPackage", {"id": "pkg_1"})
     await server.client.event("ActionStateBefore")
@@ -158,7 +158,7 @@ async def test_a_program_that_holds_the_interpreter_is_killed(server: Server) ->
 
 
 @serving()
-async def test_a_program_that_falls_silent_while_it_starts_can_be_stopped(server: Server) -> None:
+async def test_a_program_that_hangs_during_its_start_can_be_stopped(server: Server) -> None:
     server.services.execution.stop_within = 0.1
     write(server, "")
     script = server.services.settings.packages_dir / "pkg_1" / "script.py"
@@ -174,7 +174,7 @@ async def test_a_program_that_falls_silent_while_it_starts_can_be_stopped(server
 
 
 @serving()
-async def test_an_error_in_the_script_is_told(server: Server) -> None:
+async def test_a_script_error_is_reported(server: Server) -> None:
     write(server, "print('x' * 200_000)\nraise KeyError('gone')")
     await server.ask("RunPackage", {"id": "pkg_1"})
     told = await server.client.event("ProjectException")
@@ -186,7 +186,7 @@ async def test_an_error_in_the_script_is_told(server: Server) -> None:
 
 
 @serving()
-async def test_no_run_while_the_scene_is_online_and_the_other_way_round(server: Server) -> None:
+async def test_a_run_and_an_online_scene_exclude_each_other(server: Server) -> None:
     server.types.add("Lamp", LAMP)
     await server.open(Scene("scene", id="scn_1", objects=[scene_object("lamp", "Lamp")]))
     write(server, 'lamp.wait(an="a")')
@@ -204,7 +204,7 @@ async def test_no_run_while_the_scene_is_online_and_the_other_way_round(server: 
 
 
 @serving()
-async def test_run_of_what_is_no_package(server: Server) -> None:
+async def test_running_an_invalid_package_is_refused(server: Server) -> None:
     for package_id, error in (
         ("pkg_none", NotFound),
         ("../pkg", InvalidPackage),
@@ -233,7 +233,7 @@ SCRIPT = {"script.py": b"pass\n"}
 
 
 @serving()
-async def test_upload_rename_delete(server: Server) -> None:
+async def test_packages_are_uploaded_renamed_and_deleted(server: Server) -> None:
     meta = b'{"name": "first", "built": "2026-01-01T00:00:00+00:00"}'
     upload = {"id": "pkg_u", "data": zipped(SCRIPT | {"package.json": meta, "old.txt": b""})}
     await server.ask("UploadPackage", upload)
@@ -271,7 +271,7 @@ async def test_upload_rename_delete(server: Server) -> None:
         base64.b64encode(base64.b64decode(zipped(SCRIPT))[:40]).decode(),
     ],
 )
-def test_bad_uploads_leave_nothing_and_what_was_there_stays(tmp_path: Path, data: str) -> None:
+def test_a_refused_upload_changes_nothing(tmp_path: Path, data: str) -> None:
     root = tmp_path / "packages"
     packages = Packages(root)
     packages.upload("pkg_1", zipped(SCRIPT))
@@ -284,7 +284,7 @@ def test_bad_uploads_leave_nothing_and_what_was_there_stays(tmp_path: Path, data
     ]
 
 
-def test_a_zip_bomb_is_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_zip_bomb_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(packages_module, "MAX_SIZE", 3_000_000)
     packages = Packages(tmp_path)
     packages.upload("pkg_1", zipped(SCRIPT | {"big": bytes(2_900_000)}))
@@ -296,7 +296,7 @@ def test_a_zip_bomb_is_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("package_id", ["", ".", "..", "../x", "a/b", "/x", ".hidden", "a\0b", "x" * 200, "a\n"])
-def test_ids_are_no_paths(tmp_path: Path, package_id: str) -> None:
+def test_package_ids_are_not_used_as_paths(tmp_path: Path, package_id: str) -> None:
     (tmp_path / "script.py").write_text("")
     for act in (Packages(tmp_path / "packages").directory, Packages(tmp_path / "packages").delete):
         with pytest.raises(InvalidPackage):

@@ -1,4 +1,4 @@
-"""The history of runs, the trace of actions, breakpoints that are shared, and pausing by a person's command."""
+"""The history of runs, the trace of actions, shared breakpoints, and pausing by a client."""
 
 import asyncio
 import time
@@ -38,7 +38,7 @@ def told(server: Server, name: str) -> list[dict[str, Any]]:
 
 
 @serving()
-async def test_a_run_is_noted_from_its_start_to_its_end(server: Server) -> None:
+async def test_a_run_is_recorded_from_start_to_end(server: Server) -> None:
     subscribe(server)
     assert (await server.ask("ListRuns", {})).runs == []
     assert (await server.ask("GetExecutionTrace", {})).run == 0
@@ -75,7 +75,7 @@ async def test_a_run_is_noted_from_its_start_to_its_end(server: Server) -> None:
 
 
 @serving()
-async def test_how_runs_end(server: Server) -> None:
+async def test_the_end_of_a_run_is_recorded(server: Server) -> None:
     subscribe(server)
     write(server, 'lamp.blink(1, an="a")\nlamp.wait(an="b")', "pkg_wait")
     write(server, 'lamp.blink(1, an="a")\nlamp.blink("x" + 1, an="b")', "pkg_script")
@@ -152,7 +152,7 @@ class Shared:
 
 
 @serving()
-async def test_shared_breakpoints_count_when_asked_for_and_may_change(server: Server) -> None:
+async def test_shared_breakpoints_apply_on_request_and_can_change(server: Server) -> None:
     shared: Any = Shared("act_b", "acp_gone")
     server.services.breakpoints._data = shared
     await server.open(Scene("scene", id="scn_1", objects=[scene_object("lamp", "Lamp")]), PROJECT)
@@ -174,7 +174,7 @@ async def test_shared_breakpoints_count_when_asked_for_and_may_change(server: Se
 
 
 # ---------------------------------------------------------------------------------------------- kept
-async def test_the_newest_runs_and_actions_are_kept(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_the_newest_runs_and_actions_are_stored(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runs, "KEPT", 5)
     monkeypatch.setattr(runs, "KEPT_ACTIONS", 3)
     storage = await Storage.open(ServerSettings(data_dir=tmp_path))

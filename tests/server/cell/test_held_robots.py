@@ -1,4 +1,4 @@
-"""Held motion as clients meet it: one holder, his lock, presses and late requests, events; acknowledging a stop."""
+"""Hold-to-run motion as clients see it: one holder, its lock, late requests, events; acknowledging a stop."""
 
 import asyncio
 import json
@@ -147,7 +147,7 @@ def subscribe(server: Server, client: Recorder) -> None:
 
 
 @serving(with_arm)
-async def test_jog_from_press_to_release(arm: Server) -> None:
+async def test_a_jog_runs_from_press_to_release(arm: Server) -> None:
     subscribe(arm, arm.client)
     hand = Hand(arm)
     assert (await hand.jog(new=True)).scale == 1.0
@@ -173,7 +173,7 @@ async def test_jog_from_press_to_release(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_one_holder_who_has_the_lock(arm: Server) -> None:
+async def test_only_one_client_can_jog_a_robot(arm: Server) -> None:
     alice, bob = Hand(arm), Hand(arm, await join(arm, "bob"))
     with pytest.raises(RequestRefused, match="arm is locked by alice"):
         await bob.jog(new=True)
@@ -194,7 +194,7 @@ async def test_one_holder_who_has_the_lock(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_what_is_not_renewed_ends_and_needs_a_new_press(arm: Server) -> None:
+async def test_motion_that_is_not_renewed_stops_until_the_next_press(arm: Server) -> None:
     subscribe(arm, arm.client)
     hand = Hand(arm)
     await hand.jog(100, new=True)
@@ -208,7 +208,7 @@ async def test_what_is_not_renewed_ends_and_needs_a_new_press(arm: Server) -> No
 
 
 @serving(with_arm)
-async def test_whose_connection_ends_lets_go(arm: Server) -> None:
+async def test_a_closed_connection_stops_the_motion(arm: Server) -> None:
     bob = await join(arm, "bob")
     hand = Hand(arm)
     await hand.jog(new=True)
@@ -221,7 +221,7 @@ async def test_whose_connection_ends_lets_go(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_late_requests_are_thrown_away(arm: Server) -> None:
+async def test_late_requests_are_ignored(arm: Server) -> None:
     """By the sender's clock, which is another one than ours."""
     hand = Hand(arm)
 
@@ -243,7 +243,7 @@ async def test_late_requests_are_thrown_away(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_a_backlog_of_a_press_that_has_ended_does_not_move_it_again(arm: Server) -> None:
+async def test_a_backlog_of_an_ended_press_moves_nothing(arm: Server) -> None:
     hand = Hand(arm)
     await hand.jog(60, new=True)
     await asyncio.sleep(0.3)
@@ -312,7 +312,7 @@ async def test_wrong_arguments(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_hand_teaching_while_held(arm: Server) -> None:
+async def test_hand_teaching_lasts_while_the_button_is_held(arm: Server) -> None:
     subscribe(arm, arm.client)
     hand = Hand(arm)
     await hand.teach(new=True)
@@ -354,7 +354,7 @@ async def test_a_protective_stop_ends_hand_teaching_and_that_is_published(arm: S
 
 
 @serving(with_arm)
-async def test_stop_by_anybody_and_a_scene_that_goes_offline(arm: Server) -> None:
+async def test_any_client_can_stop_and_going_offline_stops(arm: Server) -> None:
     operator = await join(arm, "olga", Role.OPERATOR)
     hand = Hand(arm)
     await hand.jog(new=True)
@@ -417,7 +417,7 @@ async def test_a_protective_stop_is_acknowledged_by_name(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_what_cannot_be_acknowledged_and_by_whom(arm: Server) -> None:
+async def test_acknowledging_is_refused_without_fault_or_role(arm: Server) -> None:
     operator, technician = await join(arm, "olga", Role.OPERATOR), await join(arm, "tom", Role.TECHNICIAN)
     with pytest.raises(RequestRefused, match="no stop that could be"):
         await acknowledge(arm, operator)
@@ -438,7 +438,7 @@ async def test_what_cannot_be_acknowledged_and_by_whom(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_an_alarm_of_any_device_by_its_code(arm: Server) -> None:
+async def test_an_alarm_of_any_device_is_acknowledged_by_code(arm: Server) -> None:
     await acknowledge(arm, code="E7")
     assert (await report(arm))[3] == [["E7"]]
     with pytest.raises(Arcor2Error, match="no alarm E8"):

@@ -1,4 +1,4 @@
-"""What a host said before it ended is heard, however long a busy server takes to read it."""
+"""The last output of a host is read, even if a busy server reads it late."""
 
 import asyncio
 from types import SimpleNamespace
@@ -26,7 +26,9 @@ class Listener:
 
 
 @pytest.mark.parametrize("closes", [True, False])
-async def test_all_is_heard_before_the_end_is_told(monkeypatch: pytest.MonkeyPatch, closes: bool) -> None:
+async def test_all_output_of_a_host_is_read_before_its_end_is_reported(
+    monkeypatch: pytest.MonkeyPatch, closes: bool
+) -> None:
     monkeypatch.setattr(host_module, "LAST_WORDS", 0.8)
 
     async def wait() -> int:

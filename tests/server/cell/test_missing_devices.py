@@ -1,4 +1,4 @@
-"""Starting a scene without what cannot be connected, retrying it; robots streamed at a client's own rate."""
+"""Starting a scene with unreachable devices, connecting them later; streams at each client's rate."""
 
 import asyncio
 import itertools
@@ -74,7 +74,7 @@ def subscribed(server: Server, *events: str) -> Recorder:
 
 
 @serving()
-async def test_the_scene_comes_up_without_it_and_a_retry_brings_it_in(server: Server) -> None:
+async def test_a_scene_starts_without_a_device_and_a_retry_connects_it(server: Server) -> None:
     boxes, client = Boxes(server), subscribed(server, "ObjectState")
     await boxes.open()
     with pytest.raises(RequestRefused, match="offline"):
@@ -113,7 +113,7 @@ async def test_the_scene_comes_up_without_it_and_a_retry_brings_it_in(server: Se
 
 
 @serving()
-async def test_what_keeps_a_scene_from_starting_is_the_same(server: Server) -> None:
+async def test_other_errors_still_prevent_the_start_of_a_scene(server: Server) -> None:
     boxes = Boxes(server)
     with pytest.raises(RequestRefused, match="No scene is open"):
         await server.ask("StartSceneKeepGoing")
@@ -130,7 +130,7 @@ async def test_what_keeps_a_scene_from_starting_is_the_same(server: Server) -> N
 
 
 @serving()
-async def test_health_and_alarms_are_told(server: Server) -> None:
+async def test_health_and_alarms_are_announced(server: Server) -> None:
     boxes, client = Boxes(server), subscribed(server, "ObjectHealth")
     await boxes.open()
     boxes.away.touch()
@@ -175,7 +175,7 @@ def joints(client: Recorder) -> list[dict[str, Any]]:
 
 
 @serving(with_arm)
-async def test_a_robot_is_streamed_at_the_rate_that_each_client_wants(arm: Server) -> None:
+async def test_each_client_chooses_its_streaming_rate(arm: Server) -> None:
     quick, other, slow = arm.client, Recorder("bob"), Slow("carl")
     for client in (other, slow):
         arm.services.hub.add(client)  # type: ignore[arg-type]
@@ -207,7 +207,7 @@ async def test_a_robot_is_streamed_at_the_rate_that_each_client_wants(arm: Serve
 
 
 @serving(with_arm)
-async def test_what_cannot_be_streamed(arm: Server) -> None:
+async def test_invalid_streams_are_refused(arm: Server) -> None:
     what = {"robot_id": "obj_arm", "what": "eef_pose"}
     for rate in (0.5, 31.0):
         with pytest.raises(RequestRefused, match="1 to 30 Hz"):

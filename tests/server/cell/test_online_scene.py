@@ -1,4 +1,4 @@
-"""The scene online: its states, crashes, robots, single actions."""
+"""The online scene: states, crashes, robots, single actions."""
 
 import asyncio
 import json
@@ -133,7 +133,7 @@ async def with_arm(server: Server) -> None:
 
 
 @serving()
-async def test_a_setting_names_no_file_outside_the_device_files(server: Server) -> None:
+async def test_a_setting_cannot_name_a_file_outside_the_device_files(server: Server) -> None:
     source = """
     from arcor2_hw.objects.settings import device_file
 
@@ -166,7 +166,7 @@ async def test_a_setting_names_no_file_outside_the_device_files(server: Server) 
 
 
 @serving(with_arm)
-async def test_up_and_down(arm: Server) -> None:
+async def test_a_scene_starts_and_stops(arm: Server) -> None:
     cell, client = arm.services.online, arm.client
     with pytest.raises(RequestRefused):
         await arm.ask("StopScene")
@@ -186,7 +186,7 @@ async def test_up_and_down(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_states_are_told_in_order_after_the_answer(arm: Server) -> None:
+async def test_scene_states_are_sent_in_order_after_the_answer(arm: Server) -> None:
     await arm.ask("StartScene")
     await arm.client.event("response StartScene")
     states = [(await arm.client.event("SceneState")) for _ in range(2)]
@@ -194,7 +194,7 @@ async def test_states_are_told_in_order_after_the_answer(arm: Server) -> None:
 
 
 @serving()
-async def test_a_failed_start_says_why_and_a_later_one_works(server: Server) -> None:
+async def test_a_failed_start_gives_the_reason_and_can_be_repeated(server: Server) -> None:
     source = """
     @dataclass
     class BoxSettings(Settings):
@@ -238,7 +238,7 @@ async def test_a_crash_takes_the_scene_offline_within_a_second(arm: Server) -> N
 
 
 @serving(with_arm)
-async def test_a_driver_that_ends_the_process(arm: Server) -> None:
+async def test_a_driver_that_ends_the_process_takes_the_scene_offline(arm: Server) -> None:
     await arm.start()
     with pytest.raises(ConnectionLost):
         await arm.services.online.call(OBJ, "vanish")
@@ -246,7 +246,7 @@ async def test_a_driver_that_ends_the_process(arm: Server) -> None:
 
 
 @serving()
-async def test_a_driver_that_ends_the_process_while_it_connects(server: Server) -> None:
+async def test_a_driver_that_ends_the_process_while_connecting(server: Server) -> None:
     server.types.add(
         "Bomb", "class Bomb(Generic):\n    _ABSTRACT = False\n    def connect(self, timeout=5.0): os._exit(11)\n"
     )
@@ -260,7 +260,7 @@ async def test_a_driver_that_ends_the_process_while_it_connects(server: Server) 
 
 
 @serving(with_arm)
-async def test_silence_is_reported_and_forgiven(arm: Server) -> None:
+async def test_an_unresponsive_host_is_reported_and_may_recover(arm: Server) -> None:
     await arm.start()
     cell = arm.services.online
     arm.services.hub.subscribe(arm.client, {"ObjectState"}, True)  # type: ignore[arg-type]
@@ -278,7 +278,7 @@ async def test_silence_is_reported_and_forgiven(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_what_a_robot_tells(arm: Server) -> None:
+async def test_robot_metadata_and_poses_are_returned(arm: Server) -> None:
     with pytest.raises(RequestRefused):
         await arm.ask("GetRobotJoints", {"robot_id": OBJ})
     await arm.start()
@@ -304,7 +304,7 @@ async def test_what_a_robot_tells(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_streams_go_to_subscribers_alone(arm: Server) -> None:
+async def test_streams_are_sent_only_to_subscribers(arm: Server) -> None:
     await arm.start()
     other = Recorder("bob")
     arm.services.hub.add(other)  # type: ignore[arg-type]
@@ -320,7 +320,7 @@ async def test_streams_go_to_subscribers_alone(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_a_motion_from_start_to_end(arm: Server) -> None:
+async def test_a_motion_reports_start_and_end(arm: Server) -> None:
     await arm.start()
     locks = arm.services.locks
     request = {"robot_id": OBJ, "end_effector_id": "tool", "speed": 0.5, "position": {"x": 1, "y": 0, "z": 0}}
@@ -343,7 +343,7 @@ async def test_a_motion_from_start_to_end(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_stop_robot(arm: Server) -> None:
+async def test_stop_robot_stops_the_motion(arm: Server) -> None:
     await arm.start()
     with pytest.raises(RequestRefused):
         await arm.ask("StopRobot", {"robot_id": OBJ})
@@ -415,7 +415,7 @@ async def test_single_actions_with_links_and_parameters(arm: Server) -> None:
 
 
 @serving(with_arm)
-async def test_cancel(arm: Server) -> None:
+async def test_a_single_action_can_be_cancelled(arm: Server) -> None:
     await arm.start()
     await arm.ask("ExecuteAction", {"action_id": "act_long"})
     await arm.client.event("ActionExecution")
@@ -443,7 +443,7 @@ async def test_an_action_cut_off_by_a_crash_ends_with_an_error(arm: Server) -> N
 
 
 @serving(with_arm)
-async def test_a_moved_object_moves_live(arm: Server) -> None:
+async def test_moving_an_object_updates_the_running_scene(arm: Server) -> None:
     await arm.start()
     await arm.services.online.object_pose_changed(OBJ, Pose(Position(5, 0, 0)))
     raw = await arm.services.online.call(OBJ, "pose")

@@ -1,4 +1,4 @@
-"""A safe move as a client asks for it: an uploaded mesh and robot model get to where ways are planned."""
+"""Safe moves requested by a client: uploaded meshes and robot models reach the planner."""
 
 from collections.abc import AsyncIterator
 from typing import Any
@@ -60,7 +60,7 @@ async def move(server: Server, values: tuple[float, ...], safe: bool = True) -> 
 
 
 @serving(with_uploads)
-async def test_around_a_mesh_or_refused(server: Server) -> None:
+async def test_a_safe_move_avoids_a_mesh_or_is_refused(server: Server) -> None:
     assert (await move(server, ACROSS))["move_event_type"] == "end"
     assert int(await server.services.online.call("obj_arm", "waypoints")) > 2
     inside = (1.57, *READY[1:])
@@ -111,7 +111,7 @@ async def height(server: Server) -> float:
 
 
 @serving(with_arm_alone)
-async def test_what_was_put_in_or_is_held_counts_online_and_in_programs(server: Server) -> None:
+async def test_added_and_gripped_bodies_are_obstacles_online_and_in_programs(server: Server) -> None:
     world, beside = server.services.collisions, TIP + Position(0.0, 0.25, 0.0)
     try:
         world.put(box("table", beside + Position(0.0, 0.0, -0.2), 0.1, 0.1, 0.02))  # it was there before
@@ -177,7 +177,7 @@ def write(server: Server) -> None:
 
 
 @serving(with_arm_alone)
-async def test_the_arm_is_led_as_its_controller_told_also_in_programs(server: Server) -> None:
+async def test_the_controllers_calibration_is_used_online_and_in_programs(server: Server) -> None:
     kept = server.services.robot_calibrations
     try:
         await server.start()

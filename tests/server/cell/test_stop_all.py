@@ -1,4 +1,4 @@
-"""StopAll: whatever runs is stopped by one request, and what cannot be stopped is named at once."""
+"""StopAll stops everything with one request and names at once what cannot be stopped."""
 
 import asyncio
 import os
@@ -147,7 +147,7 @@ async def ended(server: Server, within: float = 1.0) -> None:
 
 
 @serving(devices("screwdriver", "timer"))
-async def test_a_tried_action_ends_whether_or_not_its_type_says_what_cancels_it(server: Server) -> None:
+async def test_a_tried_action_is_stopped_with_or_without_cancel_mapping(server: Server) -> None:
     await server.start()
     for name in ("screwdriver", "timer"):
         await trying(server, name)
@@ -163,7 +163,7 @@ async def test_a_tried_action_ends_whether_or_not_its_type_says_what_cancels_it(
 
 
 @serving(devices("screwdriver", "press"))
-async def test_what_cannot_be_stopped_is_named_at_once_and_does_not_keep_the_scene_online(server: Server) -> None:
+async def test_an_action_that_cannot_be_stopped_is_named_at_once(server: Server) -> None:
     await server.start()
     await trying(server, "press")
     with pytest.raises(RequestRefused):
@@ -196,7 +196,7 @@ async def test_a_stop_that_hangs_is_named_and_delays_no_other(server: Server) ->
 
 
 @serving(devices("slow"))
-async def test_while_the_scene_starts_and_stops(server: Server) -> None:
+async def test_stop_all_works_while_the_scene_starts_and_stops(server: Server) -> None:
     await server.ask("StartScene")
     await server.client.state("starting")
     assert missed(await stop_all(server)) == {}
@@ -209,7 +209,7 @@ async def test_while_the_scene_starts_and_stops(server: Server) -> None:
 
 
 @serving(devices("press"))
-async def test_what_was_requested_before_does_not_start_after(server: Server) -> None:
+async def test_requests_from_before_a_stop_do_not_start_after_it(server: Server) -> None:
     await server.start()
     await server.ask("ExecuteAction", {"action_id": "act_press"})
     await stop_all(server)  # before the call has gone to the device
@@ -257,7 +257,7 @@ async def test_a_program_is_stopped_with_its_devices(server: Server) -> None:
 
 
 @serving()
-async def test_a_program_that_is_just_starting_does_not_begin(server: Server) -> None:
+async def test_a_starting_program_is_stopped_before_it_begins(server: Server) -> None:
     write(server, "device.run(an='screwdriver_1')", "screwdriver")
     await server.ask("RunPackage", {"id": "pkg_1"})
     data = await stop_all(server)

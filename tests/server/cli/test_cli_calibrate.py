@@ -77,7 +77,7 @@ def write(path: Path, content: Any) -> Path:
     return path
 
 
-def test_where_a_camera_stands(files: Path, tmp_path: Path, calibrate: Cli) -> None:
+def test_a_camera_pose_is_calibrated(files: Path, tmp_path: Path, calibrate: Cli) -> None:
     told = ("--lens", files / "lens.yaml", "--markers", files / "markers.yaml")
     ran = calibrate("camera", files / "markers.png", *told, "--save", tmp_path / "out", "-o", tmp_path / "pose.json")
     assert ran.status == ExitStatus.OK, ran
@@ -93,7 +93,7 @@ def test_where_a_camera_stands(files: Path, tmp_path: Path, calibrate: Cli) -> N
     assert len(whole.markers) == 2
 
 
-def test_what_cannot_be_told_has_a_status_and_a_line(files: Path, tmp_path: Path, calibrate: Cli) -> None:
+def test_errors_have_an_exit_status_and_one_line(files: Path, tmp_path: Path, calibrate: Cli) -> None:
     told = ("--lens", files / "lens.yaml", "--markers", files / "markers.yaml")
     twice = tmp_path / "twice.yaml"
     twice.write_text("markers:\n  3: {pose: {}}\n  3: {pose: {}}\n")
@@ -142,7 +142,7 @@ def test_touched_points(tmp_path: Path, calibrate: Cli) -> None:
     assert "touched" in ran.err
 
 
-def test_lens_and_hand_eye_have_their_files(files: Path, tmp_path: Path, calibrate: Cli) -> None:
+def test_intrinsics_and_hand_eye_read_and_write_files(files: Path, tmp_path: Path, calibrate: Cli) -> None:
     """What they compute has tests of its own; here, that the files come together and refusals come out."""
     board = write(tmp_path / "board.yaml", {"columns": 7, "rows": 5, "square": 0.03, "marker": 0.0225})
     ran = calibrate("intrinsics", files / "markers.png", "--board", board)
@@ -160,7 +160,7 @@ def test_lens_and_hand_eye_have_their_files(files: Path, tmp_path: Path, calibra
     assert (ran.status, ran.out) == (ExitStatus.DOCUMENT_PROBLEMS, ""), ran
 
 
-def test_angles_are_about_the_fixed_axes() -> None:
+def test_angles_are_about_fixed_axes() -> None:
     for roll, pitch, yaw in ((0.3, -0.4, 1.2), (-2.0, 0.9, -3.0), (0.0, 0.0, 0.0)):
         about_x = Orientation.from_rotation_vector(roll, 0, 0)
         about_y = Orientation.from_rotation_vector(0, pitch, 0)
@@ -168,7 +168,7 @@ def test_angles_are_about_the_fixed_axes() -> None:
         assert angles(Pose(orientation=about_z * about_y * about_x)) == pytest.approx((roll, pitch, yaw))
 
 
-def test_markers_come_from_a_file_or_from_the_cell(files: Path, tmp_path: Path) -> None:
+def test_markers_are_read_from_a_file_or_from_the_cell(files: Path, tmp_path: Path) -> None:
     path = tmp_path / "cell.yaml"
     path.write_text("devices: []\ncalibration:\n  marker_size: 0.05\n  markers:\n    4: {pose: {}}\n")
     found = _markers(None, path, read_cell(path))
@@ -183,7 +183,7 @@ def test_markers_come_from_a_file_or_from_the_cell(files: Path, tmp_path: Path) 
         _markers(None, path, read_cell(path))
 
 
-def test_a_running_server_is_told_and_asked(files: Path, tmp_path: Path, calibrate: Cli) -> None:
+def test_calibrations_are_sent_to_and_read_from_a_running_server(files: Path, tmp_path: Path, calibrate: Cli) -> None:
     with asyncio.Runner() as runner:
         server = ServerProcess(tmp_path / "data")
         runner.run(server.start())

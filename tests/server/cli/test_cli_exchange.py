@@ -1,4 +1,4 @@
-"""`arcor2-hw scene | project | object-type`: out of one server, into another, checked and compared."""
+"""`arcor2-hw scene | project | object-type`: export, import into another server, check and compare."""
 
 import asyncio
 import contextlib
@@ -190,7 +190,7 @@ def changed(path: str, change: Callable[[Any], None]) -> Callable[[dict[str, byt
     return work
 
 
-def test_a_project_moves_to_an_empty_server_with_all_it_needs_and_builds_there(cli: Any, place: Place) -> None:
+def test_an_exported_project_is_imported_and_builds_on_an_empty_server(cli: Any, place: Place) -> None:
     listed = cli("project", "list", at=place.first)
     assert [line.split("  ")[0] for line in listed.out.splitlines()[1:]] == ["by hand", "open it"]
     done = cli("project", "export", "open it", at=place.first)
@@ -243,7 +243,7 @@ async def _picture(client: Client) -> Any:
     return untimed, types, sorted(models, key=lambda model: model.id), disabled, kept
 
 
-def test_what_differs_is_named_and_replaced_only_when_it_may_be(cli: Any, place: Place) -> None:
+def test_differences_are_named_and_replaced_only_on_request(cli: Any, place: Place) -> None:
     assert cli("project", "export", "open it", "-o", "out.zip", at=place.first).status == 0
     cli("project", "import", "out.zip", "--overwrite", "all", at=place.second)
 
@@ -313,9 +313,7 @@ async def _whole(client: Client, directory: Path) -> Any:
     return await _picture(client), assets, scripts, sorted(one.name for one in await client.rest.scenes())
 
 
-def test_what_fails_on_the_way_is_taken_back(
-    cli: Any, place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failed_import_is_reverted(cli: Any, place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert cli("project", "export", "open it", "-o", "out.zip", at=place.first).status == 0
     assert cli("project", "import", "out.zip", "--overwrite", "all", at=place.second).status == 0
 
@@ -372,7 +370,7 @@ def test_what_fails_on_the_way_is_taken_back(
     assert picture() == before
 
 
-def test_a_copy_gets_a_name_and_an_id_of_its_own(cli: Any, place: Place) -> None:
+def test_a_copy_gets_its_own_name_and_id(cli: Any, place: Place) -> None:
     assert cli("scene", "export", "bench", at=place.first).out.startswith("bench.zip: scene bench, ")
     cli("scene", "import", "bench.zip", "--overwrite", "all", at=place.second)
     assert cli("scene", "import", "bench.zip", "--name", "bench two", at=place.second).status == 0
@@ -388,7 +386,7 @@ def test_a_copy_gets_a_name_and_an_id_of_its_own(cli: Any, place: Place) -> None
     assert [line.split(":")[0] for line in differing.out.splitlines()] == ["~ scene › name", "~ scene › id"]
 
 
-def test_a_project_by_hand_keeps_its_script_and_a_package_comes_back(cli: Any, place: Place) -> None:
+def test_projects_with_handwritten_scripts_and_packages_are_imported(cli: Any, place: Place) -> None:
     assert cli("project", "export", "by hand", at=place.first).status == 0
     assert cli("project", "import", "by_hand.zip", "--overwrite", "all", at=place.second).status == 0
 
@@ -410,7 +408,7 @@ def test_a_project_by_hand_keeps_its_script_and_a_package_comes_back(cli: Any, p
     )
 
 
-def test_object_types_move_with_what_they_lean_on(cli: Any, place: Place) -> None:
+def test_object_types_are_exported_with_their_dependencies(cli: Any, place: Place) -> None:
     done = cli("object-type", "export", "ArmM1", at=place.first)
     assert done.out == "ArmM1.zip: object-type AbstractArm\n" or done.out.startswith("ArmM1.zip: ")
     with zipfile.ZipFile("ArmM1.zip") as archive:
@@ -530,9 +528,7 @@ def exported(place: Place) -> Path:
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_the_entry_at_fault_is_named_without_a_server_and_nothing_is_brought_in(
-    cli: Any, exported: Path, place: Place, case: str
-) -> None:
+def test_an_invalid_entry_is_named_and_nothing_is_imported(cli: Any, exported: Path, place: Place, case: str) -> None:
     path, change, told = BROKEN[case]
     repacked(exported, Path("broken.zip"), changed(path, change))
     checked = cli("project", "validate", "broken.zip")
@@ -566,7 +562,7 @@ def _link(archive: zipfile.ZipFile) -> None:
         (_bomb, "larger than"),
     ],
 )
-def test_a_file_from_outside_is_not_trusted(
+def test_a_foreign_file_is_not_trusted(
     cli: Any, exported: Path, spoil: Any, told: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("arcor2_server.exchange.archive.MAX_SIZE", 2 << 20)
@@ -578,7 +574,7 @@ def test_a_file_from_outside_is_not_trusted(
     assert {path.name for path in Path().iterdir()} == {"evil.zip"}
 
 
-def test_a_file_from_outside_does_not_command_the_terminal(cli: Any, exported: Path) -> None:
+def test_a_foreign_file_cannot_send_terminal_sequences(cli: Any, exported: Path) -> None:
     evil = "\x1b]0;owned\x07 [red]lid[/] \x9b2J"
 
     def spoil(files: dict[str, bytes]) -> None:
@@ -596,7 +592,7 @@ def test_a_file_from_outside_does_not_command_the_terminal(cli: Any, exported: P
     assert (half.status, "data/scene.json: " in half.err) == (ExitStatus.DOCUMENT_PROBLEMS, True)
 
 
-def test_what_cannot_be_done_is_said_with_a_status(cli: Any, place: Place, exported: Path, tmp_path: Path) -> None:
+def test_failures_have_an_exit_status(cli: Any, place: Place, exported: Path, tmp_path: Path) -> None:
     Path("none.zip").write_text("no zip")
     half = Path("half.zip")
     half.write_bytes(exported.read_bytes()[:2000])
@@ -614,14 +610,14 @@ def test_what_cannot_be_done_is_said_with_a_status(cli: Any, place: Place, expor
         assert (ran.status, told in ran.err, ran.err.count("\n")) == (status, True, 1), ran.err
 
 
-def test_a_program_that_is_not_finished_is_sound_with_a_note(cli: Any, exported: Path) -> None:
+def test_an_unfinished_program_is_valid_with_a_note(cli: Any, exported: Path) -> None:
     repacked(exported, Path("unfinished.zip"), changed("data/project.json", lambda project: project["logic"].pop()))
     checked = cli("project", "validate", "unfinished.zip")
     assert checked.status == 0
     assert "note: unfinished.zip: data/project.json: logic: The project cannot be built yet: " in checked.out
 
 
-def test_a_token_is_needed_where_one_is_asked_for_and_a_certificate_trusted(
+def test_tokens_and_trusted_certificates_are_used(
     cli: Any, place: Place, exported: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data = place.directory / "guarded"

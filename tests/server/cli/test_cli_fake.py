@@ -1,4 +1,4 @@
-"""`arcor2-hw fake`: what is installed, one in the foreground, and faults told to one that runs."""
+"""`arcor2-hw fake`: the list of fakes, one in the foreground, and injected faults."""
 
 import json
 import re
@@ -90,7 +90,7 @@ def test_listing_loads_no_fake() -> None:
         (None, "is not installed"),
     ],
 )
-def test_a_fake_of_another_distribution(
+def test_a_fake_of_another_distribution_is_listed(
     source: str | None, expected: InstalledFake | str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "fakery").mkdir()
@@ -112,7 +112,7 @@ def test_a_fake_of_another_distribution(
 
 # ---------------------------------------------------------------------------------------------------- run
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_fake_in_the_foreground_says_where_it_is_and_ends_in_order(number: signal.Signals) -> None:
+def test_a_fake_in_the_foreground_prints_its_address_and_ends_cleanly(number: signal.Signals) -> None:
     running = Running("conveyor", "--", "--node", "7")
     assert running.said == "conveyor is ready; Ctrl-C ends it\n"
     assert running.at["node"] == "7"
@@ -120,7 +120,7 @@ def test_a_fake_in_the_foreground_says_where_it_is_and_ends_in_order(number: sig
     assert running.end(number) == 0
 
 
-def test_run_says_what_is_wrong() -> None:
+def test_run_reports_errors() -> None:
     unknown = arcor2_hw_fake("run", "toaster")
     assert unknown.returncode == 9
     assert unknown.stderr.startswith("arcor2-hw fake run: there is no fake toaster; there are ")
@@ -129,7 +129,7 @@ def test_run_says_what_is_wrong() -> None:
 
 
 # ---------------------------------------------------------------------------------------------------- fault
-def test_a_fault_is_told_and_its_answer_printed(tester: Running) -> None:
+def test_a_fault_is_injected_and_its_answer_printed(tester: Running) -> None:
     control = tester.at["control"]
     done = arcor2_hw_fake("fault", control, "slow", "--seconds", "0.2", "--wire", "modbus")
     assert (done.returncode, done.stdout) == (0, f"{control}: slow done\n")
@@ -140,7 +140,7 @@ def test_a_fault_is_told_and_its_answer_printed(tester: Running) -> None:
     assert json.loads(truth.stdout)["board"] == "PCB-1"
 
 
-def test_without_a_kind_what_it_can_do_is_listed(tester: Running) -> None:
+def test_without_a_fault_the_available_ones_are_listed(tester: Running) -> None:
     listed = arcor2_hw_fake("fault", tester.at["control"])
     assert listed.returncode == 0
     commands = {line.split()[0]: line for line in listed.stdout.splitlines()[2:]}
@@ -161,7 +161,7 @@ def test_without_a_kind_what_it_can_do_is_listed(tester: Running) -> None:
         (["put_board", "PCB-1"], 2, "'PCB-1' must be key=value"),
     ],
 )
-def test_what_it_can_not_do_is_said_in_one_line(tester: Running, words: list[str], status: int, says: str) -> None:
+def test_an_unknown_fault_is_reported_in_one_line(tester: Running, words: list[str], status: int, says: str) -> None:
     ran = arcor2_hw_fake("fault", tester.at["control"], *words)
     assert ran.returncode == status
     assert says in ran.stderr
@@ -169,7 +169,7 @@ def test_what_it_can_not_do_is_said_in_one_line(tester: Running, words: list[str
     assert len(ran.stderr.splitlines()) == 1
 
 
-def test_names_are_those_of_the_running_demo(tester: Running, tmp_path: Path) -> None:
+def test_names_are_read_from_the_running_demo(tester: Running, tmp_path: Path) -> None:
     where = {
         "url": "ws://127.0.0.1:1",
         "tester": {"control": tester.at["control"]},

@@ -1,4 +1,4 @@
-"""`arcor2-hw object-type`: object types written for ARCOR2, and their bases and mixins, into a running server."""
+"""`arcor2-hw object-type`: upload types written for ARCOR2, with bases and mixins, to a running server."""
 
 import asyncio
 from collections.abc import Callable, Iterator
@@ -66,7 +66,7 @@ def sources(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_family_of_types_is_brought_in_together_and_one_by_one(
+def test_related_types_are_uploaded_together_and_separately(
     sources: Path, server: ServerProcess, loop: asyncio.Runner, object_type: Cli
 ) -> None:
     arm, base, mixin = (sources / f"{name}.py" for name in ("arm_m1", "abstract_arm", "kinematics_mixin"))
@@ -106,7 +106,7 @@ def test_a_family_of_types_is_brought_in_together_and_one_by_one(
     assert imported.stdout == f"object type FlowActions: new, {SHADOWS}\n", imported.stderr
 
 
-def test_what_makes_no_sense_is_refused(sources: Path, object_type: Cli) -> None:
+def test_invalid_types_are_refused(sources: Path, object_type: Cli) -> None:
     two = sources / "two.py"
     two.write_text(
         "from arcor2_hw.objects import Generic\n\n\n"

@@ -49,7 +49,7 @@ def cell_file(directory: Path, *devices: CellDevice) -> str:
 
 
 # ------------------------------------------------------------------------------------------------ check
-def test_a_device_that_is_there(tmp_path: Path, scale: FakeProcess) -> None:
+def test_a_reachable_device_is_checked(tmp_path: Path, scale: FakeProcess) -> None:
     port = scale.ready["port"]
     received = len(scale.truth()["received"])
     done = arcor2_hw("device", "check", cell_file(tmp_path, CellDevice("balance", "MtSicsScale", {"port": port})))
@@ -63,7 +63,7 @@ def test_a_device_that_is_there(tmp_path: Path, scale: FakeProcess) -> None:
     assert not [line for line in asked if line.split()[0] in ("T", "Z", "TI", "ZI", "TA", "TAC", "@")], asked
 
 
-def test_each_thing_that_is_wrong_is_told_beside_the_others(tmp_path: Path, scale: FakeProcess) -> None:
+def test_every_problem_is_reported(tmp_path: Path, scale: FakeProcess) -> None:
     file = cell_file(
         tmp_path,
         CellDevice("balance", "MtSicsScale", {"port": scale.ready["port"]}),
@@ -96,7 +96,7 @@ class Crasher(Generic):
 """
 
 
-def test_a_driver_that_takes_the_process_down_hides_no_other(tmp_path: Path, scale: FakeProcess) -> None:
+def test_a_crashing_driver_does_not_hide_other_results(tmp_path: Path, scale: FakeProcess) -> None:
     package = tmp_path / "object_types"
     package.mkdir()
     (package / "__init__.py").touch()
@@ -111,7 +111,7 @@ def test_a_driver_that_takes_the_process_down_hides_no_other(tmp_path: Path, sca
 
 
 @pytest.mark.parametrize(("text", "status"), [(None, 9), ("devices: 3", 11)])
-def test_a_bad_file_is_one_line(tmp_path: Path, text: str | None, status: int) -> None:
+def test_an_invalid_file_is_reported_in_one_line(tmp_path: Path, text: str | None, status: int) -> None:
     file = tmp_path / "cell.yaml"
     if text is not None:
         file.write_text(text)
@@ -153,7 +153,7 @@ async def test_a_scene_becomes_a_cell_file_that_can_be_read(tmp_path: Path) -> N
     assert tester_device.pose == Pose()
 
 
-def test_without_a_server_it_says_so() -> None:
+def test_a_missing_server_is_reported() -> None:
     done = arcor2_hw("device", "export", "--url", "ws://127.0.0.1:9")
     assert done.returncode == 7
     assert "ws://127.0.0.1:9" in done.stderr
@@ -200,7 +200,7 @@ def libraries(tmp_path: Path) -> str:
     return str(tmp_path)
 
 
-def test_ports_and_cameras(libraries: str) -> None:
+def test_scan_lists_ports_and_cameras(libraries: str) -> None:
     done = arcor2_hw("device", "scan", PYTHONPATH=libraries)
     assert done.returncode == 0, done.stderr
     _, *rows = done.stdout.splitlines()
@@ -210,7 +210,7 @@ def test_ports_and_cameras(libraries: str) -> None:
 
 
 @pytest.mark.parametrize("adapter", ["slcan:socket://{can}", "socketcand:{socketcand}/can0"])
-def test_nodes_of_a_bus_that_is_named(belt: FakeProcess, adapter: str) -> None:
+def test_scan_lists_the_nodes_of_a_can_bus(belt: FakeProcess, adapter: str) -> None:
     before = belt.truth()
     bus = adapter.format(**belt.ready)
     done = arcor2_hw("device", "scan", "--no-oak", "--can", bus, "--json")
@@ -232,7 +232,7 @@ def test_nodes_of_a_bus_that_is_named(belt: FakeProcess, adapter: str) -> None:
         ("slcan:/dev/does-not-exist", "cannot be opened"),
     ],
 )
-def test_a_bus_that_cannot_be_searched(bus: str, said: str) -> None:
+def test_an_unusable_bus_is_reported(bus: str, said: str) -> None:
     done = arcor2_hw("device", "scan", "--no-oak", "--can", bus)
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
@@ -240,7 +240,7 @@ def test_a_bus_that_cannot_be_searched(bus: str, said: str) -> None:
     assert said in line
 
 
-def test_a_library_that_crashes_hides_nothing(libraries: str) -> None:
+def test_a_crashing_library_does_not_hide_other_results(libraries: str) -> None:
     (Path(libraries) / "depthai.py").write_text("import os\nos.kill(os.getpid(), 9)\n")
     done = arcor2_hw("device", "scan", PYTHONPATH=libraries)
     assert done.returncode == 0

@@ -1,4 +1,4 @@
-"""`arcor2-hw device new`: what it writes passes the suite, the linter and the analysis as it is written."""
+"""`arcor2-hw device new`: generated code passes the suite, the linter and the analysis unchanged."""
 
 import os
 import re
@@ -42,7 +42,7 @@ def lines(path: Path) -> int:
 
 
 @pytest.mark.parametrize(("base", "bus"), RUN, ids=lambda each: each.value)
-def test_the_suite_passes_at_once(tmp_path: Path, base: Base, bus: Bus) -> None:
+def test_the_generated_driver_passes_the_suite(tmp_path: Path, base: Base, bus: Bus) -> None:
     root = written(tmp_path, base, bus)
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rs"],
@@ -62,7 +62,7 @@ def test_the_suite_passes_at_once(tmp_path: Path, base: Base, bus: Bus) -> None:
             assert line.endswith(OF_THE_AUTHOR), line
 
 
-def test_all_are_clean_python_whatever_their_names(tmp_path: Path) -> None:
+def test_generated_code_is_clean_with_any_name(tmp_path: Path) -> None:
     for base, bus in ALL:
         for name in ("x", "feeder-of-small-round-pi"):
             root = tmp_path / f"{base}-{bus}-{len(name)}"
@@ -83,7 +83,7 @@ def test_all_are_clean_python_whatever_their_names(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_a_modbus_machine_takes_sixty_lines_of_each_in_three_files(tmp_path: Path) -> None:
+def test_a_modbus_machine_takes_sixty_lines_in_each_of_three_files(tmp_path: Path) -> None:
     root = written(tmp_path, Base.MACHINE, Bus.MODBUS, "press")
     by_hand = [root / "press" / "press.py", root / "press" / "press_fake.py", root / "tests" / "test_press.py"]
     assert sorted(path for path in root.rglob("*.py") if path.name != "__init__.py") == sorted(by_hand)
@@ -122,7 +122,7 @@ def test_the_drivers_are_typed(tmp_path: Path, pytestconfig: pytest.Config) -> N
         (["press", "--base", "lamp", "--bus", "modbus"], "lamp"),
     ],
 )
-def test_what_makes_no_sense_is_refused_in_a_sentence(tmp_path: Path, arguments: list[str], said: str) -> None:
+def test_invalid_options_are_refused_in_one_sentence(tmp_path: Path, arguments: list[str], said: str) -> None:
     done = subprocess.run(
         [*COMMAND, "device", "new", *arguments, "--directory", str(tmp_path)],
         capture_output=True,

@@ -1,4 +1,4 @@
-"""The asset store: what is written can be read, by whom it must not be, and what a crash leaves."""
+"""The asset store: reading, writing, access, and recovery after a crash."""
 
 import asyncio
 import hashlib
@@ -30,7 +30,7 @@ async def store(tmp_path: Path) -> AssetStore:
     return await AssetStore.open(tmp_path, limit=1_000_000)
 
 
-async def test_what_was_written_is_read_also_after_a_restart(store: AssetStore, tmp_path: Path) -> None:
+async def test_assets_are_stored_across_restarts(store: AssetStore, tmp_path: Path) -> None:
     content = bytes(range(256)) * 3000
     asset = await store.put(
         chunks(content[:7], b"", content[7:]), "table.stl", file_name="t.stl", description="a table"
@@ -44,7 +44,7 @@ async def test_what_was_written_is_read_also_after_a_restart(store: AssetStore, 
         assert await read(each, "table.stl") == content
 
 
-async def test_an_id_is_made_when_none_is_given(store: AssetStore) -> None:
+async def test_an_id_is_generated_when_none_is_given(store: AssetStore) -> None:
     first, second = await store.put(chunks(b"x")), await store.put(chunks(b"x"))
     assert first.id != second.id
     assert first.digest == second.digest
@@ -63,7 +63,7 @@ async def test_only_upsert_replaces(store: AssetStore, tmp_path: Path) -> None:
     assert contents(tmp_path) == [b"two"]  # what nobody refers to is gone
 
 
-async def test_same_content_is_kept_once_and_as_long_as_one_has_it(store: AssetStore, tmp_path: Path) -> None:
+async def test_equal_content_is_stored_once_until_its_last_asset_is_deleted(store: AssetStore, tmp_path: Path) -> None:
     await store.put(chunks(b"same"), "a")
     await store.put(chunks(b"same"), "b")
     assert contents(tmp_path) == [b"same"]
@@ -78,7 +78,7 @@ async def test_same_content_is_kept_once_and_as_long_as_one_has_it(store: AssetS
         store.info("b")
 
 
-async def test_what_is_being_read_is_read_to_its_end(store: AssetStore) -> None:
+async def test_an_asset_deleted_during_reading_is_read_completely(store: AssetStore) -> None:
     content = b"0123456789" * 60_000
     await store.put(chunks(content), "a")
     reading = store.read(store.info("a"))
@@ -90,7 +90,7 @@ async def test_what_is_being_read_is_read_to_its_end(store: AssetStore) -> None:
     assert got == content
 
 
-async def test_too_much_is_refused_and_leaves_nothing(store: AssetStore, tmp_path: Path) -> None:
+async def test_an_oversized_upload_is_refused_and_leaves_nothing(store: AssetStore, tmp_path: Path) -> None:
     taken = 0
 
     async def endless() -> AsyncIterator[bytes]:
@@ -108,7 +108,7 @@ async def test_too_much_is_refused_and_leaves_nothing(store: AssetStore, tmp_pat
 
 
 @pytest.mark.parametrize("key", ["", "x" * 256, "a\nb", "a\0b", "\ud800"])
-async def test_an_impossible_id_is_refused(store: AssetStore, key: str) -> None:
+async def test_an_invalid_id_is_refused(store: AssetStore, key: str) -> None:
     with pytest.raises(InvalidData, match="printable"):
         await store.put(chunks(b"x"), key)
 
@@ -124,7 +124,7 @@ async def test_an_id_is_never_a_path(tmp_path: Path, key: str) -> None:
     assert await read(again, key) == b"content"
 
 
-async def test_an_upload_that_breaks_off_leaves_the_old_one(store: AssetStore, tmp_path: Path) -> None:
+async def test_an_interrupted_upload_keeps_the_old_asset(store: AssetStore, tmp_path: Path) -> None:
     await store.put(chunks(b"old"), "a")
 
     async def broken() -> AsyncIterator[bytes]:
@@ -138,14 +138,14 @@ async def test_an_upload_that_breaks_off_leaves_the_old_one(store: AssetStore, t
     assert not list((tmp_path / "incoming").iterdir())
 
 
-async def test_of_two_at_once_one_wins_and_the_other_is_refused(store: AssetStore) -> None:
+async def test_one_of_two_simultaneous_uploads_is_refused(store: AssetStore) -> None:
     results = await asyncio.gather(*(store.put(chunks(str(n).encode()), "a") for n in range(8)), return_exceptions=True)
     (winner,) = [result for result in results if isinstance(result, Asset)]
     assert all(isinstance(result, Conflict) for result in results if result is not winner)
     assert hashlib.sha256(await read(store, "a")).hexdigest() == winner.digest
 
 
-async def test_what_a_crash_or_a_hand_left_is_told_and_does_not_matter(store: AssetStore, tmp_path: Path) -> None:
+async def test_stray_files_are_reported_and_ignored(store: AssetStore, tmp_path: Path) -> None:
     await store.put(chunks(b"kept"), "kept")
     lost = await store.put(chunks(b"lost"), "lost")
     (tmp_path / "content" / lost.digest[:2] / lost.digest).unlink()
@@ -158,13 +158,13 @@ async def test_what_a_crash_or_a_hand_left_is_told_and_does_not_matter(store: As
     assert not list((tmp_path / "incoming").iterdir())
 
 
-async def test_a_directory_that_cannot_be_used_is_named(tmp_path: Path) -> None:
+async def test_an_unusable_directory_is_named(tmp_path: Path) -> None:
     (tmp_path / "assets").write_text("a file")
     with pytest.raises(StorageError, match=str(tmp_path / "assets")):
         await AssetStore.open(tmp_path / "assets")
 
 
-async def test_what_a_driver_offers_is_read_but_not_listed_and_an_upload_stands_before_it(
+async def test_driver_assets_are_read_but_not_listed_and_uploads_take_precedence(
     store: AssetStore, tmp_path: Path
 ) -> None:
     await store.offer("arm.zip", b"the driver's", "of a driver")

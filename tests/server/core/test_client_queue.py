@@ -1,4 +1,4 @@
-"""What waits for a client: the order, the newest of a stream, the bounds."""
+"""The send queue of a client: order, the newest message of a stream, limits."""
 
 import asyncio
 from pathlib import Path
@@ -79,7 +79,7 @@ async def test_order_and_newest_of_a_stream(wire: ValveWire, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("limits", [{"outgoing_messages": 10}, {"outgoing_bytes": 1000}, {"outgoing_age": 0.05}])
-async def test_who_lags_too_far_behind_is_closed_and_dropped(
+async def test_a_client_that_lags_too_far_is_closed(
     wire: ValveWire, tmp_path: Path, limits: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("arcor2_server.websocket.client.ABORT_AFTER", 0.05)
@@ -114,7 +114,7 @@ async def test_streams_alone_never_close_a_client(wire: ValveWire, tmp_path: Pat
     await asyncio.gather(writer, return_exceptions=True)
 
 
-async def test_ping(wire: ValveWire, tmp_path: Path) -> None:
+async def test_pings_are_answered(wire: ValveWire, tmp_path: Path) -> None:
     client = client_of(wire, tmp_path)
     assert await client.ping(0.5)
     wire.open.clear()

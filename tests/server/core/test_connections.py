@@ -1,4 +1,4 @@
-"""Connections of nobody in particular are limited in number and in time; admitted clients are not touched."""
+"""Connections that are not admitted are limited in number and time; admitted clients are not affected."""
 
 import asyncio
 import contextlib
@@ -55,7 +55,7 @@ class Opened:
         return connection
 
 
-def test_the_oldest_of_an_address_makes_room() -> None:
+def test_the_oldest_connection_of_an_address_is_closed_first() -> None:
     opened = Opened(ConnectionLimits(total=100, per_address=2))
     other, first, second = opened.open("10.0.0.8"), opened.open(), opened.open()
     assert opened.dropped == []
@@ -84,14 +84,14 @@ def test_admitted_clients_are_never_dropped() -> None:
     opened.open("10.0.0.9")
 
 
-def test_a_reserve_is_for_admitted_clients() -> None:
+def test_some_connections_are_reserved_for_admitted_clients() -> None:
     opened = Opened(ConnectionLimits(total=8, per_address=100))
     for number in range(20):
         opened.open(f"10.0.0.{number}")
     assert len(opened.limits) == 6
 
 
-def test_who_has_most_makes_room() -> None:
+def test_the_address_with_most_connections_is_closed_first() -> None:
     opened = Opened(ConnectionLimits(total=8, per_address=100))
     alone = opened.open("10.0.0.8")
     for _ in range(20):
@@ -99,14 +99,14 @@ def test_who_has_most_makes_room() -> None:
     assert alone not in opened.dropped
 
 
-def test_behind_a_proxy_are_many() -> None:
+def test_a_proxy_may_have_many_connections() -> None:
     opened = Opened(ConnectionLimits(total=100, per_address=2, proxies=["10.1.0.0/16"]))
     for _ in range(5):
         opened.open("10.1.2.3")
     assert opened.dropped == []
 
 
-def test_limits_of_the_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_limits_follow_the_file_descriptors_of_the_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for allowed, total in ((1024, 1024 - OWN_FILES), (100, 64), (-1, 4000), (1_000_000, 4000)):
         monkeypatch.setattr("resource.getrlimit", lambda _, allowed=allowed: (allowed, allowed))
         assert ConnectionLimits.of(ServerSettings(data_dir=tmp_path)).total == total
@@ -200,7 +200,7 @@ async def drips(port: int, first: bytes, drip: bytes = b"") -> bool:
 
 
 @on_uvloop
-async def test_nobody_is_waited_for_without_end(tmp_path: Path) -> None:
+async def test_slow_requests_time_out(tmp_path: Path) -> None:
     websocket = HEAD + b"Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Key: "
     body = b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\n"
     async with served(tmp_path) as here:
@@ -217,7 +217,7 @@ async def test_nobody_is_waited_for_without_end(tmp_path: Path) -> None:
 
 
 @on_uvloop
-async def test_slow_but_steady_is_served(tmp_path: Path) -> None:
+async def test_a_slow_but_steady_client_is_served(tmp_path: Path) -> None:
     async with served(tmp_path) as here, httpx.AsyncClient(base_url=f"http://127.0.0.1:{here.port}") as http:
 
         async def slowly() -> AsyncIterator[bytes]:
@@ -236,7 +236,7 @@ async def test_slow_but_steady_is_served(tmp_path: Path) -> None:
 
 
 @on_uvloop
-async def test_an_answer_that_nobody_takes_is_dropped(tmp_path: Path) -> None:
+async def test_an_unread_answer_is_dropped(tmp_path: Path) -> None:
     async with served(tmp_path) as here:
         here.silent(b"GET /big HTTP/1.1\r\nHost: localhost\r\n\r\n")
         here.silent(b"GET /big HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
@@ -245,7 +245,7 @@ async def test_an_answer_that_nobody_takes_is_dropped(tmp_path: Path) -> None:
 
 
 @on_uvloop
-async def test_a_flood_keeps_nobody_out(tmp_path: Path) -> None:
+async def test_a_flood_of_connections_blocks_no_admitted_client(tmp_path: Path) -> None:
     async with served(tmp_path, per_address=10) as here, connect(f"ws://127.0.0.1:{here.port}/admitted") as client:
         for _ in range(50):
             here.silent()
@@ -295,7 +295,9 @@ class NoFiles(socket.socket):
 
 
 @on_uvloop
-async def test_without_a_file_descriptor_it_tries_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_accepting_resumes_after_running_out_of_file_descriptors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(http_server, "PAUSE", 0.02)
     async with (
         served(tmp_path, listener=NoFiles()) as here,
@@ -305,7 +307,7 @@ async def test_without_a_file_descriptor_it_tries_again(tmp_path: Path, monkeypa
 
 
 @on_uvloop
-async def test_the_server_limits_strangers_and_not_its_clients(tmp_path: Path) -> None:
+async def test_the_server_limits_only_clients_without_admission(tmp_path: Path) -> None:
     async with running(tmp_path / "data", ARCOR2_HW_CONNECTIONS="64", ARCOR2_HW_REQUEST_TIMEOUT="0.5") as server:
         here = Served(int(server.url.rpartition(":")[2]), ConnectionLimits(1, 1))
         process = psutil.Process(server.process.pid)

@@ -1,4 +1,4 @@
-"""What the endpoint does with handlers: order of events and answer, partial success, errors nobody foresaw."""
+"""The endpoint and its handlers: order of events and answer, partial success, unexpected errors."""
 
 import asyncio
 import json
@@ -106,7 +106,9 @@ def handle(connect: Any, name: str, handler: Handler | None = None, **fields: An
     connect.routes[name] = msgspec.structs.replace(connect.routes[name], **fields)
 
 
-async def test_events_before_answer_events_after(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_events_are_sent_before_or_after_the_answer_as_declared(
+    services: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
     async with connecting(services) as connect:
 
         async def handler(context: Context, args: None) -> set[str]:
@@ -124,7 +126,9 @@ async def test_events_before_answer_events_after(services: Server, monkeypatch: 
         assert [one["event"] for one in (await bob.heard(3))[1:]] == ["ProjectSaved", "SceneSaved"]
 
 
-async def test_refusal_drops_events_unless_a_part_was_done(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_refusal_drops_events_unless_something_was_done(
+    services: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
     async with connecting(services) as connect:
 
         async def refused(context: Context, args: None) -> None:
@@ -148,7 +152,7 @@ async def test_refusal_drops_events_unless_a_part_was_done(services: Server, mon
         ]
 
 
-async def test_error_of_ours_is_the_message(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_typed_errors_become_the_message(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     async with connecting(services) as connect:
 
         async def handler(context: Context, args: None) -> None:
@@ -160,9 +164,7 @@ async def test_error_of_ours_is_the_message(services: Server, monkeypatch: pytes
         assert (await ann.heard(2))[1]["messages"] == ["robot at 10.0.0.1 did not answer"]
 
 
-async def test_what_nobody_foresaw_is_answered_with_a_reference_to_the_log(
-    services: Server, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_unexpected_errors_refer_to_the_log(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     async with connecting(services) as connect:
 
         async def handler(context: Context, args: None) -> Any:
@@ -216,7 +218,7 @@ async def test_bounded_number_in_flight(services: Server, monkeypatch: pytest.Mo
         assert len(started) == 10
 
 
-async def test_request_of_one_who_leaves_is_finished(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_request_is_completed_after_its_client_left(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     async with connecting(services) as connect:
         entered, go_on, done = asyncio.Event(), asyncio.Event(), asyncio.Event()
 
@@ -235,7 +237,7 @@ async def test_request_of_one_who_leaves_is_finished(services: Server, monkeypat
             await done.wait()
 
 
-async def test_a_name_of_megabytes_is_refused_and_nobody_is_told(services: Server) -> None:
+async def test_an_oversized_name_is_refused_without_events(services: Server) -> None:
     async with connecting(services) as connect:
         ann, bob = connect(), connect()
         await bob.heard(1)

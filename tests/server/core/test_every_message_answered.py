@@ -1,4 +1,4 @@
-"""No message is left without an answer, whatever is in it."""
+"""Every message is answered, whatever it contains."""
 
 import asyncio
 import contextlib
@@ -54,7 +54,9 @@ MIB = 1024 * 1024
         (b'{"id": 5, "request": "SystemInfo"}', 0, "Error"),
     ],
 )
-async def test_wrong_message(server: ServerProcess, text: str | bytes, number: int | None, name: str | None) -> None:
+async def test_invalid_messages_are_answered(
+    server: ServerProcess, text: str | bytes, number: int | None, name: str | None
+) -> None:
     async with talking(server.url) as talker:
         answer = await talker.raw(text)
         assert answer["result"] is False
@@ -174,7 +176,7 @@ def _encodable(text: str) -> bool:
     return True
 
 
-async def test_anything_is_answered_once(server: ServerProcess, batches: list[list[str | bytes]]) -> None:
+async def test_any_message_is_answered_once(server: ServerProcess, batches: list[list[str | bytes]]) -> None:
     async with talking(server.url) as talker:
         for batch in batches:
             for text in batch:
@@ -196,7 +198,7 @@ def padded(size: int, number: int = 7) -> str:
     return head + "x" * (size - len(head) - len(tail)) + tail
 
 
-async def test_sizes(server: ServerProcess) -> None:
+async def test_messages_are_accepted_refused_or_closed_by_size(server: ServerProcess) -> None:
     """To 16 MiB served, to 32 MiB read and refused, beyond that closed with 1009."""
     async with talking(server.url, "sizes") as talker:
         served = await talker.raw(padded(16 * MIB))
@@ -215,7 +217,7 @@ async def test_sizes(server: ServerProcess) -> None:
         await talker.granted("SystemInfo")
 
 
-async def test_requests_overtake_one_that_waits(server: ServerProcess) -> None:
+async def test_requests_overtake_a_waiting_request(server: ServerProcess) -> None:
     """Each request is a task of its own: one that waits for a lock does not hold up the next."""
     async with talking(server.url, "holder") as holder, talking(server.url, "waiter") as waiter:
         await holder.granted("WriteLock", {"object_id": "ADDING_OBJECT"})
@@ -263,7 +265,7 @@ HANDSHAKE = (
 )
 
 
-async def test_connection_that_breaks_off_is_forgotten(server: ServerProcess) -> None:
+async def test_a_broken_connection_is_removed(server: ServerProcess) -> None:
     for _ in range(20):
         broken = await connect(server.url, compression=None)
         await broken.send('{"id": 1, "request": "SystemInfo"}')
@@ -278,7 +280,7 @@ async def test_compression_is_declined(server: ServerProcess) -> None:
         assert "Sec-WebSocket-Extensions" not in offering.response.headers
 
 
-async def test_any_path_is_the_websocket(server: ServerProcess) -> None:
+async def test_the_websocket_is_available_at_any_path(server: ServerProcess) -> None:
     for path in ("", "/", "/anything", "/a/b?c=d"):
         async with talking(server.url + path) as talker:
             await talker.granted("SystemInfo")

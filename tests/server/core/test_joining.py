@@ -1,4 +1,4 @@
-"""The addresses by which others are invited."""
+"""Addresses for invitations of other devices."""
 
 from pathlib import Path
 
@@ -29,17 +29,17 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> None:
         ("cell-7.example", ["http://cell-7.example:6789"]),
     ],
 )
-def test_others_are_told_what_they_reach(tmp_path: Path, host: str, addresses: list[str]) -> None:
+def test_invitations_list_reachable_addresses(tmp_path: Path, host: str, addresses: list[str]) -> None:
     assert joining(ServerSettings(data_dir=tmp_path, host=host), 1).addresses == addresses
 
 
-def test_of_any_free_port_the_one_is_told_at_which_it_was_asked(tmp_path: Path) -> None:
+def test_invitations_use_the_port_of_the_request(tmp_path: Path) -> None:
     settings = ServerSettings(data_dir=tmp_path, host="192.0.2.9", port=0, fingerprint="AB:CD")
     found = joining(settings, 41234)
     assert (found.addresses, found.fingerprint) == (["https://192.0.2.9:41234"], "AB:CD")
 
 
-def test_without_a_network_there_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_network_there_is_no_invitation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_way_out", str)
     monkeypatch.setattr(module, "_of_name", list)
     assert joining(ServerSettings(data_dir=tmp_path, host="0.0.0.0"), 1).addresses == []

@@ -1,4 +1,4 @@
-"""The rules of PROTOCOL.md section 6, one by one, against the table of locks alone."""
+"""Locks, rule by rule, without a server (protocol, section 6)."""
 
 import asyncio
 
@@ -40,7 +40,7 @@ def locks(tree: Tree) -> Locks:
 WHOLE = {"box", "ap1", "ap2", "ori", "act"}
 
 
-async def test_write_lock_is_announced_once_and_kept_from_others(locks: Locks) -> None:
+async def test_a_write_lock_is_announced_once_and_excludes_others(locks: Locks) -> None:
     assert await locks.write_lock("ann", "ap1") == ["ap1"]
     assert await locks.write_lock("ann", "ap1") == []
     assert locks.holds("ann", "ap1")
@@ -102,7 +102,7 @@ async def test_tree_lock_is_refused_while_anything_in_it_is_locked(locks: Locks,
     assert set(await locks.write_lock("ann", "ap2", tree=True)) == WHOLE
 
 
-async def test_readers_keep_writers_out_and_the_other_way_round(locks: Locks) -> None:
+async def test_read_and_write_locks_exclude_each_other(locks: Locks) -> None:
     await locks.read_lock("ann", "ap1")
     await locks.read_lock("bob", "ap1")
     with pytest.raises(Locked):
@@ -153,14 +153,14 @@ async def test_auto_waits_for_the_lock_then_gives_up(locks: Locks) -> None:
     assert locks.locked_roots() == []
 
 
-async def test_auto_is_given_back_when_the_request_fails(locks: Locks) -> None:
+async def test_auto_releases_when_the_request_fails(locks: Locks) -> None:
     with pytest.raises(ZeroDivisionError):
         async with locks.auto("ann", "box"):
             raise ZeroDivisionError
     assert locks.locked_roots() == []
 
 
-async def test_auto_skip_held_leaves_the_clients_own_locks(locks: Locks) -> None:
+async def test_auto_skip_held_keeps_the_locks_of_the_client(locks: Locks) -> None:
     await locks.write_lock("ann", "act")
     async with locks.auto_skip_held("ann", "act", "robot"):
         assert locks.holds("ann", "robot")
@@ -173,7 +173,7 @@ async def test_auto_skip_held_leaves_the_clients_own_locks(locks: Locks) -> None
     assert locks.holds("ann", "box", tree=True)
 
 
-async def test_read_is_skipped_where_the_user_holds_a_lock(locks: Locks) -> None:
+async def test_read_skips_ids_that_the_user_has_locked(locks: Locks) -> None:
     await locks.write_lock("ann", "robot")
     async with locks.read("ann", "robot", "box"):
         assert locks.holds_read("ann", "box")
@@ -190,7 +190,7 @@ async def test_read_is_skipped_where_the_user_holds_a_lock(locks: Locks) -> None
     assert locks.holds_read("ann", "box"), "the client's own read lock outlives the request's"
 
 
-async def test_a_client_does_not_get_a_lock_that_its_own_request_holds_for_a_moment(locks: Locks) -> None:
+async def test_a_client_cannot_get_a_lock_that_its_request_holds(locks: Locks) -> None:
     async with locks.auto("ann", "robot"):
         with pytest.raises(Locked):
             await locks.write_lock("ann", "robot")
@@ -206,7 +206,7 @@ async def test_exclusive_is_refused_at_once_while_a_client_holds_a_lock(locks: L
     assert asyncio.get_running_loop().time() - start < 0.05
 
 
-async def test_exclusive_waits_for_silent_locks_and_keeps_others_out(locks: Locks) -> None:
+async def test_exclusive_waits_for_silent_locks_and_blocks_others(locks: Locks) -> None:
     order: list[str] = []
     entered, saving = asyncio.Event(), asyncio.Event()
 
@@ -241,7 +241,7 @@ async def test_exclusive_waits_for_silent_locks_and_keeps_others_out(locks: Lock
             pass
 
 
-async def test_exclusive_gives_up_on_a_silent_lock_that_stays(locks: Locks) -> None:
+async def test_exclusive_times_out_on_a_lasting_silent_lock(locks: Locks) -> None:
     await locks.acquire("SERVER", "SCENE")
     with pytest.raises(Locked):
         async with locks.exclusive():
@@ -251,14 +251,14 @@ async def test_exclusive_gives_up_on_a_silent_lock_that_stays(locks: Locks) -> N
         pass
 
 
-async def test_release_announced_gives_what_to_tell(locks: Locks) -> None:
+async def test_release_announced_returns_the_ids_to_announce(locks: Locks) -> None:
     await locks.write_lock("ann", "ap1", tree=True)
     assert locks.release_announced("bob", ["ap1"]) == []
     assert set(locks.release_announced("ann", ["ap1", "robot"])) == WHOLE
     assert locks.release_announced("ann", ["ap1"]) == []
 
 
-async def test_drop_forgets_silently(locks: Locks, tree: Tree) -> None:
+async def test_drop_removes_locks_silently(locks: Locks, tree: Tree) -> None:
     await locks.write_lock("ann", "ap2", tree=True)
     for item in ("ap2", "act"):
         del tree.parents[item]
@@ -273,7 +273,7 @@ async def test_drop_forgets_silently(locks: Locks, tree: Tree) -> None:
     assert locks.locked_roots() == ["box"]
 
 
-async def test_new_parent_takes_the_locks_along(locks: Locks, tree: Tree) -> None:
+async def test_locks_move_with_a_new_parent(locks: Locks, tree: Tree) -> None:
     await locks.write_lock("ann", "free")
     await locks.write_lock("bob", "act")
     tree.parents["free"] = "box"
@@ -288,7 +288,7 @@ async def test_new_parent_takes_the_locks_along(locks: Locks, tree: Tree) -> Non
     assert locks.locked_roots() == []
 
 
-async def test_tree_lock_of_a_moved_point_is_given_back_whole(locks: Locks, tree: Tree) -> None:
+async def test_tree_lock_of_a_moved_point_is_released_completely(locks: Locks, tree: Tree) -> None:
     assert set(await locks.write_lock("ann", "free", tree=True)) == {"free", "ori2"}
     tree.parents["free"] = "box"
     locks.move_root(["free", "ori2"], "box")
@@ -296,7 +296,7 @@ async def test_tree_lock_of_a_moved_point_is_given_back_whole(locks: Locks, tree
     assert locks.locked_roots() == []
 
 
-async def test_dry_run_asks_whether_the_tree_could_be_locked(locks: Locks) -> None:
+async def test_a_dry_run_reports_whether_the_tree_can_be_locked(locks: Locks) -> None:
     assert locks.could_lock_tree("ann", "ap1")
     await locks.write_lock("ann", "ap1")
     assert locks.could_lock_tree("ann", "ap1")
@@ -316,7 +316,7 @@ async def test_release_all_covers_children_too(locks: Locks) -> None:
     assert await locks.write_lock("bob", "robot") == ["robot"]
 
 
-async def test_waiting_for_something_that_is_removed_ends(locks: Locks, tree: Tree) -> None:
+async def test_waiting_for_a_removed_item_ends(locks: Locks, tree: Tree) -> None:
     await locks.write_lock("ann", "robot")
 
     def remove() -> None:
@@ -329,7 +329,7 @@ async def test_waiting_for_something_that_is_removed_ends(locks: Locks, tree: Tr
             pass
 
 
-async def test_the_table_lists_who_holds_what(locks: Locks) -> None:
+async def test_the_table_lists_locks_and_holders(locks: Locks) -> None:
     await locks.write_lock("ann", "ap2", tree=True)
     await locks.write_lock("bob", "robot")
     await locks.read_lock("bob", "free")
@@ -471,7 +471,7 @@ async def test_a_moved_tree_lock_covers_the_new_tree_only_while_it_is_alone_ther
     assert not locks.holds("ann", "ap1")
 
 
-async def test_a_tree_that_several_users_write_belongs_to_none(locks: Locks) -> None:
+async def test_a_tree_with_several_writers_has_no_owner(locks: Locks) -> None:
     await locks.write_lock("ann", "ap1")
     await locks.write_lock("bob", "ap2")
     assert not locks.holds("ann", "ap2")

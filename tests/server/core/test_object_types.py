@@ -1,4 +1,4 @@
-"""The registry of object types on a storage, and what clients are told of it."""
+"""The registry of object types on a storage, and its events."""
 
 import ast
 import re
@@ -183,7 +183,7 @@ async def test_an_upload_shadows_after_a_restart(types: ObjectTypes, storage: St
     assert again.meta("FlowActions") == shadow
 
 
-async def test_what_is_put_straight_into_storage_is_noticed_once(types: ObjectTypes, storage: Storage) -> None:
+async def test_changes_in_storage_are_noticed_once(types: ObjectTypes, storage: Storage) -> None:
     assert await types.refresh() == Changes()
     revision = types.revision
     await put_lamps(storage)
@@ -212,7 +212,7 @@ async def test_what_is_put_straight_into_storage_is_noticed_once(types: ObjectTy
     assert "lamp" in str(red.problem)
 
 
-async def test_other_changes_are_kept_for_the_next_refresh(types: ObjectTypes, storage: Storage) -> None:
+async def test_other_changes_wait_for_the_next_refresh(types: ObjectTypes, storage: Storage) -> None:
     await put_lamps(storage)
     await types.add(ObjectTypeSource("Other", LAMP.replace("Lamp", "Other")))
     changes = await types.refresh()
@@ -247,7 +247,7 @@ async def test_a_type_without_its_collision_model_is_disabled(types: ObjectTypes
     assert (crate.disabled, crate.problem) == (False, UNSET)
 
 
-async def test_a_type_without_its_mesh_is_disabled_until_it_comes(types: ObjectTypes, assets: AssetStore) -> None:
+async def test_a_type_is_disabled_until_its_mesh_is_uploaded(types: ObjectTypes, assets: AssetStore) -> None:
     mesh = ObjectModel.of(Mesh("Crate", "crate.stl"))
     crate = await types.add(ObjectTypeSource("Crate", CRATE, model=mesh))
     assert crate.disabled
@@ -281,7 +281,7 @@ class Arm(Robot):
 """
 
 
-async def test_a_robots_description_is_named_only_while_it_is_there(types: ObjectTypes, assets: AssetStore) -> None:
+async def test_a_robot_description_is_named_only_while_it_exists(types: ObjectTypes, assets: AssetStore) -> None:
     await types.add(ObjectTypeSource("Arm", ARM))
     assert types.robot_meta("Arm").urdf_package_filename is UNSET
     await assets.put(content(), "arm.zip")
@@ -337,14 +337,14 @@ class Loud:
     assert [code.name for code in types.type_codes(["LoudReader"])] == ["DoorReader", "Loud", "LoudReader"]
 
 
-async def test_broken_source_disables_the_type_and_says_where(types: ObjectTypes) -> None:
+async def test_a_source_error_disables_the_type_and_names_the_line(types: ObjectTypes) -> None:
     meta = await types.add(ObjectTypeSource("Broken", "class Broken(\n"))
     assert meta.disabled
     assert re.search(r"broken\.py:\d+", str(meta.problem))
     assert types.actions("Broken") == []
 
 
-async def test_code_comes_with_what_it_needs_first(types: ObjectTypes, storage: Storage) -> None:
+async def test_dependencies_of_a_type_come_first(types: ObjectTypes, storage: Storage) -> None:
     await put_lamps(storage)
     await types.refresh()
     codes = types.type_codes(["RedLamp", "FlowActions", "RedLamp"])
@@ -364,7 +364,7 @@ async def test_code_comes_with_what_it_needs_first(types: ObjectTypes, storage: 
     assert flow.version
 
 
-async def test_types_come_back_after_a_restart(types: ObjectTypes, storage: Storage, assets: AssetStore) -> None:
+async def test_uploaded_types_survive_a_restart(types: ObjectTypes, storage: Storage, assets: AssetStore) -> None:
     await types.add(ObjectTypeSource("Lamp", LAMP))
     again = ObjectTypes(storage, assets)
     await again.load()
@@ -376,7 +376,7 @@ async def test_types_come_back_after_a_restart(types: ObjectTypes, storage: Stor
 SPHERE = {"type": "Sphere", "sphere": {"id": "Ball", "radius": 0.1}}
 
 
-async def test_new_types_are_told_and_the_kept_answers_forgotten(server: ServerProcess) -> None:
+async def test_new_types_are_announced_and_clear_the_cache(server: ServerProcess) -> None:
     async with talking(server.url, "ann") as ann, talking(server.url) as bob:
         before = await ann.granted("GetObjectTypes")
         assert await ann.granted("GetObjectTypes") == before
@@ -434,7 +434,7 @@ def twin(model: dict[str, object]) -> dict[str, object]:
         },
     ],
 )
-async def test_new_type_that_makes_no_sense(server: ServerProcess, new: dict[str, object]) -> None:
+async def test_an_invalid_new_type_is_refused(server: ServerProcess, new: dict[str, object]) -> None:
     async with talking(server.url, "ann") as ann:
         before = await ann.granted("GetObjectTypes")
         await ann.refused("NewObjectType", new)
@@ -442,7 +442,7 @@ async def test_new_type_that_makes_no_sense(server: ServerProcess, new: dict[str
         await ann.nothing_more()
 
 
-async def test_lists_follow_what_is_saved(tmp_path: Path) -> None:
+async def test_lists_follow_saved_documents(tmp_path: Path) -> None:
     async with running(tmp_path / "data") as server, talking(server.url, "ann") as ann:
         assert await ann.granted("ListScenes") == []
         await ann.granted("NewScene", {"name": "Cell", "description": "small"})
@@ -517,7 +517,7 @@ async def test_a_huge_source_that_takes_too_long_is_disabled(
     assert not [length for length in parsed if length > worker.HUGE]
 
 
-async def test_a_process_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_failed_analysis_process_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", shutil.which("false"))
     with pytest.raises(InvalidData, match="failed"):
         await worker.analyse(Library())

@@ -1,4 +1,4 @@
-"""Foreign web pages are kept out, programs and our own pages are not."""
+"""Foreign web pages are refused; programs and our own pages are accepted."""
 
 import json
 import socket
@@ -42,11 +42,11 @@ def rebound(server: ServerProcess, headers: dict[str, str]) -> connect:
         ("http://127.0.0.1:99999", "127.0.0.1:99999", False),
     ],
 )
-def test_who_may_connect(origin: str | None, host: str | None, may: bool) -> None:
+def test_origins_are_accepted_or_refused(origin: str | None, host: str | None, may: bool) -> None:
     assert may_connect(origin, host, HostNames(["cell.example"])) is may
 
 
-def test_names_are_taken_from_the_environment(tmp_path: Path) -> None:
+def test_host_names_are_read_from_the_environment(tmp_path: Path) -> None:
     environment = {"ARCOR2_HW_ALLOWED_HOSTS": "cell.example, Cell"}
     settings = ServerSettings.from_environment(environment, data_dir=tmp_path, host="listen.example")
     names = HostNames.of(settings)
@@ -56,7 +56,7 @@ def test_names_are_taken_from_the_environment(tmp_path: Path) -> None:
         assert name not in names
 
 
-def test_the_names_of_this_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_this_machine_has_known_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     hosts, resolver = tmp_path / "hosts", tmp_path / "resolv.conf"
     hosts.write_text("127.0.0.1 localhost\n127.0.1.1 pc7.plant.example pc7 # us\n10.0.0.9 other.example\n")
     resolver.write_text("# made by a tool\nnameserver 10.0.0.1\nsearch cells.example\n")
@@ -83,7 +83,7 @@ async def test_a_foreign_page_gets_neither_the_websocket_nor_a_route(server: Ser
         assert "ShowMainScreen" in str(await own.recv())
 
 
-async def test_a_page_whose_name_leads_here_reads_nothing(server: ServerProcess) -> None:
+async def test_dns_rebinding_is_refused(server: ServerProcess) -> None:
     async with httpx.AsyncClient(base_url=server.url.replace("ws://", "http://")) as http:
         for path in ("/", "/editor/x", "/swagger", "/api/diagnosis", "/api/devices", "/scenes", "/projects"):
             answer = await http.get(path, headers=REBOUND)
@@ -95,7 +95,7 @@ async def test_a_page_whose_name_leads_here_reads_nothing(server: ServerProcess)
         await rebound(server, {"Origin": f"http://{REBOUND['Host']}"})
 
 
-async def test_an_existing_client_may_call_the_server_anything(server: ServerProcess) -> None:
+async def test_clients_without_origin_may_use_any_host_name(server: ServerProcess) -> None:
     async with rebound(server, {}) as client:
         assert "ShowMainScreen" in str(await client.recv())
 
@@ -111,7 +111,7 @@ def test_proxies_are_addresses_or_networks(tmp_path: Path) -> None:
             of(wrong)
 
 
-async def test_an_address_that_anybody_states_is_not_believed(server: ServerProcess) -> None:
+async def test_forwarded_addresses_of_untrusted_clients_are_ignored(server: ServerProcess) -> None:
     stated = {"X-Forwarded-For": "198.51.100.7"}
     async with connect(server.url, additional_headers=stated) as client:
         await client.recv()
@@ -119,7 +119,7 @@ async def test_an_address_that_anybody_states_is_not_believed(server: ServerProc
     assert lines[-1]["address"] == "127.0.0.1"
 
 
-async def test_every_answer_has_the_headers(server: ServerProcess) -> None:
+async def test_every_response_has_the_security_headers(server: ServerProcess) -> None:
     async with httpx.AsyncClient(base_url=server.url.replace("ws://", "http://")) as http:
         for path in ("/", "/swagger", "/object-types", "/nothing", "/healthz/ready"):
             headers = (await http.get(path)).headers

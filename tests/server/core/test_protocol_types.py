@@ -1,4 +1,4 @@
-"""The Structs say exactly what protocol.json says: every request, event, type, field, default and enum value."""
+"""The Structs match protocol.json: every request, event, type, field, default and enum value."""
 
 import enum
 from typing import Any
@@ -115,7 +115,7 @@ class Comparison:
         return msgspec.to_builtins(value)
 
 
-def test_requests() -> None:
+def test_requests_match_the_protocol() -> None:
     comparison = Comparison(PROTOCOL["types"])
     assert {name for name, rpc in RPCS.items() if not rpc.additional} == set(PROTOCOL["requests"])
     for name, theirs in PROTOCOL["requests"].items():
@@ -131,7 +131,7 @@ def test_requests() -> None:
     assert comparison.differences == []
 
 
-def test_events() -> None:
+def test_events_match_the_protocol() -> None:
     comparison = Comparison(PROTOCOL["types"])
     assert {name for name, event in EVENTS.items() if not event.additional} == set(PROTOCOL["events"])
     for name, theirs in PROTOCOL["events"].items():
@@ -143,7 +143,7 @@ def test_events() -> None:
     assert comparison.differences == []
 
 
-def test_no_type_is_left_out() -> None:
+def test_every_protocol_type_is_compared() -> None:
     comparison = Comparison(PROTOCOL["types"])
     for name, theirs in PROTOCOL["requests"].items():
         for kind, ours in ((theirs["args"], RPCS[name].args), (theirs["response_data"], RPCS[name].data)):

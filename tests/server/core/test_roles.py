@@ -1,4 +1,4 @@
-"""Every request, event and route declares its least role, and it is kept."""
+"""Every request, event and route declares its minimum role, which is enforced."""
 
 from pathlib import Path
 from typing import Any, cast
@@ -38,7 +38,7 @@ async def test_every_route_declares_its_least_role(tmp_path: Path) -> None:
     assert undeclared == []
 
 
-def test_every_handler_is_of_a_declared_request() -> None:
+def test_every_handler_has_a_declared_request() -> None:
     assert set(DECLARED) <= set(RPCS)
     assert all(isinstance(RPCS[name].role, Role) for name in DECLARED)
     assert all(isinstance(event.role, Role) for event in EVENTS.values())
@@ -81,7 +81,7 @@ async def test_event_needs_its_role(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     assert [len(wire.sent) for wire in wires] == [0, 3]
 
 
-async def test_the_page_of_roles_is_what_is_declared(tmp_path: Path) -> None:
+async def test_the_documented_roles_match_the_declarations(tmp_path: Path) -> None:
     async with running_server(ServerSettings(data_dir=tmp_path)) as services:
         made = page(create_app(services))
     text = (Path(__file__).resolve().parents[3] / "docs/reference/roles.md").read_text()

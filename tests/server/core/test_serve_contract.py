@@ -1,4 +1,4 @@
-"""The contract for scripts: `arcor2-hw serve`, its ready line, its end, its statuses."""
+"""The contract of `arcor2-hw serve` for scripts: ready line, clean end, exit statuses."""
 
 import asyncio
 import json
@@ -56,7 +56,7 @@ async def test_ready_line_and_end(tmp_path: Path, number: signal.Signals) -> Non
     assert "Traceback" not in server.log.read_text()
 
 
-async def test_a_server_of_the_tests_that_is_not_ready_in_time_is_ended(
+async def test_the_test_helper_ends_a_server_that_is_not_ready_in_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(serving, "READY_WITHIN", 0.01)
@@ -66,7 +66,7 @@ async def test_a_server_of_the_tests_that_is_not_ready_in_time_is_ended(
     assert not psutil.pid_exists(server.process.pid)
 
 
-async def test_port_taken(tmp_path: Path) -> None:
+async def test_a_used_port_is_reported(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = str(other.getsockname()[1])
         status, line = await refused_start("--port", port, "--data-dir", str(tmp_path / "data"))
@@ -74,14 +74,14 @@ async def test_port_taken(tmp_path: Path) -> None:
     assert port in line
 
 
-async def test_address_of_another_machine(tmp_path: Path) -> None:
+async def test_an_address_of_another_machine_is_reported(tmp_path: Path) -> None:
     arguments = ("--host", "192.0.2.1", "--insecure", "--port", "0", "--data-dir", str(tmp_path / "data"))
     status, line = await refused_start(*arguments)
     assert status == ExitStatus.PORT_TAKEN
     assert "192.0.2.1" in line
 
 
-async def test_directory_that_cannot_be_made(tmp_path: Path) -> None:
+async def test_a_directory_that_cannot_be_created_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     directory = tmp_path / "file" / "data"
     status, line = await refused_start("--port", "0", "--data-dir", str(directory))
@@ -89,20 +89,20 @@ async def test_directory_that_cannot_be_made(tmp_path: Path) -> None:
     assert str(directory) in line
 
 
-async def test_directory_that_cannot_be_written() -> None:
+async def test_a_directory_that_is_not_writable_is_reported() -> None:
     status, line = await refused_start("--port", "0", "--data-dir", "/proc/arcor2-hw")
     assert status == ExitStatus.DATA_UNUSABLE
     assert "/proc/arcor2-hw" in line
 
 
-async def test_corrupt_database(tmp_path: Path) -> None:
+async def test_a_corrupt_database_is_reported(tmp_path: Path) -> None:
     (tmp_path / "documents.sqlite").write_bytes(b"\x00garbage" * 1000)
     status, line = await refused_start("--port", "0", "--data-dir", str(tmp_path))
     assert status == ExitStatus.DATABASE_UNUSABLE
     assert str(tmp_path / "documents.sqlite") in line
 
 
-async def test_two_servers_on_one_directory(tmp_path: Path) -> None:
+async def test_a_second_server_on_one_directory_is_refused(tmp_path: Path) -> None:
     async with running(tmp_path / "data"):
         status, line = await refused_start("--port", "0", "--data-dir", str(tmp_path / "data"))
     assert status == ExitStatus.DATA_IN_USE
@@ -110,14 +110,14 @@ async def test_two_servers_on_one_directory(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("arguments", [("--port", "x"), ("--port", "70000"), ("--nonsense",)])
-async def test_wrong_command_line(arguments: tuple[str, ...]) -> None:
+async def test_an_invalid_command_line_is_reported(arguments: tuple[str, ...]) -> None:
     status, _, err = await run("serve", *arguments)
     assert status == ExitStatus.USAGE
     assert "Traceback" not in err
     assert err
 
 
-async def test_wrong_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_an_invalid_environment_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ARCOR2_ARSERVER_LOCK_TIMEOUT", "soon")
     status, line = await refused_start("--port", "0", "--data-dir", str(tmp_path))
     assert status == ExitStatus.USAGE
@@ -150,7 +150,7 @@ def fetch(url: str) -> tuple[int, bytes]:
         return answer.status, answer.read()
 
 
-async def test_rest_beside_the_websocket(server: ServerProcess) -> None:
+async def test_rest_and_websocket_share_the_port(server: ServerProcess) -> None:
     base = server.url.replace("ws://", "http://")
     assert await asyncio.to_thread(fetch, base + "/healthz/ready") == (200, b"")
     status, body = await asyncio.to_thread(fetch, base + "/openapi/openapi.json")
@@ -164,7 +164,7 @@ async def test_rest_beside_the_websocket(server: ServerProcess) -> None:
     missing.value.close()
 
 
-def test_idle_memory(server: ServerProcess) -> None:
+def test_idle_memory_is_limited(server: ServerProcess) -> None:
     """The whole server, spare host included, is far from this; a sudden heavy import is not."""
     process = psutil.Process(server.process.pid)
     assert process.memory_full_info().pss < 150 * 1024 * 1024

@@ -1,4 +1,4 @@
-"""What a start of the server does not do: import what it does not need, parse sources that it knows."""
+"""What the server avoids at its start: unneeded imports, and parsing known sources."""
 
 import ast
 import json
@@ -63,7 +63,7 @@ async def test_a_second_start_parses_no_source(tmp_path: Path, monkeypatch: pyte
         assert second.types.actions("TimeActions")
 
 
-async def test_a_damaged_analysis_is_made_again(tmp_path: Path) -> None:
+async def test_a_damaged_analysis_is_repeated(tmp_path: Path) -> None:
     settings = ServerSettings(data_dir=tmp_path)
     async with running_server(settings) as first:
         known = first.types.metas()
@@ -74,7 +74,7 @@ async def test_a_damaged_analysis_is_made_again(tmp_path: Path) -> None:
     assert settings.analysis_file.read_bytes() == intact
 
 
-async def test_a_second_start_checks_no_saved_document_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_second_start_checks_no_saved_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = ServerSettings(data_dir=tmp_path)
     async with running_server(settings) as first:
         await first.storage.put_scene(Scene("good", id="scn_good"))

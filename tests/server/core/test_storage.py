@@ -1,4 +1,4 @@
-"""Saved documents: what is kept, what survives a kill, what is said of a database that cannot be used."""
+"""Saved documents: what is stored, what survives a kill, errors of unusable databases."""
 
 import asyncio
 import contextlib
@@ -52,7 +52,7 @@ PROJECT = Project(
 )
 
 
-async def test_scene_is_kept_whole_with_its_times(storage: Storage) -> None:
+async def test_a_scene_is_stored_with_its_times(storage: Storage) -> None:
     saved = await storage.put_scene(SCENE)
     assert saved.int_modified is UNSET
     assert saved.created == saved.modified
@@ -71,7 +71,7 @@ async def test_scene_is_kept_whole_with_its_times(storage: Storage) -> None:
             await gone
 
 
-async def test_project_needs_its_scene_and_takes_its_source_along(storage: Storage) -> None:
+async def test_a_project_requires_its_scene_and_is_stored_with_its_source(storage: Storage) -> None:
     with pytest.raises(NotFound):
         await storage.put_project(PROJECT)
     with pytest.raises(NotFound):
@@ -230,7 +230,7 @@ async def test_migrations_run_only_on_an_older_schema(
 
 
 # ------------------------------------------------------------------------------------------------ bad days
-async def test_foreign_file_is_named(settings: ServerSettings) -> None:
+async def test_a_file_that_is_no_database_is_named(settings: ServerSettings) -> None:
     settings.documents_database.write_bytes(b"this is no database " * 500)
     with pytest.raises(StorageError, match=str(settings.documents_database)):
         await Storage.open(settings)
@@ -249,7 +249,7 @@ async def test_damaged_pages_are_found_at_start(settings: ServerSettings) -> Non
         await Storage.open(settings)
 
 
-async def test_newer_schema_is_refused_and_left_alone(settings: ServerSettings) -> None:
+async def test_a_newer_schema_is_refused_and_unchanged(settings: ServerSettings) -> None:
     await (await Storage.open(settings)).close()
     with contextlib.closing(sqlite3.connect(settings.documents_database)) as connection:
         connection.execute("UPDATE alembic_version SET version_num = '9999'")

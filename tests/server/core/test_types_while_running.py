@@ -1,4 +1,4 @@
-"""Object types that come, change and go while the server runs: what clients are told, and what a scene then runs."""
+"""Object types that are added, changed and removed at run time: events, and the types a scene uses."""
 
 from typing import Any
 
@@ -61,7 +61,7 @@ async def scene_is(client: Talker, state: str) -> None:
             return
 
 
-async def test_a_type_comes_changes_and_goes(server: ServerProcess) -> None:
+async def test_a_type_is_added_changed_and_removed(server: ServerProcess) -> None:
     base = server.url.replace("ws://", "http://")
     async with talking(server.url, "ann") as ann, httpx.AsyncClient(base_url=base, trust_env=False) as http:
 
@@ -154,7 +154,7 @@ class Counter(Generic):
 '''
 
 
-async def test_an_older_type_in_a_program_that_is_built_and_run(server: ServerProcess) -> None:
+async def test_a_program_with_an_older_type_is_built_and_run(server: ServerProcess) -> None:
     async with (
         talking(server.url, "ann") as ann,
         httpx.AsyncClient(base_url=server.url.replace("ws://", "http://"), trust_env=False) as http,

@@ -1,9 +1,9 @@
-"""Two people at one server: names, locks, and what happens to them when one leaves."""
+"""Two users on one server: names, locks, and what happens when one leaves."""
 
 from tests.server.core.serving import ServerProcess, talking
 
 
-async def test_lock_is_told_to_all_after_the_answer(server: ServerProcess) -> None:
+async def test_a_lock_is_announced_to_all_after_the_answer(server: ServerProcess) -> None:
     async with talking(server.url, "ann") as ann, talking(server.url, "bob") as bob, talking(server.url) as nobody:
         await ann.socket.send('{"id": 1, "request": "WriteLock", "args": {"object_id": "SCENE"}}')
         assert await ann.receive() == {"id": 1, "response": "WriteLock", "result": True}
@@ -26,7 +26,7 @@ async def test_lock_is_told_to_all_after_the_answer(server: ServerProcess) -> No
             await talker.nothing_more()
 
 
-async def test_tree_is_widened_and_narrowed(server: ServerProcess) -> None:
+async def test_a_tree_lock_is_widened_and_narrowed(server: ServerProcess) -> None:
     async with talking(server.url, "ann") as ann:
         await ann.refused("UpdateLock", {"object_id": "PROJECT", "new_type": "TREE"})
         await ann.granted("WriteLock", {"object_id": "PROJECT"})
@@ -40,7 +40,7 @@ async def test_tree_is_widened_and_narrowed(server: ServerProcess) -> None:
         await ann.granted("WriteUnlock", {"object_id": "PROJECT"})
 
 
-async def test_locks_need_a_name_and_something_known(server: ServerProcess) -> None:
+async def test_locks_need_a_registered_user_and_a_known_id(server: ServerProcess) -> None:
     async with talking(server.url) as talker:
         await talker.refused("WriteLock", {"object_id": "SCENE"})
         await talker.granted("RegisterUser", {"user_name": "ann"})
@@ -48,7 +48,7 @@ async def test_locks_need_a_name_and_something_known(server: ServerProcess) -> N
         await talker.refused("UpdateLock", {"object_id": "SCENE", "new_type": "tree"})
 
 
-async def test_name_is_given_once(server: ServerProcess) -> None:
+async def test_a_user_name_is_unique(server: ServerProcess) -> None:
     async with talking(server.url, "ann"), talking(server.url) as second:
         await second.refused("RegisterUser", {"user_name": ""})
         await second.refused("RegisterUser", {"user_name": "ann"})
@@ -58,7 +58,7 @@ async def test_name_is_given_once(server: ServerProcess) -> None:
         pass
 
 
-async def test_name_moves_from_a_connection_that_does_not_answer(server: ServerProcess) -> None:
+async def test_a_user_name_moves_from_an_unresponsive_connection(server: ServerProcess) -> None:
     async with talking(server.url, "ann") as gone:
         gone.socket.transport.pause_reading()
         async with talking(server.url) as back:
@@ -70,7 +70,7 @@ async def test_name_moves_from_a_connection_that_does_not_answer(server: ServerP
             await back.granted("WriteUnlock", {"object_id": "SCENE"})
 
 
-async def test_who_comes_later_learns_of_the_locks(server: ServerProcess) -> None:
+async def test_a_new_client_receives_the_locks(server: ServerProcess) -> None:
     async with talking(server.url, "ann") as ann:
         for item in ("SCENE", "PROJECT"):
             await ann.granted("WriteLock", {"object_id": item})
@@ -84,7 +84,7 @@ async def test_who_comes_later_learns_of_the_locks(server: ServerProcess) -> Non
             await ann.granted("WriteUnlock", {"object_id": item})
 
 
-async def test_locks_of_one_who_left_are_released_after_a_time(server: ServerProcess) -> None:
+async def test_locks_of_a_disconnected_user_are_released_after_a_delay(server: ServerProcess) -> None:
     async with talking(server.url, "bob") as bob:
         async with talking(server.url, "ann") as ann:
             await ann.granted("WriteLock", {"object_id": "SCENE"})
@@ -101,7 +101,7 @@ async def test_locks_of_one_who_left_are_released_after_a_time(server: ServerPro
         await bob.nothing_more()
 
 
-async def test_one_who_comes_back_in_time_keeps_his_locks(server: ServerProcess) -> None:
+async def test_a_user_who_reconnects_in_time_keeps_the_locks(server: ServerProcess) -> None:
     async with talking(server.url, "bob") as bob:
         async with talking(server.url, "ann") as ann:
             await ann.granted("WriteLock", {"object_id": "SCENE"})

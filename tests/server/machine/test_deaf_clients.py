@@ -1,4 +1,4 @@
-"""Fifty clients, ten of which never read: the others get everything in order, and what waits for the ten is bounded."""
+"""Fifty clients, ten of which never read: the others get everything in order, and the queues are bounded."""
 
 import asyncio
 import contextlib

@@ -1,4 +1,4 @@
-"""An object is found by putting a robot's tip to its focus points."""
+"""The pose of an object is found by touching its focus points with a robot."""
 
 import math
 from pathlib import Path
@@ -45,7 +45,7 @@ def test_fit_of_three_points_in_a_plane_is_no_reflection() -> None:
     assert near(fit(points, [(pose * Pose(point)).position for point in points]).pose, pose)
 
 
-def test_fit_spreads_errors_of_touching() -> None:
+def test_fit_distributes_touching_errors() -> None:
     points = [point.position for point in FOCUS_POINTS]
     touched = [(TRUE_POSE * Pose(point)).position for point in points]
     touched[0] = touched[0] + Position(0.003, 0, 0)
@@ -63,7 +63,7 @@ def test_fit_spreads_errors_of_touching() -> None:
         ([(0, 0, 0), (1, 0, 0), (0, math.inf, 0)], "is nowhere"),
     ],
 )
-def test_fit_refuses_what_determines_no_pose(points: list[tuple[float, float, float]], why: str) -> None:
+def test_fit_refuses_degenerate_points(points: list[tuple[float, float, float]], why: str) -> None:
     positions = [Position(*point) for point in points]
     with pytest.raises(InvalidData, match=why):
         fit(positions, positions)
@@ -84,7 +84,7 @@ async def put_tip(stage: Stage, actor: Actor, position: Position) -> None:
     actor.take()
 
 
-async def test_aiming(tmp_path: Path) -> None:
+async def test_an_object_is_aimed_by_its_focus_points(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm", "Part", "Plain", "Thin", "Chooser") as stage:
         alice, bob, stranger = await stage.person("alice"), await stage.person("bob"), await stage.person()
         start: dict[str, Any] = {"object_id": "x", "robot": {"robot_id": "y", "end_effector": "tip"}}

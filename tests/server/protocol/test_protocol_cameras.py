@@ -1,4 +1,4 @@
-"""Requests to cameras, and those that find out where cameras and robots stand."""
+"""Requests to cameras, and the calibration of camera and robot poses."""
 
 import asyncio
 import hashlib
@@ -120,7 +120,7 @@ def process(actor: Actor, name: str) -> list[tuple[str, bool]]:
     return [(data["state"], "message" in data) for data in told]
 
 
-async def test_a_camera_gives_its_picture_and_parameters(tmp_path: Path) -> None:
+async def test_a_camera_returns_its_picture_and_parameters(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Eye", "BlindEye", "Part") as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         stranger = await stage.person()
@@ -152,7 +152,7 @@ async def test_a_camera_gives_its_picture_and_parameters(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("request_name", ["GetCameraPose", "MarkersCorners"])
-async def test_pictures_of_clients_go_to_the_calibration_service(tmp_path: Path, request_name: str) -> None:
+async def test_client_pictures_are_calibrated_by_the_service(tmp_path: Path, request_name: str) -> None:
     async with open_stage(tmp_path) as stage:
         stranger = await stage.person()
         args: dict[str, Any] = {"camera_parameters": PARAMETERS, "image": "\xff\xd8\x00picture"}
@@ -184,7 +184,7 @@ async def test_pictures_of_clients_go_to_the_calibration_service(tmp_path: Path,
         assert await refused(stranger, request_name, **args) == "No marker is seen."
 
 
-async def test_a_camera_is_put_where_its_picture_says(tmp_path: Path) -> None:
+async def test_a_camera_pose_is_set_from_its_picture(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Eye", "BlindEye", "Part") as stage:
         alice, service = await ready(stage, eye="Eye", blind="BlindEye", part="Part")
         bob, stranger = await stage.person("bob"), await stage.person()
@@ -235,7 +235,7 @@ async def test_a_camera_is_put_where_its_picture_says(tmp_path: Path) -> None:
         assert "No scene is open" in await refused(alice, "CalibrateCamera", id=eye)
 
 
-async def test_a_camera_that_sees_no_markers_stays_where_it_is(tmp_path: Path) -> None:
+async def test_a_camera_without_visible_markers_keeps_its_pose(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Eye") as stage:
         alice = await stage.person("alice")
         await stage.place(alice, eye="Eye")
@@ -255,7 +255,7 @@ async def test_a_camera_that_sees_no_markers_stays_where_it_is(tmp_path: Path) -
         assert await stage.services.calibration_records.find() == []
 
 
-async def test_a_robot_is_put_where_a_camera_sees_it(tmp_path: Path) -> None:
+async def test_a_robot_pose_is_set_from_a_camera(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm", "DumbArm", "Eye", "Part") as stage:
         alice, service = await ready(stage, part="Part", arm="Arm", dumb="DumbArm", eye="Eye")
         bob, carol = await stage.person("bob"), await stage.person("carol")
@@ -314,7 +314,7 @@ async def test_a_robot_is_put_where_a_camera_sees_it(tmp_path: Path) -> None:
         await bob.lock(eye)
 
 
-async def test_records_of_calibrations_are_listed_and_compared(tmp_path: Path) -> None:
+async def test_calibration_records_are_listed_and_compared(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Eye", "Part") as stage:
         alice, stranger = await stage.person("alice"), await stage.person()
         await stage.place(alice, eye="Eye", part="Part")

@@ -1,4 +1,4 @@
-"""Edits that no recorded session makes: their effect, who is told what, and when they are refused."""
+"""Edits that no recorded session contains: effect, events and refusals."""
 
 from pathlib import Path
 from typing import Any
@@ -67,7 +67,7 @@ async def project(stage: Stage, alice: Actor, **objects: str) -> str:
     return stage.services.session.require_project().action_points[0].id
 
 
-async def test_orientations_and_joints_by_a_robot(tmp_path: Path) -> None:
+async def test_orientations_and_joints_are_taught_by_a_robot(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm", "TwoArms") as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         point = await project(stage, alice, arm="Arm", two="TwoArms")
@@ -154,7 +154,7 @@ async def test_robots_with_several_arms_and_hand_teaching(tmp_path: Path) -> Non
         assert told(bob) == [("HandTeachingMode", None, None, {"robot_id": arm, "enabled": False})]
 
 
-async def test_steps_of_the_logic_are_changed(tmp_path: Path) -> None:
+async def test_logic_items_are_changed(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Chooser") as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         point = await project(stage, alice, chooser="Chooser", rnd="RandomActions")

@@ -1,4 +1,4 @@
-"""Inverse and forward kinematics from a robot's model: offline, and where the robot computes none itself."""
+"""Kinematics from a robot's model: offline, and for robots that compute none themselves."""
 
 import math
 from collections.abc import AsyncIterator
@@ -71,7 +71,7 @@ async def forward(alice: Actor, robot: str, joints: Any) -> Pose:
     return msgspec.convert(found, Pose)
 
 
-async def test_offline_joints_come_from_the_model(stage: Stage, alice: Actor) -> None:
+async def test_joints_are_computed_from_the_model_offline(stage: Stage, alice: Actor) -> None:
     robot = stage.ids["ur"]
     assert not stage.services.online.online
     joints = await solve(alice, robot)
@@ -83,7 +83,7 @@ async def test_offline_joints_come_from_the_model(stage: Stage, alice: Actor) ->
     assert [joint["value"] for joint in near] == pytest.approx([joint["value"] for joint in joints], abs=1e-4)
 
 
-async def test_what_stands_in_the_scene_is_in_the_way(stage: Stage, alice: Actor) -> None:
+async def test_scene_objects_are_obstacles(stage: Stage, alice: Actor) -> None:
     robot = stage.ids["ur"]
     crate = await add(alice, stage, "crate", "Crate", Pose(TARGET.position))
     args = {"robot_id": robot, "end_effector_id": "tcp", "pose": msgspec.to_builtins(TARGET)}
@@ -96,7 +96,7 @@ async def test_what_stands_in_the_scene_is_in_the_way(stage: Stage, alice: Actor
     assert await solve(alice, robot) == joints
 
 
-async def test_what_cannot_be_is_refused(stage: Stage, alice: Actor) -> None:
+async def test_impossible_requests_are_refused(stage: Stage, alice: Actor) -> None:
     robot = stage.ids["ur"]
     pose = msgspec.to_builtins(TARGET)
     far = msgspec.to_builtins(Pose(Position(5, 0, 0)))
@@ -118,7 +118,7 @@ async def test_what_cannot_be_is_refused(stage: Stage, alice: Actor) -> None:
     assert "not logged in" in await refused(stranger, "InverseKinematics", **args)
 
 
-async def test_settings_of_the_object_shape_its_model(stage: Stage, alice: Actor) -> None:
+async def test_object_settings_change_its_model(stage: Stage, alice: Actor) -> None:
     short = await forward(alice, stage.ids["ur"], await solve(alice, stage.ids["ur"]))
     joints = await solve(alice, stage.ids["ur"])
     longer = await add(alice, stage, "longer", "UR5e", BASE, host="127.0.0.98", tcp_z=0.1)
@@ -127,7 +127,7 @@ async def test_settings_of_the_object_shape_its_model(stage: Stage, alice: Actor
     await alice.ask("RemoveFromScene", id=longer)
 
 
-async def test_a_robot_that_computes_none_itself_is_computed_for(stage: Stage, alice: Actor) -> None:
+async def test_kinematics_are_computed_for_a_robot_without_its_own(stage: Stage, alice: Actor) -> None:
     """It is in operation: joints near to those that are given come from its model."""
     silent = DUMB_ARM.replace("class DumbArm", "class Silent").replace(
         "urdf_package_name = None", 'urdf_package_name = "ur5e.zip"'

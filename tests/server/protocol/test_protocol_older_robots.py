@@ -1,4 +1,4 @@
-"""Robots whose object types were written for ARCOR2, with parameters named otherwise than in our base classes."""
+"""Robots whose object types were written for ARCOR2, with other parameter names than our base classes."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ async def project(stage: Stage, alice: Actor, **objects: str) -> None:
     await stage.start(alice)
 
 
-async def test_a_robot_that_names_its_end_effector_otherwise(tmp_path: Path) -> None:
+async def test_a_robot_with_another_parameter_name_for_the_end_effector(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "OlderArm") as stage:
         alice = await stage.person("alice")
         await project(stage, alice, arm="OlderArm")
@@ -61,7 +61,7 @@ async def test_a_robot_that_names_its_end_effector_otherwise(tmp_path: Path) -> 
         await alice.ask("JogRobot", **held | {"valid_ms": 0})
 
 
-async def test_a_robot_with_arms_that_names_them_otherwise(tmp_path: Path) -> None:
+async def test_a_robot_with_another_parameter_name_for_the_arm(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "OlderArms") as stage:
         alice = await stage.person("alice")
         await project(stage, alice, robot="OlderArms")

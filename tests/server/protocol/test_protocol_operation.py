@@ -1,4 +1,4 @@
-"""What the requests about operation answer in every state of the server, and which role each needs."""
+"""Answers of operating requests in every server state, and the role that each needs."""
 
 import itertools
 from pathlib import Path
@@ -68,7 +68,7 @@ async def test_every_request_in_every_state(tmp_path: Path) -> None:
                 assert alice.events() == [], f"{name} in {state}"
 
 
-async def test_the_role_that_is_stated_is_asked_for(tmp_path: Path) -> None:
+async def test_the_declared_role_is_required(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         operator = await stage.person("olga")
         (client,) = stage.services.hub.clients

@@ -14,7 +14,7 @@ from tests.server.protocol.stage import happens, open_stage, refused
 
 
 @pytest.mark.parametrize("yaw", [-3.0, -0.5, 0.0, 0.25, 3.1])
-def test_angles_begin_with_the_nearest_and_go_round_once(yaw: float) -> None:
+def test_angles_start_with_the_nearest_and_cover_one_turn(yaw: float) -> None:
     tool = Orientation.from_rotation_vector(0, 0, yaw) * DOWN
     assert math.remainder(yaw_of(tool) - yaw, 2 * math.pi) == pytest.approx(0, abs=1e-9)
     angles = yaws(yaw)
@@ -24,12 +24,12 @@ def test_angles_begin_with_the_nearest_and_go_round_once(yaw: float) -> None:
     assert distances == sorted(distances)
 
 
-def test_joint_change_counts_joints_that_both_name() -> None:
+def test_joint_change_counts_common_joints() -> None:
     before = [Joint("a", 1.0), Joint("b", -1.0), Joint("gripper", 5.0)]
     assert joint_change(before, [Joint("b", 1.0), Joint("a", 0.5)]) == pytest.approx(2.5)
 
 
-async def test_a_tool_is_turned_down_by_the_least_change(tmp_path: Path) -> None:
+async def test_a_tool_is_turned_down_with_the_smallest_change(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm", "DumbArm", "Part") as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         args: dict[str, Any] = {"robot_id": "x", "end_effector_id": "tip", "speed": 1.0}

@@ -1,4 +1,4 @@
-"""Reachability of the open project: asked, told of by events, worked out anew for what changed."""
+"""Reachability of the open project: requests, events, and updates after changes."""
 
 import asyncio
 import os
@@ -70,7 +70,7 @@ async def prepared(stage: Stage, alice: Actor) -> str:
     return robot
 
 
-async def test_reachability_is_told_and_follows_edits(tmp_path: Path) -> None:
+async def test_reachability_is_announced_and_follows_edits(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice, bob, carol = await stage.person("alice"), await stage.person("bob"), await stage.person()
         assert "is open" in await refused(alice, "Reachability")
@@ -164,7 +164,7 @@ class Led(Arm):
 """
 
 
-async def test_two_arms_are_in_each_others_way_where_they_stand(tmp_path: Path) -> None:
+async def test_two_arms_are_obstacles_for_each_other(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm") as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         await stage.services.types.add(ObjectTypeSource("Led", LED.lstrip()))
@@ -227,7 +227,7 @@ class Claw(Gripper):
 """
 
 
-async def test_a_gripped_part_counts_online(tmp_path: Path) -> None:
+async def test_a_gripped_part_is_an_obstacle_online(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm") as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         crate = ObjectModel.of(Box("Crate", 0.2, 0.2, 0.2))
@@ -267,7 +267,7 @@ async def test_a_gripped_part_counts_online(tmp_path: Path) -> None:
         await until(lambda: told(bob) == {above: "reachable"})
 
 
-async def test_it_ends_with_the_document_and_survives_the_worker(tmp_path: Path) -> None:
+async def test_reachability_ends_with_the_document_and_survives_a_worker_crash(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice, bob = await stage.person("alice"), await stage.person("bob")
         await prepared(stage, alice)
@@ -296,7 +296,7 @@ async def test_it_ends_with_the_document_and_survives_the_worker(tmp_path: Path)
         assert told(bob) == {}
 
 
-async def test_a_robot_whose_model_is_damaged_says_so(tmp_path: Path) -> None:
+async def test_a_damaged_robot_model_is_reported(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Arm") as stage:
         alice = await stage.person("alice")
         await alice.ask("NewScene", name="scene")

@@ -1,4 +1,4 @@
-"""Projects made before an object type renamed an action or its parameters, and projects of ARCOR2, open and run."""
+"""Projects from before an object type renamed an action or parameter, and projects of ARCOR2, open and run."""
 
 from pathlib import Path
 from typing import Any

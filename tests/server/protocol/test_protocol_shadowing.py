@@ -76,7 +76,7 @@ async def stop(alice: Actor) -> None:
     await happens(alice, "PackageState", state="stopped")
 
 
-async def test_what_uses_a_type_that_becomes_shadowed(tmp_path: Path) -> None:
+async def test_documents_use_the_type_that_shadows_an_installed_one(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice = await stage.person("alice")
         project_id = await project(stage, alice)
@@ -113,7 +113,7 @@ async def test_what_uses_a_type_that_becomes_shadowed(tmp_path: Path) -> None:
         await alice.ask("OpenProject", id=project_id)
 
 
-async def test_the_installed_type_is_back_when_its_shadow_is_deleted(tmp_path: Path) -> None:
+async def test_deleting_the_shadow_restores_the_installed_type(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice = await stage.person("alice")
         installed = {meta["type"]: meta for meta in await alice.ask("GetObjectTypes")}

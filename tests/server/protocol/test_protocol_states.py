@@ -1,4 +1,4 @@
-"""What every request answers in six server states when its arguments name nothing, as the spec recorded it."""
+"""Answers of every request in six server states when its arguments name nothing, as recorded."""
 
 import re
 from pathlib import Path
@@ -105,7 +105,7 @@ DIFFERENT: dict[str, str] = {}
 """Deliberate differences; each stands in docs/protocol.md."""
 
 
-def test_the_matrix_leaves_out_what_would_change_the_state() -> None:
+def test_the_matrix_excludes_requests_that_change_the_state() -> None:
     left_out = set(RPCS) - set(STATES["no_scene"])
     additional = {name for name, declared in RPCS.items() if declared.additional}
     assert left_out - additional == {

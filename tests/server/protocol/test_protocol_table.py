@@ -26,59 +26,59 @@ ON_THE_WIRE = "server/core/test_users_and_locks_on_the_wire.py"
 
 GRANTED = {
     "ActionParamValues": f"{VALUES}::test_a_live_object_offers_values",
-    "AddActionPointJointsUsingRobot": f"{EDITING}::test_orientations_and_joints_by_a_robot",
+    "AddActionPointJointsUsingRobot": f"{EDITING}::test_orientations_and_joints_are_taught_by_a_robot",
     "AddOverride": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
-    "CalibrateCamera": f"{CAMERAS}::test_a_camera_is_put_where_its_picture_says",
-    "CalibrateRobot": f"{CAMERAS}::test_a_robot_is_put_where_a_camera_sees_it",
-    "CameraColorImage": f"{CAMERAS}::test_a_camera_gives_its_picture_and_parameters",
-    "CameraColorParameters": f"{CAMERAS}::test_a_camera_gives_its_picture_and_parameters",
-    "CancelAction": f"{ONLINE}::test_cancel",
+    "CalibrateCamera": f"{CAMERAS}::test_a_camera_pose_is_set_from_its_picture",
+    "CalibrateRobot": f"{CAMERAS}::test_a_robot_pose_is_set_from_a_camera",
+    "CameraColorImage": f"{CAMERAS}::test_a_camera_returns_its_picture_and_parameters",
+    "CameraColorParameters": f"{CAMERAS}::test_a_camera_returns_its_picture_and_parameters",
+    "CancelAction": f"{ONLINE}::test_a_single_action_can_be_cancelled",
     "DeleteOverride": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
-    "GetCameraPose": f"{CAMERAS}::test_pictures_of_clients_go_to_the_calibration_service",
-    "GetProject": f"{EDITING}::test_steps_of_the_logic_are_changed",
+    "GetCameraPose": f"{CAMERAS}::test_client_pictures_are_calibrated_by_the_service",
+    "GetProject": f"{EDITING}::test_logic_items_are_changed",
     "GetRobotArms": f"{EDITING}::test_robots_with_several_arms_and_hand_teaching",
     "GetScene": f"{EDITING}::test_settings_and_models_of_a_scene",
     "HandTeachingMode": f"{EDITING}::test_robots_with_several_arms_and_hand_teaching",
-    "MarkersCorners": f"{CAMERAS}::test_pictures_of_clients_go_to_the_calibration_service",
-    "ObjectAimingAddPoint": f"{AIMING}::test_aiming",
-    "ObjectAimingCancel": f"{AIMING}::test_aiming",
-    "ObjectAimingDone": f"{AIMING}::test_aiming",
-    "ObjectAimingStart": f"{AIMING}::test_aiming",
-    "MoveToJoints": f"{ONLINE}::test_a_motion_from_start_to_end",
-    "OpenProject": f"{EDITING}::test_steps_of_the_logic_are_changed",
-    "PausePackage": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
-    "ReadLock": f"{ON_THE_WIRE}::test_lock_is_told_to_all_after_the_answer",
-    "ReadUnlock": f"{ON_THE_WIRE}::test_lock_is_told_to_all_after_the_answer",
-    "RemoveActionPointJoints": f"{EDITING}::test_orientations_and_joints_by_a_robot",
-    "RemoveActionPointOrientation": f"{EDITING}::test_orientations_and_joints_by_a_robot",
-    "RemoveFromScene": f"{REQUESTS}::test_an_object_that_projects_use",
-    "RemoveLogicItem": f"{REQUESTS}::test_logic_items_always_tell_of_unlocking",
-    "ResumePackage": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
-    "SceneObjectUsage": f"{REQUESTS}::test_an_object_that_projects_use",
+    "MarkersCorners": f"{CAMERAS}::test_client_pictures_are_calibrated_by_the_service",
+    "ObjectAimingAddPoint": f"{AIMING}::test_an_object_is_aimed_by_its_focus_points",
+    "ObjectAimingCancel": f"{AIMING}::test_an_object_is_aimed_by_its_focus_points",
+    "ObjectAimingDone": f"{AIMING}::test_an_object_is_aimed_by_its_focus_points",
+    "ObjectAimingStart": f"{AIMING}::test_an_object_is_aimed_by_its_focus_points",
+    "MoveToJoints": f"{ONLINE}::test_a_motion_reports_start_and_end",
+    "OpenProject": f"{EDITING}::test_logic_items_are_changed",
+    "PausePackage": f"{RUNNING}::test_each_run_state_allows_its_requests",
+    "ReadLock": f"{ON_THE_WIRE}::test_a_lock_is_announced_to_all_after_the_answer",
+    "ReadUnlock": f"{ON_THE_WIRE}::test_a_lock_is_announced_to_all_after_the_answer",
+    "RemoveActionPointJoints": f"{EDITING}::test_orientations_and_joints_are_taught_by_a_robot",
+    "RemoveActionPointOrientation": f"{EDITING}::test_orientations_and_joints_are_taught_by_a_robot",
+    "RemoveFromScene": f"{REQUESTS}::test_an_object_used_by_projects_is_not_removed",
+    "RemoveLogicItem": f"{REQUESTS}::test_logic_items_always_announce_unlocking",
+    "ResumePackage": f"{RUNNING}::test_each_run_state_allows_its_requests",
+    "SceneObjectUsage": f"{REQUESTS}::test_an_object_used_by_projects_is_not_removed",
     "SetEefPerpendicularToWorld": (
-        "server/protocol/test_protocol_perpendicular.py::test_a_tool_is_turned_down_by_the_least_change"
+        "server/protocol/test_protocol_perpendicular.py::test_a_tool_is_turned_down_with_the_smallest_change"
     ),
-    "StepAction": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
-    "StopRobot": f"{ONLINE}::test_stop_robot",
-    "UpdateActionPointOrientationUsingRobot": f"{EDITING}::test_orientations_and_joints_by_a_robot",
-    "UpdateLogicItem": f"{EDITING}::test_steps_of_the_logic_are_changed",
+    "StepAction": f"{RUNNING}::test_each_run_state_allows_its_requests",
+    "StopRobot": f"{ONLINE}::test_stop_robot_stops_the_motion",
+    "UpdateActionPointOrientationUsingRobot": f"{EDITING}::test_orientations_and_joints_are_taught_by_a_robot",
+    "UpdateLogicItem": f"{EDITING}::test_logic_items_are_changed",
     "UpdateObjectModel": f"{EDITING}::test_settings_and_models_of_a_scene",
     "UpdateObjectParameters": f"{EDITING}::test_settings_and_models_of_a_scene",
     "UpdateOverride": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
-    "UploadPackage": f"{RUNNING}::test_upload_rename_delete",
+    "UploadPackage": f"{RUNNING}::test_packages_are_uploaded_renamed_and_deleted",
 }
 """Where a request is granted that no recorded session shows so: its effect, and the events that it brings."""
 
 REFUSED = {
-    "GetCameraPose": f"{CAMERAS}::test_pictures_of_clients_go_to_the_calibration_service",
-    "MarkersCorners": f"{CAMERAS}::test_pictures_of_clients_go_to_the_calibration_service",
-    "PausePackage": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
-    "RegisterUser": f"{ON_THE_WIRE}::test_name_is_given_once",
-    "RenamePackage": f"{RUNNING}::test_upload_rename_delete",
-    "ResumePackage": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
-    "StepAction": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
-    "StopPackage": f"{RUNNING}::test_pause_step_resume_stop_and_what_each_state_forbids",
-    "TemporaryPackage": "server/protocol/test_protocol_temporary.py::test_a_project_runs_and_is_open_again",
+    "GetCameraPose": f"{CAMERAS}::test_client_pictures_are_calibrated_by_the_service",
+    "MarkersCorners": f"{CAMERAS}::test_client_pictures_are_calibrated_by_the_service",
+    "PausePackage": f"{RUNNING}::test_each_run_state_allows_its_requests",
+    "RegisterUser": f"{ON_THE_WIRE}::test_a_user_name_is_unique",
+    "RenamePackage": f"{RUNNING}::test_packages_are_uploaded_renamed_and_deleted",
+    "ResumePackage": f"{RUNNING}::test_each_run_state_allows_its_requests",
+    "StepAction": f"{RUNNING}::test_each_run_state_allows_its_requests",
+    "StopPackage": f"{RUNNING}::test_each_run_state_allows_its_requests",
+    "TemporaryPackage": "server/protocol/test_protocol_temporary.py::test_a_project_runs_and_is_reopened",
 }
 """Where a request is refused that neither a recorded session nor the matrix shows so."""
 
@@ -87,12 +87,12 @@ NEVER_REFUSED = {"GetObjectTypes", "GetRobotMeta", "ListPackages", "ListProjects
 """They need nothing and take nothing that could be wrong."""
 
 TOLD = {
-    "ActionCancelled": f"{ONLINE}::test_cancel",
+    "ActionCancelled": f"{ONLINE}::test_a_single_action_can_be_cancelled",
     "HandTeachingMode": f"{EDITING}::test_robots_with_several_arms_and_hand_teaching",
     "OverrideUpdated": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
-    "ProcessState": f"{CAMERAS}::test_a_camera_is_put_where_its_picture_says",
-    "ProjectException": f"{RUNNING}::test_an_error_in_the_script_is_told",
-    "RobotMoveToJoints": f"{ONLINE}::test_a_motion_from_start_to_end",
+    "ProcessState": f"{CAMERAS}::test_a_camera_pose_is_set_from_its_picture",
+    "ProjectException": f"{RUNNING}::test_a_script_error_is_reported",
+    "RobotMoveToJoints": f"{ONLINE}::test_a_motion_reports_start_and_end",
 }
 """Where an event is told that no recorded session holds."""
 
@@ -135,19 +135,19 @@ def recorded() -> tuple[set[str], set[str], set[str]]:
 @pytest.mark.parametrize(
     ("name", "test"), [*GRANTED.items(), *REFUSED.items(), *TOLD.items()], ids=lambda text: text.rpartition(":")[2]
 )
-def test_the_named_test_is_there_and_speaks_of_it(name: str, test: str) -> None:
+def test_the_named_test_exists_and_mentions_the_request(name: str, test: str) -> None:
     file, _, function = test.partition("::")
     texts = functions(file)[function]
     assert name in texts, f"{test} says nothing of {name}"
 
 
 @pytest.mark.parametrize(("name", "test"), REFUSED.items(), ids=REFUSED)
-def test_the_named_test_looks_for_a_refusal(name: str, test: str) -> None:
+def test_the_named_test_expects_a_refusal(name: str, test: str) -> None:
     file, _, function = test.partition("::")
     assert functions(file)[function] & {"refused", "raises"}, f"{test} refuses {name} nowhere"
 
 
-def test_every_request_is_shown_granted() -> None:
+def test_every_request_has_a_test_of_its_effect() -> None:
     granted = recorded()[0] | GRANTED.keys() | CHECKED_BY_ITSELF
     assert set(PROTOCOL["requests"]) - granted == set()
     assert GRANTED.keys() & recorded()[0] == set(), "the recorded sessions show these already"
@@ -157,11 +157,11 @@ CHECKED_BY_ITSELF = {"GetActions", "GetObjectTypes", "GetRobotMeta", "SystemInfo
 """Granted in a session whose answer differs on purpose: what has to be the same of it is compared there."""
 
 
-def test_every_request_is_shown_refused() -> None:
+def test_every_request_has_a_test_of_its_refusal() -> None:
     in_matrix = {name for rows in STATES.values() for name, outcome in rows.items() if outcome.startswith("refused")}
     shown = recorded()[1] | in_matrix | REFUSED.keys()
     assert set(PROTOCOL["requests"]) - shown == NEVER_REFUSED
 
 
-def test_every_event_is_shown() -> None:
+def test_every_event_has_a_test() -> None:
     assert set(PROTOCOL["events"]) - recorded()[2] - TOLD.keys() == NEVER_TOLD

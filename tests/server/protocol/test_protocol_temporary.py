@@ -1,4 +1,4 @@
-"""The open project is run as a package of its own, and is open again afterwards."""
+"""The open project is run as a temporary package and reopened afterwards."""
 
 import asyncio
 import shutil
@@ -45,7 +45,7 @@ async def project(stage: Stage, actor: Actor, *, seconds: str = "0.05", **more: 
     return action.id
 
 
-async def test_a_project_runs_and_is_open_again(tmp_path: Path) -> None:
+async def test_a_project_runs_and_is_reopened(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice, bob, stranger = await stage.person("alice"), await stage.person("bob"), await stage.person()
         assert "No scene is open" in await refused(stranger, "TemporaryPackage")
@@ -89,7 +89,7 @@ async def test_a_project_runs_and_is_open_again(tmp_path: Path) -> None:
         await alice.ask("AddActionPoint", name="another", position={"x": 0, "y": 0, "z": 0})
 
 
-async def test_a_scene_that_is_online_is_so_again(tmp_path: Path) -> None:
+async def test_an_online_scene_is_online_again_after_the_run(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice = await stage.person("alice")
         action = await project(stage, alice)
@@ -109,7 +109,7 @@ async def test_a_scene_that_is_online_is_so_again(tmp_path: Path) -> None:
         await stage.stop(alice)
 
 
-async def test_a_program_that_cannot_start_gives_the_project_back(tmp_path: Path) -> None:
+async def test_the_project_is_reopened_when_its_program_cannot_start(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice = await stage.person("alice")
         await project(stage, alice)
@@ -122,7 +122,7 @@ async def test_a_program_that_cannot_start_gives_the_project_back(tmp_path: Path
         await alice.ask("CloseProject")
 
 
-async def test_a_project_that_is_gone_meanwhile_leads_to_the_list(tmp_path: Path) -> None:
+async def test_a_project_deleted_during_the_run_leads_to_the_list(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice = await stage.person("alice")
         await project(stage, alice)
@@ -159,7 +159,7 @@ async def test_a_project_that_cannot_be_built_stays_open(tmp_path: Path, monkeyp
         await happens(alice, "OpenProject")
 
 
-async def test_a_server_that_ends_meanwhile_leaves_no_package_and_opens_the_project_next_time(tmp_path: Path) -> None:
+async def test_a_server_ended_during_the_run_leaves_no_package_and_reopens_the_project(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice = await stage.person("alice")
         await project(stage, alice)
@@ -173,7 +173,7 @@ async def test_a_server_that_ends_meanwhile_leaves_no_package_and_opens_the_proj
         assert (project_again.name, stage.services.session.has_changes) == ("round", False)
 
 
-async def test_a_server_that_was_killed_meanwhile_clears_up_at_its_next_start(tmp_path: Path) -> None:
+async def test_a_server_killed_during_the_run_cleans_up_at_its_next_start(tmp_path: Path) -> None:
     """The directory as it was in mid-run, as a kill or a power cut leaves it."""
     left, data = tmp_path / "left", tmp_path / "data"
     data.mkdir()

@@ -199,7 +199,7 @@ class Replay:
             self.compared += len(ours)
 
 
-async def test_all_recorded_sessions_play_the_same(tmp_path: Path) -> None:
+async def test_all_recorded_sessions_give_the_same_messages(tmp_path: Path) -> None:
     async with open_stage(tmp_path, streaming_period=0.02) as stage:
         for upload in uploads():
             meta = await stage.services.types.add(upload)

@@ -1,4 +1,4 @@
-"""Values that a live object offers for parameters, and settings that a project overrides."""
+"""Parameter values offered by a live object, and settings overridden by a project."""
 
 import json
 from pathlib import Path

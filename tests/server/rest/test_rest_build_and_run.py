@@ -1,4 +1,4 @@
-"""Build and Execution over REST: a project becomes a package and comes back; a package is run, paused and stopped."""
+"""Build and Execution over REST: build and import a package; run, pause and stop it."""
 
 import asyncio
 import io
@@ -106,7 +106,7 @@ async def next_of(talker: Talker, name: str, **data: Any) -> dict[str, Any]:
                 return message
 
 
-async def test_a_project_becomes_a_package_and_comes_back(server: ServerProcess) -> None:
+async def test_a_project_is_built_and_imported_again(server: ServerProcess) -> None:
     async with httpx.AsyncClient(base_url=base(server)) as http:
         refused(await http.get("/project/publish", params={"projectId": "none"}), 404, "NotFound", "none")
         refused(await http.get("/project/publish"), 400, "Argument", "projectId")
@@ -148,7 +148,7 @@ async def test_a_project_becomes_a_package_and_comes_back(server: ServerProcess)
         )
 
 
-async def test_a_package_is_sent_fetched_and_deleted(server: ServerProcess) -> None:
+async def test_a_package_is_uploaded_downloaded_and_deleted(server: ServerProcess) -> None:
     async with httpx.AsyncClient(base_url=base(server)) as http, talking(server.url) as talker:
         await prepare(http)
         package = await published(http, packageName="count it")
@@ -271,7 +271,7 @@ async def package_command(server: ServerProcess, *arguments: str) -> list[str]:
     return output.decode().splitlines()
 
 
-async def test_an_upload_of_a_hundred_megabytes_does_not_stop_the_others(server: ServerProcess) -> None:
+async def test_an_upload_of_a_hundred_megabytes_does_not_block_others(server: ServerProcess) -> None:
     mesh = bytes(100_000_000)
     content = zipped({"script.py": b"", "data/mesh.bin": mesh})  # not compressed
     async with httpx.AsyncClient(base_url=base(server), timeout=60) as http:
@@ -331,7 +331,7 @@ async def _told_of_uploads(follower: Client) -> list[Any]:
     return told
 
 
-async def test_the_table_of_tokens(server: ServerProcess) -> None:
+async def test_tokens_are_managed_over_rest(server: ServerProcess) -> None:
     async with httpx.AsyncClient(base_url=base(server)) as http:
         assert granted(await http.get("/tokens")) == []
         token = granted(await http.post("/tokens/create", params={"name": "line 1"}))
@@ -356,7 +356,7 @@ CAMERA: dict[str, Any] = {"fx": 1, "fy": 1, "cx": 1, "cy": 1, "distCoefs": [0, 0
 
 
 @pytest.mark.parametrize("path", ["/calibrate/camera", "/markers/corners"])
-async def test_calibration_refuses_what_is_no_picture(server: ServerProcess, path: str) -> None:
+async def test_calibration_refuses_data_that_is_no_picture(server: ServerProcess, path: str) -> None:
     async with httpx.AsyncClient(base_url=base(server), timeout=30.0) as http:
         if path == "/calibrate/camera":
             refused(await http.put(path, params=CAMERA, files=PICTURE), 404, "NotFound", "No markers are configured")
@@ -385,7 +385,7 @@ async def test_calibration_of_a_robot_needs_its_model(server: ServerProcess) -> 
         refused(await http.put("/calibrate/robot", files=PICTURE, data={"args": "{}"}), 400, "Argument", "robotJoints")
 
 
-async def test_tables_outlive_the_server(tmp_path: Any) -> None:
+async def test_marker_tables_survive_a_restart(tmp_path: Any) -> None:
     async with running(tmp_path / "data") as first, httpx.AsyncClient(base_url=base(first)) as http:
         await prepare(http)
         token = granted(await http.post("/tokens/create", params={"name": "x"}))

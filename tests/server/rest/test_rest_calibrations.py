@@ -1,4 +1,4 @@
-"""Calibrations over REST: whole results, markers of the workplace, touched points, records kept and checked."""
+"""Calibrations over REST: complete results, workplace markers, touched points, stored and checked records."""
 
 import json
 from collections.abc import AsyncIterator
@@ -67,7 +67,7 @@ def parts(pictures: list[bytes], args: Any = None) -> list[tuple[str, Any]]:
 
 
 # ------------------------------------------------------------------------------------------------ pictures
-async def test_the_originals_route_gives_the_pose_and_its_inverse(
+async def test_the_original_route_returns_the_pose_and_its_inverse(
     http: httpx.AsyncClient, pictures: list[bytes]
 ) -> None:
     answer = await http.put("/calibrate/camera", params=QUERY, files=parts(pictures[:1]))
@@ -86,7 +86,7 @@ async def test_the_originals_route_gives_the_pose_and_its_inverse(
     assert all(len(marker["corners"]) == 4 for marker in seen)
 
 
-async def test_whole_results_come_with_their_figures(http: httpx.AsyncClient, pictures: list[bytes]) -> None:
+async def test_complete_results_include_their_quality(http: httpx.AsyncClient, pictures: list[bytes]) -> None:
     record = {"object_id": "obj_cam", "object_name": "cam", "before": {}}
     args = {"camera_parameters": PARAMETERS, "markers": MARKERS, "record": record}
     found = granted(await http.put("/api/calibration/camera", files=parts(pictures, args)))
@@ -114,7 +114,7 @@ async def test_whole_results_come_with_their_figures(http: httpx.AsyncClient, pi
     refused(await http.put("/api/calibration/camera", files=parts([], args)), 400, "Argument", "image")
 
 
-async def test_pictures_and_poses_belong_together(http: httpx.AsyncClient, pictures: list[bytes]) -> None:
+async def test_the_number_of_pictures_and_poses_must_match(http: httpx.AsyncClient, pictures: list[bytes]) -> None:
     args = {"flanges": [{}], "camera_parameters": PARAMETERS, "target": MARKERS, "mounting": "eye_in_hand"}
     refused(await http.put("/api/calibration/hand-eye", files=parts(pictures, args)), 400, "Argument", "1 poses")
     args["flanges"] = [{}, {}]
@@ -141,7 +141,7 @@ async def test_pictures_and_poses_belong_together(http: httpx.AsyncClient, pictu
 
 
 # ------------------------------------------------------------------------------------------------ touch
-async def test_touched_points_are_kept_with_their_result(http: httpx.AsyncClient) -> None:
+async def test_touched_points_are_stored_with_their_result(http: httpx.AsyncClient) -> None:
     turned = Orientation.from_rotation_vector(0.1, 0.2, 0.3)
     known = [Position(0, 0, 0), Position(0.3, 0, 0), Position(0, 0.2, 0), Position(0.1, 0.1, 0.1)]
     touched = [point.rotated(turned) + Position(0.5, 0.1, 0.0) for point in known]
@@ -196,7 +196,7 @@ async def test_records_are_listed_and_checked(http: httpx.AsyncClient) -> None:
     refused(await http.put("/api/calibrations/none/check", json={"pose": {}}), 404, "NotFound")
 
 
-async def test_the_oldest_records_go_but_the_last_of_an_object_stays(services: Server) -> None:
+async def test_the_oldest_records_are_removed_except_the_last_of_each_object(services: Server) -> None:
     records = Calibrations(services.storage, limit=5)
 
     def record(name: str, number: int) -> CalibrationRecord:
@@ -213,7 +213,7 @@ async def test_the_oldest_records_go_but_the_last_of_an_object_stays(services: S
 
 
 # ------------------------------------------------------------------------------------------------ markers
-async def test_markers_are_kept(http: httpx.AsyncClient, services: Server, tmp_path: Path) -> None:
+async def test_markers_are_stored(http: httpx.AsyncClient, services: Server, tmp_path: Path) -> None:
     assert granted(await http.get("/api/calibration/markers"))["markers"] == []
     granted(await http.put("/api/calibration/markers", json=MARKERS | {"marker_size": 0.08}))
     again = Markers(services.settings.markers_file)
@@ -231,7 +231,7 @@ def damage(directory: Path) -> DataDamage:
     return DataDamage(directory, Hub())
 
 
-async def test_damaged_markers_are_set_aside(tmp_path: Path) -> None:
+async def test_damaged_marker_files_are_renamed(tmp_path: Path) -> None:
     path = tmp_path / "markers.json"
     path.write_bytes(b"{")
     notices = damage(tmp_path)
@@ -253,7 +253,7 @@ async def test_damaged_markers_are_set_aside(tmp_path: Path) -> None:
     assert afterwards.greeting() == []
 
 
-async def test_markers_of_a_file_win(tmp_path: Path) -> None:
+async def test_markers_of_a_file_take_precedence(tmp_path: Path) -> None:
     given = CalibrationConfiguration(markers=[Marker(1, Pose())])
     markers = Markers(tmp_path / "markers.json", given)
     markers.load(damage(tmp_path))

@@ -1,4 +1,4 @@
-"""The bundle for diagnosis: what is in it, what must not be, how large it may get."""
+"""The diagnosis bundle: its content, its limits, and secrets that it must not contain."""
 
 import asyncio
 import io
@@ -31,7 +31,7 @@ PASSWORD = "opensesame-7"
 
 # ------------------------------------------------------------------------------------------------ secrets
 @pytest.mark.parametrize("name", ["password", "user_password", "apiKey", "api_key", "token", "client_secret", "pin"])
-def test_a_secret_is_known_by_its_name(name: str) -> None:
+def test_secrets_are_recognised_by_name(name: str) -> None:
     assert is_secret_name(name)
     assert hide({name: "x", "other": [{"name": name, "value": '"x"'}]}) == {
         name: HIDDEN,
@@ -40,7 +40,7 @@ def test_a_secret_is_known_by_its_name(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["password_file", "host", "spinning", "keyboard", "compass"])
-def test_what_is_no_secret_stays(name: str) -> None:
+def test_other_values_are_kept(name: str) -> None:
     value = {name: "x", "list": [{"name": name, "value": 1}], "none": None}
     assert hide(value) == value
     assert list(secrets_in(value)) == []
@@ -56,7 +56,7 @@ def test_what_is_no_secret_stays(name: str) -> None:
         ("login with opensesame-7 refused", "opensesame"),
     ],
 )
-def test_texts_are_cleaned(text: str, left: str) -> None:
+def test_secrets_are_removed_from_texts(text: str, left: str) -> None:
     cleaned = clean(text, {PASSWORD, "x"})
     assert left not in cleaned
     assert HIDDEN in cleaned
@@ -65,7 +65,7 @@ def test_texts_are_cleaned(text: str, left: str) -> None:
     )
 
 
-def test_of_the_log_the_newest_stays() -> None:
+def test_the_newest_part_of_the_log_is_included() -> None:
     log = RecentLog(most=100)
     for number in range(50):
         log.add(b"line %2d..." % number)
@@ -80,7 +80,7 @@ def test_of_the_log_the_newest_stays() -> None:
     assert "_record" not in line
 
 
-def test_a_document_beyond_measure_is_left_out_and_that_is_said() -> None:
+def test_an_oversized_document_is_omitted_with_a_note() -> None:
     large = {"about.json": {}, "scene.json": {"description": "x" * (LARGEST_PART + 1)}, "project.json": None}
     archive = packed(large)
     files = content(archive)
@@ -109,7 +109,7 @@ def content(archive: bytes) -> dict[str, str]:
 
 
 @pytest.mark.asyncio(loop_scope="module")
-async def test_it_holds_what_is_open_and_no_secret(
+async def test_the_bundle_contains_open_documents_and_no_secrets(
     server: ServerProcess, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     key, operator = secret(server, Role.TECHNICIAN), secret(server, Role.OPERATOR)

@@ -1,4 +1,4 @@
-"""Lines through boxes, spheres and cylinders, compared with the points that they consist of."""
+"""Lines through boxes, spheres and cylinders, compared with their sampled points."""
 
 import math
 
@@ -45,7 +45,7 @@ SHARES = [n / SAMPLES for n in range(SAMPLES + 1)]
 
 @settings(max_examples=200, deadline=None)
 @given(positions, positions, st.builds(Obstacle.of, models, poses), st.sampled_from([0.0, 0.01, 0.3]))
-def test_a_line_meets_what_its_points_lie_in(
+def test_a_line_hits_shapes_that_contain_its_points(
     start: Position, end: Position, placed: Obstacle, inflation: float
 ) -> None:
     way = end - start
@@ -59,7 +59,7 @@ def test_a_line_meets_what_its_points_lie_in(
         assert not any(inside(point, placed, inflation - 1e-9) for point in samples)
 
 
-def test_the_size_is_increased_by_as_much_as_stated() -> None:
+def test_shapes_grow_by_the_given_margin() -> None:
     for model, reach in ((Box("x", 1, 1, 1), 0.505), (Sphere("x", 0.5), 0.51), (Cylinder("x", 0.5, 1), 0.51)):
         placed = [("x", Obstacle.of(model, Pose()))]
         for y, free in ((reach - 1e-6, False), (reach + 1e-6, True)):
@@ -69,7 +69,7 @@ def test_the_size_is_increased_by_as_much_as_stated() -> None:
     assert first_hit(Position(0, 0, 0.504), Position(0.1, 0, 0.504), top, 0.01) == Hit("x", 0.0)
 
 
-def test_a_line_of_no_length_and_one_from_within() -> None:
+def test_lines_without_length_and_lines_from_inside() -> None:
     ball = [("x", Obstacle.of(Sphere("x", 1), Pose()))]
     assert first_hit(Position(), Position(), ball, 0.0) == Hit("x", 0.0)
     assert first_hit(Position(2), Position(2), ball, 0.0) is None

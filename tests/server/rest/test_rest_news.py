@@ -1,4 +1,4 @@
-"""What REST changes, clients of the websocket meet: object types before the scene that may use them, lists as saved."""
+"""Websocket clients are notified of REST changes: types before scenes that use them, lists as saved."""
 
 import httpx
 
@@ -8,7 +8,7 @@ from tests.server.rest.test_rest_build_and_run import base
 from tests.server.rest.test_rest_storage import lamp, scene
 
 
-async def test_types_are_told_before_the_scene_opens(server: ServerProcess) -> None:
+async def test_types_are_announced_before_the_scene_opens(server: ServerProcess) -> None:
     async with httpx.AsyncClient(base_url=base(server)) as http, talking(server.url, "ann") as ann:
         for name in ("LampA", "LampB"):
             granted(await http.put("/object-types", json=lamp(name)))
@@ -30,7 +30,7 @@ async def test_types_are_told_before_the_scene_opens(server: ServerProcess) -> N
         await ann.granted("CloseScene", {"force": True})
 
 
-async def test_lists_show_what_is_put_and_what_is_wrong_with_it(server: ServerProcess) -> None:
+async def test_lists_show_stored_documents_and_their_problems(server: ServerProcess) -> None:
     async with httpx.AsyncClient(base_url=base(server)) as http, talking(server.url, "bob") as bob:
         granted(await http.put("/object-types", json=lamp("LampC")))
         granted(await http.put("/scenes", json=scene("scn_c", "LampC")))

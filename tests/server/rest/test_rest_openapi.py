@@ -1,4 +1,4 @@
-"""The OpenAPI document is one, valid, and says what the documents of the original say."""
+"""The OpenAPI document is valid and matches the original services."""
 
 import asyncio
 import base64
@@ -75,7 +75,7 @@ class Comparison:
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_it_says_what_the_original_says(name: str) -> None:
+def test_the_document_matches_the_original_operations(name: str) -> None:
     theirs = openapi(name)
     ours = document(SERVICES[name])
     compare = Comparison(theirs, ours)
@@ -114,14 +114,14 @@ def test_it_says_what_the_original_says(name: str) -> None:
 
 
 @pytest.mark.parametrize("service", ["", *SERVICES.values()])
-def test_it_is_valid(service: str) -> None:
+def test_the_document_is_valid(service: str) -> None:
     made = document(service)
     assert made["paths"]
     assert made["openapi"].startswith("3.0")
     schemathesis.openapi.from_dict(made).validate()
 
 
-def test_every_operation_is_in_it_once() -> None:
+def test_every_operation_is_documented_once() -> None:
     made = document()
     found = {(method.upper(), path) for path, operations in made["paths"].items() for method in operations}
     assert found == {(one.method, one.path) for one in OPERATIONS}
@@ -130,7 +130,7 @@ def test_every_operation_is_in_it_once() -> None:
     assert len(names) == len(set(names))
 
 
-async def test_it_is_printed(tmp_path: Path) -> None:
+async def test_the_command_line_prints_the_document(tmp_path: Path) -> None:
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "arcor2_server.cli.main", "serve", "--openapi"),
         stdout=asyncio.subprocess.PIPE,
@@ -144,7 +144,7 @@ async def test_it_is_printed(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [], "nothing was set up for it"
 
 
-async def test_the_page_for_people_needs_nothing_from_elsewhere(http: httpx.AsyncClient) -> None:
+async def test_the_documentation_page_needs_no_foreign_resources(http: httpx.AsyncClient) -> None:
     answer = await http.get("/swagger")
     assert answer.status_code == 200
     assert answer.headers["content-type"].startswith("text/html")

@@ -1,4 +1,4 @@
-"""The ports of the original, and the Execution service's own websocket."""
+"""The ports of the original services, and the Execution service's own websocket."""
 
 import asyncio
 import json
@@ -29,7 +29,7 @@ ANY = {
 }
 
 
-def test_they_come_from_the_environment() -> None:
+def test_ports_are_read_from_the_environment() -> None:
     assert ports_from_environment({}) == {
         "Storage": 10000,
         "Scene": 5013,
@@ -58,7 +58,7 @@ def test_they_come_from_the_environment() -> None:
         ("ARCOR2_EXECUTION_URL", "ws://x:99999"),
     ],
 )
-def test_what_is_no_port_names_its_variable(variable: str, value: str) -> None:
+def test_an_invalid_port_names_its_variable(variable: str, value: str) -> None:
     with pytest.raises(InvalidData, match=variable):
         ports_from_environment({variable: value})
 
@@ -74,7 +74,7 @@ def ports_of(server: ServerProcess) -> dict[str, int]:
     return {line["service"]: line["port"] for line in told if line["event"] == "classic port"}
 
 
-async def test_each_service_is_at_its_port(tmp_path: Path) -> None:
+async def test_each_service_listens_at_its_port(tmp_path: Path) -> None:
     async with running(tmp_path / "data", "--classic-ports", **ANY) as server:
         ports = ports_of(server)
         assert set(ports) == {"Storage", "Scene", "Execution", "Build", SOCKET, "Calibration"}
@@ -106,7 +106,7 @@ async def test_each_service_is_at_its_port(tmp_path: Path) -> None:
             assert await executing.granted("Version") == {"version": "1.2.0"}
 
 
-async def test_a_taken_port_is_named(tmp_path: Path) -> None:
+async def test_a_used_port_is_named(tmp_path: Path) -> None:
     blocker = await asyncio.start_server(lambda _reader, writer: writer.close(), "127.0.0.1", 0)
     port = blocker.sockets[0].getsockname()[1]
     async with blocker:
@@ -135,7 +135,7 @@ async def collected(talker: Talker, until: dict[str, Any]) -> list[str]:
                 return names
 
 
-async def test_it_serves_packages_and_nothing_else(tmp_path: Path) -> None:
+async def test_the_execution_port_serves_only_packages(tmp_path: Path) -> None:
     async with (
         running(tmp_path / "data") as server,
         httpx.AsyncClient(base_url=base(server)) as http,
@@ -179,12 +179,12 @@ async def test_it_serves_packages_and_nothing_else(tmp_path: Path) -> None:
         assert names <= EVENTS, "ShowMainScreen is for ARServer's clients"
 
 
-def test_it_is_what_the_protocol_says() -> None:
+def test_the_execution_websocket_follows_the_protocol() -> None:
     assert {*REQUESTS, "Version"} == set(PROTOCOL["execution_requests"])
     assert set(PROTOCOL["execution_events"]) == EVENTS
 
 
-async def test_it_asks_for_a_token_too(tmp_path: Path) -> None:
+async def test_the_execution_websocket_requires_a_token(tmp_path: Path) -> None:
     _, secret = TokenFile(tmp_path / "data").add("line", Role.OPERATOR)
     async with running(tmp_path / "data") as server:
         async with connect(f"{server.url}/execution") as socket:

@@ -1,4 +1,4 @@
-"""Meshes made ready to be shown, over REST: made once, kept, told of, refused by name."""
+"""Display meshes over REST: converted once, cached, announced, refused by name."""
 
 import asyncio
 import contextlib
@@ -61,7 +61,7 @@ def no_digest(content: bytes, mark: bytes) -> bytes:
     return mark.ljust(80) + content[80:]
 
 
-async def test_five_who_ask_at_once_are_given_one_and_it_is_kept(
+async def test_simultaneous_requests_share_one_conversion(
     http: httpx.AsyncClient, services: Server, runs: list[str]
 ) -> None:
     await put(http, "ball.stl", BALL)
@@ -84,7 +84,7 @@ async def test_five_who_ask_at_once_are_given_one_and_it_is_kept(
     assert runs == ["ball.stl"]
 
 
-async def test_who_has_it_is_told_so_and_it_comes_compressed_to_who_takes_that(http: httpx.AsyncClient) -> None:
+async def test_assets_are_cached_and_compressed_by_http_headers(http: httpx.AsyncClient) -> None:
     await put(http, "tagged.stl", no_digest(BALL, b"tagged"))
     plain = await http.get(SHOWN.format("tagged.stl"), headers={"Accept-Encoding": "identity"})
     packed = await http.get(SHOWN.format("tagged.stl"))
@@ -101,7 +101,7 @@ async def test_who_has_it_is_told_so_and_it_comes_compressed_to_who_takes_that(h
     assert (await http.get(SHOWN.format("tagged.stl"), headers=known)).status_code == 200
 
 
-async def test_a_broken_mesh_is_refused_by_name_and_looked_at_once(http: httpx.AsyncClient, runs: list[str]) -> None:
+async def test_a_broken_mesh_is_refused_by_name_after_one_attempt(http: httpx.AsyncClient, runs: list[str]) -> None:
     await put(http, "asset_1", b"solid nothing", "bracket.stl")
     for _ in range(2):
         refused(await http.get(SHOWN.format("asset_1")), 400, "Argument", "bracket.stl")
@@ -111,7 +111,7 @@ async def test_a_broken_mesh_is_refused_by_name_and_looked_at_once(http: httpx.A
     refused(await http.get(SHOWN.format("asset_2")), 404, "NotFound", "asset_2")
 
 
-async def test_what_takes_long_is_told_as_a_task(
+async def test_a_long_conversion_is_announced_as_a_task(
     http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     began: list[str] = []
@@ -133,7 +133,7 @@ async def test_what_takes_long_is_told_as_a_task(
     assert services.tasks.running_events() == []
 
 
-async def test_a_worker_that_dies_costs_one_answer_and_is_no_fault_of_the_mesh(
+async def test_a_crashed_worker_fails_one_request_without_blaming_the_mesh(
     http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await put(http, "unlucky.stl", no_digest(BALL, b"unlucky"))
@@ -147,7 +147,7 @@ async def test_a_worker_that_dies_costs_one_answer_and_is_no_fault_of_the_mesh(
     assert (await http.get(SHOWN.format("unlucky.stl"))).status_code == 200
 
 
-async def test_who_leaves_does_not_spoil_it_for_others(
+async def test_a_cancelled_request_does_not_affect_others(
     http: httpx.AsyncClient, services: Server, runs: list[str]
 ) -> None:
     await put(http, "shared.stl", no_digest(BALL, b"shared"))
@@ -160,7 +160,7 @@ async def test_who_leaves_does_not_spoil_it_for_others(
     assert runs == ["shared.stl"]
 
 
-async def test_what_older_makers_made_and_what_nobody_asks_for_goes(
+async def test_outdated_and_unused_assets_are_removed(
     http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder: Path = services.settings.prepared_dir

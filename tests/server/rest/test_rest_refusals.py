@@ -1,4 +1,4 @@
-"""How refusals of what computes elsewhere come out over REST."""
+"""REST statuses of refusals by compute workers."""
 
 import msgspec
 import pytest
@@ -25,14 +25,14 @@ from arcor2_server.rest.responses import refusal
         (error_of(m.Failed(["out_of_reach", "kinematics", "device", "error"], "Too far.")), 409, "General"),
     ],
 )
-def test_what_is_refused_has_its_status(error: Arcor2Error, status: int, kind: str) -> None:
+def test_every_refusal_has_its_status(error: Arcor2Error, status: int, kind: str) -> None:
     answer = refusal("Calibration", error)
     assert answer.status_code == status
     said = msgspec.json.decode(answer.content)
     assert (said["type"], said["message"], said["service"]) == (kind, str(error), "Calibration")
 
 
-def test_kinds_are_kept_across_the_process_border() -> None:
+def test_error_types_are_kept_across_processes() -> None:
     error = error_of(m.Failed(["out_of_reach", "kinematics", "device", "error"], "Too far.", "at 3 m"))
     assert isinstance(error, KinematicsError)
     assert (error.code, error.detail) == ("out_of_reach", "at 3 m")

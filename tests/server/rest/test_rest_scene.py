@@ -1,4 +1,4 @@
-"""The Scene service: what is in the way, which lines are free, where an object stands."""
+"""The Scene service: obstacles, free lines and object poses."""
 
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ def box_stl(x: float, y: float, z: float) -> bytes:
     return made
 
 
-async def test_models_are_put_in_and_taken_out(http: httpx.AsyncClient) -> None:
+async def test_collision_models_are_added_and_removed(http: httpx.AsyncClient) -> None:
     chair = {"assetData": ("chair.stl", box_stl(0.5, 0.5, 0.5))}
     granted(await http.post("/assets", params={"id": "chair.stl", "upsert": True}, files=chair))
     assert granted(await http.get("/collisions")) == []
@@ -66,7 +66,7 @@ async def test_models_are_put_in_and_taken_out(http: httpx.AsyncClient) -> None:
     assert granted(await http.put("/utils/line-safe", json=through_all)) == {"safe": True}
 
 
-async def test_meshes_are_in_the_way_as_they_are(http: httpx.AsyncClient) -> None:
+async def test_meshes_are_obstacles_with_their_exact_shape(http: httpx.AsyncClient) -> None:
     through, above = line((0, 0, 0), (10, 0, 0)), line((0, 0, 0.4), (10, 0, 0.4))
     table = {"assetData": ("table.stl", box_stl(1, 1, 0.5))}
     granted(await http.post("/assets", params={"id": "table.stl"}, files=table))
@@ -112,7 +112,9 @@ async def test_meshes_are_in_the_way_as_they_are(http: httpx.AsyncClient) -> Non
         ("sphere", {"sphereId": "x", "radius": 1}, {"position": {"x": None}}, "position"),
     ],
 )
-async def test_what_is_no_model(http: httpx.AsyncClient, path: str, params: Any, body: Any, word: str) -> None:
+async def test_invalid_models_are_refused(
+    http: httpx.AsyncClient, path: str, params: Any, body: Any, word: str
+) -> None:
     refused(await http.put(f"/collisions/{path}", params=params, json=body), 400, "Argument", word)
     assert granted(await http.get("/collisions")) == []
 
@@ -126,7 +128,7 @@ class Crate(CollisionObject):
 """
 
 
-async def test_what_stands_in_the_scene_that_is_online_is_in_the_way(http: httpx.AsyncClient, tmp_path: Path) -> None:
+async def test_objects_of_the_online_scene_are_obstacles(http: httpx.AsyncClient, tmp_path: Path) -> None:
     async with running_server(ServerSettings(data_dir=tmp_path)) as services, asking(services) as own:
         await services.types.add(ObjectTypeSource("Crate", CRATE, model=ObjectModel.of(Box("Crate", 1, 1, 1))))
         placed = SceneObject("crate", "Crate", Pose(Position(3.0)), id="obj_crate")
@@ -146,7 +148,7 @@ async def test_what_stands_in_the_scene_that_is_online_is_in_the_way(http: httpx
         assert granted(await own.get("/collisions")) == []
 
 
-async def test_where_an_object_stands(http: httpx.AsyncClient) -> None:
+async def test_the_pose_of_an_object_is_returned(http: httpx.AsyncClient) -> None:
     real = Pose(Position(0.4, -0.2, 0.1), Orientation.from_rotation_vector(0.3, -1.2, 2.0))
     on_mesh = [Position(0, 0, 0), Position(0.2, 0, 0), Position(0, 0.3, 0), Position(0.1, 0.1, 0.2)]
     touched = [real.position + point.rotated(real.orientation) for point in on_mesh]

@@ -1,4 +1,4 @@
-"""The Storage service over REST: what is put is there, in camelCase, and what is wrong is refused."""
+"""The Storage service over REST: documents round trip in camelCase, and invalid ones are refused."""
 
 import asyncio
 from typing import Any
@@ -34,14 +34,14 @@ def camel(document: Scene | Project) -> Any:
 
 
 # ------------------------------------------------------------------------------------------------ names
-async def test_a_name_goes_there_and_back() -> None:
+async def test_names_are_converted_to_camel_case_and_back() -> None:
     value = {"size_x": [{"object_id": {"pt1": 1, "is_valid": None}}]}
     assert camelized(value) == {"sizeX": [{"objectId": {"pt1": 1, "isValid": None}}]}
     assert snaked(camelized(value)) == snaked(value) == value
 
 
 # ------------------------------------------------------------------------------------------------ scenes
-async def test_a_scene_comes_and_goes(http: httpx.AsyncClient) -> None:
+async def test_a_scene_is_stored_and_deleted(http: httpx.AsyncClient) -> None:
     stamp = granted(await http.put("/scenes", json=scene("scn_a", "FlowActions")))
     stored = granted(await http.get("/scenes/scn_a"))
     assert (stored["modified"], stored["created"]) == (stamp, stamp)
@@ -64,7 +64,7 @@ async def test_a_scene_needs_known_types(http: httpx.AsyncClient) -> None:
     refused(await http.get("/scenes/scn_b"), 404, "NotFound")
 
 
-async def test_a_large_project_comes_back_as_it_was(http: httpx.AsyncClient) -> None:
+async def test_a_large_project_round_trips(http: httpx.AsyncClient) -> None:
     whole = msgspec.structs.replace(workplace.scene(), objects=[])
     granted(await http.put("/scenes", json=camel(whole)))
     granted(await http.put("/projects", json=camel(workplace.project())))
@@ -98,7 +98,7 @@ async def test_a_large_project_comes_back_as_it_was(http: httpx.AsyncClient) -> 
         b"\xff",
     ],
 )
-async def test_what_is_no_scene(http: httpx.AsyncClient, body: bytes) -> None:
+async def test_invalid_scenes_are_refused(http: httpx.AsyncClient, body: bytes) -> None:
     refused(await http.put("/scenes", content=body), 400, "Argument")
     refused(await http.get("/scenes/scn_x"), 404, "NotFound")
 
@@ -108,14 +108,14 @@ async def test_a_text_that_is_too_long_is_named(http: httpx.AsyncClient) -> None
     refused(await http.put("/scenes", json=body), 400, "Argument", "name has 201 characters", "at most 200")
 
 
-async def test_another_media_type_and_too_much(http: httpx.AsyncClient) -> None:
+async def test_wrong_media_types_and_oversized_bodies_are_refused(http: httpx.AsyncClient) -> None:
     xml = {"Content-Type": "application/xml"}
     refused(await http.put("/scenes", content=b"<scene/>", headers=xml), 415, "Argument", "application/xml")
     refused(await http.post("/assets", json={}), 415, "Argument", "multipart")
     refused(await http.put("/scenes", content=b" " * (16 * 1024 * 1024 + 1)), 413, "Argument")
 
 
-async def test_no_route(http: httpx.AsyncClient) -> None:
+async def test_unknown_routes_are_refused(http: httpx.AsyncClient) -> None:
     refused(await http.get("/nowhere"), 404, "NotFound")
     answer = await http.post("/scenes", json={})
     refused(answer, 405, "Argument")
@@ -123,7 +123,7 @@ async def test_no_route(http: httpx.AsyncClient) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ projects
-async def test_a_project_comes_and_goes_with_what_is_beside_it(http: httpx.AsyncClient) -> None:
+async def test_a_project_is_stored_and_deleted_with_its_parts(http: httpx.AsyncClient) -> None:
     granted(await http.put("/scenes", json=scene("scn_p")))
     refused(await http.put("/projects", json=project("pro_a", "scn_nowhere")), 404, "NotFound", "scn_nowhere")
     stamp = granted(await http.put("/projects", json=project("pro_a", "scn_p")))
@@ -176,7 +176,7 @@ MODELS: list[tuple[str, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize(("kind", "sizes"), MODELS)
-async def test_a_model_comes_and_goes(http: httpx.AsyncClient, kind: str, sizes: dict[str, Any]) -> None:
+async def test_a_model_is_stored_and_deleted(http: httpx.AsyncClient, kind: str, sizes: dict[str, Any]) -> None:
     body = {"id": f"a_{kind}"} | sizes
     granted(await http.put(f"/models/{kind}", json=body))
     for name in (kind, kind.capitalize()):
@@ -217,7 +217,7 @@ def lamp(name: str, **more: Any) -> dict[str, Any]:
     return {"id": name, "name": name, "source": LAMP.format(name=name)} | more
 
 
-async def test_an_object_type_comes_and_goes(http: httpx.AsyncClient, services: Server) -> None:
+async def test_an_object_type_is_stored_and_deleted(http: httpx.AsyncClient, services: Server) -> None:
     with_model = lamp("Lamp", description="text", model={"id": "Lamp", "type": "Sphere"})
     refused(await http.put("/object-types", json=with_model), 404, "NotFound", "Lamp")
     granted(await http.put("/models/sphere", json={"id": "Lamp", "radius": 0.2}))
@@ -235,7 +235,7 @@ async def test_an_object_type_comes_and_goes(http: httpx.AsyncClient, services: 
     refused(await http.delete("/object-types/Lamp"), 404, "NotFound")
 
 
-async def test_a_module_that_is_no_type_is_taken(http: httpx.AsyncClient, services: Server) -> None:
+async def test_a_module_without_type_is_accepted(http: httpx.AsyncClient, services: Server) -> None:
     mixin = {"id": "Colours", "name": "Colours", "source": "class Colours:\n    RED = 1\n"}
     granted(await http.put("/object-types", json=mixin))
     assert granted(await http.get("/object-types/Colours"))["source"] == mixin["source"]
@@ -252,18 +252,18 @@ async def test_an_installed_type_may_be_shadowed_but_not_deleted(http: httpx.Asy
 
 
 @pytest.mark.parametrize("name", ["Generic", "not a name", "class", "", "a" * 300 + "!"])
-async def test_a_name_that_cannot_be_uploaded(http: httpx.AsyncClient, name: str) -> None:
+async def test_reserved_names_cannot_be_uploaded(http: httpx.AsyncClient, name: str) -> None:
     refused(await http.put("/object-types", json=lamp(name)), 400, "Argument")
 
 
-async def test_an_installed_type_is_not_deleted_and_a_source_has_an_end(http: httpx.AsyncClient) -> None:
+async def test_installed_types_cannot_be_deleted_and_sources_are_limited(http: httpx.AsyncClient) -> None:
     refused(await http.delete("/object-types/FlowActions"), 400, "Argument", "FlowActions")
     huge = lamp("Huge") | {"source": "#" * (1024 * 1024 + 1)}
     refused(await http.put("/object-types", json=huge), 413, "Argument", "Huge")
     refused(await http.put("/object-types", json=lamp("One") | {"name": "Other"}), 400, "Argument")
 
 
-async def test_a_series_of_uploads_is_told_once(
+async def test_a_series_of_uploads_is_announced_once(
     http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[tuple[str, list[str]]] = []
@@ -307,7 +307,7 @@ async def test_a_series_of_uploads_is_told_once(
 
 
 # ------------------------------------------------------------------------------------------------ assets
-async def test_an_asset_comes_and_goes(http: httpx.AsyncClient) -> None:
+async def test_an_asset_is_stored_and_deleted(http: httpx.AsyncClient) -> None:
     content = bytes(range(256)) * 20_000
     file = {"assetData": ("../ärm.stl", content, "model/stl")}
     info = granted(await http.post("/assets", params={"id": "chair", "description": "a chair"}, files=file))
@@ -336,7 +336,7 @@ async def test_an_asset_comes_and_goes(http: httpx.AsyncClient) -> None:
         refused(refusal, 404, "NotFound", "chair")
 
 
-async def test_what_is_no_asset(http: httpx.AsyncClient) -> None:
+async def test_invalid_assets_are_refused(http: httpx.AsyncClient) -> None:
     refused(await http.post("/assets", files={"other": ("x", b"x")}), 400, "Argument", "assetData")
     refused(await http.post("/assets", files={"assetData": (None, b"\xff\xfe")}), 400, "Argument", "name")
     refused(await http.post("/assets?id=a%2Fb", files={"assetData": ("x", b"x")}), 400, "Argument")

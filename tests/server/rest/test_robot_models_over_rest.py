@@ -1,4 +1,4 @@
-"""The models of installed drivers' robots, as an editor fetches them."""
+"""Models of installed drivers' robots, as an editor fetches them."""
 
 import io
 import zipfile
@@ -15,7 +15,7 @@ from tests.server.rest.asking import granted, refused
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 
-async def test_every_robot_that_names_a_model_has_it_served(http: httpx.AsyncClient, services: Server) -> None:
+async def test_every_named_robot_model_is_served(http: httpx.AsyncClient, services: Server) -> None:
     named = {robot.type: robot.urdf_package_filename for robot in services.types.robot_metas()}
     assert {"UR3e", "UR5e", "UR10e", "DobotMagician", "TwoAxisRobot"} <= {k for k, v in named.items() if v is not UNSET}
     for name in filter(None, named.values()):
@@ -28,7 +28,7 @@ async def test_every_robot_that_names_a_model_has_it_served(http: httpx.AsyncCli
     refused(await http.delete("/assets/ur5e.zip"), 409, "Conflict", "ur5e.zip")
 
 
-async def test_a_folder_is_packed_to_the_same_bytes_and_archives_are_taken_as_they_are(tmp_path: Path) -> None:
+async def test_folders_are_packed_reproducibly_and_archives_are_kept(tmp_path: Path) -> None:
     arm = tmp_path / "urdf" / "arm"
     (arm / "meshes").mkdir(parents=True)
     (arm / "arm.urdf").write_text("<robot/>")

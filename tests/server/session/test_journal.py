@@ -96,7 +96,7 @@ async def test_closing_stores_what_waits(journal: Journal, path: Path, disk: Dis
     await journal.close()
 
 
-async def test_a_journal_that_was_never_opened_takes_nothing(path: Path) -> None:
+async def test_a_journal_that_is_not_open_refuses_jobs(path: Path) -> None:
     with pytest.raises(StorageError, match="The journal is closed"):
         Journal(path).clear()
 
@@ -163,7 +163,7 @@ async def test_an_unusable_file_is_named(tmp_path: Path) -> None:
     await journal.close()
 
 
-async def test_what_is_reopened_is_converted_and_losses_are_known(path: Path, disk: Disk) -> None:
+async def test_recovered_documents_are_converted_and_losses_reported(path: Path, disk: Disk) -> None:
     journal = Journal(path)
     await journal.open()
     for job in (scene(), edit(1), edit(2), edit(3)):

@@ -1,4 +1,4 @@
-"""A damaged journal: every acknowledged change is there, or the loss is reported and the damaged file is kept."""
+"""A damaged journal: every acknowledged change is restored, or the loss is reported and the file kept."""
 
 import random
 import shutil
@@ -145,7 +145,7 @@ def test_a_truncated_log_is_noticed(killed: Path, tmp_path: Path) -> None:
         check(directory, f"{part} of the log")
 
 
-def test_changes_that_only_undo_needs(killed: Path, tmp_path: Path) -> None:
+def test_damage_in_changes_that_only_undo_needs(killed: Path, tmp_path: Path) -> None:
     shutil.copytree(killed, tmp_path / "data")
     connection = sqlite3.connect(tmp_path / "data" / "journal.sqlite")
     connection.execute("update edit set user = 'mallory' where number = 7")

@@ -223,7 +223,7 @@ def test_older_formats_are_converted(tmp_path: Path, version: int) -> None:
 
 
 @pytest.mark.parametrize("version", [4, 99, -1])
-def test_an_unknown_format_is_set_aside(path: Path, version: int) -> None:
+def test_a_file_of_unknown_format_is_renamed(path: Path, version: int) -> None:
     change(path, f"pragma user_version = {version}")
     found, loss = reopened(path)
     assert found is None
@@ -281,7 +281,7 @@ def test_a_damaged_document_is_lost_and_reported(path: Path, statement: str, rea
     assert reopened(path) == (None, None)
 
 
-def test_without_a_position_the_file_counts(path: Path) -> None:
+def test_without_a_position_the_content_of_the_file_is_used(path: Path) -> None:
     position = path.with_suffix(".position")
     for content in (b"", b"{}", b"nonsense 00000000", b'{"serial": 9} 00000000'):
         position.write_bytes(content)
@@ -337,7 +337,7 @@ def test_an_error_of_the_disk_is_not_taken_for_damage(path: Path, monkeypatch: p
     assert [each.name for each in path.parent.glob("journal.damaged*")] == []
 
 
-def test_a_file_of_another_kind_is_damage(path: Path) -> None:
+def test_a_file_of_another_format_version_is_damaged(path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[18:20] = b"\7\7"
     path.write_bytes(content)

@@ -1,4 +1,4 @@
-"""The records of the journal: times, positions, checksums, and what users are told about losses."""
+"""The records of the journal: times, positions, checksums, and reports of losses."""
 
 import msgspec
 from msgspec import UNSET
@@ -77,7 +77,7 @@ def test_a_loss_is_a_text_for_users() -> None:
     assert str(replace(loss, stored_as="")).endswith("Everything is lost.")
 
 
-def test_what_was_closed_stays_closed() -> None:
+def test_closed_documents_stay_closed() -> None:
     found = Recovered(scene().items, 0, SAVED, Times(), [])
     closed = JournalContent(3, found)
     note_missing(closed, Position(4))

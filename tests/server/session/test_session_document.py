@@ -1,4 +1,4 @@
-"""The document: any edits, taken back, leave what was there; what the journal keeps gives the same document."""
+"""The document: random edits can be undone, and the journal restores the same document."""
 
 import random
 from collections.abc import Callable
@@ -83,7 +83,7 @@ def lookups(document: Document) -> dict[str, object]:
     }
 
 
-def test_a_document_gives_back_what_it_was_made_of() -> None:
+def test_a_document_round_trips() -> None:
     scene, project = some_project()
     document = Document.of(scene, project)
     assert (document.scene, document.project) == (scene, project)
@@ -170,7 +170,7 @@ def test_random_edits_undo_redo_and_replay(seed: int, length: int) -> None:
     assert lookups(document) == lookups(replayed)
 
 
-def test_names_users_and_trees() -> None:
+def test_a_document_indexes_names_users_and_trees() -> None:
     document = Document.of(*some_project())
     assert document.named(Kind.POINT, "p1") == "acp_1"
     assert document.named("output", "r2_1") == "act_2_1"
@@ -190,7 +190,7 @@ def test_names_users_and_trees() -> None:
     assert [item.id for item in document.incoming("END")] == ["lit_1"]
 
 
-def test_a_closed_document_takes_no_changes() -> None:
+def test_a_closed_document_refuses_changes() -> None:
     document = Document.of(*some_project())
     with document.retiring():
         pass
@@ -203,7 +203,7 @@ def test_a_closed_document_takes_no_changes() -> None:
             make()
 
 
-def test_damaged_rows_are_named_as_such() -> None:
+def test_damaged_rows_are_reported() -> None:
     with pytest.raises(msgspec.DecodeError):
         decode_items(b'[["action_point","x"]]')
     with pytest.raises(msgspec.DecodeError):

@@ -1,4 +1,4 @@
-"""Undo, redo, history: what comes back, what is told of it, and who is refused."""
+"""Undo, redo and history: effects, events and refusals."""
 
 import sqlite3
 from pathlib import Path
@@ -19,7 +19,7 @@ def work(alice: Person) -> Work:
     return Work(alice)
 
 
-async def test_every_edit_of_a_project_comes_back(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_every_edit_of_a_project_can_be_undone(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
     ids = await rich_project(work)
     ids["project"] = desk.session.require_project().id
     await alice.ask("SaveProject")
@@ -51,7 +51,7 @@ async def test_every_edit_of_a_project_comes_back(desk: Desk, alice: Person, bob
         assert desk.services.locks.locked_roots() == [], name
 
 
-async def test_all_edits_go_and_come_in_one_row(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_all_edits_can_be_undone_and_redone_in_a_row(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
     await work.project()
     watcher, states = Watcher(desk, bob), [shown(desk)]
     numbered = desk.session.revision
@@ -83,7 +83,7 @@ async def test_all_edits_go_and_come_in_one_row(desk: Desk, alice: Person, bob: 
     assert shown(desk) == states[-1]
 
 
-async def test_every_edit_of_a_scene_comes_back(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_every_edit_of_a_scene_can_be_undone(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
     scene = await work.scene()
     robot = work.object("robot")
     saved, watcher = shown(desk), Watcher(desk, bob)
@@ -133,7 +133,7 @@ async def test_undo_while_online_moves_the_live_object_but_no_robot(desk: Desk, 
 
 
 # ------------------------------------------------------------------------------------------------ history
-async def test_history_tells_who_did_what(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_the_history_lists_users_and_edits(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
     await work.project("p")
     p = work.point("p")
     await bob.ask("AddActionPoint", name="b", position=ORIGIN)
@@ -157,7 +157,7 @@ async def test_history_tells_who_did_what(desk: Desk, alice: Person, bob: Person
         await bob.ask("History", limit=1001)
 
 
-async def test_a_revision_comes_back_whoever_changed_it(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_a_revision_can_be_restored_across_users(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
     ids = await rich_project(work)
     ids["project"] = desk.session.require_project().id
     await alice.ask("SaveProject")
@@ -183,7 +183,7 @@ async def test_a_revision_comes_back_whoever_changed_it(desk: Desk, alice: Perso
         assert "can be restored" in await refused(alice, "RestoreRevision", revision=wrong)
 
 
-async def test_undo_goes_on_after_saving_and_after_a_restart(tmp_path: Path) -> None:
+async def test_undo_works_after_saving_and_after_a_restart(tmp_path: Path) -> None:
     async with open_desk(tmp_path) as desk:
         alice = await desk.person("alice")
         work = Work(alice)
@@ -214,7 +214,7 @@ async def test_undo_goes_on_after_saving_and_after_a_restart(tmp_path: Path) -> 
         await alice.ask("CloseProject")
 
 
-async def test_what_was_changed_and_changed_back_counts_as_saved_after_a_restart(tmp_path: Path) -> None:
+async def test_a_reverted_change_counts_as_saved_after_a_restart(tmp_path: Path) -> None:
     async with open_desk(tmp_path, history_limit=4) as desk:
         alice = await desk.person("alice")
         await Work(alice).project("p")
@@ -230,7 +230,7 @@ async def test_what_was_changed_and_changed_back_counts_as_saved_after_a_restart
         assert not desk.session.has_changes
 
 
-async def test_the_limit_bounds_what_can_be_taken_back(tmp_path: Path) -> None:
+async def test_the_history_limit_bounds_undo(tmp_path: Path) -> None:
     async with open_desk(tmp_path, history_limit=5) as desk:
         alice = await desk.person("alice")
         work = Work(alice)
@@ -248,7 +248,7 @@ async def test_the_limit_bounds_what_can_be_taken_back(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("version", [1, 2])
-async def test_a_journal_of_an_earlier_format_is_taken_over(tmp_path: Path, version: int) -> None:
+async def test_a_journal_of_an_earlier_format_is_converted(tmp_path: Path, version: int) -> None:
     async with open_desk(tmp_path) as desk:
         await Work(await desk.person("alice")).project("p")
     connection = sqlite3.connect(tmp_path / "journal.sqlite")
@@ -271,7 +271,7 @@ async def test_a_journal_of_an_earlier_format_is_taken_over(tmp_path: Path, vers
         assert desk.services.damage.notices == []
 
 
-async def test_an_undo_that_cannot_be_kept_is_taken_back(
+async def test_an_undo_that_cannot_be_stored_is_reverted(
     desk: Desk, alice: Person, work: Work, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from arcor2_server.documents import journal_file
@@ -293,7 +293,7 @@ async def test_an_undo_that_cannot_be_kept_is_taken_back(
     assert desk.session.has_changes
 
 
-async def test_a_save_that_fails_leaves_what_is_unsaved(
+async def test_a_failed_save_keeps_unsaved_changes(
     desk: Desk, alice: Person, work: Work, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from arcor2_hw.exceptions import StorageError
@@ -314,6 +314,6 @@ async def test_a_save_that_fails_leaves_what_is_unsaved(
     assert not desk.session.has_changes
 
 
-async def test_existing_clients_learn_of_the_requests(alice: Person) -> None:
+async def test_older_clients_are_notified_of_undo(alice: Person) -> None:
     told = await alice.ask("SystemInfo")
     assert {"Undo", "Redo", "History", "RestoreRevision"} <= set(told["supported_rpc_requests"])

@@ -1,4 +1,4 @@
-"""What was acknowledged is there after a crash; what cannot be kept is refused and taken back."""
+"""Acknowledged edits survive a crash; edits that cannot be stored are refused and reverted."""
 
 import asyncio
 import os
@@ -38,7 +38,7 @@ def point_names(desk: Desk) -> list[str]:
 
 
 @pytest.mark.parametrize("moment", [0.1, 0.35])
-async def test_kill_in_the_middle_of_edits(tmp_path: Path, moment: float) -> None:
+async def test_acknowledged_edits_survive_a_kill(tmp_path: Path, moment: float) -> None:
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
@@ -87,7 +87,7 @@ async def _lines(stream: asyncio.StreamReader, count: int) -> list[str]:
     return found
 
 
-async def test_a_restart_goes_on_where_it_was(tmp_path: Path) -> None:
+async def test_a_restart_restores_the_open_document(tmp_path: Path) -> None:
     async with open_desk(tmp_path) as desk:
         alice = await desk.person("alice")
         await open_project(alice)
@@ -112,9 +112,7 @@ async def test_a_restart_goes_on_where_it_was(tmp_path: Path) -> None:
         assert desk.session.scene is None
 
 
-async def test_a_start_that_was_killed_leaves_nothing_behind(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+async def test_a_killed_start_leaves_nothing_behind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     async with open_desk(tmp_path):
         pass
     connection = sqlite3.connect(tmp_path / "journal.sqlite")
@@ -164,7 +162,9 @@ async def test_the_journal_stays_short(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["garbage", "truncated", "row", "gap", "newer", "strange"])
-async def test_a_damaged_journal_is_set_aside(tmp_path: Path, damage: str, capsys: pytest.CaptureFixture[str]) -> None:
+async def test_a_damaged_journal_is_renamed_and_reported(
+    tmp_path: Path, damage: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     async with open_desk(tmp_path) as desk:
         alice = await desk.person("alice")
         await open_project(alice, points=30)
@@ -216,7 +216,7 @@ async def test_a_second_server_on_the_same_data_is_refused(tmp_path: Path, monke
                 pass
 
 
-async def test_what_cannot_be_kept_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_edits_that_cannot_be_stored_are_reverted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async with open_desk(tmp_path) as desk:
         alice, bob = await desk.person("alice"), await desk.person("bob")
         await open_project(alice, points=2)
@@ -246,7 +246,7 @@ async def test_what_cannot_be_kept_is_taken_back(tmp_path: Path, monkeypatch: py
         assert point_names(desk) == ["p0", "p1", "kept"]
 
 
-async def test_an_edit_during_a_save_is_not_taken_for_saved(
+async def test_an_edit_during_a_save_counts_as_unsaved(
     desk: Desk, alice: Person, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await open_project(alice)
@@ -264,7 +264,7 @@ async def test_an_edit_during_a_save_is_not_taken_for_saved(
     assert point_names(desk) == ["meanwhile"]
 
 
-async def test_a_caller_who_goes_away_does_not_take_his_edit_with_him(desk: Desk, alice: Person) -> None:
+async def test_the_edit_of_a_cancelled_request_is_kept(desk: Desk, alice: Person) -> None:
     await open_project(alice)
     task = asyncio.create_task(add_point(alice, "last"))
     while point_names(desk)[-1] != "last":

@@ -1,4 +1,4 @@
-"""The lists of saved documents: what is wrong with each, looked for only where something changed."""
+"""Lists of saved documents: problems are checked only where something changed."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -29,7 +29,9 @@ class Reads:
         return taken
 
 
-async def test_only_what_changed_is_looked_at_again(desk: Desk, alice: Person, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_only_changed_documents_are_checked_again(
+    desk: Desk, alice: Person, monkeypatch: pytest.MonkeyPatch
+) -> None:
     work = Work(alice)
     project = await work.project("p")
     scene = desk.session.require_scene().id

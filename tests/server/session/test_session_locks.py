@@ -1,4 +1,4 @@
-"""Locks of the open project: widened to a tree and narrowed again, and released when their user is lost."""
+"""Locks of the open project: widened to a tree, narrowed, and released when their user is lost."""
 
 import asyncio
 from pathlib import Path

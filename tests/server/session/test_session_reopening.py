@@ -1,4 +1,4 @@
-"""Undo history of a document that is closed and opened again, or that is changed while it is closed."""
+"""Undo history of a document that is closed and reopened, or changed while closed."""
 
 import sqlite3
 from pathlib import Path
@@ -55,7 +55,7 @@ async def test_each_user_can_undo_and_redo_after_close_and_open(
     assert points(desk) == []
 
 
-async def test_what_closing_discards_is_no_part_of_the_history(desk: Desk, alice: Person, work: Work) -> None:
+async def test_discarded_changes_are_not_in_the_history(desk: Desk, alice: Person, work: Work) -> None:
     await work.project("a", "b")
     await alice.ask("SaveProject")
     await alice.ask("Undo")
@@ -173,7 +173,7 @@ async def test_undo_is_refused_for_what_was_changed_meanwhile(desk: Desk, alice:
     assert desk.session.require_project().action_points[0].position == Position(0, 0, 0)
 
 
-async def test_history_begins_anew_where_it_does_not_lead_to_what_is_saved(
+async def test_history_restarts_when_it_does_not_match_the_saved_document(
     desk: Desk, alice: Person, work: Work
 ) -> None:
     project = await work.project("a", "b")
@@ -210,7 +210,7 @@ async def test_a_scene_has_a_history_of_its_own(desk: Desk, alice: Person, work:
     assert shown(desk) == before
 
 
-async def test_a_project_that_is_deleted_takes_its_history_along(desk: Desk, alice: Person, work: Work) -> None:
+async def test_deleting_a_project_deletes_its_history(desk: Desk, alice: Person, work: Work) -> None:
     project = await work.project("a")
     await alice.ask("SaveProject")
     saved = await desk.services.storage.project(project)
@@ -241,9 +241,7 @@ async def test_the_number_of_stored_histories_is_bounded(
 
 
 @pytest.mark.parametrize("content", [b"", b"no history", "cut"])
-async def test_a_damaged_history_does_not_keep_a_project_from_opening(
-    desk: Desk, alice: Person, work: Work, content: Any
-) -> None:
+async def test_a_project_with_a_damaged_history_opens(desk: Desk, alice: Person, work: Work, content: Any) -> None:
     project = await work.project("a")
     await alice.ask("SaveProject")
     await alice.ask("CloseProject")
@@ -262,7 +260,7 @@ async def test_a_damaged_history_does_not_keep_a_project_from_opening(
     assert "nothing" in await refused(alice)
 
 
-async def test_data_of_an_earlier_version_is_taken_over(tmp_path: Path) -> None:
+async def test_data_of_an_earlier_version_is_migrated(tmp_path: Path) -> None:
     """The files were written by the version before histories of closed documents were stored."""
     for name in ("documents", "journal"):
         connection = sqlite3.connect(tmp_path / f"{name}.sqlite")

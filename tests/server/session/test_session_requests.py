@@ -1,4 +1,4 @@
-"""Editing requests as clients see them: answers, events in order, locks of two users, dry runs."""
+"""Editing requests as clients see them: answers, order of events, locks of two users, dry runs."""
 
 import asyncio
 from typing import Any
@@ -45,7 +45,7 @@ async def test_order_of_events_when_documents_open_and_close(desk: Desk, alice: 
     assert alice.names() == ["SceneClosed", "ShowMainScreen"]
 
 
-async def test_logic_items_always_tell_of_unlocking(work: Work, alice: Person, bob: Person) -> None:
+async def test_logic_items_always_announce_unlocking(work: Work, alice: Person, bob: Person) -> None:
     await work.project("p")
     one = await work.add_action(work.point("p"), "one")
     two = await work.add_action(work.point("p"), "two")
@@ -73,7 +73,9 @@ async def test_logic_items_always_tell_of_unlocking(work: Work, alice: Person, b
         await alice.ask("AddLogicItem", start="START", end=one)
 
 
-async def test_an_action_goes_with_its_steps_by_one_edit(desk: Desk, work: Work, alice: Person, bob: Person) -> None:
+async def test_an_action_and_its_connections_are_removed_by_one_edit(
+    desk: Desk, work: Work, alice: Person, bob: Person
+) -> None:
     await work.project("p")
     point = work.point("p")
     one, two, three = [await work.add_action(point, name) for name in ("one", "two", "three")]
@@ -106,7 +108,7 @@ async def test_an_action_goes_with_its_steps_by_one_edit(desk: Desk, work: Work,
     assert desk.session.require_project().logic == []
 
 
-async def test_an_action_whose_result_is_used_stays_with_its_steps(desk: Desk, work: Work, alice: Person) -> None:
+async def test_an_action_whose_result_is_used_is_not_removed(desk: Desk, work: Work, alice: Person) -> None:
     await work.project("p")
     point = work.point("p")
     kept = [{"type": "default", "outputs": ["lucky"]}]
@@ -243,7 +245,7 @@ async def test_actions_keep_flows_defaults_and_unique_results(work: Work, alice:
         await alice.ask("RemoveActionPointOrientation", orientation_id=orientation)
 
 
-async def test_a_copy_refers_to_itself(work: Work, alice: Person) -> None:
+async def test_a_copy_refers_to_its_own_items(work: Work, alice: Person) -> None:
     await work.project("p")
     p = work.point("p")
     below = await work.add_point("below", p)
@@ -273,7 +275,7 @@ async def test_a_copy_refers_to_itself(work: Work, alice: Person) -> None:
     assert {getattr(user, "name", "") for user in document.users_of(new_source.id)} == {"linked_copy"}
 
 
-async def test_read_locks_end_with_what_they_were_on(desk: Desk, work: Work, alice: Person, bob: Person) -> None:
+async def test_read_locks_end_with_their_items(desk: Desk, work: Work, alice: Person, bob: Person) -> None:
     project = await work.project("p")
     await bob.ask("ReadLock", object_id=work.point("p"))
     with pytest.raises(Refused, match="locked"):
@@ -340,7 +342,7 @@ async def test_saving_a_moved_object_makes_joints_invalid_in_its_projects(
     assert valid == {"on_scale": False, "above": False, "free": True}
 
 
-async def test_an_object_that_projects_use(desk: Desk, work: Work, alice: Person) -> None:
+async def test_an_object_used_by_projects_is_not_removed(desk: Desk, work: Work, alice: Person) -> None:
     project = await work.project()
     scene = work.session.require_scene().id
     await work.add_point("on_scale", work.object("scale"))
@@ -362,7 +364,7 @@ async def test_an_object_that_projects_use(desk: Desk, work: Work, alice: Person
     assert work.session.require_project().action_points[0].position.x == 0.5
 
 
-async def test_a_shape_made_for_a_scene_goes_with_its_object(desk: Desk, work: Work, alice: Person) -> None:
+async def test_a_collision_object_is_removed_with_its_type(desk: Desk, work: Work, alice: Person) -> None:
     await work.scene()
     box = {"type": "Box", "box": {"id": "crate", "size_x": 0.1, "size_y": 0.1, "size_z": 0.1}}
     add = {"name": "crate", "pose": POSE, "model": box}
@@ -391,7 +393,7 @@ async def test_a_live_object_moves_with_its_pose(desk: Desk, work: Work, alice: 
         await alice.ask("AddObjectToScene", name="late", type="TimeActions")
 
 
-async def test_a_name_belongs_to_one_scene_or_project(desk: Desk, work: Work, alice: Person) -> None:
+async def test_names_of_scenes_and_projects_are_unique(desk: Desk, work: Work, alice: Person) -> None:
     await work.project()
     scene, project = work.session.require_scene().id, work.session.require_project().id
     with pytest.raises(Refused, match="already"):
@@ -485,7 +487,7 @@ async def test_a_dry_run_checks_and_changes_nothing(desk: Desk, work: Work, alic
     assert bob.events()
 
 
-async def test_requests_of_a_stranger_and_without_a_document(desk: Desk, alice: Person, stranger: Person) -> None:
+async def test_requests_without_user_or_document_are_refused(desk: Desk, alice: Person, stranger: Person) -> None:
     for name, arguments in (("RenameAction", {"action_id": "x", "new_name": "y"}), ("RemoveAction", {"id": "x"})):
         with pytest.raises(Refused, match="No scene"):
             await stranger.ask(name, **arguments)
@@ -500,9 +502,7 @@ async def test_requests_of_a_stranger_and_without_a_document(desk: Desk, alice: 
         await alice.ask("NewScene", name="scene")
 
 
-async def test_what_was_locked_with_a_tree_is_free_when_its_place_in_it_goes(
-    alice: Person, bob: Person, work: Work
-) -> None:
+async def test_removing_a_locked_parent_unlocks_its_tree(alice: Person, bob: Person, work: Work) -> None:
     await work.project("root")
     root = work.point("root")
     below = await work.add_point("below", root)

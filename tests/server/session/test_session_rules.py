@@ -95,7 +95,7 @@ def add(document: Document, item: LogicItem) -> None:
         (step("c", "b"), "loop"),
     ],
 )
-def test_steps_that_are_refused(item: LogicItem, reason: str) -> None:
+def test_invalid_connections_are_refused(item: LogicItem, reason: str) -> None:
     document = branching("a", "b", "c", "d")
     add(document, step("START", "a"))
     add(document, step("a", "b", "a/default/0"))
@@ -104,7 +104,7 @@ def test_steps_that_are_refused(item: LogicItem, reason: str) -> None:
         check_logic_item(document, meta_of, item)
 
 
-def test_steps_that_are_allowed() -> None:
+def test_valid_connections_are_accepted() -> None:
     document = branching("a", "b", "c")
     add(document, step("START", "a"))
     add(document, step("a", "b", "a/default/0", "true"))
@@ -117,7 +117,7 @@ def test_steps_that_are_allowed() -> None:
     add(document, step("c", "END"))
 
 
-def test_numbers_and_texts_may_have_a_step_for_everything_else() -> None:
+def test_numbers_and_texts_may_have_a_default_branch() -> None:
     document = branching("a", "b", "c", "d", "e")
     add(document, step("START", "a"))
     add(document, step("a", "b", "a/default/2", "3"))
@@ -137,14 +137,14 @@ def test_numbers_and_texts_may_have_a_step_for_everything_else() -> None:
         check_logic_item(document, meta_of, step("a", "d", key="a>d"))
 
 
-def test_a_truth_value_has_no_step_for_everything_else() -> None:
+def test_booleans_have_no_default_branch() -> None:
     document = branching("a", "b", "c")
     add(document, step("a", "b"))
     with pytest.raises(InvalidData, match="needs a condition"):
         check_logic_item(document, meta_of, step("a", "c", "a/default/0", "true"))
 
 
-def test_eighteen_diamonds_and_a_long_chain_are_checked_in_time() -> None:
+def test_complex_logic_is_checked_in_time() -> None:
     document = branching("s", *(f"{side}{n}" for n in range(18) for side in "lrj"))
     at = "s"
     for n in range(18):
@@ -261,7 +261,7 @@ def test_parameters_of_actions(types: RecordedTypes, parameter: tuple[str, str],
     assert found == [] if not reason else (len(found) == 1 and reason in found[0]), found
 
 
-def test_problems_cost_in_proportion(types: RecordedTypes) -> None:
+def test_checking_time_grows_linearly(types: RecordedTypes) -> None:
     """Parents in one chain and results linked from action to action: the worst for a check that looks round."""
 
     def chain(size: int) -> Project:
@@ -361,7 +361,7 @@ def encode(document: Document) -> list[Any]:
     return document.items()
 
 
-def test_a_turned_parent_turns_what_is_stated_below_it() -> None:
+def test_rotating_a_parent_rotates_its_children() -> None:
     turned = Pose(Position(1, 0, 0), Orientation.from_rotation_vector(0, 0, math.pi / 2))
     scene = Scene("s", id="scn", objects=[SceneObject("a", "T", turned, [], "obj_a")])
     points = [
@@ -378,7 +378,7 @@ def test_a_turned_parent_turns_what_is_stated_below_it() -> None:
     assert document.orientation("ori")[1].orientation.angle_to(turned.orientation.inverted()) < 1e-12
 
 
-def test_a_parent_that_hangs_below_is_refused() -> None:
+def test_a_descendant_as_parent_is_refused() -> None:
     points = [ActionPoint("p", Position(), id="a"), ActionPoint("q", Position(), "a", id="b")]
     document = Document.of(Scene("s", id="scn"), project(*points))
     for parent in ("a", "b"):

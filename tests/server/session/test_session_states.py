@@ -1,4 +1,4 @@
-"""What each editing request is refused for first, in the server states that the spec recorded."""
+"""The reason for which each editing request is refused first, in the recorded server states."""
 
 from typing import Any
 
@@ -83,13 +83,15 @@ def request(name: str) -> dict[str, Any]:
     return message | {"args": args}
 
 
-def test_these_are_all_of_them() -> None:
+def test_every_request_is_in_the_matrix() -> None:
     assert len(OURS) >= 55
     assert set(OURS) <= STATES["no_scene"].keys()
 
 
 @pytest.mark.parametrize("state", ["unregistered_no_scene", "no_scene", "scene_offline"])
-async def test_first_reason(desk: Desk, alice: Person, stranger: Person, state: str) -> None:
+async def test_requests_are_refused_for_the_recorded_reason(
+    desk: Desk, alice: Person, stranger: Person, state: str
+) -> None:
     if state == "scene_offline":
         await alice.ask("NewScene", name="scene")
     person = stranger if state.startswith("unregistered") else alice

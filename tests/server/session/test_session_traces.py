@@ -1,4 +1,4 @@
-"""Recorded sessions of the spec, played again: the same answers and events, in the same order, ids apart."""
+"""Recorded sessions played again: the same answers and events in the same order, except for ids."""
 
 import operator
 import re
@@ -131,7 +131,7 @@ def recorded_answer(name: str, number: int) -> Any:
     return next(m["msg"]["data"] for m in session(name) if m["msg"].get("id") == number and "data" in m["msg"])
 
 
-async def test_the_recorded_session_plays_the_same(desk: Desk, people: dict[str, Person]) -> None:
+async def test_the_recorded_session_gives_the_same_messages(desk: Desk, people: dict[str, Person]) -> None:
     """A scene is made, changed by a robot, gets a project that is edited off line and on line; all is deleted."""
     mapping, robot = Mapping(), "03_scene_online_robot"
     assert await play("02_scene", people, mapping) == 78

@@ -1,4 +1,4 @@
-"""Undo where others edit too: what is refused, whom it names, and the locks."""
+"""Undo while others edit: refusals, the users they name, and locks."""
 
 import asyncio
 
@@ -15,7 +15,7 @@ def work(alice: Person) -> Work:
     return Work(alice)
 
 
-async def test_only_ones_own_edits_are_taken_back(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_undo_reverts_only_own_edits(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
     await work.project("a", "b")
     a, b = work.point("a"), work.point("b")
     await make(alice, ("RenameActionPoint", {"action_point_id": a, "new_name": "a2"}, a, False), {})
@@ -37,7 +37,7 @@ async def test_only_ones_own_edits_are_taken_back(desk: Desk, alice: Person, bob
         await alice.ask("Undo", number=desk.session.revision - 3)
 
 
-async def test_refused_naming_who_changed_it_since(alice: Person, bob: Person, work: Work) -> None:
+async def test_undo_is_refused_naming_the_user_who_changed_it_since(alice: Person, bob: Person, work: Work) -> None:
     await work.project("p")
     p = work.point("p")
     await make(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": "q"}, p, False), {})
@@ -52,7 +52,7 @@ async def test_refused_naming_who_changed_it_since(alice: Person, bob: Person, w
     assert work.point("p") == p
 
 
-async def test_refused_where_others_build_on_it(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_undo_is_refused_when_others_use_the_item(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
     await work.project()
     builder = Work(bob)
     p = await work.add_point("p")
@@ -81,7 +81,9 @@ async def test_refused_where_others_build_on_it(desk: Desk, alice: Person, bob: 
     assert "bob" in await refused(alice, "Redo")
 
 
-async def test_refused_where_the_logic_would_not_hold(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_undo_is_refused_when_the_logic_would_be_invalid(
+    desk: Desk, alice: Person, bob: Person, work: Work
+) -> None:
     await work.project("p")
     p = work.point("p")
     a, b, c = [await work.add_action(p, name) for name in ("a", "b", "c")]
@@ -101,7 +103,7 @@ async def test_refused_where_the_logic_would_not_hold(desk: Desk, alice: Person,
     assert "bob" in await refused(alice)
 
 
-async def test_refused_while_others_hold_locks(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_undo_is_refused_while_others_hold_locks(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
     await work.project("p")
     p = work.point("p")
     below = await work.add_point("below", p)
@@ -131,9 +133,7 @@ async def test_refused_while_others_hold_locks(desk: Desk, alice: Person, bob: P
     assert desk.services.locks.locked_roots() == []
 
 
-async def test_locks_follow_what_goes_and_what_hangs_elsewhere(
-    desk: Desk, alice: Person, bob: Person, work: Work
-) -> None:
+async def test_locks_follow_removed_and_moved_items(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
     await work.project("a", "b")
     a, b = work.point("a"), work.point("b")
     await make(
@@ -153,7 +153,7 @@ async def test_locks_follow_what_goes_and_what_hangs_elsewhere(
     await alice.ask("SaveProject")
 
 
-async def test_two_undos_at_once_take_back_two_edits(desk: Desk, alice: Person, work: Work) -> None:
+async def test_two_simultaneous_undos_revert_two_edits(desk: Desk, alice: Person, work: Work) -> None:
     await work.project("p")
     p = work.point("p")
     for name in ("q", "r", "s"):
@@ -163,7 +163,7 @@ async def test_two_undos_at_once_take_back_two_edits(desk: Desk, alice: Person, 
     assert work.point("q") == p
 
 
-async def test_who_is_not_logged_in_is_refused(alice: Person, stranger: Person, work: Work) -> None:
+async def test_undo_needs_a_registered_user(alice: Person, stranger: Person, work: Work) -> None:
     with pytest.raises(Refused, match="open"):
         await alice.ask("Undo")
     await work.project("p")
@@ -173,7 +173,7 @@ async def test_who_is_not_logged_in_is_refused(alice: Person, stranger: Person, 
     assert (await stranger.ask("History"))["revision"] == 1
 
 
-async def test_taking_back_needs_the_role_of_the_edit(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_undo_needs_the_role_of_the_edit(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
     await work.project("p")
     await alice.ask("AddProjectParameter", name="x", type="double", value="0.5")
     (client,) = [client for client in desk.services.hub.clients if client.user == "alice"]

@@ -1,4 +1,4 @@
-"""The session over a real websocket: a server that is killed in the middle of edits, and what greets clients then."""
+"""The session over a real websocket: a server killed during edits, and the state that clients then receive."""
 
 import asyncio
 import signal
@@ -25,7 +25,7 @@ from tests.server.core.serving import ServerProcess, running
 EDITORS = 4
 
 
-async def test_kill_the_server_in_the_middle_of_edits(tmp_path: Path) -> None:
+async def test_acknowledged_edits_survive_a_kill_of_the_server(tmp_path: Path) -> None:
     data = tmp_path / "data"
     server = ServerProcess(data)
     await server.start()

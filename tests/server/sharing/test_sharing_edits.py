@@ -1,4 +1,4 @@
-"""What follows from edits: shared breakpoints that come and go, and the sentences for undo and redo."""
+"""Effects of edits on others: shared breakpoints, and the texts for undo and redo."""
 
 import asyncio
 from pathlib import Path
@@ -19,7 +19,7 @@ def work(alice: Person) -> Work:
 
 
 # ---------------------------------------------------------------------------------------------- shared breakpoints
-async def test_breakpoints_are_shared_and_told(alice: Person, bob: Person, stranger: Person, work: Work) -> None:
+async def test_breakpoints_are_shared_and_announced(alice: Person, bob: Person, stranger: Person, work: Work) -> None:
     project = await work.project("p")
     action = await work.add_action(work.point("p"), "wait")
     await subscribed(bob, "BreakpointsChanged")
@@ -45,7 +45,7 @@ async def test_breakpoints_are_shared_and_told(alice: Person, bob: Person, stran
         await alice.ask("GetBreakpoints", project_id="pro_none")
 
 
-async def test_there_are_not_too_many(monkeypatch: pytest.MonkeyPatch, alice: Person, work: Work) -> None:
+async def test_the_number_of_breakpoints_is_limited(monkeypatch: pytest.MonkeyPatch, alice: Person, work: Work) -> None:
     monkeypatch.setattr(breakpoints, "MOST", 2)
     await work.project("p", "q", "r")
     points = [work.point(name) for name in "pqr"]
@@ -55,9 +55,7 @@ async def test_there_are_not_too_many(monkeypatch: pytest.MonkeyPatch, alice: Pe
     await alice.ask("SetBreakpoints", add=points[2:], remove=points[:1])
 
 
-async def test_a_breakpoint_goes_with_what_it_is_on_and_undo_brings_it_back(
-    alice: Person, bob: Person, work: Work
-) -> None:
+async def test_a_breakpoint_is_removed_and_restored_with_its_action(alice: Person, bob: Person, work: Work) -> None:
     await work.project("p")
     action = await work.add_action(work.point("p"), "wait")
     await alice.ask("SetBreakpoints", add=[action])
@@ -72,7 +70,7 @@ async def test_a_breakpoint_goes_with_what_it_is_on_and_undo_brings_it_back(
     assert "BreakpointsChanged" not in bob.names()
 
 
-async def test_they_are_the_projects_whether_it_is_open_or_not(tmp_path: Path) -> None:
+async def test_breakpoints_belong_to_the_project(tmp_path: Path) -> None:
     async with open_desk(tmp_path) as desk:
         alice = await desk.person("alice")
         work = Work(alice)
@@ -98,7 +96,7 @@ async def test_they_are_the_projects_whether_it_is_open_or_not(tmp_path: Path) -
 
 
 # ---------------------------------------------------------------------------------------------- undo and redo
-async def test_each_is_told_what_he_could_undo(alice: Person, bob: Person, stranger: Person, work: Work) -> None:
+async def test_each_user_is_notified_of_possible_undo(alice: Person, bob: Person, stranger: Person, work: Work) -> None:
     await stranger.ask("SubscribeEvents", events=["HistoryChanged"])
     assert await came(stranger, "HistoryChanged") == {"revision": 0}
     await work.project()
@@ -176,7 +174,7 @@ SENTENCES = {
 }
 
 
-async def test_every_edit_is_called_what_it_is(desk: Desk, alice: Person, work: Work) -> None:
+async def test_every_edit_has_a_name(desk: Desk, alice: Person, work: Work) -> None:
     ids = await rich_project(work)
     ids["project"] = desk.session.require_project().id
     found = {}
@@ -198,7 +196,9 @@ async def test_every_edit_is_called_what_it_is(desk: Desk, alice: Person, work: 
     assert sentence(undo) == "moving the object robot"
 
 
-async def test_edits_in_a_row_are_told_after_their_answers_and_not_each(desk: Desk, alice: Person, work: Work) -> None:
+async def test_consecutive_edits_are_announced_together_after_the_answers(
+    desk: Desk, alice: Person, work: Work
+) -> None:
     await work.project()
     await subscribed(alice, "HistoryChanged")
     for number in range(50):

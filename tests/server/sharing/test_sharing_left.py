@@ -1,4 +1,4 @@
-"""Locks and open documents of users who left: who is told, who may take over, and what does not block a program."""
+"""Locks and open documents of users who left: events, takeover, and programs that may start."""
 
 import asyncio
 from pathlib import Path
@@ -104,7 +104,7 @@ async def test_a_user_who_returns_in_time_keeps_the_locks(desk: Desk, alice: Per
         ({"document": "@", "view": "3d"}, Role.OPERATOR, True),
     ],
 )
-async def test_who_has_a_project_open(
+async def test_users_of_an_open_project_are_listed(
     desk: Desk, alice: Person, bob: Person, presence: Any, role: Role, used: bool
 ) -> None:
     key = await Work(alice).project("p")
@@ -185,7 +185,7 @@ async def _refusal(person: Actor, request: str, **args: Any) -> str:
     return str(refused.value)
 
 
-async def test_a_restart_while_a_program_runs_in_place_of_a_project_opens_it(tmp_path: Path) -> None:
+async def test_a_restart_during_a_temporary_run_reopens_the_project(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice, olga = await stage.person("alice"), await at_the_machine(stage)
         key = await package(stage, alice)
@@ -200,7 +200,7 @@ async def test_a_restart_while_a_program_runs_in_place_of_a_project_opens_it(tmp
         assert stage.services.session.has_changes
 
 
-async def test_a_project_that_somebody_has_open_stays_open(tmp_path: Path) -> None:
+async def test_a_project_in_use_stays_open(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         alice, olga = await stage.person("alice"), await at_the_machine(stage)
         key = await package(stage, alice)

@@ -1,4 +1,4 @@
-"""Presence and previews: who is told what of whom, how often, and until when."""
+"""Presence and previews: recipients, rate and end."""
 
 import asyncio
 import time
@@ -16,7 +16,7 @@ POSE = {"position": {"x": 1.0, "y": 2.0, "z": 3.0}, "orientation": UPRIGHT}
 
 
 # ---------------------------------------------------------------------------------------------- presence
-async def test_people_come_look_and_leave(desk: Desk, alice: Person, stranger: Person) -> None:
+async def test_presence_of_users_is_announced(desk: Desk, alice: Person, stranger: Person) -> None:
     await stranger.ask("SubscribeEvents", events=["UserPresence"])
     assert (await came(stranger, "UserPresence")) == {"user": "alice", "online": True, "role": "programmer"}
     bob = await desk.person("bob")
@@ -43,7 +43,7 @@ async def test_people_come_look_and_leave(desk: Desk, alice: Person, stranger: P
     assert (await came(stranger, "UserPresence", lambda data: not data["online"]))["user"] == "carol"
 
 
-async def test_presence_needs_a_user_and_ends_somewhere(alice: Person, stranger: Person) -> None:
+async def test_presence_needs_a_user_and_is_limited(alice: Person, stranger: Person) -> None:
     with pytest.raises(Refused, match="RegisterUser"):
         await stranger.ask("UpdatePresence", view="3D")
     with pytest.raises(Refused, match="selected"):
@@ -52,7 +52,7 @@ async def test_presence_needs_a_user_and_ends_somewhere(alice: Person, stranger:
         await alice.ask("UpdatePresence", view="x" * 51)
 
 
-async def test_of_what_comes_fast_the_newest_is_told(
+async def test_fast_updates_are_reduced_to_the_newest(
     monkeypatch: pytest.MonkeyPatch, alice: Person, bob: Person
 ) -> None:
     await subscribed(bob, "UserPresence")
@@ -84,7 +84,7 @@ def is_over(data: Any) -> bool:
     return set(data) == {"id", "user"}
 
 
-async def test_a_drag_is_told_to_the_others_until_it_is_over(alice: Person, bob: Person, work: Work) -> None:
+async def test_a_drag_is_sent_to_others_until_it_ends(alice: Person, bob: Person, work: Work) -> None:
     point = work.point("p")
     await subscribed(bob, "MovePreview")
     await subscribed(alice, "MovePreview")
@@ -104,9 +104,7 @@ async def test_a_drag_is_told_to_the_others_until_it_is_over(alice: Person, bob:
     assert (await alice.ask("History"))["revision"] == work.session.revision
 
 
-async def test_it_is_over_when_the_lock_is_given_back_or_its_holder_is_gone(
-    desk: Desk, alice: Person, bob: Person, work: Work
-) -> None:
+async def test_a_drag_ends_with_its_lock_or_its_user(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
     point = work.point("p")
     await subscribed(bob, "MovePreview")
     await alice.lock(point, tree=True)
@@ -124,7 +122,7 @@ async def test_it_is_over_when_the_lock_is_given_back_or_its_holder_is_gone(
     assert desk.services.previews._dragged == {}
 
 
-async def test_who_may_not_drag_and_what(desk: Desk, alice: Person, bob: Person, stranger: Person, work: Work) -> None:
+async def test_invalid_drags_are_refused(desk: Desk, alice: Person, bob: Person, stranger: Person, work: Work) -> None:
     point, robot = work.point("p"), work.object("robot")
     orientation = work.session.require_project().action_points[0].orientations[0].id
     await alice.lock(point)
@@ -145,7 +143,7 @@ async def test_who_may_not_drag_and_what(desk: Desk, alice: Person, bob: Person,
         await drag(alice, robot, 1.0)
 
 
-async def test_a_fast_drag_is_told_at_most_thirty_times_a_second(alice: Person, bob: Person, work: Work) -> None:
+async def test_a_fast_drag_is_sent_at_most_thirty_times_a_second(alice: Person, bob: Person, work: Work) -> None:
     point = work.point("p")
     await subscribed(bob, "MovePreview")
     await alice.lock(point)
@@ -162,7 +160,7 @@ async def test_a_fast_drag_is_told_at_most_thirty_times_a_second(alice: Person, 
     await asyncio.sleep(0)
 
 
-async def test_nobody_who_did_not_subscribe_meets_any_of_it(alice: Person, bob: Person, work: Work) -> None:
+async def test_clients_without_subscription_receive_nothing(alice: Person, bob: Person, work: Work) -> None:
     point = work.point("p")
     await alice.lock(point, tree=True)
     bob.take()

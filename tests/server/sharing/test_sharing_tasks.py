@@ -1,4 +1,4 @@
-"""Tasks as clients follow them, on a whole server without its socket; what is in the way while it is disabled."""
+"""Tasks as clients follow them, on a whole server without its socket; obstacles while an object is disabled."""
 
 import asyncio
 from pathlib import Path
@@ -45,7 +45,7 @@ async def test_a_scene_is_started_and_stopped(tmp_path: Path) -> None:
         assert stage.services.tasks.running_events() == []
 
 
-async def test_a_scene_that_does_not_come_up(tmp_path: Path) -> None:
+async def test_a_failed_scene_start_is_a_failed_task(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Eye", "BlindEye") as stage:
         alice = await stage.person("alice")
         await stage.place(alice, eye="BlindEye")
@@ -62,7 +62,7 @@ async def test_a_scene_that_does_not_come_up(tmp_path: Path) -> None:
         await happens(alice, "SceneState", state="stopped")
 
 
-async def test_building_and_what_goes_wrong(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_build_is_a_task_that_can_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     async with open_stage(tmp_path) as stage:
         alice = await stage.person("alice")
         await project(stage, alice)
@@ -90,7 +90,7 @@ async def test_building_and_what_goes_wrong(tmp_path: Path, monkeypatch: pytest.
         assert stage.services.tasks.running_events() == []
 
 
-async def test_a_task_is_told_at_a_bounded_rate_and_its_end_always() -> None:
+async def test_task_progress_is_throttled_except_its_end() -> None:
     sent: list[bytes] = []
     hub = Hub()
     hub.stream_to_subscribers = lambda name, key, message, besides=None: sent.append(message)  # type: ignore[method-assign, assignment]
@@ -118,7 +118,7 @@ async def test_a_task_is_told_at_a_bounded_rate_and_its_end_always() -> None:
     board.close()
 
 
-async def test_a_disabled_object_is_not_in_the_way(tmp_path: Path) -> None:
+async def test_a_disabled_object_is_no_obstacle(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Part", "Plain") as stage:
         alice = await stage.person("alice")
         await stage.place(alice, part="Part", plain="Plain")

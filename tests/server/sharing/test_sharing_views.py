@@ -1,4 +1,4 @@
-"""The view state: whose it is, what of it is told to whom, what is refused, what outlives the server."""
+"""View states: owners, events, refusals, and what survives a restart."""
 
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ async def view(person: Person, scope: str = "user", **more: Any) -> Any:
     return await person.ask("GetViewState", scope=scope, **more)
 
 
-async def test_values_are_kept_by_user_document_and_key(alice: Person, bob: Person) -> None:
+async def test_view_states_are_stored_by_user_document_and_key(alice: Person, bob: Person) -> None:
     first = await alice.ask("SetViewState", scope="user", values={"stars": ["scn_1"], "opacity": {"obj_1": 0.5}})
     second = await alice.ask("SetViewState", scope="user", document="pro_1", values={"stars": 1})
     assert second["revision"] > first["revision"]
@@ -30,7 +30,7 @@ async def test_values_are_kept_by_user_document_and_key(alice: Person, bob: Pers
     assert (await view(bob, "shared"))["values"] == {}
 
 
-async def test_who_is_told(desk: Desk, alice: Person, bob: Person, stranger: Person) -> None:
+async def test_shared_view_states_are_announced(desk: Desk, alice: Person, bob: Person, stranger: Person) -> None:
     screen = await subscribed(stranger, "ViewStateChanged", users=["alice"])
     for person in (alice, bob):
         await subscribed(person, "ViewStateChanged")
@@ -53,7 +53,9 @@ async def test_who_is_told(desk: Desk, alice: Person, bob: Person, stranger: Per
     assert screen.events() == bob.events() == []
 
 
-async def test_what_is_refused(monkeypatch: pytest.MonkeyPatch, alice: Person, stranger: Person) -> None:
+async def test_invalid_view_states_are_refused(
+    monkeypatch: pytest.MonkeyPatch, alice: Person, stranger: Person
+) -> None:
     with pytest.raises(Refused, match="RegisterUser"):
         await stranger.ask("SetViewState", scope="user", values={"a": 1})
     with pytest.raises(Refused, match="RegisterUser"):
@@ -80,7 +82,7 @@ async def test_what_is_refused(monkeypatch: pytest.MonkeyPatch, alice: Person, s
     assert (await view(alice))["values"] == {"b": 2, "c": 3, "d": 4}
 
 
-async def test_an_operator_keeps_a_view_of_his_own_but_changes_none_of_all(alice: Person, desk: Desk) -> None:
+async def test_an_operator_changes_only_own_view_states(alice: Person, desk: Desk) -> None:
     client = desk.services.users.client_of("alice")
     assert client is not None
     client.role = Role.OPERATOR
@@ -100,7 +102,7 @@ async def test_only_the_newest_documents_are_kept(monkeypatch: pytest.MonkeyPatc
     assert kept == [{"a": 0, "b": 1}, {}, {"a": 2}, {"a": 3}]
 
 
-async def test_it_outlives_the_server_and_goes_with_its_document(tmp_path: Path) -> None:
+async def test_view_states_survive_a_restart_and_end_with_their_document(tmp_path: Path) -> None:
     async with open_desk(tmp_path) as desk:
         alice = await desk.person("alice")
         project = await Work(alice).project("p")
