@@ -47,7 +47,7 @@ from arcor2_server.storage.secret_store import SecretStore
 from arcor2_server.storage.setting_secrets import SettingSecrets
 from arcor2_server.storage.shared_data import SharedData
 from arcor2_server.websocket.hub import Hub
-from arcor2_server.workspace.calibration import Calibration, CalibrationService, RunningCalibrations
+from arcor2_server.workspace.calibration import Calibration, RunningCalibrations
 from arcor2_server.workspace.display_models import DisplayModels
 from arcor2_server.workspace.host_world import HostWorld
 from arcor2_server.workspace.kinematics import Kinematics
@@ -240,7 +240,7 @@ async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
             view_states=view_states,
             presence=presence,
             markers=markers,
-            calibration=CalibrationService(compute, markers),
+            calibration=Calibration(compute, markers),
             calibration_records=Calibrations(storage),
             running_calibrations=RunningCalibrations(),
             object_aiming=ObjectAimings(),

@@ -3,16 +3,8 @@
 from msgspec.structs import replace
 
 from arcor2_hw.data.events import Event, OpenProjectData, OpenSceneData, SceneStateData, SceneStateEnum
-from arcor2_hw.data.project import (
-    Action,
-    BareActionPoint,
-    BareProject,
-    NamedOrientation,
-    Project,
-    ProjectParameter,
-    ProjectRobotJoints,
-)
-from arcor2_hw.data.scene import BareScene, Scene, SceneObject
+from arcor2_hw.data.project import BareProject, Project
+from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.journal_records import Times
@@ -138,30 +130,6 @@ class OpenDocument:
         self._project = None
 
     # ------------------------------------------------------------------------------------------ look-ups
-    def scene_object(self, object_id: str) -> SceneObject:
-        """Return an object of the scene. Raise NotFound if there is none."""
-        return self.document.scene_object(object_id)
-
-    def action_point(self, action_point_id: str) -> BareActionPoint:
-        """Give an action point without its lists; NotFound."""
-        return self.document.action_point(action_point_id)
-
-    def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
-        """Give an orientation with its action point; NotFound."""
-        return self.document.orientation(orientation_id)
-
-    def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
-        """Return joints with their action point. Raise NotFound if there is none."""
-        return self.document.joints(joints_id)
-
-    def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
-        """Give an action with its action point; NotFound."""
-        return self.document.action(action_id)
-
-    def parameter(self, parameter_id: str) -> ProjectParameter:
-        """Return a project parameter. Raise NotFound if there is none."""
-        return self.document.parameter(parameter_id)
-
     def root_of(self, item: str) -> str:
         """Return the root of the lock tree that an id belongs to. Raise NotFound if there is none."""
         return self.document.root_of(item)

@@ -22,7 +22,7 @@ class Cameras:
 
     def require_camera(self, object_id: str) -> SceneObject:
         """Return a camera of the open scene. Raise NotFound or RequestRefused if there is none."""
-        found = self._session.scene_object(object_id)
+        found = self._session.document.scene_object(object_id)
         if not self._types.derives_from(found.type, "Camera"):
             raise RequestRefused("{name} is not a camera.", name=found.name)
         return found

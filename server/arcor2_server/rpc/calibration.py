@@ -308,6 +308,6 @@ class CalibrationRequests:
         """Set the pose of an object and of its live instance, and publish the change."""
         session = self._session
         await self._online.object_pose_changed(object_id, pose)
-        obj = replace(session.scene_object(object_id), pose=pose)
+        obj = replace(session.document.scene_object(object_id), pose=pose)
         await session.commit(user, [session.document.update(Kind.OBJECT, object_id, obj)])
         self._hub.broadcast(make_event("SceneObjectChanged", obj, ChangeType.UPDATE))

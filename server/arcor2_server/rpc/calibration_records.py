@@ -43,7 +43,7 @@ class CalibrationRecordRequests:
                 "The calibration is stated in the frame of {parent}: give a pose in that.", parent=record.parent
             )
         self._session.require_scene_open()
-        found = self._session.scene_object(record.object_id)
+        found = self._session.document.scene_object(record.object_id)
         if isinstance(found.pose, Unset):
             raise RequestRefused("{name} has no pose.", name=found.name)
         return found.pose

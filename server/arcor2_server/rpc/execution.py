@@ -81,17 +81,17 @@ class ExecutionRequests:
         session, cell = self._session, self._online
         session.require_project_open()
         async with self._locks.auto(context.user, ACTION):
-            action = session.action(args.action_id)[1]
+            action = session.document.action(args.action_id)[1]
             cell.require_online()
             if cell.running_action is not None:
-                name = session.action(cell.running_action.action_id)[1].name
+                name = session.document.action(cell.running_action.action_id)[1].name
                 raise RequestRefused("The action {name} is running.", name=name)
             object_id, _, method = action.type.partition("/")
-            obj = session.scene_object(object_id)
+            obj = session.document.scene_object(object_id)
             cell.board.require_not_failed(object_id)
             if object_id in cell.moving:
                 raise RequestRefused("{name} is moving.", name=obj.name)
-            prepared = prepare(action, self._types.action(obj.type, method), session, cell.results)
+            prepared = prepare(action, self._types.action(obj.type, method), session.document, cell.results)
             if context.dry_run:
                 return
             running = cell.running_action = RunningAction(action.id, object_id, method, context.received_at)
@@ -105,7 +105,7 @@ class ExecutionRequests:
         running = self._online.running_action
         if running is None:
             raise RequestRefused("No action is running.")
-        obj = self._session.scene_object(running.object_id)
+        obj = self._session.document.scene_object(running.object_id)
         if not self._types.action(obj.type, running.method).meta.cancellable:
             raise RequestRefused(
                 "{name}.{method} cannot be cancelled. StopAll stops its device.", name=obj.name, method=running.method

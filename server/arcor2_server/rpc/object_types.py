@@ -221,7 +221,7 @@ class ObjectTypeRequests:
         self._session.require_scene_open()
         async with self._locks.read(context.user, args.id):
             self._online.require_online()
-            obj = self._session.scene_object(args.id)
+            obj = self._session.document.scene_object(args.id)
             dynamic: dict[str, tuple[str, set[str]]] = await self._online.ask(
                 dict[str, tuple[str, set[str]]], obj.id, "DYNAMIC_PARAMS"
             )

@@ -148,7 +148,7 @@ class OperationRequests:
         if not isinstance(args.pose, Unset):
             return args.pose.orientation
         assert not isinstance(args.object_id, Unset)
-        found = self._session.scene_object(args.object_id)
+        found = self._session.document.scene_object(args.object_id)
         if isinstance(found.pose, Unset):
             raise RequestRefused("{name} has no pose.", name=found.name)
         return found.pose.orientation
@@ -188,7 +188,7 @@ class OperationRequests:
         """Create and connect a failed object again; answer when that is done."""
         self._session.require_scene_open()
         self._online.require_online()
-        self._session.scene_object(args.object_id)
+        self._session.document.scene_object(args.object_id)
         await self._online.retry(args.object_id)
 
     @rpc("AcknowledgeStop")
@@ -198,7 +198,7 @@ class OperationRequests:
         cell, session = self._online, self._session
         session.require_scene_open()
         cell.require_online()
-        found = session.scene_object(args.object_id)
+        found = session.document.scene_object(args.object_id)
         cell.board.require_not_failed(args.object_id)
         if not isinstance(args.code, Unset):
             await cell.call(args.object_id, "acknowledge", {"code": args.code}, deadline=ACKNOWLEDGED_WITHIN)

@@ -195,7 +195,7 @@ class RobotMotionRequests:
 
     async def _to_joints(self, context: Context, args: MoveToActionPointArgs, joints_id: str) -> None:
         arm_id = optional(args.arm_id)
-        joints = self._session.joints(joints_id)[1]
+        joints = self._session.document.joints(joints_id)[1]
         if joints.robot_id != args.robot_id:
             raise RequestRefused("The joints {name} belong to another robot.", name=joints.name)
         await self._motion.require_ready(args.robot_id, "move_to_joints", arm_id)
@@ -213,11 +213,11 @@ class RobotMotionRequests:
         arm_id, end_effector = optional(args.arm_id), args.end_effector_id
         if isinstance(end_effector, Unset):
             raise RequestRefused("Name the end effector that shall move there.")
-        point, named = self._session.orientation(orientation_id)
+        point, named = self._session.document.orientation(orientation_id)
         await self._motion.require_ready(args.robot_id, "move_to_pose", arm_id)
         arguments: dict[str, Any] = {
             "end_effector_id": end_effector,
-            "target_pose": global_pose(self._session, point, named.orientation),
+            "target_pose": global_pose(self._session.document, point, named.orientation),
             "speed": args.speed,
             "safe": args.safe,
             "linear": args.linear,

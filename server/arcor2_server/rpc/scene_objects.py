@@ -200,7 +200,7 @@ class SceneObjectRequests:
         # First where it may fail: a refused request must not leave an edit behind that nobody was told of.
         if not context.dry_run and self._online.online:
             await self._online.object_pose_changed(obj.id, pose)
-        obj = self._session.scene_object(obj.id)
+        obj = self._session.document.scene_object(obj.id)
         await self._update(context, replace(obj, pose=pose))
 
     @rpc("UpdateObjectPoseUsingRobot")

@@ -20,6 +20,8 @@ from arcor2_server.storage.setting_secrets import SettingSecrets
 _encode = msgspec.json.Encoder().encode
 _decode_scene = msgspec.json.Decoder(Scene).decode
 _decode_project = msgspec.json.Decoder(Project).decode
+_SCENE_COLUMNS: Final = [name for name in BareScene.__struct_fields__ if name != "int_modified"]
+_PROJECT_COLUMNS: Final = [name for name in BareProject.__struct_fields__ if name != "int_modified"]
 _MODEL_DECODERS: Final = {kind.__name__: msgspec.json.Decoder(kind).decode for kind in (Box, Cylinder, Sphere, Mesh)}
 
 
@@ -43,7 +45,7 @@ class Storage(Database):
     # ------------------------------------------------------------------------------------------------ scenes
     async def scenes(self) -> list[BareScene]:
         """Return all saved scenes without their objects, by name."""
-        columns = (SceneRow.name, SceneRow.description, SceneRow.created, SceneRow.modified, SceneRow.id)
+        columns = [getattr(SceneRow, name) for name in _SCENE_COLUMNS]
         async with self.reading() as session:
             rows = await session.execute(select(*columns).order_by(SceneRow.name))
             return [BareScene(**row) for row in rows.mappings()]
@@ -69,16 +71,8 @@ class Storage(Database):
             if self.secrets is not None:
                 before = None if row is None else self.decoded(_decode_scene, row)
                 saved = await self.secrets.extract_from_scene(saved, before)
-            await session.merge(
-                SceneRow(
-                    id=saved.id,
-                    name=saved.name,
-                    description=saved.description,
-                    created=saved.created,
-                    modified=saved.modified,
-                    document=_encode(saved),
-                )
-            )
+            columns = {name: getattr(saved, name) for name in _SCENE_COLUMNS}
+            await session.merge(SceneRow(document=_encode(saved), **columns))
         return saved
 
     async def delete_scene(self, key: str) -> None:
@@ -91,15 +85,7 @@ class Storage(Database):
     # ------------------------------------------------------------------------------------------------ projects
     async def projects(self) -> list[BareProject]:
         """Return all saved projects without their content, by name."""
-        columns = (
-            ProjectRow.name,
-            ProjectRow.scene_id,
-            ProjectRow.description,
-            ProjectRow.has_logic,
-            ProjectRow.created,
-            ProjectRow.modified,
-            ProjectRow.id,
-        )
+        columns = [getattr(ProjectRow, name) for name in _PROJECT_COLUMNS]
         async with self.reading() as session:
             rows = await session.execute(select(*columns).order_by(ProjectRow.name))
             return [BareProject(**row) for row in rows.mappings()]
@@ -126,18 +112,8 @@ class Storage(Database):
             if self.secrets is not None and saved.object_overrides:
                 before = None if row is None else self.decoded(_decode_project, row)
                 saved = await self.secrets.extract_from_project(saved, self.decoded(_decode_scene, scene), before)
-            await session.merge(
-                ProjectRow(
-                    id=saved.id,
-                    scene_id=saved.scene_id,
-                    name=saved.name,
-                    description=saved.description,
-                    has_logic=saved.has_logic,
-                    created=saved.created,
-                    modified=saved.modified,
-                    document=_encode(saved),
-                )
-            )
+            columns = {name: getattr(saved, name) for name in _PROJECT_COLUMNS}
+            await session.merge(ProjectRow(document=_encode(saved), **columns))
         return saved
 
     async def delete_project(self, key: str) -> None:

@@ -1,7 +1,5 @@
 """Calibration of cameras and robots from pictures, computed by the compute worker."""
 
-from typing import Protocol
-
 from msgspec.structs import replace
 
 from arcor2_hw.calibration.camera_results import CameraPose
@@ -31,37 +29,12 @@ class RobotView(Data, frozen=True):
     camera_parameters: CameraParameters
 
 
-class Calibration(Protocol):
-    """Computes poses from picture files. `on_progress` is called with the progress.
+class Calibration:
+    """Computes poses from picture files in the compute worker, with the configured markers.
 
-    Methods raise InvalidData for a file that is not a picture, CalibrationRefused if the pictures do not determine a
-    pose, NotInstalled, ComputeStopped and ComputeTimeout.
+    `on_progress` is called with the progress. Methods raise InvalidData for a file that is not a picture,
+    CalibrationRefused if the pictures do not determine a pose, NotInstalled, ComputeStopped and ComputeTimeout.
     """
-
-    async def camera(
-        self,
-        parameters: CameraParameters,
-        pictures: list[bytes],
-        *,
-        expected: Pose | None = None,
-        on_progress: ProgressCallback | None = None,
-    ) -> CameraPose:
-        """Return the pose of a camera that sees the configured markers.
-
-        `expected` is its approximate pose, used only if the markers alone allow two solutions.
-        """
-
-    async def markers(self, parameters: CameraParameters, picture: bytes) -> list[MarkerCorners]:
-        """Return the corners of every marker in the picture."""
-
-    async def robot(
-        self, model: RobotSource, view: RobotView, depth: list[bytes], *, on_progress: ProgressCallback | None = None
-    ) -> RobotPose:
-        """Return the pose of a robot in the world, from depth pictures (16 bit, mm)."""
-
-
-class CalibrationService:
-    """Computes poses in the compute worker, with the configured markers."""
 
     def __init__(self, compute: Compute, markers: Markers) -> None:
         self._compute = compute
@@ -75,7 +48,10 @@ class CalibrationService:
         expected: Pose | None = None,
         on_progress: ProgressCallback | None = None,
     ) -> CameraPose:
-        """Return the pose of a camera."""
+        """Return the pose of a camera that sees the configured markers.
+
+        `expected` is its approximate pose, used only if the markers alone allow two solutions.
+        """
         configuration = self._markers.configuration
         if not configuration.markers and not configuration.boards:
             raise CalibrationRefused(
@@ -102,7 +78,7 @@ class CalibrationService:
     async def robot(
         self, model: RobotSource, view: RobotView, depth: list[bytes], *, on_progress: ProgressCallback | None = None
     ) -> RobotPose:
-        """Return the pose of a robot in the world."""
+        """Return the pose of a robot in the world, from depth pictures (16 bit, mm)."""
         placed = replace(model, base=view.robot_pose)
         task = FindRobotPose(placed, view.robot_joints, depth, view.camera_parameters, view.camera_pose)
         return await self._compute.run(task, on_progress=on_progress)

@@ -277,8 +277,8 @@ class ReachabilityBoard:
         for point in project.action_points if project is not None else ():
             for orientation in point.orientations:
                 try:
-                    bare, named = session.orientation(orientation.id)
-                    found[orientation.id] = global_pose(session, bare, named.orientation)
+                    bare, named = session.document.orientation(orientation.id)
+                    found[orientation.id] = global_pose(session.document, bare, named.orientation)
                 except NotFound:
                     continue  # removed meanwhile
                 if len(found) % BATCH_SIZE == 0:

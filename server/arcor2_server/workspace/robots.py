@@ -41,7 +41,7 @@ class SceneRobots:
     # -------------------------------------------------------------------------------- in the scene
     def robot(self, robot_id: str) -> SceneObject:
         """Return the scene object of a robot. Raise NotFound, or RequestRefused if the object is not a robot."""
-        found = self._session.scene_object(robot_id)
+        found = self._session.document.scene_object(robot_id)
         if not self._types.derives_from(found.type, "Robot"):
             raise RequestRefused("{name} is not a robot.", name=found.name)
         return found

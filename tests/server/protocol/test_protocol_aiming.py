@@ -133,9 +133,9 @@ async def test_an_object_is_aimed_by_its_focus_points(tmp_path: Path) -> None:
                 {*done, index}
             )
             done.append(index)
-        before = stage.services.session.scene_object(part).pose
+        before = stage.services.session.document.scene_object(part).pose
         await alice.ask("ObjectAimingDone", dry_run=True)
-        assert stage.services.session.scene_object(part).pose == before
+        assert stage.services.session.document.scene_object(part).pose == before
         assert bob.names() == []
         await alice.ask("ObjectAimingDone")
         assert [message.get("event") or message["response"] for message in alice.take()][-2:] == [

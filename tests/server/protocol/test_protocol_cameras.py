@@ -213,7 +213,7 @@ async def test_a_camera_pose_is_set_from_its_picture(tmp_path: Path) -> None:
         assert len(images) == 3
         assert all(image.startswith(b"\xff\xd8") for image in images)
         assert expected == Pose(), "where it was placed"
-        placed = stage.services.session.scene_object(eye)
+        placed = stage.services.session.document.scene_object(eye)
         assert placed.pose == FOUND
         raw = await stage.services.online.ask(Pose, eye, "pose")
         assert raw == FOUND, "the live camera has moved too"
@@ -251,7 +251,7 @@ async def test_a_camera_without_visible_markers_keeps_its_pose(tmp_path: Path) -
         await alice.ask("CalibrateCamera", id=stage.ids["eye"])
         failed = await happens(alice, "ProcessState", state="failed")
         assert alice.names() == ["ProcessState", "ProcessState"], "nothing was moved"
-        assert stage.services.session.scene_object(stage.ids["eye"]).pose == Pose()
+        assert stage.services.session.document.scene_object(stage.ids["eye"]).pose == Pose()
         assert await stage.services.calibration_records.find() == []
 
 
@@ -300,7 +300,7 @@ async def test_a_robot_pose_is_set_from_a_camera(tmp_path: Path) -> None:
         assert view.robot_pose == Pose()
         picture = Image.open(io.BytesIO(depth))
         assert (picture.format, picture.mode, picture.getpixel((3, 3))) == ("PNG", "I;16", 1500)
-        assert stage.services.session.scene_object(arm).pose == FOUND
+        assert stage.services.session.document.scene_object(arm).pose == FOUND
         (record,) = await stage.services.calibration_records.find(object_id=arm)
         assert (record.kind, record.person, record.after) == (CalibrationKind.ROBOT_POSE, "alice", FOUND)
         assert record.parameters["camera_id"] == eye

@@ -125,7 +125,7 @@ async def test_reachability_is_announced_and_follows_edits(tmp_path: Path) -> No
 
 
 async def _joints(stage: Stage) -> list[Any]:
-    model = stage.services.robot_models.require(stage.services.session.scene_object(stage.ids["ur"]), "")
+    model = stage.services.robot_models.require(stage.services.session.document.scene_object(stage.ids["ur"]), "")
     return (await stage.services.compute.run(DescribeRobot(model))).joints
 
 

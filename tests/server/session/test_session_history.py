@@ -123,7 +123,7 @@ async def test_undo_while_online_moves_the_live_object_but_no_robot(desk: Desk, 
     assert desk.cell.moved == []
     await alice.ask("Undo", number=number)
     assert [obj for obj, _ in desk.cell.moved] == [scale]
-    assert desk.session.scene_object(scale).pose == desk.cell.moved[0][1]
+    assert desk.session.document.scene_object(scale).pose == desk.cell.moved[0][1]
     with pytest.raises(Refused, match="robot"):
         await alice.ask("Undo", number=number - 1)
     desk.cell.state = SceneStateEnum.STOPPED

@@ -202,7 +202,7 @@ async def test_a_scene_has_a_history_of_its_own(desk: Desk, alice: Person, work:
     await alice.ask("CloseScene")
     await alice.ask("OpenProject", id=project)
     assert [edit["request"] for edit in (await alice.ask("History"))["edits"]] == ["AddActionPoint"]
-    assert desk.session.scene_object(scale).pose.position == Position(9, 9, 9)
+    assert desk.session.document.scene_object(scale).pose.position == Position(9, 9, 9)
     await alice.ask("Undo")
     await alice.ask("CloseProject", force=True)
     await alice.ask("OpenScene", id=scene)

@@ -100,7 +100,7 @@ async def test_a_drag_is_sent_to_others_until_it_ends(alice: Person, bob: Person
     await alice.ask("PreviewMove", id=point)
     await came(bob, "MovePreview", is_over)
     assert "MovePreview" not in alice.names()
-    assert work.session.action_point(point).position.x == 0.5
+    assert work.session.document.action_point(point).position.x == 0.5
     assert (await alice.ask("History"))["revision"] == work.session.revision
 
 
