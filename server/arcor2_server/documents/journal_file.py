@@ -180,18 +180,12 @@ class JournalFile:
             ensure_private(self._path)
             self._connection = _connect(self._path)
             return _recover(self._connection)
-        except sqlite3.OperationalError as error:
+        except BaseException as error:
             self.close()
             if not _is_damage(error, self._path):
                 raise
-            reason = str(error)
-        except (sqlite3.DatabaseError, msgspec.DecodeError, ValueError, JournalDamaged) as error:
-            self.close()
-            reason = str(error)
-        except BaseException:
-            self.close()
-            raise
-        return JournalContent(damage=reason, lost="Unsaved changes of the scene or project that was open are lost.")
+            lost = "Unsaved changes of the scene or project that was open are lost."
+            return JournalContent(damage=str(error), lost=lost)
 
     def _write_new_file(self, content: JournalContent) -> Path:
         """Write the intact content into a new file next to the damaged one."""
@@ -262,7 +256,9 @@ _DAMAGE: Final = frozenset({sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlit
 """SQLite's codes of a damaged file. Other errors (permissions, full disk, locked file) are reported to the operator."""
 
 
-def _is_damage(error: sqlite3.Error, path: Path) -> bool:
+def _is_damage(error: BaseException, path: Path) -> bool:
+    if not isinstance(error, sqlite3.OperationalError):
+        return isinstance(error, (sqlite3.DatabaseError, msgspec.DecodeError, ValueError, JournalDamaged))
     code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
     if code in (sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN):
         # Bytes 18 and 19 are the file format versions for writing and reading: 2 with a write-ahead log.

@@ -12,13 +12,8 @@ from arcor2_server.compute.workers import Compute
 from arcor2_server.hosts.session import HostSession
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.workspace.robot_models import RobotModels
-from arcor2_server.workspace.robots import SceneRobots
+from arcor2_server.workspace.robots import SceneRobots, end_effector_link
 from arcor2_server.workspace.scene_collisions import SceneCollisions
-
-
-def _end_effector(name: str, arm_id: str | Unset) -> str:
-    """Return the link of an end effector, which in the model of a multi-arm robot starts with the arm's name."""
-    return name if isinstance(arm_id, Unset) else f"{arm_id}_{name}"
 
 
 class Kinematics:
@@ -58,7 +53,7 @@ class Kinematics:
         start = None if isinstance(args.start_joints, Unset) else args.start_joints
         if start is None:
             start = await self._robots.present_joints(robot) or None
-        effector = _end_effector(args.end_effector_id, args.arm_id)
+        effector = end_effector_link(args.end_effector_id, args.arm_id)
         task = SolveInverse(robot.id, effector, args.pose, start, args.avoid_collisions)
         if not args.avoid_collisions:
             return await self._compute.run(task, world={robot.id: WorldRobot(robot.id, model)})
@@ -76,5 +71,5 @@ class Kinematics:
     async def forward(self, robot: SceneObject, args: ForwardKinematicsArgs) -> Pose:
         """Return the pose for joints. Raise RequestRefused without a model, InvalidData for wrong joints."""
         model = self._robot_models.require(robot, "to compute forward kinematics")
-        task = SolveForward(model, _end_effector(args.end_effector_id, args.arm_id), args.joints)
+        task = SolveForward(model, end_effector_link(args.end_effector_id, args.arm_id), args.joints)
         return await self._compute.run(task)

@@ -26,7 +26,7 @@ from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.workspace.obstacles import ObstacleRegistry
 from arcor2_server.workspace.robot_calibrations import RobotCalibrations
 from arcor2_server.workspace.robot_models import RobotModels
-from arcor2_server.workspace.robots import SceneRobots
+from arcor2_server.workspace.robots import SceneRobots, end_effector_link
 from arcor2_server.workspace.scene_collisions import SceneCollisions
 from arcor2_server.workspace.stopped_robots import PERIOD, StoppedRobots
 
@@ -319,7 +319,7 @@ class ReachabilityBoard:
 
     async def _judge(self, row: _Row, targets: list[Any]) -> list[Judged]:
         """Compute the reachability of poses or joints in the worker."""
-        effector = row.end_effector if isinstance(row.arm, Unset) else f"{row.arm}_{row.end_effector}"
+        effector = end_effector_link(row.end_effector, row.arm)
         joints = isinstance(targets[0], list)
         task = JudgeJoints(row.robot, targets) if joints else JudgePoses(row.robot, effector, targets)
         run, place = self._compute.run, f"reach of {row.robot}"

@@ -26,6 +26,11 @@ def optional(value: str | Unset) -> str | None:
     return None if isinstance(value, Unset) else value
 
 
+def end_effector_link(name: str, arm_id: str | Unset) -> str:
+    """Return the link of an end effector, which in the model of a multi-arm robot starts with the arm's name."""
+    return name if isinstance(arm_id, Unset) else f"{arm_id}_{name}"
+
+
 class SceneRobots:
     """The robots of the open scene."""
 

@@ -109,15 +109,8 @@ class SceneCollisions:
         return dict(self._of_online_scene()) | self._collisions.obstacles
 
     def _of_online_scene(self) -> Iterator[tuple[str, Obstacle]]:
-        scene = self._session.scene
-        if scene is not None and self._scene_host.online:
-            board = self._scene_host.board
-            obstacles = [
-                (obj.id, obj.name, Obstacle.of(model.model(), obj.pose))
-                for obj in scene.objects
-                if not isinstance(model := self._types.meta(obj.type).object_model, Unset)
-                and not isinstance(obj.pose, Unset)
-            ]
+        if self._session.scene is not None and self._scene_host.online:
+            board, obstacles = self._scene_host.board, self._of_open_scene()
         elif (encoded := self._program_host.package_info) is not None:
             board, obstacles = self._program_host.board, list(_of_program(encoded))
         else:
@@ -133,13 +126,20 @@ class SceneCollisions:
     def obstacles(self) -> dict[str, Obstacle]:
         """Return the collision models of the open scene, online or not, and those added over REST."""
         found = self.online_obstacles()
-        scene = self._session.scene
-        if scene is not None and not self._scene_host.online:
-            for obj in scene.objects:
-                model = self._types.meta(obj.type).object_model
-                if not isinstance(model, Unset) and not isinstance(obj.pose, Unset) and obj.id not in found:
-                    found[obj.id] = Obstacle.of(model.model(), obj.pose)
+        if not self._scene_host.online:
+            for key, _, obstacle in self._of_open_scene():
+                found.setdefault(key, obstacle)
         return found
+
+    def _of_open_scene(self) -> list[tuple[str, str, Obstacle]]:
+        """Return id, name and collision model of the objects of the open scene."""
+        scene = self._session.scene
+        return [
+            (obj.id, obj.name, Obstacle.of(model.model(), obj.pose))
+            for obj in (() if scene is None else scene.objects)
+            if not isinstance(model := self._types.meta(obj.type).object_model, Unset)
+            and not isinstance(obj.pose, Unset)
+        ]
 
     def world(self, chosen: list[SceneObject], joints: Joints | None = None) -> dict[str, WorldItem]:
         """Return the world description of the open scene with the chosen robots and the parts that they hold.
