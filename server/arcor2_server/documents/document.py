@@ -3,7 +3,7 @@
 import operator
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import msgspec
 from msgspec import UNSET
@@ -36,6 +36,8 @@ REFERRING: Final = frozenset({"pose", "position", "joints", *ActionParameterType
 
 UNTIMED: Final = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
 """Resets the times of a scene or project, since an undo must not change them."""
+
+T = TypeVar("T", bound=msgspec.Struct)
 
 _by_rank = operator.attrgetter("rank")
 
@@ -95,7 +97,7 @@ class Document:
         bare = replace(project, action_points=[], parameters=[], logic=[], object_overrides=[], **UNTIMED)
         changes.append(add(Kind.PROJECT, project.id, bare))
         for point in project.action_points:
-            changes.append(add(Kind.POINT, point.id, bare_point(point)))
+            changes.append(add(Kind.POINT, point.id, reduce_to(BareActionPoint, point)))
             changes += [add(Kind.ORIENTATION, o.id, o, point.id) for o in point.orientations]
             changes += [add(Kind.JOINTS, j.id, j, point.id) for j in point.robot_joints]
             changes += [add(Kind.ACTION, a.id, a, point.id) for a in point.actions]
@@ -244,7 +246,7 @@ class Document:
         """Return an action point with orientations, joints and actions."""
         point = self.action_point(point_id)
         return ActionPoint(
-            **{name: getattr(point, name) for name in BareActionPoint.__struct_fields__},
+            **msgspec.structs.asdict(point),
             orientations=[item.value for item in self.owned(point_id, Kind.ORIENTATION)],
             robot_joints=[item.value for item in self.owned(point_id, Kind.JOINTS)],
             actions=[item.value for item in self.owned(point_id, Kind.ACTION)],
@@ -393,6 +395,6 @@ class Document:
         return points + below
 
 
-def bare_point(point: BareActionPoint) -> BareActionPoint:
-    """Return an action point without its lists."""
-    return BareActionPoint(**{name: getattr(point, name) for name in BareActionPoint.__struct_fields__})
+def reduce_to(base: type[T], value: Any) -> T:
+    """Return an instance of a base class of a struct with the fields that it has."""
+    return base(**{name: getattr(value, name) for name in base.__struct_fields__})

@@ -6,7 +6,7 @@ from arcor2_hw.data.events import Event, OpenProjectData, OpenSceneData, SceneSt
 from arcor2_hw.data.project import BareProject, Project
 from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_server.documents.changes import Kind
-from arcor2_server.documents.document import Document
+from arcor2_server.documents.document import Document, reduce_to
 from arcor2_server.documents.journal_records import Times
 from arcor2_server.documents.unsaved import Unsaved
 from arcor2_server.errors import RequestRefused
@@ -79,20 +79,13 @@ class OpenDocument:
 
     def bare_scene(self) -> BareScene:
         """Return the open scene without its objects."""
-        value = self.document.of_kind(Kind.SCENE)[0].value
-        return BareScene(name=value.name, description=value.description, id=value.id, **self._scene_times.fields())
+        scene = self.document.of_kind(Kind.SCENE)[0].value
+        return replace(reduce_to(BareScene, scene), **self._scene_times.fields())
 
     def bare_project(self) -> BareProject:
         """Return the open project without its content."""
-        value = self.document.of_kind(Kind.PROJECT)[0].value
-        return BareProject(
-            name=value.name,
-            scene_id=value.scene_id,
-            description=value.description,
-            has_logic=value.has_logic,
-            id=value.id,
-            **self._project_times.fields(),
-        )
+        project = self.document.of_kind(Kind.PROJECT)[0].value
+        return replace(reduce_to(BareProject, project), **self._project_times.fields())
 
     @property
     def scene_changed(self) -> bool:
