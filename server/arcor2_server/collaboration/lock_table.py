@@ -253,7 +253,7 @@ class LockTable:
             raise Locked("{item!r} is locked by {blockers}.", item=item, blockers=self._blockers(root, item))
         if tree and not root.free:
             raise Locked(
-                "Something in the tree of {item!r} is locked by {blockers}.",
+                "An item in the tree of {item!r} is locked by {blockers}.",
                 item=item,
                 blockers=self._blockers(root, ""),
             )

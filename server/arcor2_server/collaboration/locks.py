@@ -161,7 +161,7 @@ class Locks(LockTable):
         self._refuse_announced()
         deadline = asyncio.get_running_loop().time() + self._wait_limit
         while self._exclusive is not None or self.write_locked_roots():
-            await self._wait_for_change(deadline, "Something is being changed: try again.")
+            await self._wait_for_change(deadline, "An edit is in progress. Try again.")
             self._refuse_announced()
         self._exclusive = asyncio.current_task()
         try:
@@ -185,7 +185,7 @@ class Locks(LockTable):
 
     def _refuse_announced(self) -> None:
         if found := self.announced():
-            raise Locked("Something is locked by {found}.", found=", ".join(sorted(found)))
+            raise Locked("Items are locked by {found}.", found=", ".join(sorted(found)))
 
     async def _retry(self, lock: Callable[[dict[str, str]], None], items: Iterable[str]) -> None:
         deadline = asyncio.get_running_loop().time() + self._wait_limit

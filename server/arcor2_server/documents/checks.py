@@ -287,7 +287,7 @@ def _check_link(
     returns, outputs = action_meta(source, lookup, types).returns, source.outputs()
     if flow != FlowTypes.DEFAULT or len(outputs) != len(returns) or index >= len(returns):
         raise InvalidData(
-            "parameter {name}: {source_name} keeps no result number {index}; name its results.",
+            "parameter {name}: {source_name} has no named result number {index}. Name its results.",
             name=wanted.name,
             source_name=source.name,
             index=index,

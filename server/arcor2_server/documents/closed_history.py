@@ -109,7 +109,7 @@ class ClosedHistories:
         return None
 
     async def forget(self, document: str) -> None:
-        """Delete the history of a document. Raise OSError if that is impossible."""
+        """Delete the history of a document. Raise OSError on failure."""
         self._latest = None
         await asyncio.to_thread(self._path(document).unlink, missing_ok=True)
 

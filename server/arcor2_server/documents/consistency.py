@@ -64,7 +64,7 @@ def _check_unused(document: Document, change: Change) -> None:
     if change.kind is Kind.ACTION:
         users += [item.id for item in (*document.outgoing(key), *document.incoming(key))]
     if users:
-        raise Inconsistent("{change} is needed by what was made since.", users, change=title(change))
+        raise Inconsistent("{change} is used by later edits.", users, change=title(change))
 
 
 def _check_name(document: Document, change: Change) -> None:
@@ -99,7 +99,9 @@ def _point(document: Document, change: Change, types: Types) -> None:  # noqa: A
 
 def _owned(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
     if document.find(Kind.POINT, change.parent) is None:
-        raise Inconsistent("The action point of {change} is gone.", [change.parent], change=title(change))
+        raise Inconsistent(
+            "The action point of {change} does not exist any more.", [change.parent], change=title(change)
+        )
 
 
 def _action(document: Document, change: Change, types: Types) -> None:

@@ -124,17 +124,17 @@ def _check_condition(document: Document, meta_of: Callable[[Action], ObjectActio
     try:
         action_id, flow, index = condition.parse_what()
     except ValueError as error:
-        raise InvalidData("The condition is not understood: {reason}.", reason=error) from None
+        raise InvalidData("The condition is malformed: {reason}.", reason=error) from None
     _, action = document.action(action_id)
     outputs, returns = action.outputs(), meta_of(action).returns
     if flow != "default" or index >= len(outputs) or index >= len(returns):
         raise InvalidData(
-            "Action {name} keeps no result number {index}: name its results first.", name=action.name, index=index
+            "Action {name} has no named result number {index}: name its results first.", name=action.name, index=index
         )
     kind = BRANCHABLE.get(returns[index])
     if kind is None:
         raise InvalidData(
-            "The result {output} of {name} is {return_value}; only boolean, integer and enumerations can branch.",
+            "The result {output} of {name} is {return_value}. Conditions test booleans, integers and enumerations.",
             output=outputs[index],
             name=action.name,
             return_value=returns[index],

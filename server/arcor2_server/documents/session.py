@@ -251,7 +251,7 @@ class Session(OpenDocument):
         self._replace(Document())
 
     async def forget_history(self, document: str) -> None:
-        """Delete the history of a closed scene or project. Raise OSError if that is impossible."""
+        """Delete the history of a closed scene or project. Raise OSError on failure."""
         await self._closed.forget(document)
 
     def set_aside(self) -> Callable[[], None]:
@@ -263,7 +263,7 @@ class Session(OpenDocument):
             RequestRefused: An edit is being written.
         """
         if self._pending:
-            raise RequestRefused("Something is being changed. Try again.")
+            raise RequestRefused("An edit is in progress. Try again.")
         hidden = self.document, self.history, self.removed_types, self._scene_times, self._project_times, self._unsaved
         number, based_on = self._number, self._based_on
 

@@ -206,7 +206,7 @@ class AssetStore:
     # ------------------------------------------------------------------------------------------------ internals
     def _refuse_known(self, key: str, upsert: bool) -> None:
         if self.exists(key) and not upsert:
-            raise Conflict("There is an asset {key!r} already.", key=key)
+            raise Conflict("The asset {key!r} exists already.", key=key)
 
     async def _receive(self, content: AsyncIterable[bytes], descriptor: int) -> tuple[int, str]:
         size = 0

@@ -48,10 +48,10 @@ async def create_or_migrate(engine: AsyncEngine, place: str) -> None:
             await connection.run_sync(migrate)
     except SQLAlchemyError as error:
         raise StorageError(
-            "cannot use the database {place}: {reason}", detail=str(error), place=place, reason=_reason(error)
+            "The database {place} cannot be used: {reason}.", detail=str(error), place=place, reason=_reason(error)
         ) from error
     except OSError as error:
-        raise StorageError("cannot use the database {place}: {reason}", place=place, reason=error) from error
+        raise StorageError("The database {place} cannot be used: {reason}.", place=place, reason=error) from error
 
 
 def _reason(error: SQLAlchemyError) -> str:

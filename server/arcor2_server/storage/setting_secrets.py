@@ -141,7 +141,8 @@ class SettingSecrets:
                 secret = self.store.bind(value, address)
                 if secret is not None and (secret.type, secret.setting) != (type_name, parameter.name):
                     raise InvalidData(
-                        "The setting {name} refers to a secret of another setting. Enter it.", name=parameter.name
+                        "The setting {name} refers to the secret of another setting. Enter its value again.",
+                        name=parameter.name,
                     )
                 if check and secret is not None and secret.address != address:
                     raise AddressChanged(_enter_again(name or type_name, secret, address))

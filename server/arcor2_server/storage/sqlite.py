@@ -23,7 +23,7 @@ def check_opens(path: Path) -> None:
             return
     except (sqlite3.Error, OSError) as error:
         raise StorageError(
-            "cannot use the database {path}: {reason}", detail=str(error), path=path, reason=error
+            "The database {path} cannot be used: {reason}.", detail=str(error), path=path, reason=error
         ) from error
 
 
