@@ -35,24 +35,25 @@ def require_applicable(
                 "{change} was {what} since{by}.",
                 change=title(change),
                 what=what,
-                by=_by(history, {change.id}, after, user),
+                by=_author(history, {change.id}, after, user),
             )
     try:
         check_consistent(document, changes, types)
     except Inconsistent as error:
-        raise RequestRefused(
-            "{reason}{by}", reason=error, by=_by(history, error.ids, after, user, " That was made")
-        ) from None
+        author = _author(history, error.ids, after, user)
+        cause = f" The later edit was made{author}." if author else ""
+        raise RequestRefused("{reason}{cause}", reason=error, cause=cause) from None
 
 
-def _by(history: History, ids: set[str], after: int, user: str, opening: str = "") -> str:
-    edit = history.last_change_of(ids, after=after, user=user) if ids else None
+def _author(history: History, ids: set[str], after: int, user: str) -> str:
+    """Return the author and number of the latest conflicting edit: ` by bob (edit 7)`; empty if there is none."""
+    edit = history.last_change_of(ids, after=after, user=user)
     if edit is None:
         return ""
     if edit.kind is EditKind.EXTERNAL:
-        return f"{opening} outside the editor, while the document was closed (edit {edit.number})" + "." * bool(opening)
-    who = "you" if edit.user == user else edit.user
-    return f"{opening} by {who} (edit {edit.number}{f', {edit.request}' if edit.request else ''})" + "." * bool(opening)
+        return f" outside the editor, while the document was closed (edit {edit.number})"
+    author = "you" if edit.user == user else edit.user
+    return f" by {author} (edit {edit.number}{f', {edit.request}' if edit.request else ''})"
 
 
 def role_for(changes: Iterable[Change]) -> Role:
