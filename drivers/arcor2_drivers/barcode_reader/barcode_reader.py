@@ -1,4 +1,4 @@
-"""A barcode reader: reads one code when it is triggered; each code counts once."""
+"""The object type of a barcode reader: each trigger reads one code."""
 
 import threading
 import time
@@ -27,7 +27,7 @@ class BarcodeReader(LineDevice, Reader):
     """A fixed-mount barcode reader on a serial line or TCP."""
 
     _ABSTRACT = False
-    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(1.0)  # by the reader's own time-out
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(1.0)  # by the timeout of the reader
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"scan": "stop", "code_present": "stop"}
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {
         "dirty": AlarmText("the window is dirty", "clean the window", Severity.WARNING),
@@ -44,7 +44,7 @@ class BarcodeReader(LineDevice, Reader):
 
     # -------------------------------------------------------------------------------- connection
     def greet(self, deadline: float) -> None:
-        """Ask for the status again and again: the first question may follow half a command in the reader."""
+        """Ask for the status repeatedly: the reader may still have a part of an earlier command in its buffer."""
         while True:
             left = max(deadline - time.monotonic(), 0.01)
             try:
@@ -84,9 +84,9 @@ class BarcodeReader(LineDevice, Reader):
 
     # -------------------------------------------------------------------------------- reading
     def trigger(self, timeout: float) -> Code | NoRead:
-        """Read one code now. Codes from before this call do not count, nor do late ones after it.
+        """Read one code. Earlier codes and late ones of other readings do not count.
 
-        Raises ConnectionLost naming the port, DeviceTimeout when the reader does not answer, Cancelled by `stop`.
+        Raises ConnectionLost, which names the port, DeviceTimeout when the reader does not answer, Cancelled by `stop`.
         """
         within(f"{self.who}: timeout", timeout, 0.05, LONGEST_SCAN, "s")
         self.check()
@@ -108,7 +108,7 @@ class BarcodeReader(LineDevice, Reader):
             self._reading.release()
 
     def _read_until(self, deadline: float, go_on: GoOn) -> str | None:
-        """Trigger repeatedly, since the reader gives up earlier than we may; None when nothing was read."""
+        """Trigger repeatedly, because the timeout of the reader is shorter; None when no code was read."""
         buffer = lines.LineBuffer()
         self.line.send(lines.TRIGGER.encode("ascii") + lines.CR)
         while time.monotonic() < deadline:
@@ -131,7 +131,7 @@ class BarcodeReader(LineDevice, Reader):
         return code
 
     def stop(self) -> None:
-        """End a reading that runs; what it would still have read is dropped.
+        """Cancel the reading; a code that was being decoded is discarded.
 
         Returns when the reader has ended it. Raises DeviceTimeout.
         """
@@ -145,11 +145,11 @@ class BarcodeReader(LineDevice, Reader):
 
     # -------------------------------------------------------------------------------- commands
     def _reset(self) -> None:
-        """Make the reader drop what it does; what comes before its answer belongs to no later trigger."""
+        """Reset the reader; what it sends before its answer does not belong to a later trigger."""
         self._ask(lines.RESET, lambda line: line == lines.RESET_DONE)
 
     def _ask(self, command: str, answers: Callable[[str], bool], timeout: float = 0.0) -> str:
-        """Send a command and return the line that answers it. Raises DeviceFault when the reader does not know it."""
+        """Send a command and return the line that answers it. Raises DeviceFault when the reader rejects it."""
 
         def found(came: bytes) -> str | None:
             for line in lines.LineBuffer().feed(came):
@@ -166,9 +166,9 @@ class BarcodeReader(LineDevice, Reader):
     # -------------------------------------------------------------------------------- actions
     @action(deadline=LONGEST_SCAN + MARGIN)
     def scan(self, timeout: float = 2.0, *, an: str | None = None) -> str:
-        """Read the code in front of the reader; fail when there is none.
+        """Read the code in front of the reader; it is an error if there is none.
 
-        :param timeout: seconds after which it fails
+        :param timeout: time limit, s
         """
         assert 0.05 <= timeout <= 60.0
 
@@ -186,7 +186,7 @@ class BarcodeReader(LineDevice, Reader):
     def code_present(self, timeout: float = 1.0, *, an: str | None = None) -> bool:
         """Return whether a code is in front of the reader; last_code then returns it, once.
 
-        :param timeout: seconds to try to read one
+        :param timeout: time limit, s
         """
         assert 0.05 <= timeout <= 60.0
 
@@ -200,7 +200,5 @@ class BarcodeReader(LineDevice, Reader):
         """Return the code that code_present found: once, and not after another reading has started."""
         code, self._present_code = self._present_code, ""
         if not code:
-            raise Refused(
-                "{device}: there is no code that code_present found and last_code has not returned yet", device=self.who
-            )
+            raise Refused("{device}: there is no new code. Call code_present first.", device=self.who)
         return code

@@ -74,7 +74,7 @@ def is_code(line: str) -> bool:
 
 
 def refused(line: str, command: str) -> bool:
-    """Return whether a line says that the reader does not know a command."""
+    """Return whether a line reports an unknown command."""
     return line == f"ERR,{command},00"
 
 

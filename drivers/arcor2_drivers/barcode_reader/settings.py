@@ -9,11 +9,11 @@ from arcor2_hw.objects.settings import Range, check_serial_port
 
 @dataclasses.dataclass
 class BarcodeReaderSettings(Settings):
-    """Where the reader is.
+    """Address of the reader, and time limits.
 
     :param port: a path such as /dev/ttyUSB0, or socket://host:port
-    :param baud_rate: bits per second; without meaning for a socket
-    :param answer_timeout: seconds the reader has to answer what needs no reading
+    :param baud_rate: bits per second; ignored for a socket
+    :param answer_timeout: time the reader has to answer, except to a trigger, s
     """
 
     port: str

@@ -85,7 +85,7 @@ class Observer(StateObserver[State]):
         try:
             return self.pdos.take(identifier, data)
         except ValueError as error:
-            self.link.lose(DeviceFault("{device} sent what no drive sends: {reason}", device=self.who, reason=error))
+            self.link.lose(DeviceFault("{device} sent invalid values: {reason}", device=self.who, reason=error))
             return None
 
     def _hear_nmt(self, state: int) -> None:
@@ -152,7 +152,7 @@ class Observer(StateObserver[State]):
         try:
             return State.of(*values)
         except ValueError as error:
-            raise DeviceFault("{device} sent what no drive sends: {reason}", device=self.who, reason=error) from error
+            raise DeviceFault("{device} sent invalid values: {reason}", device=self.who, reason=error) from error
 
     def on_state(self, snapshot: Snapshot[State]) -> None:
         """Note when a fault appears."""

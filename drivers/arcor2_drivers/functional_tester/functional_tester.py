@@ -1,4 +1,4 @@
-"""A functional tester: a Machine on Modbus TCP that tests one board at a time."""
+"""The object type of a functional tester: a Machine on Modbus TCP that tests one board at a time."""
 
 import contextlib
 from typing import ClassVar, Final
@@ -77,7 +77,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         return self.current().mode
 
     def counters(self) -> dict[str, int]:
-        """Return the boards tested, passed and failed since power on."""
+        """Return the boards tested, passed and failed since power-on."""
         inputs = self.current()
         return {"tested": inputs.tested, "passed": inputs.passed, "failed": inputs.failed}
 
@@ -122,7 +122,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
     def stop(self) -> None:
         """Stop (PackML) and return at standstill; an unfinished test has no result.
 
-        Work that waits ends with Cancelled at once. Without control nothing is sent: another client started the test.
+        Calls that wait end with Cancelled. Without control nothing is sent, because another client started the test.
         """
         self.stop_waiting()
         if not self.in_control:
@@ -179,8 +179,8 @@ class FunctionalTester(Tester, Machine, CollisionObject):
             self.give(MachineCommand.START, go_on)
             after = self.wait(finished, self._s.test_timeout, what, go_on)
         except DeviceTimeout:
-            with contextlib.suppress(DeviceError):  # then the tester's watchdog ends it
-                self.stop()  # a test that nobody waits for must not continue
+            with contextlib.suppress(DeviceError):  # the watchdog of the tester ends it
+                self.stop()  # the test must not continue without us
             raise
         if after.result not in (1, 2):
             raise DeviceFault(

@@ -7,22 +7,22 @@ from arcor2_hw.objects import Settings
 from arcor2_hw.objects.settings import Range, check_host, within
 
 LONGEST_WATCHDOG: Final = 2000
-"""Longest host watchdog, ms; the type declares it as its reaction to a loss (`loss_reaction`)."""
+"""Longest host watchdog, ms; declared in `loss_reaction`."""
 LONGEST_TEST: Final = 600.0
 """Longest test, s; the deadline of the action `test` allows for it."""
 
 
 @dataclasses.dataclass
 class FunctionalTesterSettings(Settings):
-    """Where the tester is, and how long it may take.
+    """Address of the tester, and time limits.
 
     :param host: address or name of the tester
     :param port: port of its Modbus TCP server
     :param unit_id: Modbus unit id
-    :param watchdog_ms: ms without a request after which the tester aborts a test; written when control is taken
-    :param request_timeout: seconds the tester has to answer one request
-    :param test_timeout: seconds the longest test program takes
-    :param door_timeout: seconds the door has to reach its end position
+    :param watchdog_ms: time without a request after which the tester aborts a test, ms; written when control is taken
+    :param request_timeout: time the tester has to answer one request, s
+    :param test_timeout: duration of the longest test program, s
+    :param door_timeout: time the door has to reach its end position, s
     """
 
     host: str
@@ -36,5 +36,5 @@ class FunctionalTesterSettings(Settings):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_host(self.host, self.port)
-        # A repeated reading must not trip the watchdog: two time-outs, and one to spare.
+        # A repeated reading takes two timeouts; the watchdog must not expire then.
         within("request_timeout", self.request_timeout, 0.05, self.watchdog_ms / 3000.0, "s")

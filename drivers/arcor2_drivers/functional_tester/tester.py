@@ -31,19 +31,19 @@ from .settings import FunctionalTesterSettings
 TRANSITION: Final = 3.0
 """Time for a short state, s: Resetting, Clearing, Stopping, Aborting take about 0.2 s."""
 LIFE_STANDS: Final = 1.0
-"""Time without a change of the life counter after which something else than the tester answers, s."""
+"""Time without a change of the life counter after which the values are old, s."""
 NOTICED: Final = 0.2
-"""Time beyond the watchdog after which the tester has certainly noticed that we are gone, s."""
+"""Time beyond the watchdog after which the tester has certainly detected our absence, s."""
 
 
 class Tester(ModbusDevice[Inputs]):
-    """A tester whose state is read each 0.1 s, which also keeps its host watchdog quiet."""
+    """A tester whose state is read every 0.1 s; the requests also reset its host watchdog."""
 
     def use_tester(self, settings: FunctionalTesterSettings) -> None:
         """Prepare the connection; called in `__init__`."""
         self._s = settings
         self.link = ModbusLink(self.name, settings.host, settings.port, settings.unit_id, settings.request_timeout)
-        # Two readings, each repeated once, and a connection that is opened again in between.
+        # Two readings, each repeated once on a new connection.
         self.answers_within = 6.0 * settings.request_timeout
         self.use_link(self.link)
         self.fault_since: Timestamp = now()
@@ -58,11 +58,11 @@ class Tester(ModbusDevice[Inputs]):
         super().connect(timeout)
 
     def open_link(self, timeout: float) -> Snapshot[Inputs]:
-        """Open the connection, unless the tester has to notice first that we were gone."""
+        """Open the connection, unless the watchdog of the tester has to expire first."""
         left = self._leave_alone_until - time.monotonic()
         if left > 0.0:
             raise NotConnected(
-                "{device} is left alone for {left:.1f} s, so that it notices that we were gone",
+                "{device} is not contacted for {left:.1f} s, so that its watchdog expires",
                 device=self.who,
                 left=left,
             )
@@ -76,12 +76,10 @@ class Tester(ModbusDevice[Inputs]):
         try:
             return registers.decode(words, bits)
         except ValueError as error:
-            raise DeviceFault(
-                "{device} sent what no tester of this kind sends: {reason}", device=self.who, reason=error
-            ) from error
+            raise DeviceFault("{device} sent invalid values: {reason}", device=self.who, reason=error) from error
 
     def on_state(self, snapshot: Snapshot[Inputs]) -> None:
-        """Note changes of the life counter and of the fault."""
+        """Record changes of the life counter and of the fault."""
         inputs, before = snapshot.value, self.newest()
         if inputs.life != self._life[0]:
             self._life = (inputs.life, time.monotonic())
@@ -89,7 +87,7 @@ class Tester(ModbusDevice[Inputs]):
             self.fault_since = now()
 
     def on_lost(self, error: DeviceError) -> None:
-        """End control. Requests would keep a test alive that nobody waits for: leave the tester alone for a while."""
+        """End control. Send no requests for a while, so that the watchdog of the tester ends a running test."""
         newest = self.newest()
         if self.in_control and newest is not None and newest.state in RUNNING:
             self._leave_alone_until = self.link.sent + self._s.watchdog_ms / 1000.0 + NOTICED
@@ -125,7 +123,7 @@ class Tester(ModbusDevice[Inputs]):
         self.link.write_registers(Holding.HOST_WATCHDOG, 0)
 
     def leave(self) -> None:
-        """Release control because we disconnect; a test that runs is left to the watchdog, which ends it."""
+        """Release control because we disconnect; the watchdog ends a running test."""
         newest = self.newest()
         if newest is not None and newest.state not in RUNNING:
             super().leave()
@@ -141,7 +139,7 @@ class Tester(ModbusDevice[Inputs]):
         super().release_control()
 
     def owner_of(self, state: Inputs) -> str | None:
-        """Return who has control: us, the person with the key, or the client whose test runs."""
+        """Return who has control: us, the user of the key switch, or the client whose test runs."""
         if state.mode is not UnitMode.PRODUCE:
             return f"the key switch at the station ({state.mode.name.lower()})"
         if self.in_control:
@@ -149,7 +147,7 @@ class Tester(ModbusDevice[Inputs]):
         return f"another client, which started a test (state {title(state.state)})," if state.state in RUNNING else None
 
     def why_control_ended(self, state: Inputs) -> str:
-        """Return nothing: the key switch only interrupts our control."""
+        """Return an empty text: the key switch only interrupts our control."""
         return ""
 
     def control_owner(self) -> str | None:
@@ -158,7 +156,7 @@ class Tester(ModbusDevice[Inputs]):
         return None if newest is None else self.owner_of(newest)
 
     def require_command(self, what: str) -> Inputs:
-        """Return a fresh state when commands are obeyed. Raises NotInControl naming who has control."""
+        """Return a fresh state if we have control. Raises NotInControl, which names the owner."""
         inputs = self.fresh()
         owner = self.owner_of(inputs)
         if owner != US:
@@ -168,7 +166,7 @@ class Tester(ModbusDevice[Inputs]):
 
     # -------------------------------------------------------------------------------- commands
     def give(self, command: MachineCommand, go_on: GoOn) -> None:
-        """Send a command: it is taken when command_acknowledged shows its number. Raises Refused with the reason."""
+        """Send a command and wait until command_acknowledged contains its number. Raises Refused with the reason."""
         name = command.name.lower()
         if command not in registers.COMMANDS:
             state = title(self.fresh().state)
@@ -180,7 +178,7 @@ class Tester(ModbusDevice[Inputs]):
             )
         with self._one_command:
             before = self.fresh()
-            # Read, not counted here: the tester may have restarted, or another host may have sent commands.
+            # Read the number, because the tester may have restarted or another host may have sent commands.
             sequence = (self._read_holding()[Holding.COMMAND_SEQUENCE] + 1) & 0xFFFF
             go_on()
             self.link.write_registers(Holding.COMMAND, command, sequence)

@@ -12,12 +12,12 @@ from .zpl import DEFAULT_TEMPLATE, BadLabel, check_template
 
 @dataclasses.dataclass
 class ZplPrinterSettings(Settings):
-    """Where the printer is, and the template of its labels.
+    """Address of the printer, time limits, and the template of its labels.
 
     :param port: socket://host:9100, or a path such as /dev/ttyUSB0
-    :param baud_rate: bits per second; without meaning for a socket
-    :param answer_timeout: seconds the printer has to answer
-    :param print_timeout: seconds a label may take until the printer has counted it
+    :param baud_rate: bits per second; ignored for a socket
+    :param answer_timeout: time the printer has to answer, s
+    :param print_timeout: time until the printer has counted a label, s
     :param template: ZPL of a label, with {title}, {text} and {code} (Code 128) where fields go; ^CI28 for UTF-8
     """
 

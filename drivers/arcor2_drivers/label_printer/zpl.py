@@ -1,4 +1,4 @@
-"""ZPL of a host: builds and checks labels, parses answers. Pure functions.
+"""ZPL on the side of the host: builds and checks labels, parses answers. Pure functions.
 
 Source: ZPL II programming guide, ~HS (host status return), ~HI (host identification), ^FH, ^BC, and SGD getvar;
 docs/devices/label-printer.md lists what is used.
@@ -27,7 +27,7 @@ _FORBIDDEN: Final = re.compile(r"\^(CC|CT|CD|DF|XF|JU|MP|XA|XZ|PQ(?!1(?![0-9])))
 
 
 class BadLabel(ValueError):
-    """The text is not a label that is printed exactly once; the message says why."""
+    """The text is not a single label; the message says why."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Status:
 
     @property
     def idle(self) -> bool:
-        """Return whether nothing waits to be printed."""
+        """Return whether no label is waiting to be printed."""
         return not (self.formats_waiting or self.labels_left or self.partial_format)
 
 

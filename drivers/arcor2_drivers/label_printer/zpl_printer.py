@@ -1,4 +1,4 @@
-"""A ZPL label printer: a label is sent once, and is done when the printer has counted it."""
+"""The object type of a ZPL label printer: it sends each label once, and confirms it by the counter of the printer."""
 
 import dataclasses
 import time
@@ -18,7 +18,7 @@ from .settings import ZplPrinterSettings
 from .zpl import BadLabel, Status
 
 STATUS_PERIOD: Final = 1.0
-"""Time between status requests while nobody prints, s."""
+"""Time between status requests while no label is printed, s."""
 CONFIRM_PERIOD: Final = 0.05
 DEADLINE: Final = 110.0
 
@@ -69,7 +69,7 @@ class ZplPrinter(LineDevice, Printer):
         self._settle()
 
     def identify(self) -> Identity:
-        """Ask the printer for its identity; ZPL does not tell the vendor."""
+        """Ask the printer for its identity; ZPL does not report the vendor."""
         with self.held():
             model, firmware = self.ask(zpl.IDENTIFY, zpl.identity, "~HI")
             serial = self.ask(zpl.getvar(zpl.UNIQUE_ID), zpl.variable, f"getvar {zpl.UNIQUE_ID}")
@@ -77,7 +77,7 @@ class ZplPrinter(LineDevice, Printer):
 
     # -------------------------------------------------------------------------------- state
     def status(self) -> str:
-        """Return the state of the printer: ready, printing, or what keeps it from printing (paper_out, paused ...)."""
+        """Return the state of the printer: ready, printing, or why it cannot print (paper_out, paused ...)."""
         with self.held():
             found = self._ask_status()
         blocked = self._blocked_by(found)
@@ -94,10 +94,10 @@ class ZplPrinter(LineDevice, Printer):
 
         Raises:
             OutOfRange: The text is not a single label.
-            DeviceFault: Something keeps the printer from printing.
+            DeviceFault: The printer cannot print.
             Refused: It prints labels of another client, or the last label is unconfirmed.
-            Cancelled, DeviceTimeout, ConnectionLost: When this happens after sending, the label may come out or not,
-                and nothing more is printed before a person has acknowledged that.
+            Cancelled, DeviceTimeout, ConnectionLost: If this happens after sending, the label may or may not be
+                printed, and no other label is printed before a user has acknowledged that.
         """
         go_on = self.begin("printing")
         try:
@@ -123,7 +123,7 @@ class ZplPrinter(LineDevice, Printer):
             return job
 
     def stop(self) -> None:
-        """End the wait for a label, which then raises Cancelled; the printer finishes what it has received."""
+        """Cancel the wait for a label; the printer finishes what it has received."""
         self.stop_waiting()
 
     @staticmethod
@@ -168,7 +168,7 @@ class ZplPrinter(LineDevice, Printer):
 
         :param title: first line
         :param text: second line
-        :param code: content of the bar code (ASCII)
+        :param code: content of the barcode (ASCII)
         """
         if not code:
             raise OutOfRange("{device}: code must not be empty", device=self.who)
@@ -182,7 +182,7 @@ class ZplPrinter(LineDevice, Printer):
     def last_came_out(self, *, an: str | None = None) -> bool:
         """Return whether an unconfirmed label was printed after all; then printing is possible again.
 
-        Raises Refused while it still waits in the printer, and when there is no such label.
+        Raises Refused while it is still waiting in the printer, and when there is no such label.
         """
         with self.held():
             before = self._unconfirmed
@@ -193,10 +193,12 @@ class ZplPrinter(LineDevice, Printer):
             if not found.idle:
                 blocked = self._blocked_by(found)
                 why = f": {_ALARMS[blocked].text}; {_ALARMS[blocked].remedy}" if blocked else ""
-                raise Refused("{device}: the label still waits in the printer{reason}", device=self.who, reason=why)
+                raise Refused(
+                    "{device}: the label is still waiting in the printer{reason}", device=self.who, reason=why
+                )
             if counted not in (0, 1):
                 raise DeviceFault(
-                    "{device} has counted {counted} labels since; look for the label, then acknowledge",
+                    "{device} has counted {counted} labels since. Look for the label, then acknowledge the alarm.",
                     "",
                     "counter",
                     device=self.who,
@@ -240,7 +242,7 @@ class ZplPrinter(LineDevice, Printer):
 
     @staticmethod
     def _blocked_by(found: Status) -> str:
-        """Return what keeps the printer from printing; empty for nothing. Half a format counts last."""
+        """Return why the printer cannot print; empty when it can. A partial format counts last."""
         order = ("head_open", "paper_out", "ribbon_out", "too_hot", "too_cold", "paused", "partial_format")
         return next((name for name in order if getattr(found, name)), "")
 

@@ -74,9 +74,7 @@ class Block(ModbusDevice[Image]):
         try:
             return registers.decode(self.link.read_input_registers(0, registers.IMAGE_COUNT))
         except ValueError as error:
-            raise DeviceFault(
-                "{device} sent what no block of this kind sends: {reason}", device=self.who, reason=error
-            ) from error
+            raise DeviceFault("{device} sent invalid values: {reason}", device=self.who, reason=error) from error
 
     def on_state(self, snapshot: Snapshot[Image]) -> None:
         """Debounce the digital points."""

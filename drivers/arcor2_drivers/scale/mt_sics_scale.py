@@ -1,4 +1,4 @@
-"""A scale with MT-SICS commands: weighs, tares and zeroes; an old value never counts as a new one."""
+"""The object type of a scale with MT-SICS commands: weighing, tare and zero."""
 
 import contextlib
 import math
@@ -28,10 +28,10 @@ from .sics import Answer
 
 STATUS_PERIOD: Final = 0.5
 """Time between status requests while the line is free, s."""
-LOOK_AGAIN: Final = 0.03
-"""Time between questions whether the load is at rest, s; a scale measures some 20 times a second."""
+STABLE_PERIOD: Final = 0.03
+"""Time between requests while waiting for a stable value, s; a scale measures about 20 times per second."""
 OUTSIDE_FOR: Final = 0.5
-"""Time outside the range before it is a fault, s: a part that is put down hits the pan harder than it weighs."""
+"""Time outside the range after which it is a fault, s: placing a part exceeds its weight for a moment."""
 DEADLINE: Final = 90.0
 CANCEL: Final = b"@\r\n"
 """Cancels open commands and the tare: sent only after a tare or zero that failed."""
@@ -90,16 +90,16 @@ class MtSicsScale(LineDevice, Scale):
         self.set_alarm(TARE_LOST, False)
 
     def identify(self) -> Identity:
-        """Ask the scale for its identity; MT-SICS does not tell the vendor."""
+        """Ask the scale for its identity; MT-SICS does not report the vendor."""
         with self.held():
             model, firmware, serial = (self._ask(command).text for command in ("I2", "I3", "I4"))
         return Identity("", model, serial, firmware)
 
     # -------------------------------------------------------------------------------- weighing
     def weigh(self, stable: bool = True) -> Reading[float]:
-        """Return the net weight, kg, measured after this call; with `stable`, wait until it is at rest.
+        """Return the net weight, kg, measured after this call; with `stable`, wait until it is stable.
 
-        Raises DeviceTimeout when it does not come to rest in time, DeviceFault with fault_code overload, underload or
+        Raises DeviceTimeout when it does not become stable in time, DeviceFault with fault_code overload, underload or
         unit, Refused when the tare was lost, Stale for an answer that took too long, Cancelled by `stop`.
         """
         with self.held():
@@ -110,11 +110,11 @@ class MtSicsScale(LineDevice, Scale):
             if answer.mark in ("+", "-"):
                 raise self._complaint(answer)
             if answer.value is None:
-                raise Refused("{device} is busy and gives no weight now", f"S {answer.mark}", device=self.who)
+                raise Refused("{device} is busy and cannot measure now", f"S {answer.mark}", device=self.who)
             return self._reading(answer, began)
 
     def _at_rest(self) -> Reading[float]:
-        """Ask until the value is stable. The command S would stay open in the scale after a time-out."""
+        """Ask until the value is stable. The command S would stay pending in the scale after a timeout."""
         go_on, deadline = self.begin("weighing"), time.monotonic() + self._stable_timeout
         inside = time.monotonic()
         while True:
@@ -129,11 +129,11 @@ class MtSicsScale(LineDevice, Scale):
             go_on()
             if time.monotonic() >= deadline:
                 raise DeviceTimeout(
-                    "{device}: the load has not come to rest within {stable_timeout:g} s",
+                    "{device}: the load did not become stable within {stable_timeout:g} s",
                     device=self.who,
                     stable_timeout=self._stable_timeout,
                 )
-            time.sleep(LOOK_AGAIN)
+            time.sleep(STABLE_PERIOD)
 
     def _value(self) -> tuple[Answer, float]:
         """Ask for the value now; return the answer and when it was asked for. Raises as `weigh` does."""
@@ -142,7 +142,7 @@ class MtSicsScale(LineDevice, Scale):
         self._watch_range(answer)
         if answer.mark in ("S", "D") and answer.value is None:
             raise DeviceFault(
-                "{device} weighs in {unit}; set it to kg, g or mg",
+                "{device} weighs in {unit}. Set it to kg, g or mg.",
                 answer.unit,
                 "unit",
                 device=self.who,
@@ -155,7 +155,7 @@ class MtSicsScale(LineDevice, Scale):
         if not self.observing.online:  # closed or lost while the answer was on its way
             raise Stale("{device}: the connection was closed while weighing", device=self.who)
         self.observing.settled()
-        # It counts as measured when it was asked for: the scale does not report when it measured.
+        # The scale does not report when it measured: the time of the request is used.
         reading = Reading(answer.value, now(), began)
         self._newest = reading
         return reading
@@ -178,16 +178,16 @@ class MtSicsScale(LineDevice, Scale):
     def weight(self, stable: bool = True, *, an: str | None = None) -> float:
         """Return the net weight in kg.
 
-        :param stable: wait until the load has come to rest
+        :param stable: whether to wait until the load is stable
         """
         return self.weigh(stable).value
 
     @action(deadline=DEADLINE)
     def weight_within(self, lowest: float, highest: float, *, an: str | None = None) -> bool:
-        """Weigh at rest and return whether the net weight is between two limits, both included.
+        """Wait for a stable weight and return whether the net weight is between two limits, both included.
 
-        :param lowest: kg
-        :param highest: kg
+        :param lowest: lower limit, kg
+        :param highest: upper limit, kg
         """
         if not lowest <= highest:
             raise OutOfRange(
@@ -200,16 +200,16 @@ class MtSicsScale(LineDevice, Scale):
 
     @action(deadline=DEADLINE)
     def tare(self, *, an: str | None = None) -> None:
-        """Tare: the present load counts as the container. Refused in motion or outside the range."""
+        """Tare: the present load counts as the container. Refused while the load is unstable or outside the range."""
         self._set("T", "S")
 
     @action(deadline=DEADLINE)
     def zero(self, *, an: str | None = None) -> None:
-        """Zero: the present load counts as nothing; clears the tare. Refused in motion or too far from the zero."""
+        """Zero: the present load counts as 0; clears the tare. Refused while unstable or too far from zero."""
         self._set("Z", "A")
 
     def stop(self) -> None:
-        """End a weighing that waits."""
+        """Cancel a weighing that waits."""
         self.stop_waiting()
 
     def _set(self, command: str, done: str) -> None:
@@ -246,7 +246,7 @@ class MtSicsScale(LineDevice, Scale):
 
     # -------------------------------------------------------------------------------- asking
     def _ask(self, command: str) -> Answer:
-        """Ask what is answered at once. Raises DeviceTimeout, ConnectionLost, DeviceFault with ES, ET or EL."""
+        """Send a command with an immediate answer. Raises DeviceTimeout, ConnectionLost, DeviceFault with ES, ET or EL."""
         wanted = "S" if command == "SI" else command
         return self.ask(command.encode("ascii") + b"\r\n", lambda data: self._found(data, wanted, command), command)
 
@@ -263,16 +263,16 @@ class MtSicsScale(LineDevice, Scale):
                     errors=sics.ERRORS[answer.command],
                     command=command,
                 )
-            self._hello(answer)
+            self._on_greeting(answer)
         return None
 
     def on_unasked(self, data: bytes) -> None:
-        """Notice a restart."""
+        """Detect a restart."""
         for answer in sics.answers(data):
-            self._hello(answer)
+            self._on_greeting(answer)
 
-    def _hello(self, answer: Answer) -> None:
-        """Notice a restart: a scale sends its serial number when it is switched on, and has no tare then."""
+    def _on_greeting(self, answer: Answer) -> None:
+        """Detect a restart: a scale sends its serial number when it is switched on, and has no tare then."""
         if answer.command == "I4" and self._tare:
             self.set_alarm(TARE_LOST, True)
 

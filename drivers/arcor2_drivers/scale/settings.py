@@ -9,12 +9,12 @@ from arcor2_hw.objects.settings import Range, check_serial_port
 
 @dataclasses.dataclass
 class MtSicsScaleSettings(Settings):
-    """Where the scale is.
+    """Address of the scale, and time limits.
 
     :param port: a path such as /dev/ttyUSB0, or socket://host:port
-    :param baud_rate: bits per second; without meaning for a socket
-    :param answer_timeout: seconds the scale has to answer what needs no waiting
-    :param stable_timeout: seconds the load may take to come to rest
+    :param baud_rate: bits per second; ignored for a socket
+    :param answer_timeout: time the scale has to answer, without waiting for stability, s
+    :param stable_timeout: time the load has to become stable, s
     """
 
     port: str

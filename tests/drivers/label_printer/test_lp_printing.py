@@ -135,7 +135,7 @@ def test_a_fault_in_between_leaves_the_label_unconfirmed(
     for call in (lambda: printer.print(LABEL), lambda: printer.print_label("a", "b", "c")):
         with pytest.raises(Refused, match="it is unknown whether the last label was printed"):
             call()
-    with pytest.raises(Refused, match="the label still waits in the printer: it is paused"):
+    with pytest.raises(Refused, match="the label is still waiting in the printer: it is paused"):
         printer.last_came_out()
     fake.control.do("pause", on=False)
     fake.control.wait_until(lambda truth: truth["counter"] == 2)

@@ -67,7 +67,7 @@ def test_units_come_out_in_kilograms(fake: FakeProcess, scale: MtSicsScale) -> N
         fake.control.do("unit", value=unit)
         assert scale.weight() == 1.25
     fake.control.do("unit", value="lb")
-    with pytest.raises(DeviceFault, match="weighs in lb; set it to kg") as raised:
+    with pytest.raises(DeviceFault, match=r"weighs in lb\. Set it to kg") as raised:
         scale.weight()
     assert raised.value.fault_code == "unit"
 
@@ -80,7 +80,7 @@ def test_a_moving_load_is_waited_for_and_not_tared(fake: FakeProcess, scale: MtS
     assert not {"T", "Z", "@"} & set(fake.truth()["received"])
     assert abs(scale.weigh(stable=False).value) < 0.01
     began = own_time()
-    with pytest.raises(DeviceTimeout, match=r"^scale at .*: the load has not come to rest within 1 s"):
+    with pytest.raises(DeviceTimeout, match=r"^scale at .*: the load did not become stable within 1 s"):
         scale.weigh()
     ended = own_time()
     assert ended.clock - began.clock > 0.95

@@ -88,7 +88,7 @@ def test_power_cycle_and_faults(fake: Any, host: Any, wait_for: Callable[..., An
     host.close()
     host.connect()
     assert image(host)[1] == 0
-    with pytest.raises(Exception, match="number is 0 to 15"):
+    with pytest.raises(Exception, match="numbers are 0 to 15"):
         fake.control.do("set_input", number=16, on=True)
 
 
