@@ -1,4 +1,4 @@
-"""The handshake of a job: number, request, busy, done or error, request off, idle again (docs/devices/opcua-plc.md)."""
+"""Jobs: the handshake of a job: number, request, busy, done or error, request off, idle (docs/devices/opcua-plc.md)."""
 
 import contextlib
 import threading
@@ -17,13 +17,13 @@ from arcor2_hw.exceptions import (
     Refused,
 )
 
-from .plc import Hand, Plc
+from .plc import Handshake, Plc
 from .values import INTEGERS
 
-LOOK: Final = 0.02
-"""Time between looks at the handshake, s."""
-BEGINS_WITHIN: Final = 2.0
-"""s the PLC has to answer a request by busy, done or error, and to be idle again when the request is taken back."""
+POLL_PERIOD: Final = 0.02
+"""Time between readings of the handshake, s."""
+ANSWERS_WITHIN: Final = 2.0
+"""Time the PLC has to answer a request by busy, done or error, and to become idle after its end, s."""
 STOPS_WITHIN: Final = 5.0
 """Time a job may take to stop, s."""
 
@@ -38,13 +38,18 @@ class Jobs:
     def run(self, number: int, timeout: float) -> None:
         """Run a job to its end.
 
-        Raises Refused while another runs or the PLC is not idle, OutOfRange for a number the PLC cannot hold,
-        DeviceFault with the PLC's error code, DeviceTimeout, Cancelled when it was stopped, ConnectionLost,
-        NotInControl when control was lost.
+        Raises:
+            Refused: Another job is running, or the PLC is not idle.
+            OutOfRange: The number is outside of the range of its variable.
+            DeviceFault: The PLC reports an error; `fault_code` is its code.
+            DeviceTimeout: The job did not end in time.
+            Cancelled: The job was stopped.
+            ConnectionLost: The connection was lost.
+            NotInControl: Control ended.
         """
         plc = self._plc
         stops, losses = plc.stops, plc.losses
-        plc.need_handshake()
+        plc.require_handshake()
         plc.require_control(f"job {number}")
         low, high = INTEGERS.get(plc.variant("number", 0).VariantType, (0, 0))
         if not low <= number <= high:
@@ -58,7 +63,7 @@ class Jobs:
         if not self._one.acquire(blocking=False):
             raise Refused("{device}: job {number} is refused: another job runs", device=plc.who, number=number)
         try:
-            found = plc.hand()
+            found = plc.handshake()
             if found.busy or found.done or found.error:
                 raise Refused(
                     "{device}: job {number} is refused: the PLC is {found}",
@@ -70,8 +75,8 @@ class Jobs:
             try:
                 self._wait(
                     lambda hand: hand.busy or hand.done or hand.error,
-                    BEGINS_WITHIN,
-                    f"beginning job {number}",
+                    ANSWERS_WITHIN,
+                    f"the start of job {number}",
                     stops,
                     losses,
                 )
@@ -79,7 +84,7 @@ class Jobs:
                     lambda hand: not hand.busy and (hand.done or hand.error), timeout, f"job {number}", stops, losses
                 )
             finally:
-                self._take_back()
+                self._end_request()
         finally:
             self._one.release()
         if ended.error:
@@ -92,16 +97,18 @@ class Jobs:
                 code=ended.code,
             )
 
-    def _take_back(self) -> None:
-        """Take the request back, so that a job that still runs stops, and see the PLC idle."""
+    def _end_request(self) -> None:
+        """Reset the request, which stops a running job, and wait until the PLC is idle."""
         plc = self._plc
-        with contextlib.suppress(DeviceError):  # it is gone: its own supervision stops the job
+        with contextlib.suppress(DeviceError):  # else the PLC stops the job because our life sign is missing
             if plc.in_control:
                 plc.link.write({"request": plc.variant("request", False)})
-                self._wait(lambda hand: not (hand.busy or hand.done or hand.error), BEGINS_WITHIN, "being idle", -1, -1)
+                self._wait(
+                    lambda hand: not (hand.busy or hand.done or hand.error), ANSWERS_WITHIN, "being idle", -1, -1
+                )
 
     def stop(self) -> None:
-        """Take the request back when control is ours, and return when nothing runs. Raises DeviceTimeout."""
+        """Reset the request if we have control, and wait until no job runs. Raises DeviceTimeout."""
         plc = self._plc
         plc.stop_waiting()
         if not plc.in_control:
@@ -109,8 +116,10 @@ class Jobs:
         plc.link.write({"request": plc.variant("request", False)})
         self._wait(lambda hand: not hand.busy, STOPS_WITHIN, "stopping", -1, -1)
 
-    def _wait(self, holds: Callable[[Hand], bool], timeout: float, what: str, stops: int, losses: int) -> Hand:
-        """Look until something holds. stops, losses: of when the caller began; -1 when neither matters."""
+    def _wait(
+        self, holds: Callable[[Handshake], bool], timeout: float, what: str, stops: int, losses: int
+    ) -> Handshake:
+        """Wait until a condition holds. `stops`, `losses`: counters at the start of the call; -1: ignored."""
         plc = self._plc
         deadline = time.monotonic() + timeout
         while True:
@@ -121,10 +130,10 @@ class Jobs:
                 plc.check_program()
                 if not plc.in_control:
                     raise NotInControl(
-                        "{device}: {what} was given up: {why_not}", device=plc.who, what=what, why_not=plc.why_not
+                        "{device}: {what} was cancelled: {why_not}", device=plc.who, what=what, why_not=plc.why_not
                     )
             try:
-                found = plc.hand()
+                found = plc.handshake()
             except DeviceTimeout as e:
                 raise ConnectionLost(
                     "{device}: {what}: the connection was lost", f"{e} {e.detail}", device=plc.who, what=what
@@ -141,9 +150,9 @@ class Jobs:
                     timeout=timeout,
                     found=_state(found),
                 )
-            time.sleep(LOOK)
+            time.sleep(POLL_PERIOD)
 
 
-def _state(hand: Hand) -> str:
+def _state(hand: Handshake) -> str:
     words = [name for name in ("busy", "done", "error") if getattr(hand, name)]
     return f"{' and '.join(words) or 'idle'}" + (f" (code {hand.code})" if hand.error else "")

@@ -1,4 +1,4 @@
-"""One connection to an OPC UA server: asyncua's client on a thread and loop of its own, typed errors at its edge."""
+"""Link: a connection to an OPC UA server, by the client of asyncua on its own thread and event loop."""
 
 import asyncio
 import concurrent.futures
@@ -23,16 +23,17 @@ T = TypeVar("T")
 PUBLISHING: Final = 50.0
 """Time between two messages of the subscription, ms."""
 SAMPLING: Final = 20.0
-"""Time between two looks of the server at a value, ms."""
+"""Sampling period of the server, ms."""
 KEEP_ALIVE: Final = 10
-"""Publishing intervals after which a subscription without news says so."""
+"""Number of publishing intervals after which a subscription without changes sends a keep-alive."""
 LIFETIME: Final = 200
+"""Number of publishing intervals without a request after which the server ends the subscription."""
 QUEUE: Final = 32
-"""Changes of one value that the server keeps between two messages."""
+"""Number of changes of a value that the server queues between two messages."""
 SESSION: Final = 30_000
-"""Time a server keeps a session of which it hears nothing, ms."""
-LAST_WORD: Final = 0.3
-"""s the server has to take note that we leave."""
+"""Time without a request after which the server ends the session, ms."""
+CLOSE_TIMEOUT: Final = 0.3
+"""Time limit for closing the session, s."""
 JOIN: Final = 1.0
 
 _POLICIES: Final[dict[str, Any]] = {
@@ -41,8 +42,9 @@ _POLICIES: Final[dict[str, Any]] = {
     "aes256_sha256": security_policies.SecurityPolicyAes256Sha256RsaPss,
 }
 _BROKEN: Final = ("BadConnection", "BadSession", "BadSecureChannel", "BadServerNotConnected", "BadTcp", "BadShutdown")
-"""How the names of statuses begin that mean that the connection is of no use any more."""
-_DOORS: Final = ("BadUserAccessDenied", "BadIdentityToken", "BadCertificate", "BadSecurity")
+"""Prefixes of the names of statuses that mean a broken connection."""
+_UNAUTHORIZED: Final = ("BadUserAccessDenied", "BadIdentityToken", "BadCertificate", "BadSecurity")
+"""Prefixes of the names of statuses that mean rejected credentials."""
 
 Changed = Callable[[str, ua.DataValue], None]
 
@@ -52,29 +54,34 @@ def status_name(value: ua.DataValue) -> str:
     return "Good" if value.StatusCode is None else str(value.StatusCode.name)
 
 
-# What it logs with a stack at each broken connection is raised here as one typed error.
+# asyncua logs a stack trace for each broken connection; here it is raised as a typed error.
 logging.getLogger("asyncua").setLevel(logging.CRITICAL)
 
 
 class _Handler:
-    """Takes the subscription's news on the link's thread."""
+    """Receives notifications of the subscription, on the thread of the link."""
 
     def __init__(self, names: Mapping[ua.NodeId, list[str]], changed: Changed) -> None:
         self._names, self._changed = names, changed
 
     def datachange_notification(self, node: Any, val: Any, data: DataChangeNotif) -> None:
-        """Pass a new value on to whoever has the node under a name."""
+        """Report a new value for each name of its node."""
         for name in self._names.get(node.nodeid, ()):
             self._changed(name, data.monitored_item.Value)
 
     def status_change_notification(self, status: ua.StatusChangeNotification) -> None:
-        """Be told that the server ended the subscription: it falls silent then, which `Link.broken` finds."""
+        """Ignore that the server ended the subscription; `Link.broken` detects it."""
 
 
 class Link:
-    """A connection. Opened once and closed once; after a loss there is a new one.
+    """A connection, which is opened once and closed once.
 
-    nodes: node ids by our names. changed: called on the link's thread with each new value of `watched` names.
+    Args:
+        who: Name and address of the PLC, for errors.
+        settings: The settings.
+        nodes: Node ids by name.
+        watched: Names to subscribe to.
+        changed: Called on the thread of the link with each new value of a watched name.
     """
 
     def __init__(
@@ -93,7 +100,7 @@ class Link:
         self._subscription: Any = None
         self._up = False
 
-    # -------------------------------------------------------------------------------- life
+    # -------------------------------------------------------------------------------- connection
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
         try:
@@ -107,7 +114,7 @@ class Link:
             self._loop.close()
 
     def open(self, timeout: float) -> None:
-        """Open a session. Raises NotConnected, DeviceTimeout, Refused, DeviceFault naming a node."""
+        """Open a session. Raises NotConnected, DeviceTimeout, Refused, DeviceFault."""
         self._thread.start()
         try:
             self._call(self._connect(), timeout, f"connecting within {timeout:.1f} s")
@@ -182,14 +189,14 @@ class Link:
             raise NotConnected("{device}: {what}", str(e), device=self._who, what=what) from e
 
     def close(self) -> None:
-        """Close; whoever waits for an answer gets ConnectionLost."""
+        """Close; calls that wait for an answer end with ConnectionLost."""
         if not self._thread.is_alive():
             if not self._loop.is_closed():
                 self._loop.close()
             return
         up, self._up = self._up, False
         with contextlib.suppress(DeviceError):
-            self._call(self._leave(up), 2.0 * LAST_WORD, "leaving")
+            self._call(self._leave(up), 2.0 * CLOSE_TIMEOUT, "leaving")
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(JOIN)
 
@@ -199,25 +206,25 @@ class Link:
             return
         try:
             if up and self.broken is None:
-                async with asyncio.timeout(LAST_WORD):
+                async with asyncio.timeout(CLOSE_TIMEOUT):
                     await client.close_session()
                     await client.close_secure_channel()
         except (TimeoutError, OSError, ua.UaError):
-            pass  # the server ends the session by itself
+            pass  # the server ends the session after SESSION
         finally:
             client.disconnect_socket()
 
     @property
     def broken(self) -> str | None:
-        """Return why the subscription brings nothing any more; None when it does."""
+        """Return why the subscription has ended; None while it works."""
         subscription = self._subscription
         if subscription is not None and subscription.is_stale(3.0):
-            return "the subscription has fallen silent"
+            return "the subscription has ended"
         return None
 
     # -------------------------------------------------------------------------------- requests
     def read(self, names: Sequence[str], attribute: Any = ua.AttributeIds.Value) -> list[ua.DataValue]:
-        """Read now. Raises DeviceTimeout, ConnectionLost, DeviceFault."""
+        """Read values. Raises DeviceTimeout, ConnectionLost, DeviceFault."""
 
         async def ask() -> list[ua.DataValue]:
             found: list[ua.DataValue] = await self._session().read_attributes(
@@ -228,7 +235,7 @@ class Link:
         return self._call(ask(), self._settings.request_timeout, f"reading {', '.join(names[:5])}")
 
     def read_standard(self, number: int) -> Any:
-        """Read a variable of the standard's own (OPC 10000-5) by its number."""
+        """Read a variable of the standard (OPC 10000-5) by its number."""
 
         async def ask() -> Any:
             (found,) = await self._session().read_attributes([ua.NodeId(ua.Int32(number))], ua.AttributeIds.Value)
@@ -237,7 +244,7 @@ class Link:
         return self._call(ask(), self._settings.request_timeout, "reading about itself")
 
     def write(self, values: Mapping[str, ua.Variant], timeout: float = 0.0) -> None:
-        """Write in the order given, in one request. Raises Refused naming what the server refuses."""
+        """Write values in order in one request. Raises Refused, which names the rejected value."""
 
         async def ask() -> list[ua.StatusCode]:
             given = [ua.DataValue(value) for value in values.values()]
@@ -288,7 +295,7 @@ class Link:
             raise self._typed(type(e).__name__, what, e) from e
         except ua.UaError as e:
             raise ConnectionLost(
-                "{device}: {what}: no sensible answer", f"{type(e).__name__}: {e}", device=self._who, what=what
+                "{device}: {what}: invalid answer", f"{type(e).__name__}: {e}", device=self._who, what=what
             ) from e
 
     def _typed(self, name: str, what: str, error: Exception) -> DeviceError:
@@ -296,13 +303,13 @@ class Link:
             return DeviceTimeout("{device}: {what}: no answer in time", str(error), device=self._who, what=what)
         if name.startswith(_BROKEN):
             return ConnectionLost("{device}: {what}: the connection broke", str(error), device=self._who, what=what)
-        if name.startswith(_DOORS):
-            return Refused("{device} does not let us in: {name}", str(error), device=self._who, name=name)
+        if name.startswith(_UNAUTHORIZED):
+            return Refused("{device} rejected the credentials: {name}", str(error), device=self._who, name=name)
         return DeviceFault("{device}: {what}: {name}", str(error), name, device=self._who, what=what, name=name)
 
 
 def _properties(file: str) -> uacrypto.CertProperties:
-    """Return a file to asyncua, which else takes it for PEM by its name alone."""
+    """Return the content of a certificate or key file with its format, which asyncua would guess from the name."""
     content = Path(file).read_bytes()
     return uacrypto.CertProperties(content, extension="pem" if b"-----BEGIN" in content else "der")
 

@@ -1,4 +1,4 @@
-"""A PLC over OPC UA: named points, edges, and jobs that are run by a handshake."""
+"""The object type of a PLC over OPC UA: named points, edges, and jobs that are run by a handshake."""
 
 from typing import ClassVar, Final
 
@@ -20,7 +20,7 @@ from .values import quality, stamp
 STOP_TIME: Final = 0.5
 """Time a job of the PLC takes to stop, s; part of the declared reaction to a loss."""
 BUILD_INFO: Final = 2260
-PROGRAM_STANDS: Final = "program_stands"
+PROGRAM_STOPPED: Final = "program_stands"
 
 
 class OpcUaPlc(PointActions, Connected, IOBlock):
@@ -41,28 +41,28 @@ class OpcUaPlc(PointActions, Connected, IOBlock):
 
     # -------------------------------------------------------------------------------- connection
     def disconnect(self) -> None:
-        """Close. Control that is ours is released first; then the PLC stops a job that runs."""
+        """Release control, which stops a running job, and close; does nothing when closed."""
         self._plc.disconnect()
 
     def condition(self) -> Health:
-        """Return failure while the program of the PLC stands still, check_function for a bad point."""
-        if self._plc.program_stands:
+        """Return failure while the program of the PLC is stopped, check_function for a bad point."""
+        if self._plc.program_stopped:
             return Health.FAILURE
         return Health.CHECK_FUNCTION if self.alarms() else Health.NORMAL
 
     def alarms(self) -> list[Alarm]:
-        """Return what is wrong now: the program of the PLC stands still, a point is bad. Each ends with its cause."""
+        """Return an alarm for a stopped program of the PLC, and for each bad point."""
         found = []
-        if self._plc.program_stands and self._plc.observing.online:
+        if self._plc.program_stopped and self._plc.observing.online:
             self._since = self._since or now()
-            text, remedy = "the life sign of the PLC's program stands still", "start the PLC's program"
-            found.append(Alarm(PROGRAM_STANDS, Severity.ERROR, text, remedy, self._since))
+            text, remedy = "the life sign of the PLC program does not change", "start the program of the PLC"
+            found.append(Alarm(PROGRAM_STOPPED, Severity.ERROR, text, remedy, self._since))
         else:
             self._since = ""
-        for name, value in self._plc.told().items():
+        for name, value in self._plc.newest_values().items():
             if quality(value) is Quality.BAD:
                 text = f"the point {name} is {status_name(value)}"
-                remedy = "check the module and the wire that it comes from"
+                remedy = "check its I/O module and wiring"
                 found.append(Alarm(f"bad_{name}", Severity.WARNING, text, remedy, stamp(value)))
         return found
 
@@ -76,12 +76,12 @@ class OpcUaPlc(PointActions, Connected, IOBlock):
     def take_control(self) -> None:
         """Write our number as owner, and start our life sign; no output is written.
 
-        Raises NotInControl naming who has control, Refused for a PLC without a handshake.
+        Raises NotInControl, which names the owner, or Refused for a PLC without a handshake.
         """
         self._plc.take_control()
 
     def release_control(self) -> None:
-        """Release control; the PLC stops a job that runs, outputs stay."""
+        """Release control; the PLC stops a running job, outputs stay."""
         self._plc.release_control()
 
     def control_owner(self) -> str | None:
@@ -93,7 +93,7 @@ class OpcUaPlc(PointActions, Connected, IOBlock):
         """Read a point now, in its unit, with the time stamp of the source and the quality of its status.
 
         Raises OutOfRange for an unknown name, DeviceFault when the point has no value, Stale while the
-        program of the PLC stands still, NotConnected, ConnectionLost, DeviceTimeout.
+        program of the PLC is stopped, NotConnected, ConnectionLost, DeviceTimeout.
         """
         asked = Reading.of(None)
         found = self._plc.read(name)
@@ -107,7 +107,7 @@ class OpcUaPlc(PointActions, Connected, IOBlock):
         self._plc.write(name, value)
 
     def stop(self) -> None:
-        """Stop the job that runs, and return at standstill; work that waits ends with Cancelled. Outputs stay."""
+        """Stop the running job and wait until it has ended; calls that wait end with Cancelled. Outputs stay."""
         self._jobs.stop()
 
     def bad_reading(self, name: str) -> DeviceFault:
@@ -125,7 +125,7 @@ class OpcUaPlc(PointActions, Connected, IOBlock):
         """Run a job of the PLC, and return when it is done.
 
         :param number: number of the job in the program of the PLC
-        :param timeout: how long the job may take, s; one that takes longer is stopped
+        :param timeout: time limit, s; a job that takes longer is stopped
         """
         assert 0.1 <= timeout <= 600.0
 

@@ -1,4 +1,4 @@
-"""The observed PLC: life signs both ways, control of its outputs, its points as they are now."""
+"""Plc: connection, life signs in both directions, control and points of a PLC."""
 
 import contextlib
 import threading
@@ -29,17 +29,17 @@ from .settings import OpcUaPlcSettings
 from .values import INTEGERS, fits, quality, raw, stamp, type_of
 
 BEATS: Final = 5
-"""How often our life sign counts within the shorter of the two patiences."""
+"""Number of changes of our life sign within the shorter of both timeouts."""
 SERVER_STATE: Final = 2259
 LONGEST_MEMORY: Final = 1000
-"""News of the subscription that are kept for those who wait."""
+"""Number of notifications that are stored for calls that wait."""
 IDLE_WITHIN: Final = 1.0
 LEAVING: Final = 0.3
-"""Time for giving control back when the connection is closed, s."""
+"""Time limit for releasing control when the connection is closed, s."""
 
 
-class Hand(NamedTuple):
-    """The PLC's side of the handshake, read in one request."""
+class Handshake(NamedTuple):
+    """The variables of the handshake that the PLC writes, read in one request."""
 
     owner: int
     busy: bool
@@ -49,53 +49,53 @@ class Hand(NamedTuple):
 
 
 class Plc:
-    """Keeps the connection, the life signs and control. The handshake of a job is in `jobs`."""
+    """Connection, life signs, control and points. `Jobs` runs the handshake of a job."""
 
     def __init__(self, name: str, settings: OpcUaPlcSettings) -> None:
         self.settings = settings
         self.who = f"{name} at {settings.url}"
         self.points = parse_points(settings.points)
-        self.hand_nodes = parse_handshake(settings.handshake)
+        self.handshake_nodes = parse_handshake(settings.handshake)
         self.observing = Observing(self.who, self._open, self._watch, self._close, self._lost)
         self.edges = Edges()
         self.in_control = False
         self.why_not = "nobody has control"
         self.stops = 0
-        self.program_stands = False
+        self.program_stopped = False
         self._owner = 0
         self._link: Link | None = None
         self._types: dict[str, ua.VariantType] = {}
         self._newest: dict[str, ua.DataValue] = {}
-        self._told: deque[tuple[str, ua.DataValue]] = deque(maxlen=LONGEST_MEMORY)
-        self._told_in_all = 0
-        self._news = threading.Condition()
+        self._notifications: deque[tuple[str, ua.DataValue]] = deque(maxlen=LONGEST_MEMORY)
+        self._notified = 0
+        self._value_changed = threading.Condition()
         self._commands = threading.Lock()
         self._losses = 0
         self._loss: DeviceError | None = None
         self._life = 0
-        self._seen: tuple[Any, float] = (None, 0.0)
+        self._plc_life: tuple[Any, float] = (None, 0.0)
 
-    # -------------------------------------------------------------------------------- life
+    # -------------------------------------------------------------------------------- connection
     def disconnect(self) -> None:
-        """Give control back, so that a job stops, and close; does nothing when closed."""
+        """Release control, which stops a running job, and close; does nothing when closed."""
         link = self._link
         if self.in_control and link is not None and self.observing.online:
             self._drop("nobody has control")
-            with contextlib.suppress(DeviceError):  # else its own supervision does that
-                link.write(self._leaving(), LEAVING)
+            with contextlib.suppress(DeviceError):  # else the PLC detects the missing life sign
+                link.write(self._release_values(), LEAVING)
         self._drop("nobody has control")
         self.stop_waiting()
         self.observing.stop()
 
     def stop_waiting(self) -> None:
-        """End whatever waits, with Cancelled."""
-        with self._news:
+        """End the calls that wait, with Cancelled."""
+        with self._value_changed:
             self.stops += 1
-            self._news.notify_all()
+            self._value_changed.notify_all()
 
     @property
     def link(self) -> Link:
-        """Return the connection. Raises NotConnected, or ConnectionLost with what it was lost by."""
+        """Return the connection. Raises NotConnected, ConnectionLost."""
         self.observing.check()
         link = self._link
         if link is None:
@@ -113,18 +113,18 @@ class Plc:
         return self._losses
 
     # -------------------------------------------------------------------------------- control
-    def _leaving(self) -> dict[str, ua.Variant]:
+    def _release_values(self) -> dict[str, ua.Variant]:
         return {"request": self.variant("request", False), "owner": self.variant("owner", 0)}
 
     def take_control(self) -> None:
-        """Put our number into owner and begin to count our life sign. Raises NotInControl naming who has control."""
+        """Write our number to owner and start our life sign. Raises NotInControl, which names the owner."""
         with self._commands:
-            self.need_handshake()
+            self.require_handshake()
             if self.in_control:
                 return
             losses = self._losses
             self.check_program()
-            if owner := self.hand().owner:
+            if owner := self.handshake().owner:
                 raise NotInControl(
                     "{device}: control is refused: {named} has it", device=self.who, named=self._named(owner)
                 )
@@ -137,11 +137,11 @@ class Plc:
                     "owner": self.variant("owner", number),
                 }
             )
-            if (owner := self.hand().owner) != number:
+            if (owner := self.handshake().owner) != number:
                 raise NotInControl(
                     "{device}: control is refused: {named} has it", device=self.who, named=self._named(owner)
                 )
-            with self._news:
+            with self._value_changed:
                 self._owner = number
                 self.in_control = True
             try:
@@ -153,23 +153,23 @@ class Plc:
             self.observing.settled()
 
     def _await_idle(self) -> None:
-        """Return the PLC the time to see that the request of a former host has fallen."""
+        """Wait until the PLC has ended the handshake of a former host."""
         deadline = time.monotonic() + IDLE_WITHIN
         while time.monotonic() < deadline:
-            hand = self.hand()
+            hand = self.handshake()
             if not (hand.busy or hand.done or hand.error):
                 return
             time.sleep(0.02)
 
     def release_control(self) -> None:
-        """Give control back; a job that runs is stopped by the PLC."""
+        """Release control; the PLC stops a running job."""
         with self._commands:
             if self.in_control:
                 self._drop("nobody has control")
-                self.link.write(self._leaving())
+                self.link.write(self._release_values())
 
     def control_owner(self) -> str | None:
-        """Return who has control as it was last seen: us, another by its number, or nobody."""
+        """Return the last known owner: "us", another host by its number, or None."""
         if self.in_control:
             return "us"
         return self._named(self._owner) if self._owner and self.observing.online else None
@@ -184,26 +184,29 @@ class Plc:
         self._owner = 0
 
     def require_control(self, what: str) -> None:
-        """Return when the PLC obeys us. Raises NotConnected, ConnectionLost, NotInControl, Stale, with the reason."""
+        """Raise NotConnected, ConnectionLost, NotInControl or Stale with the reason, unless we may write."""
         self.observing.check()
-        if self.hand_nodes and not self.in_control:
+        if self.handshake_nodes and not self.in_control:
             raise NotInControl(
                 "{device}: {what} is refused: {why_not}", device=self.who, what=what, why_not=self.why_not
             )
         self.check_program()
 
     def check_program(self) -> None:
-        """Raise Stale while the PLC's program does not run: what the server tells is old then."""
-        if self.program_stands:
-            raise Stale("{device}: the life sign of its program stands still: its values are old", device=self.who)
+        """Raise Stale while the program of the PLC is stopped: the values of the server are old then."""
+        if self.program_stopped:
+            raise Stale(
+                "{device}: the program of the PLC is stopped: its life sign does not change, and its values are old",
+                device=self.who,
+            )
 
-    def need_handshake(self) -> None:
+    def require_handshake(self) -> None:
         """Raise Refused for a PLC without a handshake."""
-        if not self.hand_nodes:
-            raise Refused("{device}: the setting handshake is empty: there is no control to be taken", device=self.who)
+        if not self.handshake_nodes:
+            raise Refused("{device}: the setting handshake is empty, so that control cannot be taken", device=self.who)
 
-    def hand(self) -> Hand:
-        """Read the PLC's side of the handshake now. Raises DeviceFault for a value that is bad."""
+    def handshake(self) -> Handshake:
+        """Read the handshake. Raises DeviceFault for a bad value."""
         names = ("owner", "busy", "done", "error", "code")
         found = self.link.read(names)
         for name, value in zip(names, found, strict=True):
@@ -217,11 +220,11 @@ class Plc:
                     value=status_name(value),
                 )
         owner, busy, done, error, code = (value.Value.Value for value in found if value.Value is not None)
-        return Hand(int(owner), bool(busy), bool(done), bool(error), int(code))
+        return Handshake(int(owner), bool(busy), bool(done), bool(error), int(code))
 
     # -------------------------------------------------------------------------------- points
     def point(self, name: str) -> Point:
-        """Return the point of this name. Raises OutOfRange."""
+        """Return a point. Raises OutOfRange."""
         point = self.points.get(name)
         if point is None:
             raise OutOfRange(
@@ -233,7 +236,7 @@ class Plc:
         return point
 
     def read(self, name: str) -> ua.DataValue:
-        """Read a point now. Raises DeviceFault when there is no value, Stale while the PLC's program stands."""
+        """Read a point. Raises DeviceFault when it has no value, Stale while the program of the PLC is stopped."""
         self.point(name)
         self.check_program()
         (value,) = self.link.read([name])
@@ -279,27 +282,31 @@ class Plc:
         return ua.Variant(int(value) if kind in INTEGERS else float(value), kind)
 
     def wait_for(self, name: str, value: bool, timeout: float) -> None:
-        """Return when a digital point has the value, as read or as told since. Raises DeviceTimeout, Cancelled."""
+        """Wait until a digital point has a value. Raises DeviceTimeout after `timeout` s, Cancelled."""
         stops, losses, deadline = self.stops, self._losses, time.monotonic() + timeout
-        seen = self._told_in_all
+        seen = self._notified
         found = self.read(name)
         if _is(found, value):
             return
         began, what = found.SourceTimestamp, f"{name} becoming {'on' if value else 'off'}"
         while True:
-            with self._news:
-                while seen == self._told_in_all and (stops, losses) == (self.stops, self._losses):
-                    if not self._news.wait(max(deadline - time.monotonic(), 0.0)):
+            with self._value_changed:
+                while seen == self._notified and (stops, losses) == (self.stops, self._losses):
+                    if not self._value_changed.wait(max(deadline - time.monotonic(), 0.0)):
                         break
-                count = min(self._told_in_all - seen, len(self._told))
-                news = [each for told, each in list(self._told)[len(self._told) - count :] if told == name]
-                late, seen = seen == self._told_in_all, self._told_in_all
+                count = min(self._notified - seen, len(self._notifications))
+                news = [
+                    each
+                    for changed, each in list(self._notifications)[len(self._notifications) - count :]
+                    if changed == name
+                ]
+                late, seen = seen == self._notified, self._notified
             if stops != self.stops:
                 raise Cancelled("{device}: waiting for {what} was stopped", device=self.who, what=what)
             self.check_loss(losses)
             self.observing.check()
             self.check_program()
-            # What the subscription tells late, from before our reading, is over.
+            # Ignore late notifications of values from before our reading.
             if any(_is(each, value) and not _before(each.SourceTimestamp, began) for each in news):
                 return
             if late or time.monotonic() >= deadline:
@@ -312,7 +319,7 @@ class Plc:
         deadline = time.monotonic() + timeout
         self.edges.forget()
         self._types, self._newest = {}, {}
-        nodes = {name: point.node for name, point in self.points.items()} | self.hand_nodes
+        nodes = {name: point.node for name, point in self.points.items()} | self.handshake_nodes
         link = Link(self.who, self.settings, nodes, list(self.points), self._changed)
         self._link = link
         link.open(timeout)
@@ -322,17 +329,17 @@ class Plc:
         ):
             self._check_node(name, value, data_type)
         link.watch()
-        self._seen = (None, time.monotonic())
-        self.program_stands = False
-        self._beat(link)
+        self._plc_life = (None, time.monotonic())
+        self.program_stopped = False
+        self._check_life(link)
         if time.monotonic() > deadline:
             raise DeviceTimeout("{device} did not answer within {timeout:.1f} s", device=self.who, timeout=timeout)
 
     def _check_node(self, name: str, value: ua.DataValue, data_type: ua.DataValue) -> None:
-        node = self.points[name].node if name in self.points else self.hand_nodes[name]
+        node = self.points[name].node if name in self.points else self.handshake_nodes[name]
         if status_name(value) in ("BadNodeIdUnknown", "BadNodeIdInvalid", "BadAttributeIdInvalid"):
             raise DeviceFault(
-                "{device}: {name} ({node}) is not there: {value}",
+                "{device}: {name} ({node}) does not exist: {value}",
                 "",
                 status_name(value),
                 device=self.who,
@@ -360,7 +367,7 @@ class Plc:
         pause = min(self.settings.plc_patience, self.settings.life_timeout) / BEATS
         while not stopping.wait(pause):
             try:
-                self._beat(link)
+                self._check_life(link)
             except DeviceError:
                 if not stopping.is_set():
                     raise
@@ -368,9 +375,9 @@ class Plc:
             if (broken := link.broken) is not None:
                 raise ConnectionLost("{device}: {broken}", device=self.who, broken=broken)
 
-    def _beat(self, link: Link) -> None:
-        """Count our life sign, and look at the PLC's."""
-        if not self.hand_nodes:
+    def _check_life(self, link: Link) -> None:
+        """Increment our life sign, and check that of the PLC."""
+        if not self.handshake_nodes:
             link.read_standard(SERVER_STATE)
             return
         if self.in_control:
@@ -379,29 +386,29 @@ class Plc:
         in_control = self.in_control
         life, owner = (None if value.Value is None else value.Value.Value for value in link.read(("plc_life", "owner")))
         present = time.monotonic()
-        if life != self._seen[0]:
-            self._seen = (life, present)
-        self.program_stands = present - self._seen[1] > self.settings.life_timeout
-        if self.in_control and self.program_stands:
-            self._drop("the life sign of the PLC's program stood still")
+        if life != self._plc_life[0]:
+            self._plc_life = (life, present)
+        self.program_stopped = present - self._plc_life[1] > self.settings.life_timeout
+        if self.in_control and self.program_stopped:
+            self._drop("the program of the PLC was stopped")
         elif self.in_control and in_control and owner != self.settings.host_number:
             self._drop("the PLC has taken control away" if not owner else f"{self._named(owner)} has control")
         if not self.in_control:
             self._owner = owner or 0
 
     def _changed(self, name: str, value: ua.DataValue) -> None:
-        """Take news of the subscription, on the link's thread."""
-        with self._news:
+        """Store a value from the subscription; called on the thread of the link."""
+        with self._value_changed:
             self._newest[name] = value
-            self._told.append((name, value))
-            self._told_in_all += 1
-            self._news.notify_all()
+            self._notifications.append((name, value))
+            self._notified += 1
+            self._value_changed.notify_all()
         if self.points[name].digital and value.Value is not None and quality(value) is not Quality.BAD:
             self.edges.take(name, bool(value.Value.Value), stamp(value), time.monotonic())
 
-    def told(self) -> dict[str, Any]:
-        """Return the statuses the subscription told last, by name."""
-        with self._news:
+    def newest_values(self) -> dict[str, Any]:
+        """Return the newest values from the subscription by name."""
+        with self._value_changed:
             return dict(self._newest)
 
     def _close(self) -> None:
@@ -411,10 +418,10 @@ class Plc:
 
     def _lost(self, error: DeviceError) -> None:
         self._drop("control ended when the connection was lost")
-        with self._news:
+        with self._value_changed:
             self._loss = error
             self._losses += 1
-            self._news.notify_all()
+            self._value_changed.notify_all()
 
 
 def _is(found: ua.DataValue, value: bool) -> bool:

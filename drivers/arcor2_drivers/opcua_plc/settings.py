@@ -11,7 +11,7 @@ from arcor2_hw.objects.settings import Range, check_url, device_file, secret_fil
 from .points import parse_handshake, parse_points
 
 LONGEST_PATIENCE: Final = 2.0
-"""Longest plc_patience, s; the type declares it as its reaction to a loss."""
+"""Longest plc_patience, s; declared in `loss_reaction`."""
 
 
 class Security(StrEnum):
@@ -28,23 +28,23 @@ class Security(StrEnum):
 
 @dataclasses.dataclass
 class OpcUaPlcSettings(Settings):
-    """Where the PLC is, and what its nodes mean.
+    """Address and credentials of the PLC, and its points.
 
     :param url: address of the OPC UA server, as opc.tcp://host:4840
     :param points: name=kind node and options, separated by |: "part=DI ns=2;s=Cell.Part | lamp=DO ns=2;s=Cell.Lamp
-        on_loss=off | level=AI ns=2;i=7 scale=0.001 unit=m"; on_loss says what the PLC's program does with it
+        on_loss=off | level=AI ns=2;i=7 scale=0.001 unit=m"; on_loss describes the reaction of the PLC program
     :param handshake: nodes of the handshake: "owner=ns=2;s=H.Owner | host_life=... | plc_life=... | number=... |
-        request=... | busy=... | done=... | error=... | code=..."; empty for a PLC without
-    :param host_number: our number in owner; each program that may have control uses another
-    :param plc_patience: seconds without a change of our life sign after which the PLC's program considers us gone
-    :param life_timeout: seconds without a change of its life sign after which the PLC's program counts as stopped
-    :param request_timeout: seconds the server has to answer one request
+        request=... | busy=... | done=... | error=... | code=..."; empty for a PLC without a handshake
+    :param host_number: our number in owner; unique among the programs that may have control
+    :param plc_patience: time without a change of our life sign after which the PLC stops, s
+    :param life_timeout: time without a change of its life sign after which the PLC program counts as stopped, s
+    :param request_timeout: time the server has to answer one request, s
     :param user: name of the user; empty for anonymous
     :param password_file: file with the user's password
     :param security: how messages are protected
-    :param client_certificate: our certificate, PEM or DER file
+    :param client_certificate: client certificate, PEM or DER file
     :param client_key: its private key, PEM file
-    :param server_certificate: the certificate the server must have, PEM or DER file
+    :param server_certificate: certificate of the server, PEM or DER file
     """
 
     url: str
@@ -66,7 +66,7 @@ class OpcUaPlcSettings(Settings):
         host = check_url("url", self.url, "opc.tcp").hostname
         parse_points(self.points)
         parse_handshake(self.handshake)
-        # A request that takes its whole time must not stop our own life sign.
+        # The longest request must not delay our life sign too long.
         within("request_timeout", self.request_timeout, 0.1, min(2.0, self.plc_patience))
         if bool(self.user) != bool(self.password_file):
             raise OutOfRange("password_file must be given with user, and only with it")

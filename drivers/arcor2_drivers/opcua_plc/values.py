@@ -1,4 +1,4 @@
-"""Values between a program and OPC UA: types, ranges, quality. Pure."""
+"""Conversion of values between programs and OPC UA: types, ranges, quality. Pure functions."""
 
 import math
 from datetime import UTC
@@ -48,7 +48,7 @@ def quality(value: ua.DataValue) -> Quality:
 
 
 def stamp(value: ua.DataValue) -> Timestamp:
-    """Return when the source had the value; the server's time, or ours, where the source's is missing."""
+    """Return the time stamp of the source, or else of the server, or else the present time."""
     time: Any = value.SourceTimestamp or value.ServerTimestamp
     if time is None:
         return now()
@@ -56,7 +56,7 @@ def stamp(value: ua.DataValue) -> Timestamp:
 
 
 def raw(value: float, scale: float, kind: ua.VariantType) -> int | float:
-    """Return what is written for a physical value. Raises ValueError with the range."""
+    """Return the raw value of a physical one. Raises ValueError with the range."""
     if kind in INTEGERS:
         low, high = INTEGERS[kind]
         number = value / scale

@@ -246,7 +246,7 @@ class MtSicsScale(LineDevice, Scale):
 
     # -------------------------------------------------------------------------------- asking
     def _ask(self, command: str) -> Answer:
-        """Send a command with an immediate answer. Raises DeviceTimeout, ConnectionLost, DeviceFault with ES, ET or EL."""
+        """Send a command with an immediate answer. Raises DeviceTimeout, ConnectionLost, DeviceFault (ES, ET, EL)."""
         wanted = "S" if command == "SI" else command
         return self.ask(command.encode("ascii") + b"\r\n", lambda data: self._found(data, wanted, command), command)
 

@@ -88,12 +88,12 @@ def test_a_program_that_stands_makes_values_old(fake: FakeProcess, plc: OpcUaPlc
     fake.control.wait_until(lambda t: t["moving"])
     fake.control.do("live", on=False)
     assert isinstance(running.outcome(5.0), DeviceError)
-    with pytest.raises(Stale, match=r"plc at opc.tcp.*life sign of its program stands still"):
+    with pytest.raises(Stale, match=r"plc at opc.tcp.*program of the PLC is stopped"):
         plc.read("level")
     assert plc.connection in UP, "the server answers"
     assert [alarm.code for alarm in plc.alarms()] == ["program_stands"]
     assert plc.health is Health.FAILURE
-    with pytest.raises(NotInControl, match="stood still"):
+    with pytest.raises(NotInControl, match="program of the PLC was stopped"):
         plc.write_digital("lamp", True)
     fake.control.do("live", on=True)
     wait_for(plc.alarms, lambda alarms: alarms == [])

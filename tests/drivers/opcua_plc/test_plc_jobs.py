@@ -53,7 +53,7 @@ def test_a_job_that_takes_too_long_is_stopped(fake: FakeProcess, plc: OpcUaPlc) 
 
 def test_a_request_that_is_not_answered_is_taken_back(fake: FakeProcess, plc: OpcUaPlc) -> None:
     fake.control.do("deaf")
-    with pytest.raises(DeviceTimeout, match=r"beginning job 1 took longer than 2 s; the PLC is idle"):
+    with pytest.raises(DeviceTimeout, match=r"the start of job 1 took longer than 2 s; the PLC is idle"):
         plc.run_job(1)
     assert handshake(fake)[-1] == ("Request", False)
 

@@ -148,7 +148,7 @@ def test_a_variable_the_server_does_not_let_us_write(fake: FakeProcess, make: Ca
 @pytest.mark.parametrize(
     ("points", "said"),
     [
-        ("lamp=DO ns=2;s=Cell.Lamb", r"lamp \(ns=2;s=Cell.Lamb\) is not there: BadNodeIdUnknown"),
+        ("lamp=DO ns=2;s=Cell.Lamb", r"lamp \(ns=2;s=Cell.Lamb\) does not exist: BadNodeIdUnknown"),
         ("level=DI ns=2;s=Cell.Level", r"level \(ns=2;s=Cell.Level\) is Int16, not Boolean"),
         ("recipe=AI ns=2;s=Cell.Recipe", "is String, not a number"),
     ],
