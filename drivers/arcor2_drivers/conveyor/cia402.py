@@ -1,4 +1,4 @@
-"""CiA 301 and 402 as far as used: indices, states and control words."""
+"""Parts of CiA 301 and 402: indices, states and control words. Pure functions."""
 
 import enum
 from typing import Final, NamedTuple
@@ -41,9 +41,9 @@ TARGET_VELOCITY: Final = Entry(0x60FF, 0, "<i", "target velocity")
 
 PROFILE: Final = 402
 QUICK_STOP_ON_LOSS: Final = 3
-"""6007h: on a lost connection do a quick stop."""
+"""Value of 6007h: quick stop on a lost connection."""
 SLOW_DOWN_AND_DISABLE: Final = 2
-"""605Ah: slow down on the quick stop ramp, then Switch on disabled."""
+"""Value of 605Ah: decelerate on the quick stop ramp, then Switch on disabled."""
 
 
 class Mode(enum.IntEnum):
@@ -55,7 +55,7 @@ class Mode(enum.IntEnum):
 
 
 class Power(enum.StrEnum):
-    """States of the drive, as CiA 402 names them."""
+    """States of the drive (CiA 402)."""
 
     NOT_READY = "Not ready to switch on"
     SWITCH_ON_DISABLED = "Switch on disabled"
@@ -97,7 +97,7 @@ CW_HALT: Final = 0x0100
 
 
 def power(statusword: int) -> Power:
-    """Return the state a status word tells. Raises ValueError for a pattern that CiA 402 does not know."""
+    """Return the state in a status word. Raises ValueError for an invalid one."""
     for mask, value, state in _STATES:
         if statusword & mask == value:
             return state
@@ -105,7 +105,7 @@ def power(statusword: int) -> Power:
 
 
 class State(NamedTuple):
-    """What the drive tells of itself; position and velocity in counts, counts/s."""
+    """State of the drive; position in counts, velocity in counts/s."""
 
     power: Power
     statusword: int
@@ -116,5 +116,5 @@ class State(NamedTuple):
 
     @classmethod
     def of(cls, statusword: int, mode: int, position: int, velocity: int, error_code: int) -> "State":
-        """Make one. Raises ValueError when the status word is none of CiA 402."""
+        """Return the state with a status word. Raises ValueError for an invalid one."""
         return cls(power(statusword), statusword, mode, position, velocity, error_code)

@@ -1,4 +1,4 @@
-"""A conveyor: an Axis and a Machine on a CiA 402 drive; positions and speeds in m and m/s."""
+"""The object type of a conveyor: an Axis and a Machine with a CiA 402 drive; positions in m, speeds in m/s."""
 
 from typing import ClassVar, Final
 
@@ -18,9 +18,9 @@ from .packml import STATES, Unit
 from .settings import LONGEST_HEARTBEAT, LONGEST_MOVE, LONGEST_RAMP, ConveyorSettings
 
 MARGIN: Final = 30.0
-"""Time a move may take beyond LONGEST_MOVE, s: enabling, the handshake and the stop, with their time-outs."""
+"""Time a move may take beyond LONGEST_MOVE, s: enabling, handshake and stop, including timeouts."""
 NOTICES: Final = 0.1
-"""Time from the heartbeat's time-out until the drive slows down, s."""
+"""Time from the heartbeat timeout until the drive decelerates, s."""
 
 
 class Conveyor(PolledControl[State], Machine, Axis):
@@ -50,7 +50,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
     # -------------------------------------------------------------------------------- connection
     def disconnect(self) -> None:
-        """Release control and stop observing. A belt that moves is stopped, by us or by the drive."""
+        """Release control and stop observing. A moving belt is stopped, by us or by the drive."""
         self.stop_waiting()
         super().disconnect()
 
@@ -92,13 +92,13 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
     # -------------------------------------------------------------------------------- control
     def arm(self) -> None:
-        """Set what the drive does when it loses us, and start the node."""
+        """Configure the reaction of the drive to the loss of our heartbeat, and start the node."""
         link, s = self._observer.link, self._units
         armed = (
             (cia402.CONSUMER_HEARTBEAT, s.master_id << 16 | s.heartbeat_ms),
             (cia402.ABORT_OPTION, cia402.QUICK_STOP_ON_LOSS),
         )
-        link.write(cia402.CONSUMER_HEARTBEAT, 0)  # heartbeats from before do not count
+        link.write(cia402.CONSUMER_HEARTBEAT, 0)  # earlier heartbeats do not count
         for entry, value in armed:
             link.write(entry, value)
         link.write(cia402.QUICK_STOP_OPTION, cia402.SLOW_DOWN_AND_DISABLE)
@@ -121,18 +121,18 @@ class Conveyor(PolledControl[State], Machine, Axis):
         self._observer.guarded = True
 
     def disarm(self) -> None:
-        """Switch the torque off, and the monitoring of our heartbeat."""
+        """Switch off the torque and the monitoring of our heartbeat."""
         self._observer.link.write(cia402.CONTROLWORD, cia402.CW_DISABLE_VOLTAGE)
         self._observer.link.write(cia402.CONSUMER_HEARTBEAT, 0)
 
     def release_control(self) -> None:
-        """Switch the torque off, and the monitoring of our heartbeat. Raises Refused while the belt moves."""
+        """Switch off the torque and the monitoring of our heartbeat. Raises Refused while the belt moves."""
         if self.in_control and not self._motion.stands(self.fresh()):
             raise Refused("{device}: release_control is refused while the belt moves: halt it", device=self.who)
         super().release_control()
 
     def owner_of(self, state: State) -> str | None:
-        """Return who has control: us, the node whose heartbeat the drive monitors, or whoever enabled the drive."""
+        """Return who has control: us, the node whose heartbeat is monitored, or the client that enabled the drive."""
         if self.in_control:
             return US
         master, limit = self._observer.consumer >> 16 & 0x7F, self._observer.consumer & 0xFFFF
@@ -143,7 +143,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
         return "another client, which enabled the drive," if state.power is Power.ENABLED else None
 
     def drop_control(self, why: str = NOBODY) -> None:
-        """Note that we have no control; after a loss the drive may have been off, so that its zero is unknown too."""
+        """End control. After a loss, also forget the zero: the drive may have been off."""
         super().drop_control(why)
         self._observer.guarded = False
         self._unit.forget()
@@ -176,7 +176,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
     @property
     def homed(self) -> bool:
-        """Return whether the drive was homed since the last loss of the connection."""
+        """Return whether the drive was homed since the last connection loss."""
         return self._homed
 
     # -------------------------------------------------------------------------------- the base's methods
@@ -254,7 +254,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
         return self._unit.state(self.current())
 
     def command(self, command: MachineCommand) -> None:
-        """Send a command; return when the belt is in the state it leads to. Raises Refused, NotInControl."""
+        """Execute a command, and wait for the state that it leads to. Raises Refused, NotInControl."""
         now, go_on = self._begin(command.name.lower(), resting=False)
         if command in (MachineCommand.STOP, MachineCommand.ABORT):
             self.stop_waiting()
@@ -280,9 +280,9 @@ class Conveyor(PolledControl[State], Machine, Axis):
         now = self.current()
         return [
             ("control is taken", self.in_control),
-            ("no fault stands", now.power not in FAULTY and not self._unit.aborted),
+            ("there is no fault", now.power not in FAULTY and not self._unit.aborted),
             ("the drive is enabled", now.power is Power.ENABLED),
-            ("the belt stands", self._motion.stands(now)),
+            ("the belt is stopped", self._motion.stands(now)),
         ]
 
     # -------------------------------------------------------------------------------- actions
@@ -303,7 +303,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
     @action
     def unhold(self, *, an: str | None = None) -> None:
-        """Run the belt again as before the hold."""
+        """Continue to run the belt after a hold."""
         self.command(MachineCommand.UNHOLD)
 
     @action
@@ -318,7 +318,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
     @action(deadline=LONGEST_MOVE + MARGIN)
     def home(self, *, an: str | None = None) -> None:
-        """Find the zero of the belt."""
+        """Home the belt: find its zero."""
         _, go_on = self._begin("home")
         losses = self._observer.losses
         with self._unit.act("home"):
@@ -333,8 +333,8 @@ class Conveyor(PolledControl[State], Machine, Axis):
     def move_to(self, position: float, speed: float = 0.1, *, an: str | None = None) -> None:
         """Move the belt to a position; it has to be homed.
 
-        :param position: m from its zero
-        :param speed: m/s
+        :param position: target position, m
+        :param speed: speed, m/s
         """
         assert 0.001 <= speed <= 10.0
 
@@ -344,8 +344,8 @@ class Conveyor(PolledControl[State], Machine, Axis):
     def move_by(self, distance: float, speed: float = 0.1, *, an: str | None = None) -> None:
         """Move the belt by a distance.
 
-        :param distance: m, negative for backwards
-        :param speed: m/s
+        :param distance: distance, m; negative for backwards
+        :param speed: speed, m/s
         """
         assert 0.001 <= speed <= 10.0
 
@@ -353,9 +353,9 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
     @action
     def run(self, velocity: float = 0.1, *, an: str | None = None) -> None:
-        """Run the belt until it is halted; return when it has its velocity.
+        """Run the belt until it is halted; return when it has reached its velocity.
 
-        :param velocity: m/s, negative for backwards
+        :param velocity: velocity, m/s; negative for backwards
         """
         assert -10.0 <= velocity <= 10.0
 
@@ -363,7 +363,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
     @action
     def halt(self, *, an: str | None = None) -> None:
-        """Slow the belt down; return at standstill. A move that runs ends with Cancelled."""
+        """Stop the belt; return at standstill. A running move ends with Cancelled."""
         self.stop_waiting()
         if self.in_control:
             self._motion.halt()

@@ -1,4 +1,4 @@
-"""What the error codes of EMCY and 603Fh mean, and what a person does about them (CiA 301, table of codes; CiA 402)."""
+"""Meaning and remedy of the error codes of EMCY and 603Fh (CiA 301, CiA 402)."""
 
 from typing import Final, NamedTuple
 
@@ -6,7 +6,7 @@ from arcor2_hw.data.device import Severity
 
 
 class Fault(NamedTuple):
-    """What an error code means and what a person should do."""
+    """Meaning and remedy of an error code."""
 
     text: str
     remedy: str
@@ -15,13 +15,13 @@ class Fault(NamedTuple):
 
 _RESET: Final = "then reset the fault"
 _CABLE: Final = f"have the motor and its cable checked, {_RESET}"
-_FREE: Final = f"see that the belt runs freely, {_RESET}"
+_FREE: Final = f"check that the belt runs freely, {_RESET}"
 _SUPPLY: Final = f"check the supply, {_RESET}"
 _BRAKING: Final = f"check the braking resistor and the supply, {_RESET}"
-_COOL: Final = f"let it cool, see that air gets to it, {_RESET}"
+_COOL: Final = f"let it cool, check its ventilation, {_RESET}"
 _BUS: Final = f"check cable, termination and load of the bus, {_RESET}"
-_SERVICE: Final = f"switch the drive off and on; when it comes again, have it serviced, {_RESET}"
-_PARAMETERS: Final = f"check the drive's parameters with the maker's tool, {_RESET}"
+_SERVICE: Final = f"switch the drive off and on; if the fault returns, have it serviced, {_RESET}"
+_PARAMETERS: Final = f"check the drive's parameters with the tool of the manufacturer, {_RESET}"
 _SENSOR: Final = f"check the encoder and its cable, {_RESET} and home"
 
 _FAULTS: Final = {
@@ -86,7 +86,7 @@ _CLASSES: Final = {
 
 
 def fault_of(code: int) -> Fault:
-    """Return what an error code means; by its class when it is not known itself."""
+    """Return the meaning of an error code; that of its class for an unknown code."""
     return _FAULTS.get(code) or Fault(
         _CLASSES.get(code >> 12, "unknown error"), f"look the code up in the drive's manual, {_RESET}"
     )

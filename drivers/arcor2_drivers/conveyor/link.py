@@ -1,4 +1,4 @@
-"""The CAN bus to one drive: SDO requests one at a time, each with its time limit; a late answer answers nothing."""
+"""CanLink: the CAN bus to a drive, with one SDO request at a time. Late answers are ignored."""
 
 import contextlib
 import logging
@@ -23,23 +23,23 @@ from .settings import CanInterface, ConveyorSettings
 from .slcan import SlcanBus
 from .socketcand import SocketcandBus
 
-LOOK: Final = 0.05
-"""s the receiver waits for a frame before it looks whether it should end."""
+RECEIVE_TIMEOUT: Final = 0.05
+"""Longest time the receiver waits for a frame before it checks whether it should end, s."""
 WRITE_TIMEOUT: Final = 1.0
-"""s the adapter has to take a frame. When this process stands still for that long in sending, pyserial raises, too."""
+"""Time the adapter has to accept a frame, s. pyserial also raises if this process stalls that long while sending."""
 NMT_START: Final = 1
 HEARTBEAT: Final = 0x700
 EMCY: Final = 0x80
 OPERATIONAL: Final = b"\x05"
 
-# canopen logs every failure as an error. Each reaches the caller typed; a drive that is off would fill the log.
+# canopen logs every failure as an error; here it is raised, and a drive that is off would fill the log.
 logging.getLogger("canopen").setLevel(logging.CRITICAL)
 
 Hear = Callable[[int, bytes], None]
 
 
 class _Network(canopen.Network):
-    """canopen's network without its receiving thread, and with a time limit for sending."""
+    """The network of canopen without its receiving thread, and with a time limit for sending."""
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         bus = self.bus
@@ -51,7 +51,7 @@ class _Network(canopen.Network):
 
 
 class _Responses(queue.Queue[bytes]):
-    """Answers, waited for by running time: after a stall of this process one may be there, and not be received yet."""
+    """A queue of answers whose time limit does not count stalls of this process."""
 
     def get(self, block: bool = True, timeout: float | None = None) -> bytes:
         clock = RunningTime()
@@ -64,7 +64,7 @@ class _Responses(queue.Queue[bytes]):
 
 
 class _Sdo(SdoClient):
-    """An SDO client that hears only the answer to what was asked for, by index and subindex."""
+    """An SDO client that accepts only the answer to its request, by index and subindex."""
 
     _expected = b""
 
@@ -82,10 +82,11 @@ class _Sdo(SdoClient):
 
 
 class CanLink:
-    """The way to one drive. Requests come from several threads and go out one after the other.
+    """The connection to a drive. Several threads may send requests, which are executed one after the other.
 
-    When an answer does not come in time the link is lost until `open`: what comes late must not answer a request for
-    the same index. An SDO server answers in order, so that the several requests of `open` drain what is late.
+    When an answer does not come in time, the link is broken until `open`: a late answer must not be taken for the
+    answer to another request for the same index. An SDO server answers in order, so the requests after `open` drain
+    late answers.
     """
 
     def __init__(self, name: str, settings: ConveyorSettings, hear: Hear) -> None:
@@ -101,7 +102,7 @@ class CanLink:
 
     # -------------------------------------------------------------------------------- life
     def open(self, timeout: float) -> None:
-        """Open the bus within `timeout` s; the drive is not asked anything. Raises NotConnected, DeviceTimeout."""
+        """Open the bus within `timeout` s; nothing is sent to the drive. Raises NotConnected, DeviceTimeout."""
         self.close()
         settings = self._settings
         try:
@@ -134,10 +135,10 @@ class CanLink:
             host, port, name = settings.server
             if settings.interface is CanInterface.SOCKETCAND:
                 return SocketcandBus(name, host, port, timeout)
-            # See that somebody listens: pyserial itself waits five seconds for that, whatever it is told.
+            # Check that the port is open, because pyserial waits five seconds for it, whatever its timeout.
             socket.create_connection((host, port), timeout).close()
         if settings.interface is CanInterface.SLCAN:
-            return SlcanBus(settings.channel, bitrate=settings.bitrate, sleep_after_open=0.0, timeout=LOOK)
+            return SlcanBus(settings.channel, bitrate=settings.bitrate, sleep_after_open=0.0, timeout=RECEIVE_TIMEOUT)
         return can.Bus(channel=settings.channel, interface=settings.interface.value)
 
     def close(self) -> None:
@@ -149,7 +150,7 @@ class CanLink:
         port = getattr(bus, "serialPortOrig", None)
         raw = getattr(port, "_socket", None)
         if isinstance(bus, SocketcandBus):
-            with contextlib.suppress(OSError):  # the other end was quicker
+            with contextlib.suppress(OSError):  # the other end has closed it
                 bus.wake()
         if isinstance(bus, SlcanBus) and raw is not None:
             with contextlib.suppress(can.CanError, OSError):
@@ -157,13 +158,13 @@ class CanLink:
             with contextlib.suppress(OSError):
                 raw.shutdown(socket.SHUT_RDWR)  # wakes the receiver
         if receiver is not None and receiver is not threading.current_thread():
-            receiver.join(4.0 * LOOK)
+            receiver.join(4.0 * RECEIVE_TIMEOUT)
         if network is not None:
             network.bus = None
         if bus is None:
             return
         if raw is not None and port is not None:
-            # Closed here: pyserial sleeps 0.3 s in closing, and forgets a socket that its peer has reset.
+            # Closed here, because pyserial sleeps 0.3 s and does not close a socket that was reset by its peer.
             raw.close()
             port.is_open = False
             can.BusABC.shutdown(bus)
@@ -174,8 +175,8 @@ class CanLink:
     def _receive(self, bus: can.BusABC, network: _Network, closing: threading.Event) -> None:
         while not closing.is_set():
             try:
-                message = bus.recv(LOOK)
-            except (ValueError, IndexError):  # no frame: an adapter that sends foreign bytes
+                message = bus.recv(RECEIVE_TIMEOUT)
+            except (ValueError, IndexError):  # the adapter sent invalid bytes
                 flush = getattr(bus, "flush", None)
                 if flush is not None:
                     with contextlib.suppress(can.CanError):
@@ -197,11 +198,11 @@ class CanLink:
         return self.loss
 
     def lose(self, error: DeviceError) -> None:
-        """Return the link up for `error` until it is opened again."""
+        """Mark the link as broken by `error` until it is opened again."""
         self._lose(error)
 
     def check(self) -> None:
-        """Return while the link is well. Raises what it was lost by."""
+        """Raise the error that broke the link, if any."""
         if self.loss is not None:
             raise _again(self.loss)
 
@@ -222,9 +223,10 @@ class CanLink:
         return int(struct.unpack(entry.form, data[:size])[0])
 
     def read_first(self, entry: Entry, timeout: float, enough: Callable[[], bool]) -> int:
-        """Read a value that never changes, over and over until the drive answers: it may be booting.
+        """Read a constant value repeatedly until the drive answers, because it may be booting.
 
-        Raises DeviceTimeout when there is no answer within `timeout` s, or before it is `enough`.
+        Raises:
+            DeviceTimeout: No answer came within `timeout` s, or before `enough` returned true.
         """
         deadline = time.monotonic() + timeout
         while True:
@@ -238,7 +240,7 @@ class CanLink:
                 self.loss = None
 
     def write(self, entry: Entry, value: int) -> None:
-        """Write a value; never sent a second time. Raises DeviceTimeout, ConnectionLost, DeviceFault."""
+        """Write a value; it is never repeated. Raises DeviceTimeout, ConnectionLost, DeviceFault."""
         what = f"writing {value} to {entry.title} ({entry.at:04X}h:{entry.subindex:02X})"
         data = struct.pack(entry.form, value)
         self._request(lambda sdo: sdo.download(entry.at, entry.subindex, data), what)
@@ -283,7 +285,7 @@ class CanLink:
         self._send(HEARTBEAT + self._settings.master_id, OPERATIONAL)
 
     def start_node(self) -> None:
-        """Have the node be Operational (NMT)."""
+        """Set the node to Operational (NMT)."""
         self._send(0x000, bytes([NMT_START, self._settings.node_id]))
 
     def _send(self, identifier: int, data: bytes) -> None:

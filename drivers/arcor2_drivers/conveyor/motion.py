@@ -1,4 +1,4 @@
-"""How the drive is enabled, moved and brought to a stand, step by step of CiA 402, and how a wait learns to give up."""
+"""Motion: enable, move and stop the drive by the state machine of CiA 402."""
 
 import contextlib
 import threading
@@ -15,11 +15,11 @@ from .observer import Observer
 from .settings import ConveyorSettings
 
 STEP: Final = 1.0
-"""s the drive has for one step of its state machine."""
+"""Time limit for a step of the state machine, s."""
 MARGIN: Final = 2.0
-"""Time a motion may take beyond what its speed and ramps say, s."""
+"""Time a motion may take beyond the time computed from its speed and ramps, s."""
 STANDS: Final = 0.001
-"""m/s: slower than that it stands; a velocity that is measured never is quite zero."""
+"""Velocity below which the belt counts as stopped, m/s: a measured velocity is never exactly 0."""
 
 
 class Motion:
@@ -32,13 +32,13 @@ class Motion:
         self._stands = max(settings.rate(STANDS), 1)
 
     def control(self, word: int, go_on: GoOn) -> None:
-        """Write the control word, unless a stop has come: from then on nothing overtakes it."""
+        """Write the control word, unless the work was cancelled. Steps do not overtake each other."""
         with self._one_step:
             go_on()
             self._link.write(cia402.CONTROLWORD, word)
 
     def stands(self, now: State) -> bool:
-        """Return whether the belt stands."""
+        """Return whether the belt is stopped."""
         return abs(now.velocity) <= self._stands
 
     def fault(self, now: State, what: str) -> DeviceFault:
@@ -71,7 +71,7 @@ class Motion:
 
     # -------------------------------------------------------------------------------- enabling
     def enable(self, mode: Mode, what: str, go_on: GoOn) -> None:
-        """Bring the drive to Operation enabled in a mode, standing. Raises DeviceFault, DeviceTimeout, Cancelled."""
+        """Enable the drive in a mode, at standstill. Raises DeviceFault, DeviceTimeout, Cancelled."""
         now = self._observer.fresh().value
         if now.power in FAULTY:
             raise self.fault(now, f"{what} is refused in state {now.power}")
@@ -95,7 +95,7 @@ class Motion:
         self._step(lambda s: s.power is Power.ENABLED, f"{what}: enabling", go_on)
 
     def make_ready(self, what: str, go_on: GoOn) -> None:
-        """Be enabled in profile velocity, standing: ready to run."""
+        """Enable the drive in profile velocity mode, at standstill."""
         self.enable(Mode.PROFILE_VELOCITY, what, go_on)
         self.control(cia402.CW_ENABLE, go_on)
 
@@ -109,7 +109,7 @@ class Motion:
         return self._observer.wait(holds, STEP, what).value
 
     def _reach(self, arrived: Callable[[State], bool], timeout: float, what: str, go_on: GoOn) -> State:
-        """Wait while enabled; when that fails the belt is halted, for nobody waits for it any more."""
+        """Wait for a state while the drive is enabled; halt the belt after a timeout."""
 
         def holds(now: State) -> bool:
             go_on()
@@ -119,13 +119,13 @@ class Motion:
         try:
             return self._observer.wait(holds, timeout, what).value
         except DeviceTimeout:
-            with contextlib.suppress(DeviceError):  # the drive listens for our heartbeat
+            with contextlib.suppress(DeviceError):  # the drive monitors our heartbeat
                 self.halt()
             raise
 
     # -------------------------------------------------------------------------------- motions
     def home(self, what: str, go_on: GoOn) -> None:
-        """Home as the settings say. Raises DeviceFault when the drive cannot."""
+        """Home as configured in the settings. Raises DeviceFault when it fails."""
         s, write = self._settings, self._link.write
         write(cia402.HOMING_METHOD, s.homing_method)
         write(cia402.HOMING_SPEED_SEARCH, s.rate(s.homing_speed))
@@ -150,7 +150,7 @@ class Motion:
         self.control(cia402.CW_ENABLE, go_on)
 
     def move(self, target: int, relative: bool, speed: int, expected: int, what: str, go_on: GoOn) -> None:
-        """Move to `target`, or by it, in counts; `expected` is where it has to end."""
+        """Move to `target`, or by it, counts; `expected` is the end position, counts."""
         s, write = self._settings, self._link.write
         self.enable(Mode.PROFILE_POSITION, what, go_on)
         before = self._observer.fresh().value
@@ -197,7 +197,7 @@ class Motion:
 
     # -------------------------------------------------------------------------------- stands
     def halt(self) -> None:
-        """Slow down, return when the belt stands. What it was doing is forgotten, by the drive too."""
+        """Stop the belt and wait for standstill. The set-point is discarded, also by the drive."""
         s = self._settings
         with self._one_step:
             power = cia402.power(self._link.read(cia402.STATUSWORD))
@@ -209,12 +209,12 @@ class Motion:
             return
         with self._one_step:
             if cia402.power(self._link.read(cia402.STATUSWORD)) is Power.ENABLED:
-                # Clearing the halt bit alone would let the drive go on with its set-point.
+                # If only the halt bit were cleared, the drive would continue to its set-point.
                 self._link.write(cia402.CONTROLWORD, cia402.CW_SWITCH_ON)
         self._observer.wait(lambda now: now.power is not Power.ENABLED, STEP, "leaving Operation enabled")
 
     def quick_stop(self) -> None:
-        """Stop on the quick stop ramp; return when the belt stands. The torque is off then."""
+        """Stop on the quick stop ramp; wait for standstill. The torque is off then."""
         with self._one_step:
             if cia402.power(self._link.read(cia402.STATUSWORD)) is Power.ENABLED:
                 self._link.write(cia402.CONTROLWORD, cia402.CW_QUICK_STOP)
@@ -223,7 +223,7 @@ class Motion:
         )
 
     def fault_reset(self, go_on: GoOn) -> None:
-        """Reset a fault. Raises Refused while its cause stands."""
+        """Reset a fault. Raises Refused while its cause is present."""
         now = self._observer.wait(
             lambda s: s.power is not Power.FAULT_REACTION, MARGIN, "the reaction to the fault"
         ).value

@@ -18,9 +18,12 @@ PDO_MISSED: Final = 0.1
 
 
 class Observer(StateObserver[State]):
-    """Keeps the newest state. It writes nothing but our heartbeat, while `guarded`.
+    """Keeps the newest state. It sends only our heartbeat, while `guarded`.
 
-    lost: called with the reason when control ends.
+    Args:
+        name: Name of the conveyor.
+        settings: The settings.
+        lost: Called with the reason when control ends.
     """
 
     period = 0.05
@@ -53,7 +56,7 @@ class Observer(StateObserver[State]):
         super().disconnect()
 
     def heard(self, master: int, within: float) -> bool:
-        """Return whether a heartbeat of node `master` came in the last `within` s; we do not receive our own."""
+        """Return whether a heartbeat of node `master` came within the last `within` s; we do not receive our own."""
         return time.monotonic() - self._masters.get(master, -1e9) <= within
 
     def listen(self) -> None:
@@ -91,13 +94,13 @@ class Observer(StateObserver[State]):
     def _hear_nmt(self, state: int) -> None:
         before, self.nmt = self.nmt, state
         if self.guarded and before == OPERATIONAL[0] != state:
-            # Another host commands the node; the drive has reacted as 6007h says.
+            # Another host commands the node; the drive has reacted as configured in 6007h.
             self._drop_control("another host has changed the NMT state of the drive")
             self.wake()
 
     # -------------------------------------------------------------------------------- on the observing thread
     def open(self, timeout: float) -> Snapshot[State]:
-        """Open the bus and see that a drive answers."""
+        """Open the bus and check that a drive answers."""
         deadline = time.monotonic() + timeout
         self._opened = self._by_pdo = False
         self.nmt = None
@@ -111,9 +114,9 @@ class Observer(StateObserver[State]):
                 profile=profile,
                 expected=cia402.PROFILE,
             )
-        self.link.read(cia402.VENDOR)  # drains what is late, see CanLink
+        self.link.read(cia402.VENDOR)  # drains late answers, see CanLink
         self.emergency = 0
-        self._opened = True  # from now on a boot is a loss
+        self._opened = True  # from now on a boot counts as a loss
         return Snapshot.by(self._ask)
 
     def read(self) -> State | None:
@@ -155,7 +158,7 @@ class Observer(StateObserver[State]):
             raise DeviceFault("{device} sent invalid values: {reason}", device=self.who, reason=error) from error
 
     def on_state(self, snapshot: Snapshot[State]) -> None:
-        """Note when a fault appears."""
+        """Record the time of a new fault."""
         code, before = snapshot.value.error_code, self.newest()
         if code and (before is None or before.error_code != code):
             self.emergency_since = now()

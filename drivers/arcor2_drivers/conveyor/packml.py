@@ -1,7 +1,7 @@
-"""The belt as a PackML unit: which state it is in, and what a command does in it (ISA-TR88.00.02).
+"""Unit: the belt as a PackML unit, its states and commands (ISA-TR88.00.02).
 
-Stopped: without torque. Idle: enabled, standing. Execute: the belt moves. Held: stopped by hold, the torque stays.
-Aborted: a fault, or abort; the belt stands without torque until it is cleared.
+Stopped: without torque. Idle: enabled, at standstill. Execute: the belt moves. Held: stopped by hold, with torque.
+Aborted: after a fault or abort; at standstill without torque until it is cleared.
 """
 
 import contextlib
@@ -37,7 +37,7 @@ STATES: Final = frozenset(
 
 
 class Unit:
-    """Remembers what the drive does not know: that it was held or aborted, and which command is under way."""
+    """The part of the state that the drive does not store: held, aborted, and the running command."""
 
     def __init__(self, who: str, motion: Motion, speed: int) -> None:
         self._who, self._motion, self._speed = who, motion, speed
@@ -47,7 +47,7 @@ class Unit:
         self.held = self.aborted = False
 
     def forget(self) -> None:
-        """Begin anew: control was lost or given back."""
+        """Reset the state, because control has ended."""
         self.held = self.aborted = False
 
     def state(self, now: State) -> MachineState:
@@ -68,7 +68,7 @@ class Unit:
 
     @contextlib.contextmanager
     def act(self, what: str) -> Iterator[None]:
-        """Be the one act there is; a hold is over by it. Raises Refused beside another, and while aborted."""
+        """Run a command exclusively; it ends a hold. Raises Refused while another runs, and while aborted."""
         if self.aborted:
             raise Refused("{device}: {what} is refused in state Aborted: clear it first", device=self._who, what=what)
         if not self._one_act.acquire(blocking=False):

@@ -34,7 +34,7 @@ MOTION: Final = Tpdo(1, 0x280, (cia402.POSITION, cia402.VELOCITY))
 
 
 def set_up(link: CanLink, node: int, period_ms: int) -> None:
-    """Have the drive send STATUS and MOTION each `period_ms`. Raises Refused when it cannot."""
+    """Configure the drive to send STATUS and MOTION every `period_ms`. Raises Refused when it cannot."""
     try:
         for pdo in (STATUS, MOTION):
             _set_up(link, pdo, node, period_ms)
@@ -60,18 +60,18 @@ def _set_up(link: CanLink, pdo: Tpdo, node: int, period_ms: int) -> None:
 
 
 class PdoState:
-    """Puts the two PDOs together. Called on the thread that receives."""
+    """Combines the two PDOs to a state. Called on the receiving thread."""
 
     def __init__(self, node: int) -> None:
         self._node = node
         self._status: tuple[tuple[int, ...], float] | None = None
         self.received = 0
-        """How many of the two have come."""
+        """Number of PDOs received."""
         self.newest = 0.0
-        """When the last whole state came (monotonic)."""
+        """Time of the last complete state (monotonic, s)."""
 
     def take(self, identifier: int, data: bytes) -> tuple[State, float] | None:
-        """Take a frame; give the state that it completes, and since when that holds (monotonic)."""
+        """Receive a frame; return the state that it completes, and its time (monotonic, s)."""
         if identifier == STATUS.base + self._node:
             values = STATUS.unpack(data)
             if values is not None:

@@ -11,7 +11,7 @@ from arcor2_hw.objects import Settings
 from arcor2_hw.objects.settings import Range, check_serial_port, check_url, within
 
 LONGEST_HEARTBEAT: Final = 1000
-"""Longest heartbeat time, ms; the type declares it as its reaction to a loss."""
+"""Longest heartbeat time, ms; the type declares it in `loss_reaction`."""
 LONGEST_RAMP: Final = 0.5
 """Longest quick stop from the highest speed, s; part of the declared reaction to a loss."""
 LONGEST_MOVE: Final = 600.0
@@ -21,7 +21,7 @@ _NETWORK_INTERFACE: Final = re.compile(r"[\w.-]{1,15}")
 
 
 class CanInterface(StrEnum):
-    """How python-can reaches the bus."""
+    """Interface of python-can to the bus."""
 
     SLCAN = "slcan"
     SOCKETCAN = "socketcan"
@@ -30,28 +30,28 @@ class CanInterface(StrEnum):
 
 @dataclasses.dataclass
 class ConveyorSettings(Settings):
-    """Where the drive is, and its units and limits.
+    """Address of the drive, its units and limits.
 
     :param channel: for slcan socket://host:port or a serial port; for socketcan the network interface; for socketcand
         socket://host:port/bus, as socket://10.0.0.2:29536/can0
     :param interface: how the bus is reached
     :param bitrate: bit/s of the bus; slcan only, a network interface has its own
     :param node_id: CANopen node id of the drive
-    :param master_id: CANopen node id that we send heartbeats as
+    :param master_id: CANopen node id of our heartbeats
     :param counts_per_metre: counts of the drive for one metre of belt; negative inverts the direction
     :param max_speed: highest speed, m/s
-    :param acceleration: m/s², also for slowing down
-    :param quick_stop_deceleration: m/s², of a quick stop and after a loss
-    :param min_position: lowest position move_to and move_by may go to, m
-    :param max_position: highest position, m
-    :param homing_method: number of the method (CiA 402)
-    :param homing_speed: m/s
-    :param homing_timeout: seconds homing may take
-    :param tolerance: how far from its target a move may end, m
-    :param heartbeat_ms: ms without our heartbeat after which the drive stops; below 700 a busy computer stops it
-    :param sdo_timeout: seconds the drive has to answer a request
-    :param pdo_period_ms: ms between the PDOs with the state of the drive while we have control; 0: read by SDO
-    :param belt_speed: m/s the belt runs with when it is started as a machine; negative for backwards
+    :param acceleration: acceleration and deceleration, m/s²
+    :param quick_stop_deceleration: deceleration of a quick stop and after a loss, m/s²
+    :param min_position: lowest position of moves, m
+    :param max_position: highest position of moves, m
+    :param homing_method: number of the homing method (CiA 402)
+    :param homing_speed: speed of homing, m/s
+    :param homing_timeout: time limit of homing, s
+    :param tolerance: largest distance of the end of a move from its target, m
+    :param heartbeat_ms: time without our heartbeat after which the drive stops, ms; a busy computer needs 700 or more
+    :param sdo_timeout: time the drive has to answer a request, s
+    :param pdo_period_ms: period of the PDOs with the state of the drive while we have control, ms; 0: read by SDO
+    :param belt_speed: speed of the belt when it is started as a machine, m/s; negative for backwards
     """
 
     channel: str
@@ -93,7 +93,7 @@ class ConveyorSettings(Settings):
         if self.pdo_period_ms:
             within("pdo_period_ms", self.pdo_period_ms, 2, 100)
         within("belt_speed", abs(self.belt_speed), 0.001, self.max_speed)
-        # A request that takes its whole time must not delay the heartbeat too long.
+        # The longest request must not delay the heartbeat too long.
         within("sdo_timeout", self.sdo_timeout, 0.02, self.heartbeat_ms / 2000.0)
 
     def _check_channel(self) -> None:
@@ -119,13 +119,13 @@ class ConveyorSettings(Settings):
         return where.hostname or "", where.port or 0, where.path.strip("/")
 
     def counts(self, value: float) -> int:
-        """Return m or m/s in counts of the drive."""
+        """Convert m or m/s to counts or counts/s."""
         return round(value * self.counts_per_metre)
 
     def rate(self, value: float) -> int:
-        """Return an unsigned rate (speed, acceleration) in counts of the drive; at least 1."""
+        """Convert a speed or acceleration to counts; the result is positive and at least 1."""
         return max(1, round(value * abs(self.counts_per_metre)))
 
     def metres(self, counts: int) -> float:
-        """Return counts in m, or counts/s in m/s."""
+        """Convert counts to m, or counts/s to m/s."""
         return counts / self.counts_per_metre

@@ -1,7 +1,7 @@
-"""CAN by a Lawicel adapter, as a python-can bus that reads what has come at once.
+"""SlcanBus: a python-can bus for Lawicel adapters that reads all available bytes at once.
 
-python-can's own reads byte by byte and releases the interpreter for each: next to an action that computes it falls
-behind a drive that sends its state 100 times a second.
+The bus of python-can reads single bytes and releases the interpreter for each. While an action computes, it cannot keep
+up with a drive that sends its state 100 times per second.
 """
 
 import os
@@ -19,7 +19,7 @@ class SlcanBus(slcanBus):
     """A Lawicel adapter on a serial port or at `socket://host:port`. Every failure is a can.CanError."""
 
     def _read(self, timeout: float | None) -> str | None:
-        """Return the first line that came within `timeout` s, None when none did; the others wait in the queue."""
+        """Return the first line that came within `timeout` s, or None; further lines are queued."""
         try:
             fd = self.fileno()
             ready, _, _ = select.select([fd], [], [], timeout)

@@ -1,8 +1,7 @@
-"""CAN by socketcand's raw mode over TCP, as a python-can bus.
+"""SocketcandBus: a python-can bus for the raw mode of socketcand over TCP.
 
-python-can's own client has no time limit while it connects, and takes a connection that was closed for a bus on which
-nothing happens. Its syntax of frames is used; the socket is ours. From general knowledge of socketcand's protocol and
-python-can's client: no document was at hand.
+The client of python-can has no time limit while it connects, and does not detect a closed connection. This bus uses its
+syntax of frames with its own socket. No specification of the protocol was available.
 """
 
 import select
@@ -18,72 +17,76 @@ from can.interfaces.socketcand.socketcand import (
 )
 
 LONGEST: Final = 256
-"""Bytes from < to >; what is longer is noise."""
+"""Longest message from < to >, bytes; longer ones are noise."""
 
 
 class SocketcandBus(can.BusABC):
-    """One bus of a socketcand server. Every failure is a can.CanError or an OSError.
+    """A bus of a socketcand server. Every failure is a can.CanError or an OSError.
 
-    channel: name of the bus at the server, as can0. timeout: s for connecting and the three greetings together.
+    Args:
+        channel: Name of the bus at the server, such as can0.
+        host: Name or address of the server.
+        port: TCP port of the server.
+        timeout: Time limit for connecting and greeting, s.
     """
 
     def __init__(self, channel: str, host: str, port: int, timeout: float) -> None:
         self.channel_info = f"socketcand {channel} at {host}:{port}"
-        self._came = b""
+        self._buffer = b""
         self._frames: deque[can.Message] = deque()
         deadline = time.monotonic() + timeout
         self._socket = socket.create_connection((host, port), timeout)
         try:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._greeted("hi", deadline)
+            self._expect("hi", deadline)
             for command in (f"open {channel}", "rawmode"):
                 self._socket.sendall(f"< {command} >".encode())
-                self._greeted("ok", deadline)
+                self._expect("ok", deadline)
         except BaseException:
             self._socket.close()
             self._is_shutdown = True
             raise
         super().__init__(channel=channel)
 
-    def _greeted(self, wanted: str, deadline: float) -> None:
-        while (told := self._next()) is None:
+    def _expect(self, wanted: str, deadline: float) -> None:
+        while (text := self._next()) is None:
             if not self._receive(deadline - time.monotonic()):
                 raise can.CanTimeoutError(f"{self.channel_info} does not say <{wanted}>")
-        if told.split()[1:-1] != [wanted]:
-            raise can.CanInitializationError(f"{self.channel_info} says {told!r} instead of <{wanted}>")
+        if text.split()[1:-1] != [wanted]:
+            raise can.CanInitializationError(f"{self.channel_info} says {text!r} instead of <{wanted}>")
 
     def _receive(self, timeout: float) -> bool:
-        """Take what has come within `timeout` s; tell whether anything has."""
+        """Receive bytes within `timeout` s; return whether any came."""
         ready, _, _ = select.select([self._socket], [], [], max(0.0, timeout))
         if not ready:
             return False
         data = self._socket.recv(65536)
         if not data:
             raise can.CanOperationError(f"{self.channel_info} has closed the connection")
-        self._came += data
+        self._buffer += data
         return True
 
     def _next(self) -> str | None:
-        """Return the next whole message, from < to >. Raises ValueError for what is none."""
-        end = self._came.find(b">")
+        """Return the next complete message, from < to >. Raises ValueError for an invalid one."""
+        end = self._buffer.find(b">")
         if end < 0:
-            if len(self._came) > LONGEST:
-                self._came = b""
+            if len(self._buffer) > LONGEST:
+                self._buffer = b""
                 raise ValueError("no message of socketcand")
             return None
-        told, self._came = self._came[: end + 1].strip(), self._came[end + 1 :]
-        if not told.startswith(b"<") or len(told) > LONGEST:
-            raise ValueError(f"no message of socketcand: {told[:40]!r}")
-        return told.decode("ascii")
+        text, self._buffer = self._buffer[: end + 1].strip(), self._buffer[end + 1 :]
+        if not text.startswith(b"<") or len(text) > LONGEST:
+            raise ValueError(f"no message of socketcand: {text[:40]!r}")
+        return text.decode("ascii")
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         deadline = time.monotonic() + (1e6 if timeout is None else timeout)
         while True:
-            while (told := self._next()) is not None:
-                if told.startswith("< frame ") and (frame := convert_ascii_message_to_can_message(told)) is not None:
+            while (text := self._next()) is not None:
+                if text.startswith("< frame ") and (frame := convert_ascii_message_to_can_message(text)) is not None:
                     return frame, False
-                if told.startswith("< error "):
-                    raise can.CanOperationError(f"{self.channel_info}: {told}")
+                if text.startswith("< error "):
+                    raise can.CanOperationError(f"{self.channel_info}: {text}")
             if not self._receive(deadline - time.monotonic()):
                 return None, False
 
@@ -96,11 +99,11 @@ class SocketcandBus(can.BusABC):
             raise can.CanTimeoutError(f"{self.channel_info} takes no frame") from error
 
     def flush(self) -> None:
-        """Throw away what has come and is no message."""
-        self._came = b""
+        """Discard invalid bytes."""
+        self._buffer = b""
 
     def wake(self) -> None:
-        """Let a thread that waits for a frame fail."""
+        """Make a thread that waits for a frame fail."""
         self._socket.shutdown(socket.SHUT_RDWR)
 
     def shutdown(self) -> None:
@@ -113,4 +116,4 @@ class SocketcandBus(can.BusABC):
         return self._socket.fileno()
 
     def _apply_filters(self, filters: Any) -> None:
-        """Filter nothing; python-can does it in `recv`."""
+        """Do nothing; `recv` of python-can filters."""

@@ -307,10 +307,10 @@ async def test_lamps_are_what_the_outputs_say() -> None:
 @pytest.mark.parametrize(
     ("change", "names"),
     [
-        (lambda whole: whole.update(feeder=PLAIN["feeder"]), "feeder or on a belt"),
+        (lambda whole: whole.update(feeder=PLAIN["feeder"]), "feeder or a belt"),
         (lambda whole: whole["belt"].update(pitch=0.05), "pitch"),
         (lambda whole: whole["belt"]["barriers"][0].update(at=0.1), "barriers"),
-        (lambda whole: whole["labelling"]["press"].update(end=list(BEGIN)), "begin and end"),
+        (lambda whole: whole["labelling"]["press"].update(end=list(BEGIN)), "begin to end"),
         (lambda whole: whole["labelling"]["arm"].update(links=[0.1]), "links"),
     ],
 )

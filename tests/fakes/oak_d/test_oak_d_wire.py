@@ -185,7 +185,7 @@ def test_what_is_no_question_is_refused(fake: FakeProcess) -> None:
             client.socket.sendall(wrong)
             kind, header, _ = client.message()
             assert kind == 7
-            assert header["reason"] in ("no message of version 1", "wrong checksum")
+            assert header["reason"] in ("not a message of version 1", "wrong checksum")
             assert client.socket.recv(1) == b""
 
 

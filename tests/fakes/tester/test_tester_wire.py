@@ -232,7 +232,7 @@ def test_a_board_goes_in_only_through_an_open_door(tester: Any, host: Host, wait
     with pytest.raises(Exception, match="defect"):
         tester.control.do("put_board", code="B1", defect="melted")
     tester.control.do("put_board", code="B1")
-    with pytest.raises(Exception, match="B1 lies in the fixture"):
+    with pytest.raises(Exception, match="B1 is already in the fixture"):
         tester.control.do("put_board", code="B2")
     assert tester.control.do("take_board") == "B1"
     assert not host.switches[2]
