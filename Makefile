@@ -20,11 +20,11 @@ run: .make/run .make/editor
 # Only these files are collected for the second run: collecting all of them takes 10 s.
 ALONE = $(shell grep -rl --include='test_*.py' mark.alone tests)
 
-# Tests mostly wait for simulated devices, so three workers suit two cores. Tests marked `alone` start a dozen processes
+# Tests mostly wait for simulated devices, so four workers suit two cores. Tests marked `alone` start a dozen processes
 # each and run afterwards, in two workers. Exit code 5 means that no test was selected, as ARGS may select only one kind.
 test: .make/dev .make/editor .make/browser
 	$(BIN)/python editor/build.py test
-	$(BIN)/python -m pytest --numprocesses 3 --dist loadgroup --no-loadscope-reorder -m "not alone" $(ARGS) || test $$? = 5
+	$(BIN)/python -m pytest --numprocesses 4 --dist loadgroup --no-loadscope-reorder -m "not alone" $(ARGS) || test $$? = 5
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m alone $(or $(ARGS),$(ALONE)) || test $$? = 5
 
 bench: .make/dev

@@ -22,7 +22,7 @@ from arcor2_hw.data.package import PackageStateEnum
 from tests.demo.running import Run, demo
 from tests.e2e.harness import until
 
-pytestmark = [pytest.mark.timeout(240), pytest.mark.alone, pytest.mark.asyncio(loop_scope="module")]
+pytestmark = [pytest.mark.timeout(240), pytest.mark.asyncio(loop_scope="module")]
 SEED = random.SystemRandom().randrange(1_000_000)
 BOARDS = 2
 GOOD = 3

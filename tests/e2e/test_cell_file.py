@@ -22,7 +22,7 @@ from arcor2_hw.data.project import ActionParameter, Flow
 from tests.fakes.conftest import FakeProcess
 from tests.server.core.serving import running
 
-pytestmark = [pytest.mark.timeout(120), pytest.mark.alone]
+pytestmark = pytest.mark.timeout(120)
 NOBODY = "socket://127.0.0.1:9"
 
 

@@ -20,6 +20,7 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.robot import Joint
+from arcor2_hw.testing.own_time import Instant, own_time
 from tests.drivers.universal_robots.conftest import FakeUr
 from tests.e2e.harness import until
 from tests.server.core.serving import ServerProcess, running
@@ -70,10 +71,10 @@ class Site:
     def moving(self) -> bool:
         return max(map(abs, self.fake.truth()["qd"])) > 1e-3
 
-    async def rests(self, since: float) -> None:
+    async def rests(self, since: Instant) -> None:
         """The arm comes to rest in time, and stays there."""
         while self.moving():
-            late = time.monotonic() - since
+            late = own_time() - since
             assert late < RESTS_WITHIN, f"it moves {late:.2f} s after somebody froze"
             await asyncio.sleep(0.005)
         await self.stays()
@@ -180,14 +181,14 @@ async def test_the_arm_stops_when_any_process_freezes_or_dies(fake: FakeUr, tmp_
         await _a_server_that_freezes(place)
         await _a_host_that_freezes(place)
         async with jogging(place):
-            began = time.monotonic()
+            began = own_time()
             place.server.process.kill()
             await place.rests(began)
 
 
 async def _a_client_that_freezes(place: Site) -> None:
     async with jogging(place) as jogger:
-        began = time.monotonic()
+        began = own_time()
         jogger.process.send_signal(signal.SIGSTOP)
         await place.rests(began)
         while (told := (await place.client.next_event("RobotHold")).data).held:
@@ -201,7 +202,7 @@ async def _a_client_that_freezes(place: Site) -> None:
 async def _a_server_that_freezes(place: Site) -> None:
     """All that waited for it is served when it comes back, and moves nothing."""
     async with jogging(place) as jogger:
-        began = time.monotonic()
+        began = own_time()
         place.server.process.send_signal(signal.SIGSTOP)
         try:
             await place.rests(began)
@@ -215,7 +216,7 @@ async def _a_host_that_freezes(place: Site) -> None:
     """Its controller's watchdog stops the arm meanwhile; what waited for the host moves nothing."""
     async with jogging(place) as jogger:
         host = place.host()
-        began = time.monotonic()
+        began = own_time()
         os.kill(host, signal.SIGSTOP)
         try:
             await place.rests(began)
@@ -285,7 +286,7 @@ async def test_the_tcp_keeps_its_speed_and_protective_stops_are_acknowledged(fak
             await _hold_on(turn)
         with pytest.raises(RequestFailed, match="protective stop"):
             await place.jog(new=True, linear=SLOWLY_UP)
-        await place.rests(time.monotonic())
+        await place.rests(own_time())
 
         async def acknowledged() -> bool:
             with contextlib.suppress(RequestFailed):  # for its first seconds the controller does not let it be unlocked

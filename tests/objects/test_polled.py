@@ -96,7 +96,7 @@ def test_it_reads_faster_while_somebody_waits(polled: Polled[int], device: Devic
     before = device.count
     with pytest.raises(DeviceTimeout, match=r"^thing at home: nothing ever took longer than 0\.5 s$"):
         polled.wait(lambda _: False, 0.5, "nothing ever")
-    assert device.count - before > 20  # 10 at the quiet pace
+    assert device.count - before > 15  # 10 at the quiet pace
 
 
 def test_a_state_gets_stale(polled: Polled[int], device: Device) -> None:
@@ -113,7 +113,7 @@ def test_a_stop_ends_what_was_begun_and_nothing_else(polled: Polled[int], device
     thread, errors = failing(lambda: polled.wait(lambda _: False, 5.0, "pressing", go_on))
     time.sleep(0.05)
     polled.stop_waiting()
-    thread.join(2.0)
+    thread.join(20.0)
     assert isinstance(errors[0], Cancelled)
     assert str(errors[0]) == "thing at home: pressing was stopped"
     with pytest.raises(Cancelled):
@@ -126,7 +126,7 @@ def test_a_loss_ends_what_waits_even_when_it_is_over_at_once(polled: Polled[int]
     thread, errors = failing(lambda: polled.wait(lambda _: False, 5.0, "pressing"))
     time.sleep(0.05)
     device.broken = True
-    thread.join(2.0)
+    thread.join(20.0)
     device.broken = False
     assert isinstance(errors[0], ConnectionLost)
     assert device.told == ["it broke"]
@@ -145,7 +145,7 @@ def test_disconnecting_ends_what_waits_and_tells_no_loss(polled: Polled[int], de
     time.sleep(0.05)
     device.answers.clear()
     polled.disconnect()
-    thread.join(2.0)
+    thread.join(20.0)
     assert isinstance(errors[0], NotConnected)
     assert device.told == []
     assert polled.newest() is None

@@ -152,7 +152,7 @@ def pair() -> Iterator[tuple[ArmLine, socket.socket]]:
     yield made, theirs
     made.end(NotInControl("the test is over"))
     kept.shutdown(socket.SHUT_RDWR)
-    answering.join(2.0)
+    answering.join(20.0)
     for each in (theirs, kept):
         each.close()
 

@@ -183,7 +183,7 @@ def test_stop_ends_a_test_without_result(
     loaded.stop()
     assert own_time() - began < 0.6  # Stopping takes 0.2 s
     assert fake.truth()["state"] == "Stopped"
-    thread.join(1.0)
+    thread.join(20.0)
     assert isinstance(outcome[0], Cancelled)
     assert fake.truth()["tested"] == 0
     loaded.stop()  # harmless
@@ -194,7 +194,7 @@ def test_stop_at_the_station_cancels(fake: FakeProcess, loaded: FunctionalTester
     thread, outcome = in_background(loaded.test)
     wait_for(lambda: fake.truth()["state"], lambda state: state == "Execute")
     fake.control.do("command", name="stop")
-    thread.join(2.0)
+    thread.join(20.0)
     assert isinstance(outcome[0], Cancelled)
     assert "stopped at the station" in str(outcome[0])
 

@@ -127,7 +127,7 @@ def test_a_broken_stream_is_a_loss_and_comes_back(fake: FakeProcess, camera: Oak
 def test_a_slow_stream_is_an_old_picture(fake: FakeProcess, camera: OakD) -> None:
     fake.control.do("slow", seconds=0.7)
     time.sleep(0.2)
-    wait(lambda: not fresh(camera), 2.0)
+    wait(lambda: not fresh(camera))
     fake.control.do("heal")
     wait(lambda: camera.connection is not Connection.LOST)
     wait(lambda: fresh(camera))

@@ -106,7 +106,7 @@ def test_stop_ends_a_weighing(fake: FakeProcess, make: Callable[..., MtSicsScale
     thread.start()
     fake.control.wait_until(lambda truth: truth["received"].count("SI") >= 3)
     scale.stop()
-    thread.join(2.0)
+    thread.join(20.0)
     assert isinstance(outcome[0], Cancelled)
 
 

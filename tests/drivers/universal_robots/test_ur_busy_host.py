@@ -37,7 +37,7 @@ def control_process(pid: int | None = None) -> psutil.Process:
 
 def stopped_within(fake: FakeUr, limit: float) -> None:
     began = own_time()
-    fake.control.wait_until(lambda t: not t["moving"], limit + 1.0)
+    fake.control.wait_until(lambda t: not t["moving"])
     assert own_time() - began < limit
 
 
@@ -79,7 +79,7 @@ def test_a_starved_control_process_says_why(ready: UR5e, fake: FakeUr) -> None:
     trips = fake.truth()["watchdog_trips"]
     process = control_process()
     process.send_signal(signal.SIGSTOP)
-    fake.control.wait_until(lambda t: t["watchdog_trips"] > trips, 1.0)
+    fake.control.wait_until(lambda t: t["watchdog_trips"] > trips)
     process.send_signal(signal.SIGCONT)
     with pytest.raises(ConnectionLost, match="this computer was too slow for the robot's watchdog"):
         doing.result(1.0)
@@ -89,11 +89,11 @@ def test_a_frozen_owner_stops_the_arm_within_what_is_declared(owner: Owner, fake
     assert UR5e.loss_reaction.kind is LossKind.STOPS_WITHIN
     process = owner()
     time.sleep(0.3)  # at full speed
-    began = time.monotonic()
+    began = own_time()
     os.kill(process.pid, signal.SIGSTOP)
     time.sleep(BUSY)
     assert fake.truth()["moving"]
-    stopped_within(fake, UR5e.loss_reaction.within - (time.monotonic() - began))
+    stopped_within(fake, UR5e.loss_reaction.within - (own_time() - began))
 
 
 def test_a_killed_owner_stops_the_arm_at_once(owner: Owner, fake: FakeUr) -> None:
@@ -102,8 +102,8 @@ def test_a_killed_owner_stops_the_arm_at_once(owner: Owner, fake: FakeUr) -> Non
     child = control_process(process.pid)
     process.kill()
     stopped_within(fake, 0.5)
-    wait(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE, 1.0)
-    fake.control.wait_until(lambda t: t["program"] is None, 1.0)
+    wait(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE)
+    fake.control.wait_until(lambda t: t["program"] is None)
 
 
 def test_the_controllers_watchdog_stops_the_arm_when_the_computer_dies(owner: Owner, fake: FakeUr) -> None:
@@ -125,5 +125,5 @@ def test_a_door_opened_and_closed_during_a_stall_ends_the_program(owner: Owner, 
     time.sleep(0.1)
     fake.do("safeguard_stop", on=False)
     os.kill(process.pid, signal.SIGCONT)
-    fake.control.wait_until(lambda t: not t["moving"] and t["program"] is None, 1.0)
-    assert process.wait(2.0) != 0
+    fake.control.wait_until(lambda t: not t["moving"] and t["program"] is None)
+    assert process.wait(20.0) != 0

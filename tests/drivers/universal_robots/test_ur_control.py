@@ -468,7 +468,7 @@ def test_the_program_waits_for_a_slow_owner_but_not_for_ever(
     try:
         time.sleep(0.5)
         assert fake.truth()["program"] is not None
-        fake.control.wait_until(lambda t: t["program"] is None, 2.0)
+        fake.control.wait_until(lambda t: t["program"] is None)
         wait(lambda: session.ended is not None)
         assert "too slow" in str(session.ended)
     finally:

@@ -176,7 +176,7 @@ def test_it_tells_who_it_is(robot: UR5e) -> None:
 def test_observing_comes_back_by_itself_and_stale_is_an_error(robot: UR5e, fake: FakeUr, fault: str) -> None:
     old = robot.robot_joints()
     fake.do(fault)
-    wait(lambda: robot.connection in (Connection.LOST, Connection.BACK), 1.5)
+    wait(lambda: robot.connection in (Connection.LOST, Connection.BACK))
     if fault != "reset":
         with pytest.raises((ConnectionLost, Stale), match=fake.host):
             robot.robot_joints()

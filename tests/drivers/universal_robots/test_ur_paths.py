@@ -143,7 +143,7 @@ def test_a_path_stops_when_its_owner_is_killed(fake: FakeUr) -> None:
         moving(fake)
         owner.kill()
         assert at_rest(fake, 2.0) < 0.5
-        fake.control.wait_until(lambda t: t["program"] is None, 1.0)
+        fake.control.wait_until(lambda t: t["program"] is None)
 
 
 def test_a_path_stopped_at_the_pendant_ends_control(ready: UR5e, fake: FakeUr) -> None:

@@ -136,7 +136,7 @@ def test_a_safeguard_stop_ends_a_jog_and_hand_teaching(ready: UR5e, fake: FakeUr
     ready.jog((0.0, -0.1, 0.0, 0.0, 0.0, 0.0), valid_for=0.8)
     moving(fake)
     fake.do("safeguard_stop")
-    fake.control.wait_until(lambda t: not t["moving"] and t["program"] is None, 1.0)
+    fake.control.wait_until(lambda t: not t["moving"] and t["program"] is None)
     with pytest.raises((SafetyStop, NotInControl)):
         ready.jog((0.0, -0.1, 0.0, 0.0, 0.0, 0.0))
 
@@ -211,7 +211,7 @@ def test_a_jog_goes_along_its_frame_and_rests_when_not_renewed(ready: UR5e, fake
     moving(fake)
     time.sleep(0.3)
     began = own_time()
-    fake.control.wait_until(lambda t: not t["moving"], 1.0)
+    fake.control.wait_until(lambda t: not t["moving"])
     assert own_time() - began < 0.5
     way = ready.get_end_effector_pose("tcp").position - start.position
     along = Position(0.0, 0.0, 1.0)
@@ -226,7 +226,7 @@ def test_joints_are_jogged_one_by_one(ready: UR5e, fake: FakeUr) -> None:
     q = fake.truth()["q"]
     ready.jog(joint_velocities=[0.0, 0.0, 0.0, 0.0, 0.0, -0.5], valid_for=0.3)
     moving(fake)
-    fake.control.wait_until(lambda t: not t["moving"], 1.0)
+    fake.control.wait_until(lambda t: not t["moving"])
     turned = [b - a for a, b in zip(q, fake.truth()["q"], strict=True)]
     assert turned[5] < -0.05
     assert max(map(abs, turned[:5])) < 1e-3
