@@ -48,14 +48,14 @@ def running(request: pytest.FixtureRequest) -> Iterator[tuple[InstalledFake, Fak
     process.end()
 
 
-def test_it_can_be_made_to_fail(running: tuple[InstalledFake, FakeProcess]) -> None:
+def test_every_fake_has_the_common_faults(running: tuple[InstalledFake, FakeProcess]) -> None:
     fake, process = running
     commands = set(process.control.do("commands"))
     assert commands >= FAULTS | {"power_cycle", "truth"}
     assert ("wrong_checksum" in commands) is (fake.name not in NO_CHECKSUM)
 
 
-def test_every_command_says_what_it_takes(running: tuple[InstalledFake, FakeProcess]) -> None:
+def test_every_command_describes_its_parameters(running: tuple[InstalledFake, FakeProcess]) -> None:
     _, process = running
     described: list[dict[str, Any]] = process.control.do("describe")
     assert {each["name"] for each in described} | {"commands", "describe", "subscribe", "unsubscribe"} == set(
@@ -69,7 +69,7 @@ def test_every_command_says_what_it_takes(running: tuple[InstalledFake, FakeProc
     }
 
 
-def test_it_lives_through_a_power_cycle_and_all_faults(running: tuple[InstalledFake, FakeProcess]) -> None:
+def test_every_fake_survives_a_power_cycle_and_all_faults(running: tuple[InstalledFake, FakeProcess]) -> None:
     _, process = running
     for fault in (*sorted(FAULTS - {"heal"}), "heal"):
         process.control.do(fault)
@@ -78,7 +78,7 @@ def test_it_lives_through_a_power_cycle_and_all_faults(running: tuple[InstalledF
     assert process.process.poll() is None
 
 
-def test_it_can_be_run_faster_where_it_takes_time() -> None:
+def test_fakes_with_durations_can_run_faster() -> None:
     running = {
         fake.name: subprocess.Popen([sys.executable, "-m", fake.module, "--help"], stdout=subprocess.PIPE, text=True)
         for fake in FOUND
@@ -97,7 +97,7 @@ class Clock:
         return self.now * self.scale
 
 
-def test_ten_times_as_fast_the_servos_take_a_tenth_and_their_watchdog_its_time() -> None:
+def test_the_pace_does_not_affect_the_watchdog_of_the_servos() -> None:
     times, trips = [], []
     for clock in (Clock(1.0), Clock(10.0)):
         servo = Servo(1, clock, time_scale=clock.scale)

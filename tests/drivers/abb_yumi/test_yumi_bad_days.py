@@ -123,7 +123,7 @@ def test_garbage_on_a_line_is_a_typed_error(fake: FakeYumi, ready: YuMi) -> None
 
 
 @pytest.mark.parametrize("fault", ["garbage", "half_frame", "reset", "refuse"])
-def test_rws_that_fails_is_lost_and_back(fake: FakeYumi, robot: YuMi, fault: str) -> None:
+def test_an_rws_failure_is_a_loss_and_recovers(fake: FakeYumi, robot: YuMi, fault: str) -> None:
     fake.do(fault, wire="rws")
     if fault == "refuse":
         fake.do("reset", wire="rws")
@@ -136,7 +136,7 @@ def test_rws_that_fails_is_lost_and_back(fake: FakeYumi, robot: YuMi, fault: str
     wait(lambda: len(robot.robot_joints()) == 14)
 
 
-def test_connecting_to_a_slow_controller_keeps_to_its_time(fake: FakeYumi) -> None:
+def test_connecting_to_a_slow_controller_respects_the_timeout(fake: FakeYumi) -> None:
     fake.do("slow", wire="rws", seconds=0.3)
     robot, began = make(fake.host), own_time()
     with pytest.raises(DeviceTimeout) as error:
@@ -148,7 +148,7 @@ def test_connecting_to_a_slow_controller_keeps_to_its_time(fake: FakeYumi) -> No
     robot.disconnect()
 
 
-def test_leaving_a_slow_controller_leaves_no_mastership_behind(fake: FakeYumi, ready: YuMi) -> None:
+def test_disconnecting_from_a_slow_controller_releases_mastership(fake: FakeYumi, ready: YuMi) -> None:
     fake.do("slow", wire="rws", seconds=0.12)
     time.sleep(0.5)
     began = own_time()
@@ -157,7 +157,7 @@ def test_leaving_a_slow_controller_leaves_no_mastership_behind(fake: FakeYumi, r
     assert fake.truth()["mastership"]["rapid"] is None
 
 
-def test_stale_is_an_error_and_names_the_address(fake: FakeYumi, robot: YuMi) -> None:
+def test_a_stale_state_is_an_error_that_names_the_address(fake: FakeYumi, robot: YuMi) -> None:
     robot.get_end_effector_pose("tcp", "left")
     fake.do("silence", wire="rws")
     time.sleep(0.9)
@@ -180,7 +180,7 @@ STOPS = [
 
 
 @pytest.mark.parametrize(("state", "kind"), STOPS)
-def test_a_safety_stop_is_told_by_its_kind(fake: FakeYumi, ready: YuMi, state: str, kind: Safety) -> None:
+def test_a_safety_stop_is_reported_by_its_kind(fake: FakeYumi, ready: YuMi, state: str, kind: Safety) -> None:
     doing = moving_far(fake, ready)
     fake.do("control_state", state=state)
     with pytest.raises(SafetyStop) as error:
@@ -235,7 +235,7 @@ def test_turning_the_key_ends_control(fake: FakeYumi, ready: YuMi) -> None:
     assert not fake.moving()
 
 
-def test_a_rapid_error_is_told_in_abbs_words(fake: FakeYumi, ready: YuMi) -> None:
+def test_a_rapid_error_is_reported_with_the_controllers_text(fake: FakeYumi, ready: YuMi) -> None:
     doing = moving_far(fake, ready)
     fake.do("rapid_error", code=40512, title="Missing external axis value")
     with pytest.raises(DeviceFault) as error:
@@ -245,7 +245,7 @@ def test_a_rapid_error_is_told_in_abbs_words(fake: FakeYumi, ready: YuMi) -> Non
     wait(lambda: fake.truth()["mastership"]["rapid"] is None)
 
 
-def test_the_half_done_motion_of_a_stopped_program_is_forgotten(fake: FakeYumi, ready: YuMi) -> None:
+def test_the_interrupted_motion_of_a_stopped_program_is_dropped(fake: FakeYumi, ready: YuMi) -> None:
     doing = moving_far(fake, ready)
     fake.do("rapid_error", code=10125, title="Program stopped")
     with pytest.raises(DeviceFault):
@@ -291,7 +291,7 @@ def test_a_motion_server_that_is_silent_is_named(fake: FakeYumi, robot: YuMi) ->
     assert robot.control_owner() != "us"
 
 
-def test_a_motion_server_that_is_not_there_is_named(fake: FakeYumi, robot: YuMi) -> None:
+def test_a_missing_motion_server_is_named(fake: FakeYumi, robot: YuMi) -> None:
     fake.do("refuse", wire="left")
     with pytest.raises(DeviceError) as error:
         robot.take_control()
@@ -299,7 +299,7 @@ def test_a_motion_server_that_is_not_there_is_named(fake: FakeYumi, robot: YuMi)
     assert fake.truth()["mastership"]["rapid"] is None
 
 
-def test_ports_of_the_other_arm_are_noticed(fake: FakeYumi) -> None:
+def test_swapped_ports_of_the_arms_are_detected(fake: FakeYumi) -> None:
     robot = make(fake.host, left_port=6111, right_port=6101)
     robot.connect(3.0)
     with pytest.raises(Refused) as error:
@@ -308,7 +308,7 @@ def test_ports_of_the_other_arm_are_noticed(fake: FakeYumi) -> None:
     robot.disconnect()
 
 
-def test_a_controller_that_was_switched_off_and_on(fake: FakeYumi, ready: YuMi) -> None:
+def test_a_power_cycle_of_the_controller(fake: FakeYumi, ready: YuMi) -> None:
     doing = moving_far(fake, ready)
     fake.do("power_cycle")
     with pytest.raises(DeviceError) as error:

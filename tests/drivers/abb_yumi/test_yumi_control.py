@@ -37,7 +37,7 @@ def test_connecting_observes(fake: FakeYumi) -> None:
     assert robot.connection is Connection.OFFLINE
 
 
-def test_arms_joints_and_poses_are_told_apart(robot: YuMi) -> None:
+def test_joints_and_poses_of_both_arms_differ(robot: YuMi) -> None:
     assert robot.get_arm_ids() == {"left", "right"}
     both, left, right = robot.robot_joints(), robot.robot_joints(arm_id="left"), robot.robot_joints(arm_id="right")
     assert [joint.name for joint in left] == [f"ROB_L_{number}" for number in range(1, 8)]
@@ -54,7 +54,7 @@ def test_arms_joints_and_poses_are_told_apart(robot: YuMi) -> None:
     assert robot.suctions() == set()
 
 
-def test_poses_are_in_the_world_and_of_the_tool(fake: FakeYumi) -> None:
+def test_poses_are_those_of_the_tool_in_the_world(fake: FakeYumi) -> None:
     at = Pose(Position(1.0, 2.0, 0.5), Orientation.from_rotation_vector(0.0, 0.0, 1.5707963267948966))
     bare, tooled = make(fake.host, at, left_tcp_z=0.0), make(fake.host)
     for each in (bare, tooled):
@@ -68,7 +68,7 @@ def test_poses_are_in_the_world_and_of_the_tool(fake: FakeYumi) -> None:
         each.disconnect()
 
 
-def test_state_is_full(robot: YuMi) -> None:
+def test_the_state_is_complete(robot: YuMi) -> None:
     robot.take_control()
     wait(lambda: robot.state().program is ProgramState.PLAYING)
     state = robot.state()
@@ -80,7 +80,7 @@ def test_state_is_full(robot: YuMi) -> None:
     assert (identity.vendor, identity.serial, identity.firmware) == ("ABB", "14000-500000", "RobotWare 6.13.0190")
 
 
-def test_control_is_taken_and_given_back(fake: FakeYumi, robot: YuMi) -> None:
+def test_control_is_taken_and_released(fake: FakeYumi, robot: YuMi) -> None:
     fake.do("control_state", state="motoroff")
     robot.take_control()
     robot.take_control()
@@ -113,7 +113,7 @@ FORBIDDING: list[tuple[str, dict[str, Any], type[DeviceError], str]] = [
 
 
 @pytest.mark.parametrize(("fault", "arguments", "kind", "named"), FORBIDDING)
-def test_what_forbids_control_is_named(
+def test_reasons_against_control_are_named(
     fake: FakeYumi, robot: YuMi, fault: str, arguments: dict[str, Any], kind: type[DeviceError], named: str
 ) -> None:
     if fault == "operation_mode":
@@ -141,7 +141,7 @@ def test_what_forbids_control_is_named(
         assert robot.control_owner() == "Palletizing"
 
 
-def test_mastership_of_somebody_else_is_named(fake: FakeYumi, robot: YuMi) -> None:
+def test_the_holder_of_mastership_is_named(fake: FakeYumi, robot: YuMi) -> None:
     fake.do("mastership_held", alias="Anna", location="Cell 3")
     before = fake.truth()["writes"]
     with pytest.raises(NotInControl) as error:
@@ -152,7 +152,7 @@ def test_mastership_of_somebody_else_is_named(fake: FakeYumi, robot: YuMi) -> No
     wait(lambda: robot.control_owner() == "Anna (RobotStudio, Cell 3)")
 
 
-def test_a_second_hub_is_refused_by_the_first_ones_mastership(fake: FakeYumi, robot: YuMi) -> None:
+def test_mastership_of_the_first_hub_refuses_a_second_one(fake: FakeYumi, robot: YuMi) -> None:
     robot.take_control()
     other = make(fake.host)
     other.connect(3.0)
@@ -164,7 +164,7 @@ def test_a_second_hub_is_refused_by_the_first_ones_mastership(fake: FakeYumi, ro
     assert robot.control_owner() == "us"
 
 
-def test_a_program_that_is_not_ours_and_stands_is_named(fake: FakeYumi, robot: YuMi) -> None:
+def test_a_foreign_program_that_is_stopped_is_named(fake: FakeYumi, robot: YuMi) -> None:
     fake.do("foreign_program", on=True, name="Welding")
     fake.do("rapid_error", code=10125, title="Program stopped")
     with pytest.raises(Refused) as error:
@@ -174,7 +174,7 @@ def test_a_program_that_is_not_ours_and_stands_is_named(fake: FakeYumi, robot: Y
     assert fake.truth()["mastership"]["rapid"] is None
 
 
-def test_without_a_stated_mass_there_is_no_control(fake: FakeYumi) -> None:
+def test_control_is_refused_without_a_mass(fake: FakeYumi) -> None:
     robot = make(fake.host, right_mass=-1.0)
     robot.connect(3.0)
     with pytest.raises(Refused) as error:
@@ -183,7 +183,7 @@ def test_without_a_stated_mass_there_is_no_control(fake: FakeYumi) -> None:
     robot.disconnect()
 
 
-def test_a_wrong_password_is_told(fake: FakeYumi) -> None:
+def test_a_wrong_password_is_reported(fake: FakeYumi) -> None:
     robot = make(fake.host, password="guess")
     with pytest.raises(NotConnected) as error:
         robot.connect(2.0)
@@ -193,7 +193,7 @@ def test_a_wrong_password_is_told(fake: FakeYumi) -> None:
     robot.disconnect()
 
 
-def test_power_on_switches_the_motors_on_and_no_more(fake: FakeYumi, robot: YuMi) -> None:
+def test_power_on_only_switches_the_motors_on(fake: FakeYumi, robot: YuMi) -> None:
     fake.do("control_state", state="motoroff")
     robot.power_on()
     truth = fake.truth()
@@ -202,7 +202,7 @@ def test_power_on_switches_the_motors_on_and_no_more(fake: FakeYumi, robot: YuMi
     assert truth["mastership"]["rapid"] is None
 
 
-def test_sessions_do_not_pile_up(fake: FakeYumi) -> None:
+def test_sessions_do_not_accumulate(fake: FakeYumi) -> None:
     """A controller has 70 sessions; each of 36 connections that command takes two."""
     for _ in range(36):
         robot = make(fake.host)
@@ -215,7 +215,7 @@ def test_sessions_do_not_pile_up(fake: FakeYumi) -> None:
     robot.disconnect()
 
 
-def test_a_refusal_carries_the_controllers_words(fake: FakeYumi) -> None:
+def test_a_refusal_contains_the_controllers_text(fake: FakeYumi) -> None:
     rws = Rws("yumi", fake.host, RWS_PORT, "Default User", "robotics")
     with pytest.raises(Refused) as error:
         rws.act("/rw/rapid/execution", "resetpp")
@@ -227,7 +227,7 @@ def test_a_refusal_carries_the_controllers_words(fake: FakeYumi) -> None:
     rws.logout()
 
 
-def test_both_forms_of_the_fakes_answers_say_the_same(fake: FakeYumi) -> None:
+def test_json_and_xhtml_answers_have_the_same_content(fake: FakeYumi) -> None:
     with httpx.Client(
         base_url=f"http://{fake.host}:{RWS_PORT}", auth=httpx.DigestAuth("Default User", "robotics"), trust_env=False
     ) as client:
@@ -239,7 +239,7 @@ def test_both_forms_of_the_fakes_answers_say_the_same(fake: FakeYumi) -> None:
         client.get("/logout")
 
 
-def test_observing_costs_little(fake: FakeYumi, robot: YuMi) -> None:
+def test_observing_needs_little_cpu_time(fake: FakeYumi, robot: YuMi) -> None:
     before, began = fake.truth()["requests"], time.monotonic()
     time.sleep(1.0)
     rate = (fake.truth()["requests"] - before) / (time.monotonic() - began)

@@ -9,7 +9,7 @@ from .conftest import Doing, FakeYumi, make, under_way, wait
 from .test_yumi_motion import turned
 
 
-def test_fingers_grip_what_is_there(fake: FakeYumi, ready: YuMi) -> None:
+def test_fingers_grip_a_part(fake: FakeYumi, ready: YuMi) -> None:
     ready.calibrate_gripper(ArmId.RIGHT)
     assert ready.open_gripper(ArmId.RIGHT, 0.02) == pytest.approx(0.02, abs=1e-5)
     fake.do("part", arm="right")
@@ -19,7 +19,7 @@ def test_fingers_grip_what_is_there(fake: FakeYumi, ready: YuMi) -> None:
     assert fake.arm("left")["width"] == pytest.approx(0.025)
 
 
-def test_nothing_gripped_is_told(fake: FakeYumi, ready: YuMi) -> None:
+def test_gripping_nothing_is_an_error(fake: FakeYumi, ready: YuMi) -> None:
     ready.calibrate_gripper()
     with pytest.raises(DeviceFault) as error:
         ready.grip()
@@ -27,7 +27,7 @@ def test_nothing_gripped_is_told(fake: FakeYumi, ready: YuMi) -> None:
     assert "left hand of yumi" in str(error.value)
 
 
-def test_fingers_that_know_no_zero_are_refused(ready: YuMi) -> None:
+def test_uncalibrated_fingers_are_refused(ready: YuMi) -> None:
     with pytest.raises(Refused) as error:
         ready.grip()
     assert "refused" in str(error.value)
@@ -49,7 +49,7 @@ def test_a_stop_opens_no_gripper(fake: FakeYumi, ready: YuMi) -> None:
     assert fake.arm("left")["width"] == pytest.approx(0.01)
 
 
-def test_a_cup_that_is_not_set_is_refused(fake: FakeYumi, ready: YuMi) -> None:
+def test_a_suction_cup_that_is_not_configured_is_refused(fake: FakeYumi, ready: YuMi) -> None:
     with pytest.raises(Refused) as error:
         ready.set_suction(ArmId.LEFT, True)
     assert "left_suction" in str(error.value)
@@ -83,7 +83,7 @@ def test_one_arm_is_taught_by_hand(fake: FakeYumi, ready: YuMi) -> None:
     ready.move_to_joints(turned(ready, "left", 6, 0.1), 0.8, arm_id="left")
 
 
-def test_no_arm_is_released_while_one_moves(fake: FakeYumi, ready: YuMi) -> None:
+def test_hand_teaching_is_refused_while_an_arm_moves(fake: FakeYumi, ready: YuMi) -> None:
     moving = Doing(ready.move_to_joints, turned(ready, "left", 6, 1.0), 0.5, arm_id="left")
     under_way(fake, "left")
     with pytest.raises(Refused):
@@ -94,7 +94,7 @@ def test_no_arm_is_released_while_one_moves(fake: FakeYumi, ready: YuMi) -> None
         moving.result()
 
 
-def test_giving_control_back_makes_the_arm_stiff(fake: FakeYumi, ready: YuMi) -> None:
+def test_releasing_control_makes_the_arm_stiff(fake: FakeYumi, ready: YuMi) -> None:
     ready.set_hand_teaching_mode(True, "right")
     ready.release_control()
     assert not fake.arm("right")["lead_through"]

@@ -56,7 +56,7 @@ QUOTED = [
 
 
 @pytest.mark.parametrize(("made", "expected"), QUOTED)
-def test_lines_are_as_the_readme_says(made: bytes, expected: bytes | None) -> None:
+def test_lines_match_the_examples_of_the_readme(made: bytes, expected: bytes | None) -> None:
     text, _, number = made.decode().strip().rpartition("*")
     by_hand = 0
     for place in range(len(text)):
@@ -90,7 +90,7 @@ def test_a_tool_fits_into_a_line(position: list[float], quaternion: list[float])
 
 
 @given(st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=2, max_size=40), st.data())
-def test_two_neighbours_that_changed_places_are_noticed(text: str, data: st.DataObject) -> None:
+def test_the_checksum_detects_two_swapped_characters(text: str, data: st.DataObject) -> None:
     place = data.draw(st.integers(0, len(text) - 2))
     swapped = text[:place] + text[place + 1] + text[place] + text[place + 2 :]
     assert (check(text) == check(swapped)) is (text == swapped)
@@ -103,7 +103,7 @@ def test_a_garbled_answer_is_a_typed_error(raw: bytes) -> None:
     assert error.value.fault_code == "garbled"
 
 
-def test_numbers_that_are_none_are_not_sent() -> None:
+def test_non_finite_numbers_are_not_sent() -> None:
     for value in (float("nan"), float("inf")):
         with pytest.raises(ValueError):
             line(1, Code.SPEED, [value, 1.0])
@@ -120,7 +120,7 @@ def test_two_derivations_of_the_kinematics_agree(arm: str) -> None:
 
 
 @pytest.mark.parametrize("arm", ["left", "right"])
-def test_nominal_inverse_kinematics_comes_back(arm: str) -> None:
+def test_nominal_inverse_kinematics_inverts_forward_kinematics(arm: str) -> None:
     rng, home = np.random.default_rng(5), kinematics.HOME[arm]
     for _ in range(20):
         q = np.clip(home + rng.normal(0.0, 0.3, 7), *np.array(nominal.LIMITS).T)
@@ -157,7 +157,7 @@ def pair() -> Iterator[tuple[ArmLine, socket.socket]]:
         each.close()
 
 
-def test_a_late_answer_answers_no_later_question(pair: tuple[ArmLine, socket.socket]) -> None:
+def test_a_late_answer_is_not_used_for_a_later_request(pair: tuple[ArmLine, socket.socket]) -> None:
     made, server = pair
     with pytest.raises(DeviceTimeout) as error:
         made.ask(Code.FORWARD_POSITION, within=0.1)
@@ -176,7 +176,7 @@ def test_a_late_answer_answers_no_later_question(pair: tuple[ArmLine, socket.soc
     assert answered == [(3.0, 3.0, 3.0, 3.0)]
 
 
-def test_an_answer_in_pieces_is_one(pair: tuple[ArmLine, socket.socket]) -> None:
+def test_an_answer_received_in_pieces_is_joined(pair: tuple[ArmLine, socket.socket]) -> None:
     made, server = pair
     answered: list[tuple[float, ...]] = []
     asking = threading.Thread(target=lambda: answered.append(made.ask(Code.HAND_STATE)))

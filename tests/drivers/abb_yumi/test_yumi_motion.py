@@ -28,7 +28,7 @@ def shifted(pose: Pose, by: Position) -> Pose:
     return Pose(pose.position + by, pose.orientation)
 
 
-def test_a_joint_move_takes_its_time_and_gets_there(fake: FakeYumi, ready: YuMi) -> None:
+def test_a_joint_move_arrives_in_the_computed_time(fake: FakeYumi, ready: YuMi) -> None:
     goal = turned(ready, "left", 1, 0.5)
     other = fake.arm("right")["joints"]
     began = time.monotonic()
@@ -76,7 +76,7 @@ def test_a_pose_with_all_axes_together(ready: YuMi) -> None:
     assert at.orientation.angle_to(target.orientation) < 1e-4
 
 
-def test_a_path_goes_through_its_poses(fake: FakeYumi, ready: YuMi) -> None:
+def test_a_path_passes_its_waypoints(fake: FakeYumi, ready: YuMi) -> None:
     start = ready.get_end_effector_pose("tcp", "left")
     corners = [shifted(start, Position(*by)) for by in ((0.08, 0.0, 0.0), (0.08, 0.06, 0.0), (0.0, 0.06, 0.05))]
     flange = Position(*fake.arm("left")["position"])
@@ -125,7 +125,7 @@ def test_stopping_one_of_two_coupled_arms_stops_both(fake: FakeYumi, ready: YuMi
     )
 
 
-def test_arms_move_beside_each_other_and_stop_alone(fake: FakeYumi, ready: YuMi) -> None:
+def test_arms_move_concurrently_and_stop_separately(fake: FakeYumi, ready: YuMi) -> None:
     left = Doing(ready.move_to_joints, turned(ready, "left", 6, 1.5), 0.5, arm_id="left")
     right = Doing(ready.move_to_joints, turned(ready, "right", 6, 1.5), 0.5, arm_id="right")
     under_way(fake, "left", "right")
@@ -141,7 +141,7 @@ def test_arms_move_beside_each_other_and_stop_alone(fake: FakeYumi, ready: YuMi)
     right.result()
 
 
-def test_stop_passes_and_tells_when_it_stands(fake: FakeYumi, ready: YuMi) -> None:
+def test_stop_overtakes_a_motion_and_returns_at_standstill(fake: FakeYumi, ready: YuMi) -> None:
     goal = turned(ready, "left", 1, 1.2)
     for _ in range(3):
         moving = Doing(ready.move_to_joints, goal, 1.0, arm_id="left")
@@ -156,7 +156,7 @@ def test_stop_passes_and_tells_when_it_stands(fake: FakeYumi, ready: YuMi) -> No
     ready.move_to_joints(goal, 1.0, arm_id="left")
 
 
-def test_a_stop_before_the_command_is_sent_wins(fake: FakeYumi, ready: YuMi) -> None:
+def test_a_stop_before_the_command_is_sent_cancels_it(fake: FakeYumi, ready: YuMi) -> None:
     begun = fake.arm("left")["moves_begun"]
     guard = ready._control.stops["left"].guard()
     goal = [joint.value for joint in turned(ready, "left", 1, 0.5)]
@@ -166,7 +166,7 @@ def test_a_stop_before_the_command_is_sent_wins(fake: FakeYumi, ready: YuMi) -> 
     assert fake.arm("left")["moves_begun"] == begun
 
 
-def test_the_speed_override_slows_and_does_not_fail(fake: FakeYumi, ready: YuMi) -> None:
+def test_a_low_speed_override_slows_a_move_without_a_timeout(fake: FakeYumi, ready: YuMi) -> None:
     fake.do("speed_ratio", percent=25)
     began = time.monotonic()
     ready.move_to_joints(turned(ready, "left", 1, 0.4), 1.0, arm_id="left")
@@ -190,7 +190,7 @@ def at(robot: YuMi, arm: str, degrees: list[float]) -> list[Joint]:
     return [Joint(name, math.radians(value)) for name, value in zip(names, degrees, strict=True)]
 
 
-def test_where_one_arm_is_going_counts(fake: FakeYumi, ready: YuMi) -> None:
+def test_the_path_of_the_other_arm_is_considered(fake: FakeYumi, ready: YuMi) -> None:
     """Each of the two ways is free while the other arm is at home; both at once are not."""
     left = at(ready, "left", [-26.0, -117.0, 42.0, 26.0, 25.0, 34.0, 132.0])
     right = at(ready, "right", [32.0, -139.0, 15.0, 5.0, 61.0, 3.0, -141.0])
@@ -211,7 +211,7 @@ def test_where_one_arm_is_going_counts(fake: FakeYumi, ready: YuMi) -> None:
     assert fake.arm("left")["moves_begun"] == begun
 
 
-def test_an_arm_that_is_too_close_may_leave(fake: FakeYumi, ready: YuMi) -> None:
+def test_an_arm_that_is_too_close_may_move_away(fake: FakeYumi, ready: YuMi) -> None:
     home = ready.robot_joints(arm_id="right")
     fake.do("place", arm="left", joints=[2.0, -139.0, 19.0, 7.0, 47.0, -4.0, 136.0])
     fake.do("place", arm="right", joints=[26.0, -138.0, 7.0, -15.0, 62.0, 33.0, -145.0])
@@ -222,7 +222,7 @@ def test_an_arm_that_is_too_close_may_leave(fake: FakeYumi, ready: YuMi) -> None
     ready.move_to_joints(home, 1.0, arm_id="right")
 
 
-def test_kinematics_come_back(ready: YuMi) -> None:
+def test_inverse_kinematics_inverts_forward_kinematics(ready: YuMi) -> None:
     for arm in ("left", "right"):
         pose = shifted(ready.get_end_effector_pose("tcp", arm), Position(0.1, 0.0, 0.08))
         joints = ready.inverse_kinematics("tcp", pose, arm_id=arm)
@@ -231,7 +231,7 @@ def test_kinematics_come_back(ready: YuMi) -> None:
         assert back.orientation.angle_to(pose.orientation) < 1e-4
 
 
-def test_the_seed_chooses_among_solutions(ready: YuMi) -> None:
+def test_the_seed_selects_the_solution(ready: YuMi) -> None:
     pose = ready.get_end_effector_pose("tcp", "left")
     here = ready.inverse_kinematics("tcp", pose, arm_id="left")
     seed = turned(ready, "left", 4, 0.6)
@@ -297,7 +297,7 @@ def test_commands_need_control(robot: YuMi) -> None:
     robot.stop()
 
 
-def test_actions_do_what_they_say(fake: FakeYumi, ready: YuMi) -> None:
+def test_actions_move_the_arms(fake: FakeYumi, ready: YuMi) -> None:
     stored = {
         arm: ProjectRobotJoints("there", "obj_1", turned(ready, arm, 6, 0.2), True, arm) for arm in ("left", "right")
     }

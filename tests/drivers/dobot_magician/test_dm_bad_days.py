@@ -34,7 +34,7 @@ def write(port: str, *frames: bytes) -> None:
             assert line.read(14 if frame[4] == 3 else 6)
 
 
-def test_a_stall_of_half_a_second_costs_no_connection(fake: FakeProcess, arm: DobotMagician) -> None:
+def test_a_stall_of_half_a_second_keeps_the_connection(fake: FakeProcess, arm: DobotMagician) -> None:
     for _ in range(3):
         stall(BUSY)
         assert arm.connection is Connection.ONLINE
@@ -42,7 +42,7 @@ def test_a_stall_of_half_a_second_costs_no_connection(fake: FakeProcess, arm: Do
     assert arm.control_owner() == "us"
 
 
-def test_a_port_that_is_not_there_or_in_use(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:
+def test_a_missing_port_or_one_in_use(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:
     absent = make("/dev/no-such-port")
     with pytest.raises(NotConnected, match=r"^arm at /dev/no-such-port: the port cannot be opened\.$"):
         absent.connect()
@@ -55,9 +55,7 @@ def test_a_port_that_is_not_there_or_in_use(fake: FakeProcess, make: Callable[..
 
 
 @pytest.mark.parametrize("fault", ["silence", "garbage"])
-def test_a_device_that_does_not_answer_sensibly(
-    fake: FakeProcess, make: Callable[..., DobotMagician], fault: str
-) -> None:
+def test_invalid_answers_are_errors(fake: FakeProcess, make: Callable[..., DobotMagician], fault: str) -> None:
     fake.control.do(fault)
     arm = make(fake.ready["port"])
     began = own_time()
@@ -69,7 +67,7 @@ def test_a_device_that_does_not_answer_sensibly(
 
 
 @pytest.mark.parametrize("fault", ["silence", "garbage", "half_frame", "wrong_checksum"])
-def test_a_wire_that_fails_is_named_and_comes_back(
+def test_a_wire_fault_is_a_loss_and_recovers(
     fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any], fault: str
 ) -> None:
     fake.control.do(fault)
@@ -91,7 +89,7 @@ def test_a_wire_that_fails_is_named_and_comes_back(
     assert fake.truth()["motions"] == 1
 
 
-def test_answers_that_lag_behind_answer_nothing(
+def test_late_answers_are_not_used(
     start_fake: Callable[..., FakeProcess], make: Callable[..., DobotMagician], wait_for: Callable[..., Any]
 ) -> None:
     fake = start_fake("dobot_magician")
@@ -108,7 +106,7 @@ def test_answers_that_lag_behind_answer_nothing(
     assert arm.identify().serial == "DT1022049091"
 
 
-def test_unplugged_in_mid_move_and_plugged_again(
+def test_unplugging_and_plugging_during_a_move(
     fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
 ) -> None:
     thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
@@ -130,7 +128,7 @@ def test_unplugged_in_mid_move_and_plugged_again(
         arm.home()
 
 
-def test_what_a_loss_left_running_is_stopped_when_it_is_back(
+def test_stop_after_a_reconnect_stops_a_motion_left_running(
     fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
 ) -> None:
     arm.conveyor(0.05)
@@ -147,7 +145,7 @@ def test_what_a_loss_left_running_is_stopped_when_it_is_back(
     assert arm.control_owner() is None
 
 
-def test_control_is_refused_while_it_moves_for_somebody_else(
+def test_control_is_refused_while_another_client_moves_the_arm(
     fake: FakeProcess, make: Callable[..., DobotMagician]
 ) -> None:
     ratio = encode(83, 1, struct.pack("<2f", 5.0, 50.0))
@@ -169,7 +167,7 @@ def test_control_is_refused_while_it_moves_for_somebody_else(
     assert arm.control_owner() == "us"
 
 
-def test_what_waits_in_a_standing_queue_never_runs(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:
+def test_commands_left_in_a_stopped_queue_never_run(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:
     write(fake.ready["port"], ptp(30.0), ptp(-30.0))
     fake.control.wait_until(lambda truth: truth["queued"] == 2)
     arm = make(fake.ready["port"])
@@ -182,7 +180,7 @@ def test_what_waits_in_a_standing_queue_never_runs(fake: FakeProcess, make: Call
     assert truth["joints"][0] == pytest.approx(10.0, abs=0.01)
 
 
-def test_switched_off_and_on_and_homed(fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]) -> None:
+def test_homing_after_a_power_cycle(fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]) -> None:
     thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
     fake.control.wait_until(lambda truth: truth["moving"])
     fake.control.do("power_cycle")
@@ -234,7 +232,7 @@ for angle in (60, -60, 60):
 """
 
 
-def test_a_killed_owner_leaves_one_motion_and_no_more(fake: FakeProcess, tmp_path: Path) -> None:
+def test_a_killed_owner_leaves_only_the_present_motion(fake: FakeProcess, tmp_path: Path) -> None:
     script = tmp_path / "owner.py"
     script.write_text(OWNER)
     owner = subprocess.Popen([sys.executable, str(script), fake.ready["port"]], env=dict(os.environ))
@@ -249,7 +247,7 @@ def test_a_killed_owner_leaves_one_motion_and_no_more(fake: FakeProcess, tmp_pat
     assert (truth["motions"], truth["queued"], truth["longest_queue"]) == (1, 0, 1)
 
 
-def test_closing_stops_what_we_move(fake: FakeProcess, arm: DobotMagician) -> None:
+def test_disconnecting_stops_the_arm(fake: FakeProcess, arm: DobotMagician) -> None:
     thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
     fake.control.wait_until(lambda truth: truth["moving"])
     began = own_time()

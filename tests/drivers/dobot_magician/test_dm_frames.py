@@ -27,12 +27,12 @@ FRAMES = [
 
 
 @pytest.mark.parametrize(("frame", "octets"), FRAMES, ids=lambda value: "")
-def test_frames_by_hand(frame: Frame, octets: str) -> None:
+def test_frames_match_examples(frame: Frame, octets: str) -> None:
     assert encode(*frame) == bytes.fromhex(octets)
     assert FrameBuffer().feed(bytes.fromhex(octets)) == [frame]
 
 
-def test_foreign_bytes_give_whole_frames_only() -> None:
+def test_garbage_yields_only_complete_frames() -> None:
     generator = random.Random(7)
     for _ in range(300):
         sent, line = [], b""
@@ -72,7 +72,7 @@ def test_alarm_bits() -> None:
     assert "7Fh" in alarms.describe(0x7F)[0]
 
 
-def test_forward_and_inverse_are_one() -> None:
+def test_inverse_kinematics_inverts_forward_kinematics() -> None:
     tool = forward((0.0, math.pi / 4, math.pi / 4, 0.0), 0.0597, 0.0)
     assert tool == pytest.approx((0.2591, 0.0, -0.0085, 0.0), abs=1e-4)  # where a homed arm stands, folded at 45°
     generator = random.Random(3)
@@ -92,6 +92,6 @@ def test_forward_and_inverse_are_one() -> None:
         assert math.remainder(again.r - tool.r, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_pose_that_does_not_point_down_is_none() -> None:
+def test_a_pose_that_does_not_point_down_is_refused() -> None:
     with pytest.raises(Unreachable, match=r"tilted by 180\.0°"):
         tool_of(Pose())

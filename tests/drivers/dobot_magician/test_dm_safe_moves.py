@@ -42,7 +42,7 @@ def touches(around: Around, *seen: list[float]) -> set[str]:
     return around.touches(RobotModel.load(URDF, {"tool_x": 0.0597, "tool_z": 0.0}), BASE, seen)
 
 
-def test_the_model_is_where_the_arm_says_it_is(arm: DobotMagician, around: Around) -> None:
+def test_the_model_agrees_with_the_arm(arm: DobotMagician, around: Around) -> None:
     told, found = arm.get_end_effector_pose("tcp"), arm.safe_moves.forward("tcp", arm.robot_joints())
     assert told.position.distance_to(found.position) < 1e-5
     assert told.orientation.angle_to(found.orientation) < 1e-4
@@ -68,7 +68,7 @@ def test_a_joint_move_goes_around(arm: DobotMagician, around: Around, to_pose: b
     assert touches(around, *straight) == {"box"}
 
 
-def test_refused_and_nothing_moves(arm: DobotMagician, around: Around) -> None:
+def test_a_blocked_move_is_refused_without_motion(arm: DobotMagician, around: Around) -> None:
     before = values(arm)
     inside = around.boxes["box"][0] + Position(0.0, 0.0, 0.05)
     pose = Pose(inside, arm.get_end_effector_pose("tcp").orientation)
@@ -83,14 +83,14 @@ def test_refused_and_nothing_moves(arm: DobotMagician, around: Around) -> None:
     assert arm.inverse_kinematics("tcp", pose, avoid_collisions=False)
 
 
-def test_a_line_past_it_is_driven(arm: DobotMagician, around: Around) -> None:
+def test_a_line_past_an_obstacle_is_executed(arm: DobotMagician, around: Around) -> None:
     here = arm.get_end_effector_pose("tcp")
     there = Pose(here.position + Position(0.0, 0.0, 0.03), here.orientation)
     arm.move_to_pose("tcp", there, 1.0)
     assert arm.get_end_effector_pose("tcp").position.distance_to(there.position) < 1e-3
 
 
-def test_a_stop_ends_it_and_nothing_follows(arm: DobotMagician, around: Around, fake: FakeProcess) -> None:
+def test_a_stop_ends_a_safe_move(arm: DobotMagician, around: Around, fake: FakeProcess) -> None:
     doing = Doing(arm.move_to_joints, joints(RIGHT), 0.2)
     start = values(arm)
     while values(arm) == pytest.approx(start, abs=0.01):
@@ -104,7 +104,7 @@ def test_a_stop_ends_it_and_nothing_follows(arm: DobotMagician, around: Around, 
     assert values(arm) == pytest.approx(at, abs=1e-6)
 
 
-def test_it_stops_before_what_comes_into_its_path(arm: DobotMagician, around: Around) -> None:
+def test_the_arm_stops_before_an_obstacle_that_enters_its_path(arm: DobotMagician, around: Around) -> None:
     box = around.boxes.pop("box")
     doing = Doing(arm.move_to_joints, joints(RIGHT), 0.05)  # slow: it must not reach the box before it appears
     start = values(arm)

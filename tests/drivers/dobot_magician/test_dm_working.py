@@ -48,7 +48,7 @@ def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]
     return thread, outcome
 
 
-def test_connecting_only_asks(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:
+def test_connecting_only_reads(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:
     arm = make(fake.ready["port"])
     assert arm.connection is Connection.OFFLINE
     arm.connect()
@@ -100,7 +100,7 @@ def test_every_move_type_arrives(fake: FakeProcess, arm: DobotMagician) -> None:
     assert truth["motions"] == 6
 
 
-def test_kinematics_agrees_with_the_arm_and_names_what_is_out_of_reach(fake: FakeProcess, arm: DobotMagician) -> None:
+def test_kinematics_agree_with_the_arm_and_name_unreachable_poses(fake: FakeProcess, arm: DobotMagician) -> None:
     pose = arm.forward_kinematics("tcp", joints(10, 50, 40, -15))
     arm.move_to_joints(joints(10, 50, 40, -15), 1.0)
     assert arm.get_end_effector_pose("tcp").position.distance_to(pose.position) < 1e-5
@@ -126,7 +126,7 @@ def test_kinematics_agrees_with_the_arm_and_names_what_is_out_of_reach(fake: Fak
     assert fake.truth()["motions"] == motions
 
 
-def test_stop_passes_a_motion_and_nothing_follows(
+def test_stop_overtakes_a_motion_and_drops_the_queue(
     fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
 ) -> None:
     thread, outcome = in_background(lambda: arm.pick(at(0.2, 0.15, 0.0), speed=0.02))
@@ -178,7 +178,7 @@ def test_pick_and_place_switch_at_the_part(fake: FakeProcess, arm: DobotMagician
     assert fake.truth()["longest_queue"] == 1
 
 
-def test_the_belt_runs_and_stops_with_everything(
+def test_the_belt_runs_and_stops_with_the_arm(
     fake: FakeProcess, arm: DobotMagician, make: Callable[..., DobotMagician]
 ) -> None:
     arm.conveyor(0.05)
@@ -197,7 +197,7 @@ def test_the_belt_runs_and_stops_with_everything(
         without.conveyor(0.05)
 
 
-def test_an_alarm_ends_a_motion_by_name_and_is_acknowledged(fake: FakeProcess, arm: DobotMagician) -> None:
+def test_an_alarm_ends_a_motion_and_is_acknowledged(fake: FakeProcess, arm: DobotMagician) -> None:
     thread, outcome = in_background(lambda: arm.move_to_joints(joints(80, 45, 45, 0), 0.03))
     fake.control.wait_until(lambda truth: truth["moving"])
     fake.control.do("alarm", code=0x51)

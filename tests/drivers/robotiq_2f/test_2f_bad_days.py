@@ -16,7 +16,7 @@ from tests.drivers.robotiq_2f.test_2f_gripping import in_background
 from tests.fakes.conftest import FakeProcess
 
 
-def test_nobody_there(make: Callable[..., Robotiq2F]) -> None:
+def test_a_closed_port(make: Callable[..., Robotiq2F]) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{taken.getsockname()[1]}"
@@ -28,7 +28,7 @@ def test_nobody_there(make: Callable[..., Robotiq2F]) -> None:
             gripper.state()
 
 
-def test_somebody_who_says_nothing(fake: FakeProcess, make: Callable[..., Robotiq2F]) -> None:
+def test_a_server_that_does_not_answer(fake: FakeProcess, make: Callable[..., Robotiq2F]) -> None:
     fake.control.do("silence")
     gripper = make(fake.ready["ascii"], request_timeout=0.2)
     began = own_time()
@@ -40,7 +40,7 @@ def test_somebody_who_says_nothing(fake: FakeProcess, make: Callable[..., Roboti
 
 
 @pytest.mark.parametrize("fault", ["silence", "reset", "half_frame", "garbage", "slow"])
-def test_bad_wire_in_mid_grip_and_back(
+def test_a_wire_fault_during_a_grip_is_a_loss_and_recovers(
     fake: FakeProcess, make: Callable[..., Robotiq2F], wait_for: Callable[..., Any], fault: str
 ) -> None:
     gripper = make(fake.ready["ascii"], request_timeout=0.15)
@@ -73,7 +73,7 @@ def test_bad_wire_in_mid_grip_and_back(
     assert gripper.connection is Connection.ONLINE
 
 
-def test_senseless_answers_are_typed(make: Callable[..., Robotiq2F]) -> None:
+def test_invalid_answers_are_typed_errors(make: Callable[..., Robotiq2F]) -> None:
     """A listener that answers each question with the next of a row of wrong answers."""
     for answer in (b"POS 3\n", b"ACT 999\n", b"?\n", b"\xff\xff\xff\n", b"A" * 200, b"ACT x\n", b"ACT"):
         with socket.create_server(("127.0.0.1", 0)) as server:
@@ -95,7 +95,7 @@ def test_senseless_answers_are_typed(make: Callable[..., Robotiq2F]) -> None:
             thread.join(5.0)
 
 
-def test_disconnecting_ends_who_waits(fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]) -> None:
+def test_disconnecting_ends_a_waiting_call(fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]) -> None:
     thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
     wait_for(gripper.state, lambda state: state is GripperState.MOVING)
     began = own_time()

@@ -42,7 +42,7 @@ def words(data: bytes) -> list[int]:
 
 
 @pytest.mark.parametrize("frame", QUOTED)
-def test_the_quoted_frames_are_whole(frame: str) -> None:
+def test_the_example_frames_have_valid_checksums(frame: str) -> None:
     data = bytes.fromhex(frame)
     assert crc(data[:-2]) == data[-2:]
 
@@ -56,11 +56,11 @@ def test_the_quoted_frames_are_whole(frame: str) -> None:
         (Command(position=0, speed=255, force=255), OPEN),
     ],
 )
-def test_what_the_driver_writes_is_what_the_example_writes(command: Command, frame: str) -> None:
+def test_the_driver_writes_the_example_frames(command: Command, frame: str) -> None:
     assert encode(command, [0, 0, 0]) == words(bytes.fromhex(frame)[7:-2])
 
 
-def test_what_the_example_answers_is_read() -> None:
+def test_the_example_answers_are_decoded() -> None:
     gripped = decode(words(bytes.fromhex(GRIPPED)[3:-2]))
     assert (gripped.act, gripped.go_to, gripped.activation) == (True, True, Activation.ACTIVE)
     assert (gripped.object, gripped.fault, gripped.echo, gripped.position) == (Object.CONTACT_CLOSING, 0, 0xFF, 0xBD)
@@ -71,7 +71,7 @@ def test_what_the_example_answers_is_read() -> None:
         assert (status.activation, status.active) == (activation, activation is Activation.ACTIVE)
 
 
-def test_the_fake_answers_the_example_as_the_manual_does(fake: FakeProcess, wait_for: Callable[..., object]) -> None:
+def test_the_fake_answers_as_in_the_example_of_the_manual(fake: FakeProcess, wait_for: Callable[..., object]) -> None:
     descriptor = os.open(fake.ready["rtu"], os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
 
     def ask(frame: str, length: int) -> str:

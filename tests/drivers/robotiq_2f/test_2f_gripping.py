@@ -67,7 +67,7 @@ def test_connecting_and_taking_control_write_nothing(fake: FakeProcess, make: Ca
     assert fake.truth()["count"] == commands
 
 
-def test_whole_cycle(fake: FakeProcess, gripper: Robotiq2F) -> None:
+def test_a_complete_cycle(fake: FakeProcess, gripper: Robotiq2F) -> None:
     assert gripper.state() is GripperState.AT_POSITION
     commands = fake.truth()["count"]
     gripper.activate()  # harmless when activated
@@ -91,7 +91,7 @@ def test_whole_cycle(fake: FakeProcess, gripper: Robotiq2F) -> None:
     assert gripper.state() is GripperState.AT_POSITION
 
 
-def test_the_same_grip_again_tells_what_is_so_now(fake: FakeProcess, gripper: Robotiq2F) -> None:
+def test_repeating_a_grip_returns_the_present_result(fake: FakeProcess, gripper: Robotiq2F) -> None:
     fake.control.do("put_part", width=0.05)
     assert gripper.grip(0.0, speed=0.15)[0]
     assert gripper.grip(0.0, speed=0.15)[0]
@@ -99,7 +99,7 @@ def test_the_same_grip_again_tells_what_is_so_now(fake: FakeProcess, gripper: Ro
     assert gripper.grip(0.0, speed=0.15) == (False, 0.0)
 
 
-def test_lost_part_is_noticed(fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]) -> None:
+def test_a_lost_part_is_detected(fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]) -> None:
     fake.control.do("put_part", width=0.04)
     assert gripper.grip(0.0, speed=0.15)[0]
     fake.control.do("remove_part")
@@ -146,7 +146,7 @@ def test_blocked_release_fails(fake: FakeProcess, gripper: Robotiq2F) -> None:
     gripper.release()
 
 
-def test_stop_ends_a_grip_and_holds_what_is_held(
+def test_stop_ends_a_grip_and_keeps_the_part(
     fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]
 ) -> None:
     thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
@@ -209,7 +209,7 @@ def test_major_fault_ends_a_grip_and_is_acknowledged(
     gripper.activate()
 
 
-def test_minor_fault_is_told_and_ends_with_its_cause(
+def test_a_minor_fault_is_reported_until_its_cause_is_removed(
     fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]
 ) -> None:
     fake.control.do("fault", code=8)
@@ -228,7 +228,7 @@ def test_interference_fails_the_activation(fake: FakeProcess, observed: Robotiq2
         observed.activate()
 
 
-def test_power_cycle_in_mid_grip(fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]) -> None:
+def test_a_power_cycle_during_a_grip(fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]) -> None:
     thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
     wait_for(gripper.state, lambda state: state is GripperState.MOVING)
     fake.control.do("power_cycle")
@@ -241,7 +241,7 @@ def test_power_cycle_in_mid_grip(fake: FakeProcess, gripper: Robotiq2F, wait_for
     assert fake.truth()["count"] == commands
 
 
-def test_another_client_is_noticed_and_named(
+def test_another_client_is_detected_and_named(
     fake: FakeProcess, gripper: Robotiq2F, make: Callable[..., Robotiq2F], wait_for: Callable[..., Any]
 ) -> None:
     gripper.grip(0.02, speed=0.15)
@@ -294,7 +294,7 @@ def test_scaling_by_the_limits_of_the_model() -> None:
     assert (scaling.width(settings, 0), scaling.width(settings, 255)) == (0.14, 0.0)
 
 
-def test_tool_and_limits_are_those_of_the_model_unless_given() -> None:
+def test_tool_and_limits_default_to_those_of_the_model() -> None:
     small = Robotiq2F("id", "small", Robotiq2FSettings(host="h"))
     large = Robotiq2F("id", "large", Robotiq2FSettings(host="h", model=Model.TWO_F_140, tcp_z=0.23, max_force=100.0))
     assert (small.mass, small.tcp.position.z) == (0.925, 0.163)

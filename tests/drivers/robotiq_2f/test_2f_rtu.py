@@ -73,7 +73,7 @@ def test_registers() -> None:
             decode(wrong)
 
 
-def test_whole_cycle(fake: FakeProcess, rtu: Robotiq2F) -> None:
+def test_a_complete_cycle(fake: FakeProcess, rtu: Robotiq2F) -> None:
     commands = fake.truth()["count"]
     assert rtu.state() is GripperState.INACTIVE
     rtu.take_control()
@@ -105,7 +105,7 @@ def test_absent_port_and_foreign_unit(fake: FakeProcess, make_rtu: Callable[...,
 
 
 @pytest.mark.parametrize("fault", ["silence", "half_frame", "garbage", "reset"])
-def test_bad_line_in_mid_grip_and_back(
+def test_a_line_fault_during_a_grip_is_a_loss_and_recovers(
     fake: FakeProcess, rtu: Robotiq2F, wait_for: Callable[..., Any], fault: str
 ) -> None:
     make_ready(fake, rtu)

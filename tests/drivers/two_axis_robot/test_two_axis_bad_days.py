@@ -37,7 +37,7 @@ Make = Callable[..., TwoAxisRobot]
 WaitFor = Callable[..., object]
 
 
-def test_a_port_that_is_not_there_or_taken_is_named(fake: FakeProcess, make: Make, robot: TwoAxisRobot) -> None:
+def test_a_missing_port_or_one_in_use_is_named(fake: FakeProcess, make: Make, robot: TwoAxisRobot) -> None:
     absent = make("/dev/ttyNOBODY")
     with pytest.raises(NotConnected, match=r"arm: port /dev/ttyNOBODY"):
         absent.connect()
@@ -67,7 +67,7 @@ def test_garbage_and_noise_do_not_hang(fake: FakeProcess, make: Make) -> None:
     assert own_time() - began < 2.0
 
 
-def test_one_damaged_answer_costs_nothing(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+def test_one_damaged_answer_is_tolerated(fake: FakeProcess, ready: TwoAxisRobot) -> None:
     fake.control.do("wrong_crc")
     ready.move_to_joints(HOME, 0.5)
     assert ready.connection is Connection.ONLINE
@@ -75,7 +75,7 @@ def test_one_damaged_answer_costs_nothing(fake: FakeProcess, ready: TwoAxisRobot
 
 
 @pytest.mark.parametrize("fault", ["half_frame", "garbage", "unplug"])
-def test_a_loss_in_mid_move(fake: FakeProcess, ready: TwoAxisRobot, wait_for: WaitFor, fault: str) -> None:
+def test_a_connection_loss_during_a_move(fake: FakeProcess, ready: TwoAxisRobot, wait_for: WaitFor, fault: str) -> None:
     doing = Doing(ready.move_to_joints, FAR, 0.5)
     moving(fake)
     fake.control.do(fault)
@@ -132,7 +132,7 @@ def test_the_servos_stop_when_the_drivers_process_is_killed(fake: FakeProcess, m
     assert fake.truth()["servos"]["1"]["angle"] == pytest.approx(servo["angle"], abs=0.002)
 
 
-def test_a_hardware_error_is_named_and_rebooted_on_a_persons_word(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+def test_a_hardware_error_is_named_and_cleared_by_a_person(fake: FakeProcess, ready: TwoAxisRobot) -> None:
     doing = Doing(ready.move_to_joints, FAR, 0.5)
     moving(fake)
     fake.control.do("hardware_error", servo=2, bits=0x20)
@@ -165,7 +165,7 @@ def test_a_hardware_error_is_named_and_rebooted_on_a_persons_word(fake: FakeProc
     ready.move_to_joints(HOME, 1.0)
 
 
-def test_a_refusal_names_servo_and_register_and_costs_no_connection(fake: FakeProcess, robot: TwoAxisRobot) -> None:
+def test_a_refusal_names_servo_and_register_and_keeps_the_connection(fake: FakeProcess, robot: TwoAxisRobot) -> None:
     fake.control.do("status_error", servo=1, error=6)
     with pytest.raises(Refused, match=r"servo 1 of arm at .* refuses .* register 38: the value is beyond"):
         robot.take_control()
@@ -174,7 +174,7 @@ def test_a_refusal_names_servo_and_register_and_costs_no_connection(fake: FakePr
     robot.take_control()
 
 
-def test_a_supply_that_was_gone_takes_control_away(fake: FakeProcess, ready: TwoAxisRobot, wait_for: WaitFor) -> None:
+def test_a_power_loss_of_a_servo_ends_control(fake: FakeProcess, ready: TwoAxisRobot, wait_for: WaitFor) -> None:
     fake.control.do("power_cycle")
 
     def refused() -> bool:
@@ -189,7 +189,7 @@ def test_a_supply_that_was_gone_takes_control_away(fake: FakeProcess, ready: Two
 
 
 @pytest.mark.parametrize("request_", ["read", "write"])
-def test_a_late_answer_answers_nothing_else(fake: FakeProcess, request_: str) -> None:
+def test_a_late_answer_is_not_used_for_another_request(fake: FakeProcess, request_: str) -> None:
     bus = Bus("arm", fake.ready["port"], 1_000_000)
     bus.open()
     try:
@@ -204,7 +204,7 @@ def test_a_late_answer_answers_nothing_else(fake: FakeProcess, request_: str) ->
         bus.close()
 
 
-def test_a_servo_that_is_not_there_takes_no_longer_than_its_deadline(fake: FakeProcess) -> None:
+def test_a_missing_servo_is_reported_within_the_deadline(fake: FakeProcess) -> None:
     bus = Bus("arm", fake.ready["port"], 1_000_000)
     bus.open()
     try:

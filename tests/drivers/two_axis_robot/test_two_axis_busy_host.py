@@ -50,7 +50,7 @@ def test_a_stall_of_half_a_second_does_not_stop_a_move(fake: FakeProcess, ready:
     ready.move_to_joints([Joint("joint_1", 0.0), Joint("joint_2", 0.0)], 1.0)
 
 
-def test_a_frozen_owner_stops_the_servos_within_what_is_declared(
+def test_a_frozen_owner_stops_the_servos_within_the_declared_time(
     fake: FakeProcess, owner: "subprocess.Popen[bytes]"
 ) -> None:
     began = own_time()
@@ -81,7 +81,7 @@ def test_a_watchdog_that_tripped_is_named(fake: FakeProcess, ready: TwoAxisRobot
         doing.result(2.0)
 
 
-def test_control_given_back_ends_the_child_process(ready: TwoAxisRobot, wait_for: Callable[..., object]) -> None:
+def test_releasing_control_ends_the_child_process(ready: TwoAxisRobot, wait_for: Callable[..., object]) -> None:
     keep_alive = ready._observer._keep_alive
     assert keep_alive is not None
     ready.release_control()

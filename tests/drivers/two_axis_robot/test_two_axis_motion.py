@@ -48,7 +48,7 @@ def test_a_wrong_setting_is_named(name: str, value: Any) -> None:
 
 
 @given(st.floats(-3.1, 3.1), st.floats(-3.1, 3.1), st.floats(0.01, 1.0), st.floats(0.01, 1.0))
-def test_inverse_kinematics_undoes_forward(q1: float, q2: float, first: float, second: float) -> None:
+def test_inverse_kinematics_inverts_forward_kinematics(q1: float, q2: float, first: float, second: float) -> None:
     x, y, _ = kinematics.forward((first, second), (q1, q2))
     solutions = kinematics.inverse((first, second), x, y)
     assert 1 <= len(solutions) <= 2
@@ -62,7 +62,7 @@ def test_inverse_kinematics_undoes_forward(q1: float, q2: float, first: float, s
         assert math.hypot(near[0] - q1, near[1] - q2) < 1e-3
 
 
-def test_the_elbow_goes_to_the_side_of_the_seed(fake: FakeProcess, make: Callable[..., TwoAxisRobot]) -> None:
+def test_the_elbow_is_on_the_side_of_the_seed(fake: FakeProcess, make: Callable[..., TwoAxisRobot]) -> None:
     turned = Pose(Position(1.0, 2.0, 0.5), Orientation.from_rotation_vector(0.0, 0.0, math.pi / 2))
     robot = make(fake.ready["port"], turned, link_1=0.2, link_2=0.1)
     straight = robot.forward_kinematics("tcp", joints(0.0, 0.0))
@@ -104,7 +104,7 @@ def test_connecting_observes_and_writes_nothing(fake: FakeProcess, robot: TwoAxi
         robot.robot_joints()
 
 
-def test_a_whole_cycle(fake: FakeProcess, make: Callable[..., TwoAxisRobot]) -> None:
+def test_a_complete_cycle(fake: FakeProcess, make: Callable[..., TwoAxisRobot]) -> None:
     fake.control.do("place", servo=1, ticks=2500)
     robot = make(fake.ready["port"], homing_offset_1=0.1, current_limit=0.5, direction_2=-1)
     robot.connect()
@@ -148,7 +148,7 @@ def test_both_joints_arrive_together(fake: FakeProcess, ready: TwoAxisRobot) -> 
 
 
 @pytest.mark.parametrize("phase", [0.05, 0.8])
-def test_stop_passes_the_move(fake: FakeProcess, ready: TwoAxisRobot, phase: float) -> None:
+def test_stop_overtakes_the_move(fake: FakeProcess, ready: TwoAxisRobot, phase: float) -> None:
     doing = Doing(ready.move_to_joints, joints(2.0, -2.0), 1.0)
     moving(fake)
     fake.control.wait_until(lambda t: t["servos"]["1"]["angle"] > 2.0 * phase)
@@ -194,7 +194,7 @@ def angles(fake: FakeProcess) -> list[float]:
     return [fake.truth()["servos"][number]["angle"] for number in ("1", "2")]
 
 
-def test_a_jog_runs_out_by_itself_and_a_renewed_one_goes_on(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+def test_a_jog_expires_unless_renewed(fake: FakeProcess, ready: TwoAxisRobot) -> None:
     ready.move_to_joints(joints(0.0, 1.0), 0.5)
     began = time.monotonic()
     for _ in range(5):
@@ -222,7 +222,7 @@ def test_a_jog_along_the_axes_of_a_frame(fake: FakeProcess, ready: TwoAxisRobot)
         ready.move_to_joints(joints(0.3, 1.2), 0.5)
 
 
-def test_a_jog_stops_at_the_limit_and_by_a_stop(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+def test_a_jog_ends_at_the_limit_and_by_a_stop(fake: FakeProcess, ready: TwoAxisRobot) -> None:
     ready.move_to_joints(joints(2.55, 1.0), 0.8)
     ready.jog(joint_velocities=[1.0, 0.0], valid_for=0.5)
     time.sleep(0.1)
@@ -234,7 +234,7 @@ def test_a_jog_stops_at_the_limit_and_by_a_stop(fake: FakeProcess, ready: TwoAxi
     assert angles(fake)[0] > 2.2
 
 
-def test_what_cannot_be_jogged(ready: TwoAxisRobot) -> None:
+def test_invalid_jogs_are_refused(ready: TwoAxisRobot) -> None:
     ready.move_to_joints(joints(0.0, 1.0), 0.8)
     for twist in ((0.0, 0.0, 0.1, 0.0, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0, 0.0, 0.1)):
         with pytest.raises(Refused, match="plane"):
@@ -252,12 +252,12 @@ def test_what_cannot_be_jogged(ready: TwoAxisRobot) -> None:
         ready.jog(joint_velocities=[0.1, 0.0])
 
 
-def test_the_slowest_move_is_not_taken_for_a_standstill(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+def test_the_slowest_move_does_not_count_as_standstill(fake: FakeProcess, ready: TwoAxisRobot) -> None:
     ready.move_to_joints(joints(0.045, 0.0), 0.01, safe=False)
     assert fake.truth()["servos"]["1"]["angle"] == pytest.approx(0.045, abs=math.radians(1.2))
 
 
-def test_a_state_that_arrives_late_is_not_taken_for_a_standstill(
+def test_a_late_state_does_not_count_as_standstill(
     fake: FakeProcess, ready: TwoAxisRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     observer = ready._observer

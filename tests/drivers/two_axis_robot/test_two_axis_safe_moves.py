@@ -68,7 +68,7 @@ def test_a_move_folds_to_get_past_a_pin(arm: TwoAxisRobot, around: Around) -> No
     assert touches(around, *straight) == {"pin"}
 
 
-def test_the_elbow_goes_to_the_side_that_is_free(arm: TwoAxisRobot, around: Around) -> None:
+def test_the_elbow_moves_to_the_free_side(arm: TwoAxisRobot, around: Around) -> None:
     pose = arm.forward_kinematics("tcp", joints((-0.2, -0.9)))
     blind = arm.inverse_kinematics("tcp", pose, joints((-0.2, -0.9)), avoid_collisions=False)
     assert [joint.value for joint in blind] == pytest.approx((-0.2, -0.9), abs=1e-6)
@@ -90,7 +90,7 @@ def test_the_elbow_goes_to_the_side_that_is_free(arm: TwoAxisRobot, around: Arou
     assert values(arm) == pytest.approx(before, abs=0.01)
 
 
-def test_it_stops_before_what_comes_into_its_path(arm: TwoAxisRobot, around: Around) -> None:
+def test_the_arm_stops_before_an_obstacle_that_enters_its_path(arm: TwoAxisRobot, around: Around) -> None:
     pin = around.boxes.pop("pin")
     doing = Doing(arm.move_to_joints, joints(RIGHT), 0.05)  # slow: it must not reach the pin before it appears
     start = values(arm)

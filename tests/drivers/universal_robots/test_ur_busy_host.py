@@ -66,7 +66,7 @@ def test_a_jog_ends_on_time_while_the_host_is_stalled(ready: UR5e, fake: FakeUr)
     assert ready.control_owner() == "us"
 
 
-def test_a_frozen_host_ends_control_and_says_why(ready: UR5e, fake: FakeUr) -> None:
+def test_a_frozen_host_ends_control_with_the_reason(ready: UR5e, fake: FakeUr) -> None:
     doing = far_move(ready, fake)
     stall(FROZEN)
     assert not fake.truth()["moving"]
@@ -74,7 +74,7 @@ def test_a_frozen_host_ends_control_and_says_why(ready: UR5e, fake: FakeUr) -> N
         doing.result(1.0)
 
 
-def test_a_starved_control_process_says_why(ready: UR5e, fake: FakeUr) -> None:
+def test_a_starved_control_process_reports_the_reason(ready: UR5e, fake: FakeUr) -> None:
     doing = far_move(ready, fake)
     trips = fake.truth()["watchdog_trips"]
     process = control_process()
@@ -85,7 +85,7 @@ def test_a_starved_control_process_says_why(ready: UR5e, fake: FakeUr) -> None:
         doing.result(1.0)
 
 
-def test_a_frozen_owner_stops_the_arm_within_what_is_declared(owner: Owner, fake: FakeUr) -> None:
+def test_a_frozen_owner_stops_the_arm_within_the_declared_time(owner: Owner, fake: FakeUr) -> None:
     assert UR5e.loss_reaction.kind is LossKind.STOPS_WITHIN
     process = owner()
     time.sleep(0.3)  # at full speed

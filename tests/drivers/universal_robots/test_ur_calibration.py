@@ -31,7 +31,7 @@ def arm(robot: UR5e, fake: FakeUr) -> Iterator[UR5e]:
     fake.do("calibration", deltas=NONE)
 
 
-def test_the_calibration_is_read_while_observing_and_goes_into_the_model(arm: UR5e, fake: FakeUr) -> None:
+def test_the_calibration_is_read_and_used_by_the_model(arm: UR5e, fake: FakeUr) -> None:
     nominal = arm.kinematic_calibration()
     assert [each.d for each in nominal.joints] == NOMINAL_D
     assert [each.a for each in nominal.joints] == [0.0, -0.425, -0.3922, 0.0, 0.0, 0.0]
@@ -53,7 +53,7 @@ def test_the_calibration_is_read_while_observing_and_goes_into_the_model(arm: UR
     assert 1e-4 < off < 0.02
 
 
-def test_a_controller_that_tells_none_or_is_not_there_is_named(arm: UR5e, fake: FakeUr) -> None:
+def test_a_controller_without_calibration_or_answer_is_named(arm: UR5e, fake: FakeUr) -> None:
     fake.do("calibration", deltas=NONE, reported=False)
     with pytest.raises(DeviceTimeout, match=f"{fake.host}:30001"):
         read_calibration(fake.host, timeout=0.3)
@@ -79,7 +79,7 @@ def served(content: bytes) -> tuple[str, threading.Thread, socket.socket]:
 @pytest.mark.parametrize(
     "content", [b"", b"\0\0\0\1\x10", b"\xff" * 64, struct.pack(">IBIB", 30, 16, 25, 5) + bytes(20)]
 )
-def test_what_is_no_primary_stream_is_a_lost_connection(content: bytes) -> None:
+def test_garbage_on_the_primary_port_is_a_lost_connection(content: bytes) -> None:
     host, thread, server = served(content)
     try:
         with pytest.raises(ConnectionLost, match=r"127\.99\.0\.3:30001"):
@@ -89,7 +89,7 @@ def test_what_is_no_primary_stream_is_a_lost_connection(content: bytes) -> None:
         server.close()
 
 
-def test_messages_come_in_any_pieces_and_nonsense_is_refused() -> None:
+def test_messages_in_pieces_are_joined_and_garbage_is_refused() -> None:
     numbers = struct.pack(">6I24dI", *range(6), *([0.1] * 24), 0)
     package = struct.pack(">IB", 5 + len(numbers), 5) + numbers
     whole = struct.pack(">IB", 5 + len(package), 16) + package

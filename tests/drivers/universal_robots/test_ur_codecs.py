@@ -23,7 +23,7 @@ def packed(kind: int, payload: bytes) -> bytes:
 
 @settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 255), st.binary(max_size=60)), max_size=6), st.data())
-def test_frames_come_out_whole_however_the_bytes_are_cut(sent: list[tuple[int, bytes]], data: st.DataObject) -> None:
+def test_frames_are_complete_however_the_bytes_are_split(sent: list[tuple[int, bytes]], data: st.DataObject) -> None:
     stream = b"".join(packed(kind, payload) for kind, payload in sent)
     cut = data.draw(st.integers(0, len(stream)))
     first, rest = frames(stream[:cut])
@@ -34,7 +34,7 @@ def test_frames_come_out_whole_however_the_bytes_are_cut(sent: list[tuple[int, b
 
 @settings(deadline=None)
 @given(st.binary(max_size=200))
-def test_foreign_bytes_are_frames_or_a_value_error_and_never_kept_without_bound(data: bytes) -> None:
+def test_garbage_is_frames_or_a_value_error_within_bounded_memory(data: bytes) -> None:
     try:
         _, rest = frames(data)
     except ValueError:
@@ -54,7 +54,7 @@ def test_a_recipe_gives_the_layout_and_names_what_is_missing() -> None:
 
 @settings(deadline=None)
 @given(st.text(max_size=80))
-def test_dashboard_answers_are_understood_or_a_device_fault(answer: str) -> None:
+def test_dashboard_answers_are_decoded_or_a_device_fault(answer: str) -> None:
     for read in (dashboard.is_remote, dashboard.program_name):
         try:
             read(answer)
@@ -80,7 +80,9 @@ numbers = st.floats(-1.0, 1.0)
 
 @settings(deadline=None)
 @given(numbers, numbers, numbers, numbers, numbers, numbers)
-def test_a_pose_goes_to_the_controller_and_back(x: float, y: float, z: float, a: float, b: float, c: float) -> None:
+def test_a_pose_survives_conversion_for_the_controller(
+    x: float, y: float, z: float, a: float, b: float, c: float
+) -> None:
     pose = Pose(Position(x, y, z), Orientation.from_rotation_vector(a, b, c))
     back = from_vector(to_vector(pose))
     assert back.position.distance_to(pose.position) < 1e-12
@@ -92,7 +94,7 @@ def test_the_controllers_base_is_base_link_turned_half_round() -> None:
     assert at.position.distance_to(Position(0.9, 1.8, 3.3)) < 1e-12
 
 
-def test_numbers_nobody_knows_are_a_fault_and_no_power() -> None:
+def test_unknown_numbers_are_a_fault_without_power() -> None:
     assert safety_of(1) is Safety.NORMAL
     assert safety_of(99) is Safety.FAULT
     assert (power_of(3), power_of(5), power_of(7)) == (Power.OFF, Power.IDLE_BRAKED, Power.OPERATIONAL)
@@ -100,7 +102,7 @@ def test_numbers_nobody_knows_are_a_fault_and_no_power() -> None:
 
 @settings(deadline=None)
 @given(st.floats(0, 10), st.floats(0.01, 3), st.floats(0.05, 20))
-def test_the_time_of_a_motion_is_the_least_that_speed_and_acceleration_allow(d: float, v: float, a: float) -> None:
+def test_the_computed_time_is_the_minimum_for_speed_and_acceleration(d: float, v: float, a: float) -> None:
     took = timing.trapezoid(d, v, a)
     assert took >= d / v - 1e-9
     assert took >= 2.0 * math.sqrt(d / a) - 1e-9

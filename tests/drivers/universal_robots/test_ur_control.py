@@ -68,7 +68,7 @@ def stays(fake: FakeUr, seconds: float = 0.6) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ taking control
-def test_the_pose_is_that_of_our_tool_before_control_too(fake: FakeUr) -> None:
+def test_the_pose_is_that_of_our_tool_before_control_is_taken(fake: FakeUr) -> None:
     """Otherwise a goal computed from the pose before the first motion is off by the tool's length."""
     robot = make(fake.host, tcp_z=0.25, tcp_x=0.02)
     robot.connect(3.0)
@@ -82,7 +82,7 @@ def test_the_pose_is_that_of_our_tool_before_control_too(fake: FakeUr) -> None:
     assert before.orientation.angle_to(after.orientation) < 1e-3
 
 
-def test_control_is_taken_and_given_back(robot: UR5e, fake: FakeUr) -> None:
+def test_control_is_taken_and_released(robot: UR5e, fake: FakeUr) -> None:
     with pytest.raises(NotInControl, match="not taken"):
         robot.move_to_joints(robot.robot_joints(), 0.5)
     assert robot.control_owner() is None
@@ -100,7 +100,7 @@ def test_control_is_taken_and_given_back(robot: UR5e, fake: FakeUr) -> None:
     assert fake.truth()["watchdog_trips"] == truth["watchdog_trips"], "the program was ended in order"
 
 
-def test_what_forbids_control_is_named(robot: UR5e, fake: FakeUr) -> None:
+def test_reasons_against_control_are_named(robot: UR5e, fake: FakeUr) -> None:
     fake.do("remote_control", on=False)
     with pytest.raises(NotInControl, match="local control"):
         robot.take_control()
@@ -113,7 +113,7 @@ def test_what_forbids_control_is_named(robot: UR5e, fake: FakeUr) -> None:
     assert fake.truth()["program"] is None
 
 
-def test_an_unstated_payload_refuses_control(fake: FakeUr) -> None:
+def test_control_is_refused_without_a_payload(fake: FakeUr) -> None:
     robot = make(fake.host, payload_mass=-1.0)
     robot.connect(3.0)
     try:
@@ -136,7 +136,7 @@ def test_registers_in_use_are_named(fake: FakeUr) -> None:
         robot.disconnect()
 
 
-def test_the_upper_registers_leave_the_fieldbus_alone(start_fake: Callable[..., FakeUr]) -> None:
+def test_the_upper_registers_do_not_affect_a_fieldbus(start_fake: Callable[..., FakeUr]) -> None:
     fake = start_fake("--controller-version", "5.12")
     fake.do("fieldbus", on=True)
     robot = make(fake.host)
@@ -150,7 +150,7 @@ def test_the_upper_registers_leave_the_fieldbus_alone(start_fake: Callable[..., 
         robot.disconnect()
 
 
-def test_power_and_brakes_are_acts_of_their_own(start_fake: Callable[..., FakeUr]) -> None:
+def test_power_and_brakes_are_separate_commands(start_fake: Callable[..., FakeUr]) -> None:
     fake = start_fake("--powered-off", "--time-scale", "0.1")
     robot = make(fake.host)
     robot.connect(3.0)
@@ -178,7 +178,7 @@ def test_joint_moves_arrive(ready: UR5e, fake: FakeUr) -> None:
     assert ready.last_move.pose.position.distance_to(ready.get_end_effector_pose("tcp").position) < 1e-6
 
 
-def test_a_linear_move_is_linear_at_the_speed_asked_for(ready: UR5e, fake: FakeUr) -> None:
+def test_a_linear_move_has_the_requested_speed(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
     target = Pose(start.position + Position(0.0, -0.3, -0.1), start.orientation)
     doing = Doing(ready.move_to_pose, "tcp", target, 0.25)
@@ -196,7 +196,7 @@ def test_a_linear_move_is_linear_at_the_speed_asked_for(ready: UR5e, fake: FakeU
     assert ready.last_move.duration >= away / 0.25
 
 
-def test_point_motion_takes_the_controllers_own_kinematics(ready: UR5e) -> None:
+def test_joint_moves_to_a_pose_use_the_controllers_kinematics(ready: UR5e) -> None:
     start = ready.get_end_effector_pose("tcp")
     target = Pose(start.position + Position(0.05, 0.2, 0.1), start.orientation)
     ready.move(target, MoveType.JOINT, 0.8)
@@ -233,7 +233,7 @@ def test_one_motion_at_a_time(ready: UR5e, fake: FakeUr) -> None:
         doing.result()
 
 
-def test_manual_mode_caps_the_tcp(ready: UR5e, fake: FakeUr) -> None:
+def test_manual_mode_limits_the_tcp_speed(ready: UR5e, fake: FakeUr) -> None:
     fake.do("operational_mode", mode="MANUAL")
     time.sleep(0.55)  # the mode is read twice a second
     speeds = []
@@ -261,9 +261,7 @@ def test_a_slow_slider_gives_a_move_more_time(ready: UR5e, fake: FakeUr, monkeyp
     assert fake.truth()["q"][0] == pytest.approx(0.15, abs=1e-3)
 
 
-def test_a_move_that_does_not_end_in_its_time_is_stopped(
-    ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_move_that_exceeds_its_time_is_stopped(ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(timing, "GRACE", 0.1)
     monkeypatch.setattr(timing, "SLACK", 0.1)
     with pytest.raises(DeviceTimeout, match="computed time"):
@@ -274,7 +272,7 @@ def test_a_move_that_does_not_end_in_its_time_is_stopped(
 
 
 # ------------------------------------------------------------------------------------------------ stopping
-def test_stop_passes_the_move_and_says_what_was_sent(ready: UR5e, fake: FakeUr) -> None:
+def test_stop_overtakes_the_move_and_reports_the_result(ready: UR5e, fake: FakeUr) -> None:
     took = []
     for _ in range(5):
         doing = far_move(ready, fake)
@@ -313,7 +311,7 @@ def test_the_dashboard_stops_when_the_control_process_hangs(ready: UR5e, fake: F
     ready.move_to_joints(turned(ready, 0.1), 0.5)  # a stop of ours costs nobody control
 
 
-def test_a_motion_that_waits_is_dropped_by_a_stop(ready: UR5e, fake: FakeUr) -> None:
+def test_a_stop_cancels_a_motion_that_waits(ready: UR5e, fake: FakeUr) -> None:
     taken = len(fake.do("commands_taken"))
     guard = ready._control.stops.guard()
     ready._control.stops.request()
@@ -342,7 +340,9 @@ def test_after_a_safeguard_stop_nothing_moves_until_a_new_command(ready: UR5e, f
     ready.move_to_joints(turned(ready, 0.1), 0.5)
 
 
-def test_without_a_dashboard_the_watchdog_keeps_a_safeguard_stop(start_fake: Callable[..., FakeUr]) -> None:
+def test_without_a_dashboard_the_watchdog_ends_the_program_after_a_safeguard_stop(
+    start_fake: Callable[..., FakeUr],
+) -> None:
     fake = start_fake("--controller-version", "10.12")  # PolyScope X
     robot = make(fake.host)
     robot.connect(3.0)
@@ -412,7 +412,7 @@ def test_hand_teaching(ready: UR5e, fake: FakeUr) -> None:
     assert not fake.truth()["freedrive"]
 
 
-def test_a_jog_runs_out_by_itself(ready: UR5e, fake: FakeUr) -> None:
+def test_a_jog_expires(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp").position
     for _ in range(5):
         ready.jog((0.0, -0.1, 0.0, 0.0, 0.0, 0.0), valid_for=0.2)
@@ -427,7 +427,7 @@ def test_a_jog_runs_out_by_itself(ready: UR5e, fake: FakeUr) -> None:
 
 # ------------------------------------------------------------------------------------------------ losing each other
 @pytest.mark.parametrize("fault", ["silence", "reset", "half_frame"])
-def test_a_cable_cut_in_mid_move(ready: UR5e, fake: FakeUr, fault: str) -> None:
+def test_a_cable_cut_during_a_move(ready: UR5e, fake: FakeUr, fault: str) -> None:
     doing = far_move(ready, fake)
     scripts = fake.truth()["scripts_taken"]
     fake.do(fault)
@@ -448,7 +448,7 @@ def test_a_cable_cut_in_mid_move(ready: UR5e, fake: FakeUr, fault: str) -> None:
     ready.move_to_joints(turned(ready, 0.1), 0.5)
 
 
-def test_a_silence_as_long_as_the_library_cannot_bear(ready: UR5e, fake: FakeUr) -> None:
+def test_a_silence_longer_than_the_timeout_of_the_library(ready: UR5e, fake: FakeUr) -> None:
     fake.do("silence")
     time.sleep(2.8)  # it takes 2.5 to notice
     fake.do("heal")
@@ -458,7 +458,7 @@ def test_a_silence_as_long_as_the_library_cannot_bear(ready: UR5e, fake: FakeUr)
     assert fake.truth()["program"] is not None, "nothing of ours came back and killed it"
 
 
-def test_the_program_waits_for_a_slow_owner_but_not_for_ever(
+def test_the_watchdog_tolerates_a_slow_owner_for_a_limited_time(
     robot: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From arming the watchdog on, the control process kicks without being asked; then the owner has to pulse."""
@@ -506,7 +506,7 @@ def test_outputs_and_inputs(ready: UR5e, fake: FakeUr) -> None:
         waiting.result(1.0)
 
 
-def test_pick_and_place_by_the_sensors_word(fake: FakeUr) -> None:
+def test_pick_and_place_use_the_part_sensor(fake: FakeUr) -> None:
     size = {"part_size_x": 0.1, "part_size_y": 0.08, "part_size_z": 0.02, "part_offset_z": 0.01}
     robot = make(fake.host, gripper_output=0, part_sensor_input=1, **size)
     robot.connect(3.0)
@@ -541,7 +541,7 @@ def test_pick_and_place_by_the_sensors_word(fake: FakeUr) -> None:
         robot.disconnect()
 
 
-def test_a_stop_ends_a_pick_as_a_whole_and_keeps_the_gripper(fake: FakeUr) -> None:
+def test_a_stop_ends_the_whole_pick_and_keeps_the_gripper(fake: FakeUr) -> None:
     robot = make(fake.host, gripper_output=0, gripper_time=1.0)
     robot.connect(3.0)
     try:
@@ -558,7 +558,7 @@ def test_a_stop_ends_a_pick_as_a_whole_and_keeps_the_gripper(fake: FakeUr) -> No
         robot.disconnect()
 
 
-def test_the_tool_is_told(ready: UR5e, fake: FakeUr) -> None:
+def test_the_tool_is_set(ready: UR5e, fake: FakeUr) -> None:
     before = ready.get_end_effector_pose("tcp").position
     ready.set_tool(Pose(Position(0.0, 0.0, 0.2), Orientation()), 2.0, (0.0, 0.0, 0.05))
     truth = fake.truth()

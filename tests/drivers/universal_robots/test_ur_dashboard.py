@@ -50,7 +50,7 @@ def server() -> Iterator[Callable[[Answer], Dashboard]]:
         thread.join(5.0)
 
 
-def test_a_late_answer_answers_no_later_question(server: Callable[[Answer], Dashboard]) -> None:
+def test_a_late_answer_is_not_used_for_a_later_request(server: Callable[[Answer], Dashboard]) -> None:
     def answer(client: socket.socket, line: bytes) -> None:
         if line == b"slow":
             time.sleep(0.3)
@@ -67,7 +67,7 @@ def test_a_late_answer_answers_no_later_question(server: Callable[[Answer], Dash
     assert dashboard.ask("next") == "answer to next"
 
 
-def test_what_comes_unasked_answers_nothing(server: Callable[[Answer], Dashboard]) -> None:
+def test_unsolicited_data_is_not_used_as_an_answer(server: Callable[[Answer], Dashboard]) -> None:
     dashboard = server(lambda client, line: client.sendall(line + b"\nand one more\n"))
     assert dashboard.ask("first") == "first"
     time.sleep(0.05)
@@ -85,7 +85,7 @@ def test_an_idle_connection_that_was_closed_is_replaced(server: Callable[[Answer
     assert dashboard.ask("second") == "second"
 
 
-def test_what_goes_wrong_is_typed_and_names_the_address(server: Callable[[Answer], Dashboard]) -> None:
+def test_errors_are_typed_and_name_the_address(server: Callable[[Answer], Dashboard]) -> None:
     def answer(client: socket.socket, line: bytes) -> None:
         if line == b"flood":
             client.sendall(b"x" * 20000)

@@ -55,7 +55,7 @@ def listener() -> Iterator[Callable[[Callable[[socket.socket], None]], str]]:
         client.close()
 
 
-def test_a_robot_that_is_off_is_named_with_its_address() -> None:
+def test_a_robot_that_is_switched_off_is_named_with_its_address() -> None:
     robot = make("127.99.0.1")
     with pytest.raises(NotConnected, match=r"127\.99\.0\.1:30004"):
         robot.connect(1.0)
@@ -81,7 +81,7 @@ def _reset(client: socket.socket) -> None:
     ],
     ids=["silent", "reset", "half a frame", "another protocol"],
 )
-def test_what_is_no_controller_is_a_typed_error_within_the_deadline(
+def test_another_server_is_a_typed_error_within_the_deadline(
     listener: Callable[[Callable[[socket.socket], None]], str],
     behave: Callable[[socket.socket], None],
     error: type[Exception],
@@ -95,7 +95,7 @@ def test_what_is_no_controller_is_a_typed_error_within_the_deadline(
     robot.disconnect()
 
 
-def test_a_reset_that_overtakes_the_accepting_is_the_same_loss(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reset_while_connecting_is_a_connection_loss(monkeypatch: pytest.MonkeyPatch) -> None:
     def overtaken(*_: object) -> socket.socket:
         raise ConnectionResetError(104, "Connection reset by peer")
 
@@ -130,7 +130,7 @@ def test_connecting_observes_and_is_idempotent(fake: FakeUr) -> None:
     assert fake.truth()["program"] == before["program"]
 
 
-def test_the_state_is_told_whole(robot: UR5e, fake: FakeUr) -> None:
+def test_the_state_is_complete(robot: UR5e, fake: FakeUr) -> None:
     state = robot.state()
     assert (state.mode, state.power, state.safety) == (Mode.AUTOMATIC_EXTERNAL, Power.OPERATIONAL, Safety.NORMAL)
     assert (state.program, state.control, state.moving) == (ProgramState.STOPPED, Control.REMOTE, False)
@@ -148,7 +148,7 @@ def test_the_state_is_told_whole(robot: UR5e, fake: FakeUr) -> None:
     assert [alarm.code for alarm in robot.alarms()] == ["safeguard_stop"]
 
 
-def test_poses_are_in_the_world_by_the_place_of_base_link(fake: FakeUr) -> None:
+def test_poses_are_in_the_world(fake: FakeUr) -> None:
     robot = make(
         fake.host,
         Pose(Position(1.0, 0.0, 0.5), Orientation.from_rotation_vector(0.0, 0.0, 1.5707963267948966)),
@@ -165,7 +165,7 @@ def test_poses_are_in_the_world_by_the_place_of_base_link(fake: FakeUr) -> None:
         robot.disconnect()
 
 
-def test_it_tells_who_it_is(robot: UR5e) -> None:
+def test_identify(robot: UR5e) -> None:
     identity = robot.identify()
     assert identity.vendor == "Universal Robots"
     assert identity.serial.isdigit()
@@ -173,7 +173,7 @@ def test_it_tells_who_it_is(robot: UR5e) -> None:
 
 
 @pytest.mark.parametrize("fault", ["silence", "reset", "half_frame", "garbage"])
-def test_observing_comes_back_by_itself_and_stale_is_an_error(robot: UR5e, fake: FakeUr, fault: str) -> None:
+def test_observation_recovers_and_a_stale_state_is_an_error(robot: UR5e, fake: FakeUr, fault: str) -> None:
     old = robot.robot_joints()
     fake.do(fault)
     wait(lambda: robot.connection in (Connection.LOST, Connection.BACK))
@@ -186,7 +186,7 @@ def test_observing_comes_back_by_itself_and_stale_is_an_error(robot: UR5e, fake:
     assert robot.control_owner() is None
 
 
-def test_a_sample_asked_for_at_the_instant_of_return_is_given(robot: UR5e) -> None:
+def test_a_sample_is_available_as_soon_as_the_connection_is_back(robot: UR5e) -> None:
     """The look at the newest sample and the look at the connection are two: in between everything may come back."""
     observer = robot._observer
     fresh = observer._newest
@@ -209,7 +209,7 @@ def test_a_sample_asked_for_at_the_instant_of_return_is_given(robot: UR5e) -> No
         observer.observing = kept
 
 
-def test_a_loss_is_logged_once_and_the_return_once(robot: UR5e, fake: FakeUr, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_loss_and_the_recovery_are_logged_once(robot: UR5e, fake: FakeUr, caplog: pytest.LogCaptureFixture) -> None:
     fake.do("refuse")
     fake.do("reset")
     fake.do("refuse")
@@ -222,7 +222,7 @@ def test_a_loss_is_logged_once_and_the_return_once(robot: UR5e, fake: FakeUr, ca
     assert len([text for text in told if " back after " in text]) == 1
 
 
-def test_every_sample_is_taken_and_costs_little(fake: FakeUr, robot: UR5e) -> None:
+def test_no_sample_is_missed_and_little_cpu_time_is_needed(fake: FakeUr, robot: UR5e) -> None:
     received, missed, began = robot.samples_received, robot.samples_missed, time.monotonic()
     sent, used = fake.truth()["timestamp"] * 500, resource.getrusage(resource.RUSAGE_SELF)
     time.sleep(1.5)
@@ -240,7 +240,7 @@ def test_a_bad_setting_of_the_model_is_refused() -> None:
         make("127.0.0.1", payload_mass=7.0)
 
 
-def test_the_driver_folder_runs_from_anywhere() -> None:
+def test_the_driver_works_from_any_folder() -> None:
     """It is copied into released packages under another name: only relative imports may lead inside it."""
     folder = Path(__file__).parents[3] / "drivers" / "arcor2_drivers" / "universal_robots"
     files = list(folder.glob("*.py"))

@@ -41,7 +41,7 @@ def followed(robot: UR5e, doing: Doing) -> list[Position]:
     return seen
 
 
-def test_a_program_reads_as_urscript_and_is_watched_before_it_moves() -> None:
+def test_a_motion_program_arms_its_watchdog_before_it_moves() -> None:
     for limit in (None, Limit(10.0), Limit(10.0, (0.0, 0.0, -1.0))):
         text = motion_program(
             7, [linear([0.1] * 6, 0.2, 1.2, 0.05)], Registers.of(True), 10.0, Tool(Pose(), 1.0, (0, 0, 0.1)), 5.0, limit
@@ -54,7 +54,7 @@ def test_a_program_reads_as_urscript_and_is_watched_before_it_moves() -> None:
         assert any("r=0.05" in line for line in lines)
 
 
-def test_a_path_rounds_its_corners_and_ends_in_control(ready: UR5e, fake: FakeUr) -> None:
+def test_a_path_rounds_its_corners_and_keeps_control(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
     corner, end = shifted(start, y=-0.15), shifted(start, y=-0.15, z=-0.15)
     doing = Doing(ready.move_path, [corner, end], 0.03, True, 0.3)
@@ -80,7 +80,7 @@ def test_without_a_blend_each_waypoint_is_reached(ready: UR5e) -> None:
     assert ready.get_end_effector_pose("tcp").position.distance_to(end.position) < 1e-3
 
 
-def test_a_path_that_makes_no_sense_moves_nothing(ready: UR5e, fake: FakeUr) -> None:
+def test_an_invalid_path_is_refused_without_motion(ready: UR5e, fake: FakeUr) -> None:
     start, q, scripts = ready.get_end_effector_pose("tcp"), fake.truth()["q"], fake.truth()["scripts_taken"]
     near, far = shifted(start, y=-0.1), shifted(start, z=-3.0)
     with pytest.raises(OutOfRange, match="half the distance"):
@@ -94,7 +94,7 @@ def test_a_path_that_makes_no_sense_moves_nothing(ready: UR5e, fake: FakeUr) -> 
     assert (fake.truth()["q"], fake.truth()["scripts_taken"]) == (q, scripts)
 
 
-def test_a_stop_ends_a_path_and_the_next_command_is_taken(ready: UR5e, fake: FakeUr) -> None:
+def test_a_stop_ends_a_path_and_the_next_command_is_accepted(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
     doing = Doing(ready.move_path, [shifted(start, y=-0.3), shifted(start, y=-0.3, z=-0.3)], 0.02, True, 0.2)
     moving(fake)
@@ -112,7 +112,7 @@ def test_a_stop_ends_a_path_and_the_next_command_is_taken(ready: UR5e, fake: Fak
     ready.move_to_pose("tcp", start, 0.5)
 
 
-def test_a_hung_control_process_does_not_keep_a_path_from_stopping(ready: UR5e, fake: FakeUr) -> None:
+def test_a_path_stops_although_the_control_process_hangs(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
     doing = Doing(ready.move_path, [shifted(start, y=-0.4)], 0.0, True, 0.1)
     moving(fake)
@@ -157,7 +157,7 @@ def test_a_path_stopped_at_the_pendant_ends_control(ready: UR5e, fake: FakeUr) -
         doing.result(2.0)
 
 
-def test_a_safeguard_stop_ends_a_path_for_good(ready: UR5e, fake: FakeUr) -> None:
+def test_a_path_does_not_resume_after_a_safeguard_stop(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
     doing = Doing(ready.move_path, [shifted(start, y=-0.3)], 0.0, True, 0.1)
     moving(fake)
@@ -181,7 +181,7 @@ def test_a_path_that_takes_too_long_is_stopped(ready: UR5e, fake: FakeUr, monkey
 
 
 # ------------------------------------------------------------------------------------------------ force
-def test_a_move_ends_at_contact_and_the_wrench_is_told(fake: FakeUr) -> None:
+def test_a_move_ends_at_contact_and_the_wrench_is_reported(fake: FakeUr) -> None:
     """The scene turns base_link by a quarter about z: directions and forces are of the world."""
     turn = Orientation.from_rotation_vector(0.0, 0.0, 1.5707963267948966)
     robot = make(fake.host, Pose(Position(0.2, 0.0, 0.3), turn))
@@ -226,7 +226,7 @@ def test_a_careful_move_stops_at_a_force_from_the_side(ready: UR5e, fake: FakeUr
         fake.do("no_obstacle")
 
 
-def test_running_into_something_is_a_protective_stop(ready: UR5e, fake: FakeUr) -> None:
+def test_a_collision_is_a_protective_stop(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
     try:
         z = fake.truth()["tcp_pose"][2]
@@ -252,7 +252,7 @@ def _acknowledged(robot: UR5e) -> bool:
     ("direction", "force", "distance"),
     [((0.0, 0.0, 0.0), 10.0, 0.1), ((0.0, 0.0, 1.0), 0.1, 0.1), ((0.0, 0.0, 1.0), 10.0, 3.0)],
 )
-def test_what_cannot_be_asked_of_a_contact(
+def test_invalid_arguments_of_a_contact_are_refused(
     ready: UR5e, direction: tuple[float, float, float], force: float, distance: float
 ) -> None:
     with pytest.raises(OutOfRange):

@@ -43,7 +43,7 @@ def touches(around: Around, *seen: list[float]) -> set[str]:
     return around.touches(RobotModel.load(URDF, {"tcp_z": 0.1}), Pose(), seen)
 
 
-def test_a_joint_move_goes_around_and_only_where_it_was_looked_at(ready: UR5e, around: Around, fake: FakeUr) -> None:
+def test_a_joint_move_follows_the_checked_path_around_an_obstacle(ready: UR5e, around: Around, fake: FakeUr) -> None:
     at = between(ready)
     around.boxes["post"] = Position(at.x, at.y, at.z - 0.05), (0.06, 0.06, 0.5)
     seen: list[list[float]] = []
@@ -62,7 +62,7 @@ def test_a_joint_move_goes_around_and_only_where_it_was_looked_at(ready: UR5e, a
     assert np.allclose(fake.truth()["q"], HOME, atol=1e-3)
 
 
-def test_to_a_pose_by_a_configuration_that_is_free(ready: UR5e, around: Around, fake: FakeUr) -> None:
+def test_a_pose_is_reached_in_a_free_configuration(ready: UR5e, around: Around, fake: FakeUr) -> None:
     goal = [0.9, -1.0, 1.4, -1.9, -1.57, 0.0]
     pose = ready.forward_kinematics("tcp", joints(ready, goal))
     model = RobotModel.load(URDF)
@@ -74,7 +74,7 @@ def test_to_a_pose_by_a_configuration_that_is_free(ready: UR5e, around: Around, 
     assert touches(around, fake.truth()["q"]) == set()
 
 
-def test_inverse_kinematics_is_the_controllers_in_a_configuration_that_is_free(ready: UR5e, around: Around) -> None:
+def test_inverse_kinematics_of_the_controller_in_a_free_configuration(ready: UR5e, around: Around) -> None:
     goal = [0.9, -1.0, 1.4, -1.9, -1.57, 0.0]
     pose = ready.forward_kinematics("tcp", joints(ready, goal))
     near = joints(ready, goal)
@@ -91,7 +91,7 @@ def test_inverse_kinematics_is_the_controllers_in_a_configuration_that_is_free(r
         ready.inverse_kinematics("tcp", pose, near)
 
 
-def test_a_line_into_something_is_refused_and_nothing_moves(ready: UR5e, around: Around, fake: FakeUr) -> None:
+def test_a_line_into_an_obstacle_is_refused_without_motion(ready: UR5e, around: Around, fake: FakeUr) -> None:
     here = ready.get_end_effector_pose("tcp")
     there = Pose(here.position + Position(0.0, 0.25, 0.0), here.orientation)
     around.boxes["post"] = here.position + Position(0.0, 0.17, 0.05), (0.03, 0.03, 0.3)
@@ -103,7 +103,7 @@ def test_a_line_into_something_is_refused_and_nothing_moves(ready: UR5e, around:
     assert ready.get_end_effector_pose("tcp").position.distance_to(there.position) < 1e-3
 
 
-def test_a_stop_between_waypoints_ends_it(ready: UR5e, around: Around, fake: FakeUr) -> None:
+def test_a_stop_between_waypoints_ends_the_move(ready: UR5e, around: Around, fake: FakeUr) -> None:
     at = between(ready)
     around.boxes["post"] = Position(at.x, at.y, at.z - 0.05), (0.06, 0.06, 0.5)
     doing = Doing(ready.move_to_joints, joints(ready, BESIDE), 0.3)
@@ -119,7 +119,9 @@ def test_a_stop_between_waypoints_ends_it(ready: UR5e, around: Around, fake: Fak
 
 
 @pytest.mark.parametrize("line", [False, True])
-def test_it_stops_before_what_comes_into_its_path(ready: UR5e, around: Around, fake: FakeUr, line: bool) -> None:
+def test_the_arm_stops_before_an_obstacle_that_enters_its_path(
+    ready: UR5e, around: Around, fake: FakeUr, line: bool
+) -> None:
     here = ready.get_end_effector_pose("tcp")
     # Slow, so that the arm does not reach the post before it appears.
     if line:
@@ -143,7 +145,7 @@ def test_it_stops_before_what_comes_into_its_path(ready: UR5e, around: Around, f
     assert np.allclose(fake.truth()["q"], HOME, atol=1e-3)
 
 
-def test_the_tool_that_was_told_counts(ready: UR5e, around: Around) -> None:
+def test_the_tool_set_at_run_time_is_used(ready: UR5e, around: Around) -> None:
     pose = ready.get_end_effector_pose("tcp")
     found = ready.safe_moves.forward("tcp", ready.robot_joints())
     assert found.position.distance_to(pose.position) < 1e-4
@@ -154,7 +156,7 @@ def test_the_tool_that_was_told_counts(ready: UR5e, around: Around) -> None:
 
 
 @pytest.mark.parametrize("tcp", [(0.0, 0.0, 0.2), (0.12, 0.05, 0.1), (0.0, -0.15, -0.05)])
-def test_the_tool_does_not_go_through_things(robot: UR5e, around: Around, tcp: tuple[float, float, float]) -> None:
+def test_the_tool_is_kept_clear_of_obstacles(robot: UR5e, around: Around, tcp: tuple[float, float, float]) -> None:
     robot._control.stated_tool = robot._control.stated_tool._replace(tcp=Pose(Position(*tcp)))
     flange = Pose(Position(*(-value for value in tcp)))
     at = robot.safe_moves.forward("tcp", robot.robot_joints())
@@ -166,7 +168,7 @@ def test_the_tool_does_not_go_through_things(robot: UR5e, around: Around, tcp: t
         assert any("tool of ur and chip" in pair for pair in found) is hit, (share, found)
 
 
-def test_without_control_nothing_is_planned(robot: UR5e, around: Around) -> None:
+def test_planning_needs_control(robot: UR5e, around: Around) -> None:
     for move in (
         lambda: robot.move_to_joints(joints(robot, BESIDE), 0.5),
         lambda: robot.move_to_pose("tcp", Pose(), 0.5),

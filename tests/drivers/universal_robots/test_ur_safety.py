@@ -55,7 +55,7 @@ def whole(fake: FakeUr) -> Iterator[FakeUr]:
 
 
 @pytest.mark.parametrize("system", [False, True])
-def test_an_emergency_stop_takes_the_power_and_a_person_brings_it_back(
+def test_an_emergency_stop_switches_power_off_until_a_person_restores_it(
     ready: UR5e, whole: FakeUr, system: bool
 ) -> None:
     doing = far_move(ready, whole)
@@ -100,7 +100,7 @@ def test_a_violation_or_fault_needs_a_restart_of_the_safety_system_by_a_person(
     switched_on(ready)
 
 
-def test_reduced_mode_moves_on_and_is_told(ready: UR5e, fake: FakeUr) -> None:
+def test_reduced_mode_continues_the_motion_and_is_reported(ready: UR5e, fake: FakeUr) -> None:
     fake.do("reduced", on=True)
     wait(lambda: ready.state().safety is Safety.REDUCED)
     assert ready.alarms() == []
@@ -109,7 +109,7 @@ def test_reduced_mode_moves_on_and_is_told(ready: UR5e, fake: FakeUr) -> None:
     wait(lambda: ready.state().safety is Safety.NORMAL)
 
 
-def test_in_recovery_nothing_is_commanded_until_the_arm_is_back(ready: UR5e, fake: FakeUr) -> None:
+def test_recovery_mode_refuses_commands(ready: UR5e, fake: FakeUr) -> None:
     doing = far_move(ready, fake)
     fake.do("recovery", on=True)
     with pytest.raises(SafetyStop) as stop:
@@ -141,7 +141,7 @@ def test_a_safeguard_stop_ends_a_jog_and_hand_teaching(ready: UR5e, fake: FakeUr
         ready.jog((0.0, -0.1, 0.0, 0.0, 0.0, 0.0))
 
 
-def test_local_control_refuses_what_only_the_pendant_may(ready: UR5e, fake: FakeUr) -> None:
+def test_local_control_refuses_power_and_safety_commands(ready: UR5e, fake: FakeUr) -> None:
     ready.release_control()
     fake.control.wait_until(lambda t: t["program"] is None)
     fake.do("protective_stop")
@@ -165,7 +165,7 @@ def _acknowledged(robot: UR5e) -> bool:
 
 
 # ------------------------------------------------------------------------------------------------ jogging
-def test_a_late_jog_is_thrown_away(ready: UR5e, fake: FakeUr) -> None:
+def test_a_late_jog_is_dropped(ready: UR5e, fake: FakeUr) -> None:
     """A jog that waits longer than it is valid moves nothing; one that was stopped meanwhile neither."""
     session = ready._control.session
     assert session is not None
@@ -178,7 +178,7 @@ def test_a_late_jog_is_thrown_away(ready: UR5e, fake: FakeUr) -> None:
     assert not fake.truth()["moving"]
 
 
-def test_a_long_jog_keeps_neither_the_watchdog_nor_a_stop_waiting(ready: UR5e, fake: FakeUr) -> None:
+def test_a_long_jog_delays_neither_the_watchdog_nor_a_stop(ready: UR5e, fake: FakeUr) -> None:
     trips = fake.truth()["watchdog_trips"]
     ready.jog(joint_velocities=[0.3, 0.0, 0.0, 0.0, 0.0, 0.0], valid_for=1.0)
     time.sleep(0.5)
@@ -191,7 +191,7 @@ def test_a_long_jog_keeps_neither_the_watchdog_nor_a_stop_waiting(ready: UR5e, f
     assert fake.truth()["watchdog_trips"] == trips
 
 
-def test_a_move_ends_the_jog_before_it(ready: UR5e, fake: FakeUr) -> None:
+def test_a_move_ends_a_previous_jog(ready: UR5e, fake: FakeUr) -> None:
     ready.jog(joint_velocities=[0.3, 0.0, 0.0, 0.0, 0.0, 0.0], valid_for=1.0)
     moving(fake)
     target = ready.robot_joints()
@@ -205,7 +205,7 @@ def test_a_move_ends_the_jog_before_it(ready: UR5e, fake: FakeUr) -> None:
 
 
 @pytest.mark.parametrize("frame", ["base", "tool"])
-def test_a_jog_goes_along_its_frame_and_rests_when_not_renewed(ready: UR5e, fake: FakeUr, frame: str) -> None:
+def test_a_jog_follows_its_frame_and_expires(ready: UR5e, fake: FakeUr, frame: str) -> None:
     start = ready.get_end_effector_pose("tcp")
     ready.jog((0.0, 0.0, 0.1, 0.0, 0.0, 0.0), frame=frame, valid_for=0.3)  # type: ignore[arg-type]
     moving(fake)
@@ -222,7 +222,7 @@ def test_a_jog_goes_along_its_frame_and_rests_when_not_renewed(ready: UR5e, fake
     assert way.distance_to(Position(along.x * length, along.y * length, along.z * length)) < 2e-3
 
 
-def test_joints_are_jogged_one_by_one(ready: UR5e, fake: FakeUr) -> None:
+def test_single_joints_are_jogged(ready: UR5e, fake: FakeUr) -> None:
     q = fake.truth()["q"]
     ready.jog(joint_velocities=[0.0, 0.0, 0.0, 0.0, 0.0, -0.5], valid_for=0.3)
     moving(fake)
@@ -269,7 +269,7 @@ def test_each_generation_is_observed_controlled_and_moved(
         robot.disconnect()
 
 
-def test_polyscope_x_leaves_to_the_pendant_what_needs_a_dashboard(start_fake: Callable[..., FakeUr]) -> None:
+def test_polyscope_x_refuses_commands_that_need_a_dashboard(start_fake: Callable[..., FakeUr]) -> None:
     fake = start_fake("--controller-version", "10.12", "--powered-off", "--time-scale", "0.1")
     robot = make(fake.host)
     robot.connect(3.0)

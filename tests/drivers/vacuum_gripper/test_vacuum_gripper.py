@@ -142,7 +142,7 @@ def test_a_part_that_sticks_is_an_error(make: Make, fake: FakeProcess) -> None:
     assert not output(fake, BLOW), "the blast is over all the same"
 
 
-def test_a_part_lost_on_the_way_is_an_alarm_and_an_error(holding: SuctionGripper, fake: FakeProcess) -> None:
+def test_a_part_lost_during_transport_is_an_alarm_and_an_error(holding: SuctionGripper, fake: FakeProcess) -> None:
     part(fake, False)
     wait_for(lambda: [alarm.code for alarm in holding.alarms()] == ["part_lost"])
     assert holding.health is Health.CHECK_FUNCTION
@@ -161,7 +161,7 @@ def test_a_part_lost_on_the_way_is_an_alarm_and_an_error(holding: SuctionGripper
     assert (holding.alarms(), holding.health) == ([], Health.NORMAL)
 
 
-def test_a_flicker_of_the_sensor_is_no_loss(make: Make, fake: FakeProcess) -> None:
+def test_a_flicker_of_the_sensor_is_tolerated(make: Make, fake: FakeProcess) -> None:
     gripper = make(lost_after=1.5)
     gripper.connect()
     gripper.take_control()
@@ -178,7 +178,7 @@ def test_a_flicker_of_the_sensor_is_no_loss(make: Make, fake: FakeProcess) -> No
     assert gripper.alarms() == [], "what was let go is not lost"
 
 
-def test_a_stop_ends_the_waiting_and_lets_nothing_fall(gripper: SuctionGripper, fake: FakeProcess) -> None:
+def test_a_stop_ends_an_action_and_keeps_the_part(gripper: SuctionGripper, fake: FakeProcess) -> None:
     doing = BackgroundCall(gripper.grip)
     wait_for(lambda: output(fake, VACUUM))
     gripper.stop()
@@ -191,7 +191,7 @@ def test_a_stop_ends_the_waiting_and_lets_nothing_fall(gripper: SuctionGripper, 
     assert not output(fake, BLOW)
 
 
-def test_one_act_at_a_time(gripper: SuctionGripper, fake: FakeProcess) -> None:
+def test_one_action_at_a_time(gripper: SuctionGripper, fake: FakeProcess) -> None:
     doing = BackgroundCall(gripper.grip)
     wait_for(lambda: output(fake, VACUUM))
     for second in (gripper.grip, gripper.release, gripper.blow_off):
@@ -201,7 +201,7 @@ def test_one_act_at_a_time(gripper: SuctionGripper, fake: FakeProcess) -> None:
     assert doing.end() is None
 
 
-def test_the_vacuum_tells_of_a_part_where_no_switch_does(make: Make, fake: FakeProcess) -> None:
+def test_the_vacuum_detects_a_part_without_a_switch(make: Make, fake: FakeProcess) -> None:
     gripper = make(part_input="", vacuum_input="pressure", part_vacuum=20_000.0, grip_time=0.3)
     gripper.connect()
     gripper.take_control()
@@ -214,7 +214,7 @@ def test_the_vacuum_tells_of_a_part_where_no_switch_does(make: Make, fake: FakeP
     assert gripper.part_held()
 
 
-def test_without_a_sensor_the_times_are_waited(make: Make, fake: FakeProcess) -> None:
+def test_without_a_sensor_actions_wait_for_their_time(make: Make, fake: FakeProcess) -> None:
     gripper = make(part_input="", blow_output="", grip_time=0.3, release_time=0.2)
     gripper.connect()
     gripper.take_control()
@@ -275,12 +275,12 @@ def test_an_output_that_does_not_hold_on_loss_is_refused(make: Make) -> None:
         ({"vacuum_input": "falls"}, "no analog input 'falls'"),
     ],
 )
-def test_what_the_carrier_does_not_have_is_named(make: Make, settings: dict[str, str], told: str) -> None:
+def test_missing_points_of_the_carrier_are_named(make: Make, settings: dict[str, str], told: str) -> None:
     with pytest.raises((InvalidData, NotFound), match=told):
         make(**settings).connect(0.3)
 
 
-def test_a_carrier_that_is_not_up_is_waited_for(make: Make, block: RemoteIO) -> None:
+def test_connecting_waits_for_the_carrier(make: Make, block: RemoteIO) -> None:
     block.disconnect()
     gripper = make()
     began = own_time()
@@ -294,7 +294,7 @@ def test_a_carrier_that_is_not_up_is_waited_for(make: Make, block: RemoteIO) -> 
     assert gripper.connection is Connection.ONLINE
 
 
-def test_a_lost_carrier_tells_nothing_old(holding: SuctionGripper, fake: FakeProcess) -> None:
+def test_a_lost_carrier_returns_no_old_values(holding: SuctionGripper, fake: FakeProcess) -> None:
     fake.control.do("silence")
     try:
         wait_for(lambda: holding.connection is Connection.LOST)
@@ -321,7 +321,7 @@ def test_a_lost_carrier_tells_nothing_old(holding: SuctionGripper, fake: FakePro
         ("lost_after", 99.0),
     ],
 )
-def test_a_senseless_setting_is_named(name: str, value: object) -> None:
+def test_an_invalid_setting_is_named(name: str, value: object) -> None:
     chosen: dict[str, Any] = {"carrier": "block", "vacuum_output": "vacuum", name: value}
     with pytest.raises(OutOfRange, match=name if name != "blow_output" else "may be used once"):
         VacuumGripperSettings(**chosen)

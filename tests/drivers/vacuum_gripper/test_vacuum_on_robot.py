@@ -40,7 +40,7 @@ def gripper(robot: UR5e) -> Iterator[SuctionGripper]:
     made.disconnect()
 
 
-def test_both_take_control_at_once_and_there_is_one(robot: UR5e, gripper: SuctionGripper, ur: FakeUr) -> None:
+def test_robot_and_gripper_take_control_at_once(robot: UR5e, gripper: SuctionGripper, ur: FakeUr) -> None:
     with pytest.raises(NotInControl, match="gripper on ur"):
         gripper.on()
     taken = ur.truth()["scripts_taken"]
@@ -53,9 +53,7 @@ def test_both_take_control_at_once_and_there_is_one(robot: UR5e, gripper: Suctio
     assert ur.truth()["scripts_taken"] == taken + 1
 
 
-def test_it_grips_while_the_robot_moves_and_keeps_its_part_at_a_stop(
-    robot: UR5e, gripper: SuctionGripper, ur: FakeUr
-) -> None:
+def test_gripping_during_a_move_keeps_the_part_at_a_stop(robot: UR5e, gripper: SuctionGripper, ur: FakeUr) -> None:
     gripper.take_control()
     joints = robot.robot_joints()
     joints[0].value += 2.0
@@ -95,7 +93,7 @@ def _no_robot() -> UR5e:
     raise NotFound("the scene has 2 robots")
 
 
-def test_it_grips_during_a_path_of_the_robots_own_program(robot: UR5e, gripper: SuctionGripper, ur: FakeUr) -> None:
+def test_gripping_during_a_motion_program(robot: UR5e, gripper: SuctionGripper, ur: FakeUr) -> None:
     robot.take_control()
     here = robot.get_end_effector_pose("tcp")
     there = type(here)(here.position - type(here.position)(0.0, 0.2, 0.0), here.orientation)

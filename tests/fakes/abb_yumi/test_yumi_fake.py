@@ -158,7 +158,7 @@ def test_a_wrong_password_is_refused(fake: FakeProcess) -> None:
     http.close()
 
 
-def test_acts_need_mastership_and_sessions_hold_it(http: Http) -> None:
+def test_commands_need_mastership_of_their_session(http: Http) -> None:
     assert http.ask("POST", "/rw/rapid/execution?action=resetpp")[0] == 403
     assert http.ask("POST", "/rw/mastership/rapid?action=request")[0] == 204
     other = Http()
@@ -171,7 +171,7 @@ def test_acts_need_mastership_and_sessions_hold_it(http: Http) -> None:
     other.close()
 
 
-def test_motors_go_on_in_automatic_only(fake: FakeProcess, http: Http) -> None:
+def test_motors_switch_on_only_in_automatic_mode(fake: FakeProcess, http: Http) -> None:
     target = "/rw/panel/ctrlstate?action=setctrlstate"
     fake.control.do("control_state", state="motoroff")
     fake.control.do("operation_mode", mode="MANR")
@@ -186,7 +186,7 @@ def test_motors_go_on_in_automatic_only(fake: FakeProcess, http: Http) -> None:
     assert http.ask("POST", target, "ctrl-state=motoron")[0] == 403
 
 
-def test_what_is_not_there_is_404(http: Http) -> None:
+def test_a_missing_resource_is_404(http: Http) -> None:
     for target in ("/", "/rw/nothing", "/rw/mastership/moon", "/rw/motionsystem/mechunits/ROB_X/jointtarget"):
         assert http.ask("GET", target)[0] == 404
 
@@ -198,7 +198,7 @@ def test_garbage_closes_the_http_connection(fake: FakeProcess) -> None:
         assert raw.recv(100) == b""
 
 
-def test_the_motion_server_checks_what_it_gets(lines: Callable[[int], tuple[Line, Line]]) -> None:
+def test_the_motion_server_checks_its_input(lines: Callable[[int], tuple[Line, Line]]) -> None:
     commands, watch = lines(LEFT)
     assert commands.ask("1") == [0, 1, 1]
     assert commands.ask("99") == [11]
@@ -220,9 +220,7 @@ def test_the_motion_server_checks_what_it_gets(lines: Callable[[int], tuple[Line
     assert right.ask("1") == [0, 1, 2]
 
 
-def test_a_motion_is_answered_twice_and_takes_its_time(
-    fake: FakeProcess, lines: Callable[[int], tuple[Line, Line]]
-) -> None:
+def test_a_motion_is_answered_at_start_and_end(fake: FakeProcess, lines: Callable[[int], tuple[Line, Line]]) -> None:
     commands, watch = lines(LEFT)
     commands.ask("2 2")
     joints = [math.degrees(value) for value in HOME["left"]]
@@ -238,7 +236,7 @@ def test_a_motion_is_answered_twice_and_takes_its_time(
     assert commands.receive()[2:] == pytest.approx([0, *joints], abs=0.01)
 
 
-def test_a_stop_brakes_and_is_answered_at_rest(fake: FakeProcess, lines: Callable[[int], tuple[Line, Line]]) -> None:
+def test_a_stop_is_answered_at_standstill(fake: FakeProcess, lines: Callable[[int], tuple[Line, Line]]) -> None:
     commands, watch = lines(RIGHT)
     commands.ask("2 2")
     joints = [math.degrees(value) for value in HOME["right"]]
@@ -254,7 +252,9 @@ def test_a_stop_brakes_and_is_answered_at_rest(fake: FakeProcess, lines: Callabl
     assert abs(fake.truth()["arms"]["right"]["joints"][5]) < 99.0
 
 
-def test_silence_lets_the_watchdog_stop(fake: FakeProcess, lines: Callable[[int], tuple[Line, Line]]) -> None:
+def test_the_watchdog_stops_the_arm_without_keep_alives(
+    fake: FakeProcess, lines: Callable[[int], tuple[Line, Line]]
+) -> None:
     commands, _ = lines(LEFT)
     commands.ask("2 0.3")
     joints = [math.degrees(value) for value in HOME["left"]]
@@ -269,7 +269,7 @@ def test_silence_lets_the_watchdog_stop(fake: FakeProcess, lines: Callable[[int]
     assert commands.ask("30 3") == [15]
 
 
-def test_one_arm_alone_waits_in_vain(lines: Callable[[int], tuple[Line, Line]]) -> None:
+def test_one_arm_waits_for_its_partner_for_a_limited_time(lines: Callable[[int], tuple[Line, Line]]) -> None:
     commands, watch = lines(LEFT)
     commands.ask("2 5")
     commands.ask("20 " + " ".join(f"{math.degrees(value):.3f}" for value in HOME["left"]))
@@ -284,7 +284,7 @@ def test_one_arm_alone_waits_in_vain(lines: Callable[[int], tuple[Line, Line]]) 
 
 
 @pytest.mark.parametrize("arm", ["left", "right"])
-def test_the_calibration_position_is_where_abb_has_it(arm: str) -> None:
+def test_the_calibration_position_is_that_of_abb(arm: str) -> None:
     """From general knowledge of the robot: -9.58, +-182.61, 198.63 mm; 0.066, +-0.842, -0.111, +-0.523."""
     side = 1.0 if arm == "left" else -1.0
     flange = Kinematics(arm).forward(HOME[arm])
@@ -295,7 +295,7 @@ def test_the_calibration_position_is_where_abb_has_it(arm: str) -> None:
 
 
 @pytest.mark.parametrize("arm", ["left", "right"])
-def test_inverse_kinematics_find_pose_and_arm_angle(arm: str) -> None:
+def test_inverse_kinematics_reach_pose_and_arm_angle(arm: str) -> None:
     kinematics, rng = Kinematics(arm), np.random.default_rng(3)
     found = 0
     for _ in range(30):
@@ -327,7 +327,7 @@ def test_a_motion_keeps_to_the_limits_of_the_axes() -> None:
 
 
 @pytest.mark.parametrize("line", ["", "1", "1 1", "1 1*", "1 1*261", "a 1*1", "1 1 nan*100"])
-def test_lines_that_are_none_are_rejected(line: str) -> None:
+def test_invalid_lines_are_rejected(line: str) -> None:
     with pytest.raises(Rejected):
         parsed(line)
 

@@ -49,7 +49,7 @@ def line(fake: FakeProcess) -> Iterator[Line]:
     line.serial.close()
 
 
-def test_bytes_by_hand(line: Line) -> None:
+def test_frames_match_examples(line: Line) -> None:
     line.serial.write(bytes.fromhex("00 aa 17 aa aa 02 02 00 fe"))
     assert line.serial.read(9) == bytes.fromhex("aa aa 05 02 00 03 06 05 f0")
     line.serial.timeout = 0.1
@@ -63,7 +63,7 @@ def test_bytes_by_hand(line: Line) -> None:
     assert line.ask(20, 0) == bytes(16)
 
 
-def test_the_queue_has_indices_and_a_forced_stop_leaves_what_waits(fake: FakeProcess, line: Line) -> None:
+def test_the_queue_has_indices_and_survives_a_forced_stop(fake: FakeProcess, line: Line) -> None:
     line.ask(83, 1, "2f", 20.0, 100.0)
     first, second = line.move(40, 45, 45, 0), line.move(-40, 45, 45, 0)
     assert second == first + 1
@@ -131,7 +131,7 @@ def test_limits_are_alarms(
     line.serial.close()
 
 
-def test_outputs_and_parameters_are_kept(fake: FakeProcess, line: Line) -> None:
+def test_outputs_and_parameters_are_stored(fake: FakeProcess, line: Line) -> None:
     line.ask(62, 1, "2B", 1, 1)
     line.ask(63, 1, "2B", 1, 0)
     line.ask(135, 1, "BBi", 1, 1, -5000)

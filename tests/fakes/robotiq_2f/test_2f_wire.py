@@ -53,7 +53,7 @@ def test_answers_byte_for_byte(wire: Wire, wait_for: Callable[..., object]) -> N
     assert wire.ask(b"GET POS\n") == b"POS 230\n"
 
 
-def test_what_ends_a_motion_is_stamped(fake: FakeProcess, wire: Wire) -> None:
+def test_requests_that_end_a_motion_have_a_time_stamp(fake: FakeProcess, wire: Wire) -> None:
     wire.ask(b"SET GTO 1 POS 100\n")
     assert fake.control.do("stops") == []
     sent = time.monotonic()
@@ -66,7 +66,7 @@ def test_an_endless_line_is_cut_off(wire: Wire) -> None:
     assert wire.ask(b"A" * 1000) == b""
 
 
-def test_control_channel_refuses_nonsense(fake: FakeProcess) -> None:
+def test_the_control_channel_refuses_invalid_commands(fake: FakeProcess) -> None:
     for command, arguments in (("put_part", {"width": 0.2}), ("fault", {"code": 3}), ("put_part", {})):
         with pytest.raises(ControlError):
             fake.control.do(command, **arguments)
@@ -86,7 +86,7 @@ def fingers(clock: list[float]) -> Gripper:
     return gripper
 
 
-def test_fingers_take_their_time(fingers: Gripper, clock: list[float]) -> None:
+def test_fingers_move_in_time(fingers: Gripper, clock: list[float]) -> None:
     fingers.request({"POS": 230, "SPE": 0, "GTO": 1})  # 20 mm/s for 85 mm: 4.25 s
     clock[0] += 0.005
     assert fingers.registers()["PRE"] == 0
@@ -100,7 +100,7 @@ def test_fingers_take_their_time(fingers: Gripper, clock: list[float]) -> None:
     assert (fingers.registers()["OBJ"], fingers.registers()["POS"]) == (3, 230)
 
 
-def test_part_stops_the_fingers_and_its_loss_lets_them_go_on(fingers: Gripper, clock: list[float]) -> None:
+def test_a_part_stops_the_fingers_until_it_is_removed(fingers: Gripper, clock: list[float]) -> None:
     fingers.put_part(0.0425)
     fingers.request({"POS": 255, "SPE": 255, "GTO": 1})
     clock[0] += 5.0

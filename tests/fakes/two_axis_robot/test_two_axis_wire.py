@@ -59,7 +59,7 @@ QUOTED = [
 
 
 @pytest.mark.parametrize(("made", "quoted"), [row[1:] for row in QUOTED], ids=[row[0] for row in QUOTED])
-def test_frames_are_as_they_are_quoted(made: bytes, quoted: str) -> None:
+def test_frames_match_the_examples_of_the_manual(made: bytes, quoted: str) -> None:
     frame = bytes.fromhex(quoted)
     assert made == frame
     by_the_vendor = PacketHandler(2.0).updateCRC(0, list(frame), len(frame) - 2)
@@ -67,7 +67,7 @@ def test_frames_are_as_they_are_quoted(made: bytes, quoted: str) -> None:
 
 
 @given(st.lists(st.sampled_from([0xFF, 0xFD, 0x00, 0x55]), max_size=40).map(bytes), st.binary(max_size=8))
-def test_whatever_is_stuffed_comes_out_again(parameters: bytes, before: bytes) -> None:
+def test_stuffing_is_reversible(parameters: bytes, before: bytes) -> None:
     made = packet(3, 0x03, parameters)
     assert b"\xff\xff\xfd\x00" not in made[4:]
     noise = before.replace(b"\xff", b"\x00")
@@ -77,7 +77,7 @@ def test_whatever_is_stuffed_comes_out_again(parameters: bytes, before: bytes) -
     assert found == [Instruction(3, 0x03, parameters)]
 
 
-def test_a_damaged_packet_is_told_from_a_whole_one() -> None:
+def test_a_damaged_packet_is_detected() -> None:
     made = packet(3, 0x03, b"\x40\x00\x01")
     damaged = made[:-3] + b"\x00" + made[-2:]
     assert list(Receiver().feed(damaged + made)) == [BadCrc(3), Instruction(3, 0x03, b"\x40\x00\x01")]
@@ -111,7 +111,7 @@ def test_a_servo_moves_under_its_profile_and_stops_when_the_bus_is_silent(second
     assert servo.position == stood
 
 
-def test_a_shaft_between_two_ticks_does_not_move_to_the_tick_at_which_it_is() -> None:
+def test_a_goal_at_the_present_tick_does_not_move_the_shaft() -> None:
     now = [0.0]
     servo = Servo(1, lambda: now[0], position=2047.6)
     for write in ((116, (2048).to_bytes(4, "little")), (64, b"\x01"), (116, (2048).to_bytes(4, "little"))):
@@ -142,7 +142,7 @@ def port(fake: FakeProcess) -> Iterator[Any]:
         port.closePort()
 
 
-def test_the_vendors_library_speaks_with_it(fake: FakeProcess, port: Any) -> None:
+def test_the_vendors_library_works_with_the_fake(fake: FakeProcess, port: Any) -> None:
     speak = PacketHandler(2.0)
     assert speak.ping(port, 1) == (1020, COMM_SUCCESS, 0)
     assert speak.ping(port, 9)[1] == COMM_RX_TIMEOUT
@@ -197,7 +197,7 @@ def test_half_a_frame_and_silence_on_the_raw_wire(fake: FakeProcess) -> None:
         os.close(line)
 
 
-def test_it_ends_when_told_to_and_refuses_wrong_words(fake: FakeProcess) -> None:
+def test_the_process_ends_on_sigterm_and_refuses_invalid_arguments(fake: FakeProcess) -> None:
     with pytest.raises(Exception, match="no servo 7"):
         fake.control.do("hardware_error", servo=7)
     assert fake.terminate() == 0

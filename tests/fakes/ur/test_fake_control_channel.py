@@ -89,7 +89,7 @@ async def test_subscription_at_a_rate_and_on_change(server):
         assert seen == [1, 3]
 
 
-async def test_client_tells_when_the_fake_is_gone(server):
+async def test_the_client_detects_the_end_of_the_fake(server):
     client = await ControlClient.connect(server.address)
     server.command("hang", asyncio.Event().wait)
     with pytest.raises(ControlError, match="no answer"):
@@ -184,6 +184,6 @@ async def test_slow_frames_keep_their_order(server):
 
 
 @pytest.mark.parametrize("text", ["", "host", ":1", "a:b", "a:70000"])
-def test_addresses_that_are_none(text):
+def test_invalid_addresses(text):
     with pytest.raises(ValueError):
         parse_address(text)

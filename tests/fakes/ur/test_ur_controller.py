@@ -61,7 +61,7 @@ def test_protective_stop_pauses_and_play_continues_the_old_motion(c):
     assert c.arm.q == pytest.approx(GOAL)
 
 
-def test_stopping_the_program_first_forgets_the_old_motion(c):
+def test_stopping_the_program_first_drops_the_old_motion(c):
     start_move(c)
     c.protective_stop("test")
     wait(c, 5.1)
@@ -77,7 +77,7 @@ def test_stopping_the_program_first_forgets_the_old_motion(c):
 
 # ------------------------------------------------------------------------------------------------------ safeguard stop
 @pytest.mark.parametrize("reports_paused", [False, True])
-def test_safeguard_stop_goes_on_by_itself(c, reports_paused):
+def test_a_program_continues_after_a_safeguard_stop(c, reports_paused):
     start_move(c)
     c.safeguard_stop(True, reports_paused)
     assert c.safety is SafetyMode.SAFEGUARD_STOP
@@ -92,7 +92,7 @@ def test_safeguard_stop_goes_on_by_itself(c, reports_paused):
     assert c.arm.q == pytest.approx(GOAL)
 
 
-def test_safeguard_stop_does_not_wake_a_stopped_or_paused_program(c):
+def test_a_safeguard_stop_does_not_resume_a_stopped_or_paused_program(c):
     start_move(c)
     c.pause_program()
     wait(c, 0.5)
@@ -118,7 +118,7 @@ def test_safeguard_stop_does_not_wake_a_stopped_or_paused_program(c):
 
 
 # ------------------------------------------------------------------------------------------------- emergency and faults
-def test_emergency_stop_takes_the_power_when_the_arm_stands(c):
+def test_an_emergency_stop_switches_power_off_at_standstill(c):
     start_move(c, v=3.0)
     c.emergency_stop(True)
     assert c.program is None
@@ -149,7 +149,7 @@ def test_violation_and_fault_need_a_restart_of_safety(c, violation, mode):
     assert c.robot_mode is RobotMode.POWER_OFF
 
 
-def test_worse_conditions_hide_lesser_ones(c):
+def test_the_worst_safety_condition_is_reported(c):
     c.reduced(True)
     c.safeguard_stop(True)
     c.protective_stop("both")
@@ -161,7 +161,7 @@ def test_worse_conditions_hide_lesser_ones(c):
     assert c.safety is SafetyMode.REDUCED
 
 
-def test_reduced_mode_caps_the_speed(c):
+def test_reduced_mode_limits_the_speed(c):
     c.reduced(True)
     start_move(c, v=3.0)
     assert max(map(abs, c.arm.qd)) <= 1.0 + 1e-9
@@ -218,7 +218,7 @@ def test_dashboard_answers(c):
     assert d.answer("get operational mode") == "MANUAL"
 
 
-def test_local_control_refuses_what_moves(c):
+def test_local_control_refuses_motions(c):
     c.remote = False
     d = Dashboard(c)
     for command in ("play", "stop", "power on", "brake release", "unlock protective stop", "load a.urp"):
@@ -227,7 +227,7 @@ def test_local_control_refuses_what_moves(c):
     assert d.answer("robotmode") == "Robotmode: RUNNING"
 
 
-def test_power_by_dashboard_takes_its_time(c):
+def test_power_on_by_the_dashboard_takes_time(c):
     d = Dashboard(c)
     assert d.answer("power off") == "Powering off"
     assert d.answer("robotmode") == "Robotmode: POWER_OFF"
@@ -280,7 +280,7 @@ def test_asynchronous_status_counts_operations(c, offset):
     assert c.output_ints[offset + 2] >> 24 == running >> 24
 
 
-def test_the_stop_that_is_really_run(c):
+def test_the_kind_of_stop_depends_on_earlier_stops(c):
     """Synchronous stops run stopj at first; from the first asynchronous one on everything runs stopl."""
     control_script(c)
     for code, asynchronous, kind in [(33, 0, "stopj"), (34, 0, "stopj"), (34, 1, "stopl"), (34, 0, "stopl")]:
@@ -331,7 +331,7 @@ def test_stop_script_ends_the_program(c):
     [(1, [math.nan] * 8), (1, [*HOME, 0.0, 1.0]), (3, [0.4, math.inf, 0, 0, 0, 0, 1, 1]), (11, [math.nan])],
 )
 @pytest.mark.parametrize("asynchronous", [0, 1])
-def test_senseless_numbers_end_the_program_not_the_controller(c, code, doubles, asynchronous):
+def test_invalid_numbers_end_only_the_program(c, code, doubles, asynchronous):
     control_script(c)
     c.input_doubles[: len(doubles)] = doubles
     c.input_ints[1], c.input_ints[0] = asynchronous, code
@@ -344,7 +344,7 @@ def test_senseless_numbers_end_the_program_not_the_controller(c, code, doubles, 
 @pytest.mark.parametrize(
     "line", ["movej([1,2])", "movej('x')", "movel(p[9,9,9,0,0,0])", "movej(p[9,9,9,0,0,0])", "sleep([])"]
 )
-def test_senseless_scripts_end_in_an_error(c, line):
+def test_invalid_scripts_end_in_an_error(c, line):
     c.start_program(WrittenProgram(c, "bad", line))
     wait(c, 8.0)
     assert c.program is None or c.safety is SafetyMode.PROTECTIVE_STOP
@@ -370,7 +370,7 @@ def test_calls_with_literals_only():
     assert [call.name for call in calls("def f():\n  sync() # note\n  # movej()\nend")] == ["sync"]
 
 
-def test_scripts_are_cut_at_their_end():
+def test_scripts_are_split_at_their_end():
     splitter = Splitter()
     text = b"def a():\n  if x:\n    sync()\n  end\nend\nstopj(2)\nsec b():\n  textmsg(1)\nend\n"
     found = [entry for i in range(len(text)) for entry in splitter.feed(text[i : i + 1])]

@@ -10,7 +10,7 @@ from arcor2_fakes.ur.kinematics import difference, from_pose
 HOME = (0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0)
 
 
-def test_receive_at_500_hz_without_a_hole(ur):
+def test_receiving_at_500_hz_misses_no_sample(ur):
     seen = ur.library("""
 receive = Receive(host, 500.0, ["timestamp", "actual_q", "actual_TCP_pose", "robot_mode", "safety_mode"])
 stamps, start = [], time.monotonic()
@@ -30,7 +30,7 @@ report(stamps=stamps, q=receive.getActualQ(), pose=receive.getActualTCPPose(), m
     assert ur.do("truth")["samples_lost"] == 0
 
 
-def test_default_recipe_is_served_whole(start_ur):
+def test_the_default_recipe_is_served_completely(start_ur):
     ur = start_ur("--controller-version", "5.12")
     seen = ur.library("""
 receive = Receive(host)
@@ -238,7 +238,7 @@ report(kicked=kicked["moving"], trips_before=kicked["watchdog_trips"])
     assert truth["q"][0] < 2.5
 
 
-def test_killed_client_leaves_the_arm_at_rest(ur):
+def test_a_killed_client_leaves_the_arm_at_standstill(ur):
     """kill -9 in mid-move: no goodbye on the wire, the watchdog does it."""
     with pytest.raises(AssertionError, match="status -9"):
         ur.library("""
@@ -255,7 +255,7 @@ os.kill(os.getpid(), 9)
 
 
 @pytest.mark.parametrize("fault", ["silence", "half_frame", "reset"])
-def test_cable_cut_in_mid_move_ends_at_rest_and_stays_there(ur, fault):
+def test_a_cable_cut_during_a_move_ends_at_standstill(ur, fault):
     """The library kicks on, reconnects by itself and sometimes crashes over it: nothing of that may move the arm."""
     with ur.library_running("""
 control = Control(host, 500.0)
@@ -309,7 +309,7 @@ report(refused=refused, early=early, resting=resting, still=still, again=control
     assert seen["again"]
 
 
-def test_safeguard_stop_pauses_and_goes_on(ur):
+def test_a_safeguard_stop_pauses_the_program(ur):
     seen = ur.library("""
 receive = Receive(host, 500.0, ["timestamp", "safety_mode", "runtime_state", "actual_q"])
 control = Control(host, 500.0)
@@ -333,7 +333,7 @@ report(mode=mode, resting=resting, still=still, goal=goal, end=receive.getActual
     assert seen["end"] == pytest.approx(seen["goal"], abs=1e-9)
 
 
-def test_synchronous_move_waits_through_a_safeguard_stop_and_gives_up_on_an_emergency_stop(ur):
+def test_a_synchronous_move_survives_a_safeguard_stop_but_not_an_emergency_stop(ur):
     seen = ur.library("""
 import threading
 control = Control(host, 500.0)
@@ -363,7 +363,7 @@ report(waits=waits, ends=ends, hangs=second.is_alive(), truth=fake.do("truth"))
     assert seen["truth"]["safety"] == "ROBOT_EMERGENCY_STOP"
 
 
-def test_foreign_program_survives_observation_and_dies_by_control(ur):
+def test_a_foreign_program_survives_observation_but_not_control(ur):
     ur.do("foreign_program", on=True)
     seen = ur.library("""
 receive = Receive(host, 500.0, ["timestamp", "actual_q", "runtime_state", "robot_status_bits"])
@@ -398,7 +398,7 @@ report(error=error, remote=dashboard.isInRemoteControl())
 
 
 @pytest.mark.parametrize("fault", ["silence", "half_frame", "reset"])
-def test_lost_stream_is_seen_and_found_again(ur, fault):
+def test_a_lost_stream_is_detected_and_recovers(ur, fault):
     seen = ur.library(f"""
 receive = Receive(host, 500.0, ["timestamp", "actual_q"])
 fake.do("{fault}", wire="rtde")

@@ -94,7 +94,7 @@ def test_line_out_of_reach_is_refused_not_jumped():
 
 
 @pytest.mark.parametrize("linear", [False, True])
-def test_stop_decelerates_to_rest(linear):
+def test_stop_decelerates_to_standstill(linear):
     a = arm()
     a.move_joints((2.0, *HOME[1:]), 1.0, 3.0)
     for _ in range(400):
@@ -109,7 +109,7 @@ def test_stop_decelerates_to_rest(linear):
     assert before[0] < a.q[0] < 1.9
 
 
-def test_pause_stops_on_the_path_and_goes_on():
+def test_pause_stops_on_the_path_and_resumes():
     a, goal = arm(), (1.0, -1.0, 1.2, -2.0, -1.0, 0.5)
     a.move_joints(goal, 1.0, 2.0)
     for _ in range(300):

@@ -122,7 +122,7 @@ def test_input_packages(ur):
 @pytest.mark.parametrize(
     "junk", [b"\x00\x00U", b"\x00\x02V", b"\x00\x04V\x00", b"\x00\x06Oabc", b"\x00\x06I\xff\xfe\xfd"]
 )
-def test_junk_drops_the_client_not_the_fake(ur, junk):
+def test_garbage_closes_only_the_connection_of_its_client(ur, junk):
     with RtdeSocket(ur) as rtde:
         rtde.socket.sendall(junk)
         assert rtde.socket.recv(10) == b""
@@ -130,7 +130,7 @@ def test_junk_drops_the_client_not_the_fake(ur, junk):
         assert rtde.ask(b"V", b"\x00\x02") == b"\x01"
 
 
-def test_dashboard_and_script_ports_take_pieces_and_junk(ur):
+def test_dashboard_and_script_ports_accept_pieces_and_survive_garbage(ur):
     with socket.create_connection(parse_address(ur.ready["dashboard"]), 2.0) as client:
         lines = client.makefile()
         assert lines.readline().startswith("Connected")

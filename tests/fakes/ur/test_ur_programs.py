@@ -69,13 +69,13 @@ end
 
 
 @pytest.mark.parametrize("text", ["while True:\n  sync()", "if 1 ==:\nend", "end", "x = = 1", "else:\nend", "run f("])
-def test_what_cannot_be_read_does_not_start(text):
+def test_a_program_that_cannot_be_parsed_does_not_start(text):
     with pytest.raises(ValueError, match=r"understood|block|beginning"):
         parse(text)
 
 
 @pytest.mark.parametrize("text", ["nowhere(1)[0]", "x = y", "while True:\n  x = 1\nend", "x = [1][4]", "x = 'a' - 1"])
-def test_what_makes_no_sense_ends_the_program(c, text):
+def test_an_invalid_call_ends_the_program(c, text):
     killed = c.programs_killed
     c.start_program(WrittenProgram(c, "bad", text))
     for _ in range(100):
@@ -108,14 +108,14 @@ def corner(c, blend, kind="movel"):
     return min(math.dist(place, places[0]) for place in seen), min(speeds[ramp : len(speeds) - 2 * ramp])
 
 
-def test_without_a_blend_the_corner_is_reached_and_stood_at(c):
+def test_without_a_blend_the_arm_stops_at_the_corner(c):
     nearest, slowest = corner(c, 0.0)
     assert nearest < 1e-6
     assert slowest < 1e-3
 
 
 @pytest.mark.parametrize("kind", ["movel", "movej"])
-def test_a_blend_rounds_the_corner_within_its_radius_and_does_not_stand(c, kind):
+def test_a_blend_rounds_the_corner_within_its_radius_without_a_stop(c, kind):
     nearest, slowest = corner(c, 0.02, kind)
     assert 1e-3 < nearest <= 0.02
     assert slowest > 0.02
@@ -140,7 +140,7 @@ def test_a_blend_has_no_jump_in_its_speed(c):
         last = now
 
 
-def test_an_obstacle_pushes_like_a_spring_and_stops_what_runs_into_it(c):
+def test_an_obstacle_acts_like_a_spring_and_a_collision_stops_the_arm(c):
     x, y, z, *turn = c.arm.pose
     down = ", ".join(map(str, turn))
     c.place_obstacle(Obstacle.of((0.0, 0.0, z - 0.05), (0.0, 0.0, 2.0)))
@@ -156,7 +156,7 @@ def test_an_obstacle_pushes_like_a_spring_and_stops_what_runs_into_it(c):
     assert not c.arm.moving
 
 
-def test_recovery_ends_a_program_and_lets_none_start(c):
+def test_recovery_mode_ends_a_program_and_refuses_a_new_one(c):
     c.start_program(WrittenProgram(c, "move", f"movej({[1.0, *HOME[1:]]})"))
     for _ in range(200):
         c.tick()

@@ -12,7 +12,7 @@ frames = st.lists(st.tuples(st.integers(0, 255), st.binary(max_size=300)), max_s
 
 
 @given(frames, st.lists(st.integers(1, 50), min_size=1))
-def test_frames_survive_any_cutting(sent, cuts):
+def test_frames_are_complete_however_the_bytes_are_split(sent, cuts):
     stream = b"".join(pack(kind, payload) for kind, payload in sent)
     deframer, received, at, n = Deframer(), [], 0, 0
     while at < len(stream):
