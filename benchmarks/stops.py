@@ -25,7 +25,7 @@ from tests.drivers.benches.dobot_magician_bench import DobotMagicianBench
 from tests.drivers.benches.robotiq_2f_bench import Robotiq2FBench
 from tests.drivers.benches.two_axis_robot_bench import TwoAxisRobotBench
 from tests.drivers.benches.universal_robots_bench import UR5eBench
-from tests.drivers.busy import stall
+from tests.drivers.stall import stall
 
 STOPS: Final = 100
 """Number of stops of each driver."""

@@ -1,4 +1,4 @@
-"""What every installed fake offers: the faults of a wire, a power cycle, and a pace of its own."""
+"""Common features of all installed fakes: faults of the wire, a power cycle, and a simulation speed."""
 
 import subprocess
 import sys

@@ -14,7 +14,7 @@ import pytest
 from arcor2_hw.keep_alive import KeepAlive, RunningTime, acquire_within, once_within, pulse, result_within
 from arcor2_hw.keep_alive_process import FROZEN_AFTER, Parent, ParentEnd
 from arcor2_hw.testing.own_time import own_time
-from tests.drivers.busy import BUSY, stall
+from tests.drivers.stall import BUSY, stall
 
 MESSAGE = b"kick\r"
 OWNER = """

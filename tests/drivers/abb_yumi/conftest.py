@@ -1,4 +1,4 @@
-"""A fake controller of its own per module, on an address of its own, and a driver on it per test."""
+"""A fake controller per module, on its own address, and a driver per test."""
 
 import itertools
 import os
@@ -11,7 +11,7 @@ import pytest
 from arcor2_drivers.abb_yumi.settings import YumiSettings
 from arcor2_drivers.abb_yumi.yumi import YuMi
 from arcor2_hw.data.geometry import Pose
-from tests.drivers.doing import Doing as Doing
+from tests.drivers.background_call import BackgroundCall as BackgroundCall
 from tests.fakes.conftest import FakeProcess
 
 RWS_PORT = 8080

@@ -1,4 +1,4 @@
-"""Observing a YuMi, taking its control, and everything that forbids it."""
+"""Observing a YuMi, taking control of it, and the reasons against control."""
 
 import time
 from typing import Any

@@ -1,11 +1,11 @@
-"""The hands of a YuMi, and teaching its arms by hand."""
+"""Hands of a YuMi, and hand teaching."""
 
 import pytest
 
 from arcor2_drivers.abb_yumi.yumi import ArmId, YuMi
 from arcor2_hw.exceptions import Cancelled, DeviceFault, Refused
 
-from .conftest import Doing, FakeYumi, make, under_way, wait
+from .conftest import BackgroundCall, FakeYumi, make, under_way, wait
 from .test_yumi_motion import turned
 
 
@@ -39,7 +39,7 @@ def test_a_stop_opens_no_gripper(fake: FakeYumi, ready: YuMi) -> None:
     ready.open_gripper()
     fake.do("part", arm="left")
     ready.grip()
-    moving = Doing(ready.move_to_joints, turned(ready, "left", 6, 1.0), 0.5, arm_id="left")
+    moving = BackgroundCall(ready.move_to_joints, turned(ready, "left", 6, 1.0), 0.5, arm_id="left")
     under_way(fake, "left")
     ready.stop()
     with pytest.raises(Cancelled):
@@ -84,7 +84,7 @@ def test_one_arm_is_taught_by_hand(fake: FakeYumi, ready: YuMi) -> None:
 
 
 def test_hand_teaching_is_refused_while_an_arm_moves(fake: FakeYumi, ready: YuMi) -> None:
-    moving = Doing(ready.move_to_joints, turned(ready, "left", 6, 1.0), 0.5, arm_id="left")
+    moving = BackgroundCall(ready.move_to_joints, turned(ready, "left", 6, 1.0), 0.5, arm_id="left")
     under_way(fake, "left")
     with pytest.raises(Refused):
         ready.set_hand_teaching_mode(True, "right")

@@ -1,4 +1,4 @@
-"""Lines of the motion server, settings, and a late answer; no controller."""
+"""Lines of the motion server, settings, and late answers, without a controller."""
 
 import contextlib
 import socket

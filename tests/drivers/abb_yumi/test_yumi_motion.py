@@ -1,4 +1,4 @@
-"""A YuMi at work: joints, lines, paths, both arms together and beside each other, stop, clearance, kinematics."""
+"""Motion of a YuMi: joints, lines, paths, both arms coupled and concurrently, stop, clearance, kinematics."""
 
 import math
 import time
@@ -12,7 +12,7 @@ from arcor2_hw.data.robot import Joint, MoveEnd
 from arcor2_hw.exceptions import Cancelled, InvalidData, NotFound, NotInControl, OutOfRange, Refused
 from arcor2_hw.testing.own_time import own_time
 
-from .conftest import Doing, FakeYumi, under_way
+from .conftest import BackgroundCall, FakeYumi, under_way
 
 ACROSS = Position(0.0, -0.30, 0.0)
 """m: from the left arm's home well into the right arm."""
@@ -48,7 +48,7 @@ def test_a_joint_move_arrives_in_the_computed_time(fake: FakeYumi, ready: YuMi) 
 def test_a_line_is_straight(fake: FakeYumi, ready: YuMi) -> None:
     start = ready.get_end_effector_pose("tcp", "left")
     target = shifted(start, Position(0.12, 0.05, 0.04))
-    moving = Doing(ready.move_to_pose, "tcp", target, 0.3, arm_id="left")
+    moving = BackgroundCall(ready.move_to_pose, "tcp", target, 0.3, arm_id="left")
     off = []
     under_way(fake, "left")
     first = Position(*fake.arm("left")["position"])
@@ -80,7 +80,7 @@ def test_a_path_passes_its_waypoints(fake: FakeYumi, ready: YuMi) -> None:
     start = ready.get_end_effector_pose("tcp", "left")
     corners = [shifted(start, Position(*by)) for by in ((0.08, 0.0, 0.0), (0.08, 0.06, 0.0), (0.0, 0.06, 0.05))]
     flange = Position(*fake.arm("left")["position"])
-    moving = Doing(ready.move_path, corners, 0.005, speed=0.4, arm_id="left")
+    moving = BackgroundCall(ready.move_path, corners, 0.005, speed=0.4, arm_id="left")
     seen = []
     under_way(fake, "left")
     while fake.moving("left"):
@@ -97,7 +97,7 @@ def test_a_path_passes_its_waypoints(fake: FakeYumi, ready: YuMi) -> None:
 def test_both_arms_start_and_arrive_together(fake: FakeYumi, ready: YuMi) -> None:
     far = turned(ready, "left", 1, -0.6)
     near = shifted(ready.get_end_effector_pose("tcp", "right"), Position(0.03, -0.02, 0.0))
-    moving = Doing(ready.move_synchronously, {"left": far, "right": near}, 0.6)
+    moving = BackgroundCall(ready.move_synchronously, {"left": far, "right": near}, 0.6)
     fake.control.wait_until(lambda t: any(arm["moving"] for arm in t["arms"].values()))
     alone = 0
     while fake.moving():
@@ -114,7 +114,7 @@ def test_both_arms_start_and_arrive_together(fake: FakeYumi, ready: YuMi) -> Non
 
 def test_stopping_one_of_two_coupled_arms_stops_both(fake: FakeYumi, ready: YuMi) -> None:
     targets = {"left": turned(ready, "left", 6, 2.0), "right": turned(ready, "right", 6, 2.0)}
-    moving = Doing(ready.move_synchronously, targets, 0.5)
+    moving = BackgroundCall(ready.move_synchronously, targets, 0.5)
     under_way(fake, "left", "right")
     ready.stop("right")
     with pytest.raises(Cancelled):
@@ -126,8 +126,8 @@ def test_stopping_one_of_two_coupled_arms_stops_both(fake: FakeYumi, ready: YuMi
 
 
 def test_arms_move_concurrently_and_stop_separately(fake: FakeYumi, ready: YuMi) -> None:
-    left = Doing(ready.move_to_joints, turned(ready, "left", 6, 1.5), 0.5, arm_id="left")
-    right = Doing(ready.move_to_joints, turned(ready, "right", 6, 1.5), 0.5, arm_id="right")
+    left = BackgroundCall(ready.move_to_joints, turned(ready, "left", 6, 1.5), 0.5, arm_id="left")
+    right = BackgroundCall(ready.move_to_joints, turned(ready, "right", 6, 1.5), 0.5, arm_id="right")
     under_way(fake, "left", "right")
     assert ready.move_in_progress
     with pytest.raises(Refused) as error:
@@ -144,7 +144,7 @@ def test_arms_move_concurrently_and_stop_separately(fake: FakeYumi, ready: YuMi)
 def test_stop_overtakes_a_motion_and_returns_at_standstill(fake: FakeYumi, ready: YuMi) -> None:
     goal = turned(ready, "left", 1, 1.2)
     for _ in range(3):
-        moving = Doing(ready.move_to_joints, goal, 1.0, arm_id="left")
+        moving = BackgroundCall(ready.move_to_joints, goal, 1.0, arm_id="left")
         under_way(fake, "left")
         began = own_time()
         ready.stop()
@@ -197,7 +197,7 @@ def test_the_path_of_the_other_arm_is_considered(fake: FakeYumi, ready: YuMi) ->
     home = ready.robot_joints(arm_id="left")
     ready.move_to_joints(left, 1.0, arm_id="left")
     ready.move_to_joints(home, 1.0, arm_id="left")
-    moving = Doing(ready.move_to_joints, right, 0.1, arm_id="right")
+    moving = BackgroundCall(ready.move_to_joints, right, 0.1, arm_id="right")
     under_way(fake, "right")
     begun = fake.arm("left")["moves_begun"]
     with pytest.raises(Refused) as error:

@@ -1,4 +1,4 @@
-"""The YuMi on its fake controller, on an address of its own."""
+"""The YuMi on its fake controller, on its own address."""
 
 import math
 import sys

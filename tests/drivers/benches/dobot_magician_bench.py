@@ -1,4 +1,4 @@
-"""The Dobot Magician on its fake, on a pty. It has no watchdog: what was begun goes on when we are gone."""
+"""The Dobot Magician on its fake. It has no watchdog: a started motion continues after a connection loss."""
 
 import math
 import sys

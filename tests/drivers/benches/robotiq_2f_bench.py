@@ -1,4 +1,4 @@
-"""The 2F gripper on its fake's URCap; one that is cut off finishes its motion and holds."""
+"""The 2F gripper on its fake. After a connection loss it finishes its motion and holds."""
 
 import sys
 from collections.abc import Callable

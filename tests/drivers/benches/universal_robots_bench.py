@@ -1,4 +1,4 @@
-"""The UR5e on its fake controller, on an address of its own."""
+"""The UR5e on its fake controller, on its own address."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping

@@ -1,4 +1,4 @@
-"""The vacuum gripper on a fake I/O block that is its carrier; the block is observed all the time."""
+"""The vacuum gripper on a fake I/O block, its carrier."""
 
 import sys
 from collections.abc import Callable, Iterator

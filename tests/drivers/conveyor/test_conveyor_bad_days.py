@@ -18,7 +18,7 @@ from arcor2_drivers.conveyor.slcan import SlcanBus
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl
 from arcor2_hw.testing.own_time import own_time
-from tests.drivers.busy import BUSY, stall
+from tests.drivers.stall import BUSY, stall
 from tests.fakes.conftest import FakeProcess
 
 QUICK: dict[str, Any] = {"sdo_timeout": 0.15, "heartbeat_ms": 600}

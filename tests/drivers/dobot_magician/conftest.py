@@ -1,4 +1,4 @@
-"""A fake arm in a process of its own, and the driver on its line."""
+"""A fake arm in a separate process, and a driver connected to it."""
 
 from collections.abc import Callable, Iterator
 from typing import Any

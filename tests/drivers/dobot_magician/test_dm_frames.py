@@ -1,4 +1,4 @@
-"""The codec, the alarms and the kinematics of the Magician: pure."""
+"""Codec, alarms and kinematics of the Magician: pure functions."""
 
 import math
 import random

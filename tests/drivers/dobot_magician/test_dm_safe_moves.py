@@ -1,4 +1,4 @@
-"""Safe moves of the Dobot: around what the scene says stands there, one motion after the other, or refused."""
+"""Safe moves of the Dobot around obstacles of the scene, and refused ones."""
 
 from pathlib import Path
 
@@ -11,8 +11,8 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Cancelled, PathBlocked
 from arcor2_hw.kinematics.model import RobotModel
-from tests.drivers.around import Around
-from tests.drivers.doing import Doing
+from tests.drivers.background_call import BackgroundCall
+from tests.drivers.surroundings import BoxSurroundings
 from tests.fakes.conftest import FakeProcess
 
 from .conftest import BASE
@@ -22,8 +22,8 @@ LEFT, RIGHT = (0.9, 0.6, 0.9, 0.0), (-0.9, 0.6, 0.9, 0.0)
 
 
 @pytest.fixture
-def around(arm: DobotMagician) -> Around:
-    around = Around()
+def around(arm: DobotMagician) -> BoxSurroundings:
+    around = BoxSurroundings()
     arm.surround(around)
     arm.move_to_joints(joints(LEFT), 1.0)
     around.boxes["box"] = (BASE * Pose(Position(0.2, 0.0, -0.05))).position, (0.06, 0.06, 0.2)
@@ -38,24 +38,24 @@ def values(arm: DobotMagician) -> list[float]:
     return [joint.value for joint in arm.robot_joints()]
 
 
-def touches(around: Around, *seen: list[float]) -> set[str]:
+def touches(around: BoxSurroundings, *seen: list[float]) -> set[str]:
     return around.touches(RobotModel.load(URDF, {"tool_x": 0.0597, "tool_z": 0.0}), BASE, seen)
 
 
-def test_the_model_agrees_with_the_arm(arm: DobotMagician, around: Around) -> None:
+def test_the_model_agrees_with_the_arm(arm: DobotMagician, around: BoxSurroundings) -> None:
     told, found = arm.get_end_effector_pose("tcp"), arm.safe_moves.forward("tcp", arm.robot_joints())
     assert told.position.distance_to(found.position) < 1e-5
     assert told.orientation.angle_to(found.orientation) < 1e-4
 
 
 @pytest.mark.parametrize("to_pose", [False, True])
-def test_a_joint_move_goes_around(arm: DobotMagician, around: Around, to_pose: bool) -> None:
+def test_a_joint_move_goes_around(arm: DobotMagician, around: BoxSurroundings, to_pose: bool) -> None:
     seen: list[list[float]] = []
     goal = arm.forward_kinematics("tcp", joints(RIGHT))
     if to_pose:
-        doing = Doing(arm.move_to_pose, "tcp", goal, 1.0, True, False)
+        doing = BackgroundCall(arm.move_to_pose, "tcp", goal, 1.0, True, False)
     else:
-        doing = Doing(arm.move_to_joints, joints(RIGHT), 1.0)
+        doing = BackgroundCall(arm.move_to_joints, joints(RIGHT), 1.0)
     while not doing.ended_at:
         sample = values(arm)
         if not seen or sample != seen[-1]:
@@ -68,7 +68,7 @@ def test_a_joint_move_goes_around(arm: DobotMagician, around: Around, to_pose: b
     assert touches(around, *straight) == {"box"}
 
 
-def test_a_blocked_move_is_refused_without_motion(arm: DobotMagician, around: Around) -> None:
+def test_a_blocked_move_is_refused_without_motion(arm: DobotMagician, around: BoxSurroundings) -> None:
     before = values(arm)
     inside = around.boxes["box"][0] + Position(0.0, 0.0, 0.05)
     pose = Pose(inside, arm.get_end_effector_pose("tcp").orientation)
@@ -83,15 +83,15 @@ def test_a_blocked_move_is_refused_without_motion(arm: DobotMagician, around: Ar
     assert arm.inverse_kinematics("tcp", pose, avoid_collisions=False)
 
 
-def test_a_line_past_an_obstacle_is_executed(arm: DobotMagician, around: Around) -> None:
+def test_a_line_past_an_obstacle_is_executed(arm: DobotMagician, around: BoxSurroundings) -> None:
     here = arm.get_end_effector_pose("tcp")
     there = Pose(here.position + Position(0.0, 0.0, 0.03), here.orientation)
     arm.move_to_pose("tcp", there, 1.0)
     assert arm.get_end_effector_pose("tcp").position.distance_to(there.position) < 1e-3
 
 
-def test_a_stop_ends_a_safe_move(arm: DobotMagician, around: Around, fake: FakeProcess) -> None:
-    doing = Doing(arm.move_to_joints, joints(RIGHT), 0.2)
+def test_a_stop_ends_a_safe_move(arm: DobotMagician, around: BoxSurroundings, fake: FakeProcess) -> None:
+    doing = BackgroundCall(arm.move_to_joints, joints(RIGHT), 0.2)
     start = values(arm)
     while values(arm) == pytest.approx(start, abs=0.01):
         assert not doing.ended_at
@@ -104,9 +104,9 @@ def test_a_stop_ends_a_safe_move(arm: DobotMagician, around: Around, fake: FakeP
     assert values(arm) == pytest.approx(at, abs=1e-6)
 
 
-def test_the_arm_stops_before_an_obstacle_that_enters_its_path(arm: DobotMagician, around: Around) -> None:
+def test_the_arm_stops_before_an_obstacle_that_enters_its_path(arm: DobotMagician, around: BoxSurroundings) -> None:
     box = around.boxes.pop("box")
-    doing = Doing(arm.move_to_joints, joints(RIGHT), 0.05)  # slow: it must not reach the box before it appears
+    doing = BackgroundCall(arm.move_to_joints, joints(RIGHT), 0.05)  # slow: it must not reach the box before it appears
     start = values(arm)
     while values(arm) == pytest.approx(start, abs=0.01):
         assert not doing.ended_at

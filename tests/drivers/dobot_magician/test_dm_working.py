@@ -1,4 +1,4 @@
-"""The Magician's driver on its fake: observing, moving, stopping, picking, the belt."""
+"""The Magician: observing, moving, stopping, picking, and the conveyor belt."""
 
 import math
 import threading

@@ -1,4 +1,4 @@
-"""A fake gripper in a process of its own, and the driver on its wire."""
+"""A fake gripper in a separate process, and a driver connected to it."""
 
 from collections.abc import Callable, Iterator
 from typing import Any

@@ -1,4 +1,4 @@
-"""The gripper's driver on a fake: activation, gripping, losing a part, stopping, control, scaling, settings."""
+"""The 2F gripper: activation, gripping, lost parts, stop, control, scaling, settings."""
 
 import threading
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from arcor2_hw.exceptions import (
     Refused,
 )
 from arcor2_hw.objects.small import GripperState
-from tests.drivers.around import Carrier
+from tests.drivers.surroundings import Carrier
 from tests.fakes.conftest import FakeProcess
 
 

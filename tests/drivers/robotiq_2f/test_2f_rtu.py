@@ -1,4 +1,4 @@
-"""The gripper's driver on Modbus RTU: registers, a whole cycle, a bad line, unplugged and plugged again."""
+"""The 2F gripper on Modbus RTU: registers, a complete cycle, line faults, unplugging."""
 
 import os
 import pty

@@ -1,4 +1,4 @@
-"""Fake servos in a process of their own, and the driver on their line."""
+"""Fake servos in a separate process, and a driver connected to them."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 from arcor2_drivers.two_axis_robot.settings import TwoAxisRobotSettings
 from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
 from arcor2_hw.data.geometry import Pose
-from tests.drivers.doing import Doing as Doing
+from tests.drivers.background_call import BackgroundCall as BackgroundCall
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
 __all__ = ["start_fake", "wait_for"]

@@ -1,4 +1,4 @@
-"""A busy host does not stop the servos, a frozen one brings them to rest, a dead one at once: two-axis robot."""
+"""Two-axis robot: a busy host does not stop the servos; a frozen or dead one does."""
 
 import os
 import signal
@@ -14,11 +14,11 @@ from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Cancelled, NotInControl
 from arcor2_hw.testing.own_time import own_time
-from tests.drivers.busy import BUSY, stall
+from tests.drivers.stall import BUSY, stall
 from tests.fakes.conftest import FakeProcess
 
-from .conftest import Doing, moving, standing
-from .test_two_axis_bad_days import FAR, KILLED
+from .conftest import BackgroundCall, moving, standing
+from .test_two_axis_faults import FAR, KILLED
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def trips(fake: FakeProcess) -> int:
 
 
 def test_a_stall_of_half_a_second_does_not_stop_a_move(fake: FakeProcess, ready: TwoAxisRobot) -> None:
-    doing = Doing(ready.move_to_joints, FAR, 0.15)
+    doing = BackgroundCall(ready.move_to_joints, FAR, 0.15)
     moving(fake)
     for _ in range(2):
         stall(BUSY)
@@ -73,7 +73,7 @@ def test_a_watchdog_that_tripped_is_named(fake: FakeProcess, ready: TwoAxisRobot
     keep_alive = ready._observer._keep_alive
     assert keep_alive is not None
     os.kill(keep_alive.pid, signal.SIGKILL)  # as if this computer had not run it
-    doing = Doing(ready.move_to_joints, FAR, 0.15)
+    doing = BackgroundCall(ready.move_to_joints, FAR, 0.15)
     moving(fake)
     stall(0.7)
     assert trips(fake) == 2

@@ -1,4 +1,4 @@
-"""The two-axis robot on a good day: settings, kinematics, control, motion, stop, teaching."""
+"""Two-axis robot: settings, kinematics, control, motion, stop, hand teaching."""
 
 import math
 import time
@@ -19,7 +19,7 @@ from arcor2_hw.data.robot import Joint, MoveEnd, Power
 from arcor2_hw.exceptions import Cancelled, DeviceFault, NotConnected, NotInControl, OutOfRange, Refused
 from tests.fakes.conftest import FakeProcess
 
-from .conftest import Doing, moving, standing
+from .conftest import BackgroundCall, moving, standing
 
 WRONG = [
     ("port", " "),
@@ -138,7 +138,7 @@ def test_a_complete_cycle(fake: FakeProcess, make: Callable[..., TwoAxisRobot]) 
 
 
 def test_both_joints_arrive_together(fake: FakeProcess, ready: TwoAxisRobot) -> None:
-    doing = Doing(ready.move_to_joints, joints(1.2, 0.6), 0.6)
+    doing = BackgroundCall(ready.move_to_joints, joints(1.2, 0.6), 0.6)
     moving(fake)
     halfway = fake.control.wait_until(lambda t: t["servos"]["1"]["angle"] > 0.6)["servos"]
     assert halfway["2"]["angle"] == pytest.approx(halfway["1"]["angle"] / 2, rel=0.15)
@@ -149,7 +149,7 @@ def test_both_joints_arrive_together(fake: FakeProcess, ready: TwoAxisRobot) -> 
 
 @pytest.mark.parametrize("phase", [0.05, 0.8])
 def test_stop_overtakes_the_move(fake: FakeProcess, ready: TwoAxisRobot, phase: float) -> None:
-    doing = Doing(ready.move_to_joints, joints(2.0, -2.0), 1.0)
+    doing = BackgroundCall(ready.move_to_joints, joints(2.0, -2.0), 1.0)
     moving(fake)
     fake.control.wait_until(lambda t: t["servos"]["1"]["angle"] > 2.0 * phase)
     at = fake.truth()["servos"]["1"]["angle"]

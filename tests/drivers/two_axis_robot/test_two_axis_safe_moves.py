@@ -1,4 +1,4 @@
-"""Safe moves of the two-axis robot: around what the scene says stands there, or refused."""
+"""Safe moves of the two-axis robot around obstacles of the scene, and refused ones."""
 
 import time
 from collections.abc import Callable
@@ -13,8 +13,8 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import PathBlocked
 from arcor2_hw.kinematics.model import RobotModel
-from tests.drivers.around import Around
-from tests.drivers.doing import Doing
+from tests.drivers.background_call import BackgroundCall
+from tests.drivers.surroundings import BoxSurroundings
 from tests.fakes.conftest import FakeProcess
 
 URDF = Path(next(iter(arcor2_drivers.__path__))) / "two_axis_robot" / "urdf" / "two_axis_robot"
@@ -31,8 +31,8 @@ def arm(fake: FakeProcess, make: Callable[..., TwoAxisRobot]) -> TwoAxisRobot:
 
 
 @pytest.fixture
-def around(arm: TwoAxisRobot) -> Around:
-    around = Around()
+def around(arm: TwoAxisRobot) -> BoxSurroundings:
+    around = BoxSurroundings()
     arm.surround(around)
     arm.take_control()
     arm.move_to_joints(joints(LEFT), 1.0)
@@ -48,13 +48,13 @@ def values(arm: TwoAxisRobot) -> list[float]:
     return [joint.value for joint in arm.robot_joints()]
 
 
-def touches(around: Around, *seen: list[float]) -> set[str]:
+def touches(around: BoxSurroundings, *seen: list[float]) -> set[str]:
     return around.touches(RobotModel.load(URDF, LINKS), BASE, seen)
 
 
-def test_a_move_folds_to_get_past_a_pin(arm: TwoAxisRobot, around: Around) -> None:
+def test_a_move_folds_to_get_past_a_pin(arm: TwoAxisRobot, around: BoxSurroundings) -> None:
     seen: list[list[float]] = []
-    doing = Doing(arm.move_to_joints, joints(RIGHT), 1.0)
+    doing = BackgroundCall(arm.move_to_joints, joints(RIGHT), 1.0)
     while not doing.ended_at:
         time.sleep(0.005)
         sample = values(arm)
@@ -68,7 +68,7 @@ def test_a_move_folds_to_get_past_a_pin(arm: TwoAxisRobot, around: Around) -> No
     assert touches(around, *straight) == {"pin"}
 
 
-def test_the_elbow_moves_to_the_free_side(arm: TwoAxisRobot, around: Around) -> None:
+def test_the_elbow_moves_to_the_free_side(arm: TwoAxisRobot, around: BoxSurroundings) -> None:
     pose = arm.forward_kinematics("tcp", joints((-0.2, -0.9)))
     blind = arm.inverse_kinematics("tcp", pose, joints((-0.2, -0.9)), avoid_collisions=False)
     assert [joint.value for joint in blind] == pytest.approx((-0.2, -0.9), abs=1e-6)
@@ -90,9 +90,9 @@ def test_the_elbow_moves_to_the_free_side(arm: TwoAxisRobot, around: Around) -> 
     assert values(arm) == pytest.approx(before, abs=0.01)
 
 
-def test_the_arm_stops_before_an_obstacle_that_enters_its_path(arm: TwoAxisRobot, around: Around) -> None:
+def test_the_arm_stops_before_an_obstacle_that_enters_its_path(arm: TwoAxisRobot, around: BoxSurroundings) -> None:
     pin = around.boxes.pop("pin")
-    doing = Doing(arm.move_to_joints, joints(RIGHT), 0.05)  # slow: it must not reach the pin before it appears
+    doing = BackgroundCall(arm.move_to_joints, joints(RIGHT), 0.05)  # slow: it must not reach the pin before it appears
     start = values(arm)
     while values(arm) == pytest.approx(start, abs=0.02):
         assert not doing.ended_at

@@ -1,4 +1,4 @@
-"""A fake controller of its own per module, on an address of its own, and a driver on it per test."""
+"""A fake controller per module, on its own address, and a driver per test."""
 
 import contextlib
 import itertools
@@ -15,7 +15,7 @@ import pytest
 from arcor2_drivers.universal_robots.settings import UrSettings
 from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_hw.data.geometry import Pose
-from tests.drivers.doing import Doing as Doing
+from tests.drivers.background_call import BackgroundCall as BackgroundCall
 from tests.fakes.conftest import FakeProcess
 
 HOME = [0.0, -1.5707963267948966, 1.5707963267948966, -1.5707963267948966, -1.5707963267948966, 0.0]

@@ -1,4 +1,4 @@
-"""A busy host does not stop the arm, a frozen one brings it to rest, a dead one at once: UR."""
+"""UR: a busy host does not stop the arm; a frozen or dead one does."""
 
 import os
 import signal
@@ -13,19 +13,19 @@ from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_hw.data.device import LossKind
 from arcor2_hw.exceptions import Cancelled, ConnectionLost
 from arcor2_hw.testing.own_time import own_time
-from tests.drivers.busy import BUSY, stall
+from tests.drivers.stall import BUSY, stall
 
-from .conftest import Doing, FakeUr, moving, wait
+from .conftest import BackgroundCall, FakeUr, moving, wait
 
 Owner = Callable[[], "Popen[bytes]"]
 FROZEN = 1.3
 
 
-def far_move(robot: UR5e, fake: FakeUr) -> Doing:
+def far_move(robot: UR5e, fake: FakeUr) -> BackgroundCall:
     """Start a move of 3 s."""
     joints = robot.robot_joints()
     joints[0].value += 3.0
-    doing = Doing(robot.move_to_joints, joints, 0.5)
+    doing = BackgroundCall(robot.move_to_joints, joints, 0.5)
     moving(fake)
     return doing
 

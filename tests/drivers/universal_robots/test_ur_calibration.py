@@ -1,4 +1,4 @@
-"""The kinematics of the very arm, read from the controller and put into the model."""
+"""Kinematic calibration of a robot, read from its controller and used by the model."""
 
 import math
 import socket

@@ -1,4 +1,4 @@
-"""The pure parts of the UR driver: RTDE frames, dashboard answers, frames of reference, settings, time budgets."""
+"""Pure functions of the UR driver: RTDE frames, dashboard answers, frames of reference, settings, time limits."""
 
 import math
 import struct

@@ -1,4 +1,4 @@
-"""Controlling a UR: moves arrive, stops stop, nothing resumes, the controller's watchdog catches our death."""
+"""Control of a UR: moves, stops, nothing resumes by itself, the watchdog of the controller."""
 
 import math
 import signal
@@ -29,7 +29,7 @@ from arcor2_hw.exceptions import (
 )
 from arcor2_hw.testing.own_time import own_time
 
-from .conftest import Doing, FakeUr, make, moving, wait
+from .conftest import BackgroundCall, FakeUr, make, moving, wait
 
 
 def turned(robot: UR5e, by: float, joint: int = 0) -> list[Joint]:
@@ -43,9 +43,9 @@ def shifted(robot: UR5e, y: float) -> Pose:
     return Pose(here.position + Position(0.0, y, 0.0), here.orientation)
 
 
-def far_move(robot: UR5e, fake: FakeUr, speed: float = 0.5) -> Doing:
+def far_move(robot: UR5e, fake: FakeUr, speed: float = 0.5) -> BackgroundCall:
     """A long joint move that is under way."""
-    doing = Doing(robot.move_to_joints, turned(robot, 3.0), speed)
+    doing = BackgroundCall(robot.move_to_joints, turned(robot, 3.0), speed)
     moving(fake)
     return doing
 
@@ -181,7 +181,7 @@ def test_joint_moves_arrive(ready: UR5e, fake: FakeUr) -> None:
 def test_a_linear_move_has_the_requested_speed(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
     target = Pose(start.position + Position(0.0, -0.3, -0.1), start.orientation)
-    doing = Doing(ready.move_to_pose, "tcp", target, 0.25)
+    doing = BackgroundCall(ready.move_to_pose, "tcp", target, 0.25)
     seen = []
     while fake.truth()["moving"] or not seen or len(seen) < 20:
         seen.append(ready.get_end_effector_pose("tcp").position)
@@ -494,12 +494,12 @@ def test_outputs_and_inputs(ready: UR5e, fake: FakeUr) -> None:
     for number in (0, 7, 8, 15, 16, 17):
         ready.set_digital_output(number, False)
     assert not ready.get_digital_input(4)
-    doing = Doing(ready.wait_for_input, 4, True, 5.0)
+    doing = BackgroundCall(ready.wait_for_input, 4, True, 5.0)
     fake.do("set_input", bit=4, on=True)
     doing.result(1.0)
     fake.do("set_input", bit=4, on=False)
     wait(lambda: not ready.get_digital_input(4))
-    waiting = Doing(ready.wait_for_input, 4, True, 5.0)
+    waiting = BackgroundCall(ready.wait_for_input, 4, True, 5.0)
     time.sleep(0.05)
     ready.stop()
     with pytest.raises(Cancelled):
@@ -519,7 +519,7 @@ def test_pick_and_place_use_the_part_sensor(fake: FakeUr) -> None:
         assert fault.value.fault_code == "nothing_held"
         assert not fake.truth()["digital_outputs"] & 1
         assert robot.parts == {}
-        picking = Doing(robot.pick, target, approach=0.05, slow_speed=0.5)
+        picking = BackgroundCall(robot.pick, target, approach=0.05, slow_speed=0.5)
         fake.control.wait_until(lambda t: t["digital_outputs"] & 1)
         at = robot.get_end_effector_pose("tcp").position
         fake.do("set_input", bit=1, on=True)
@@ -529,7 +529,7 @@ def test_pick_and_place_use_the_part_sensor(fake: FakeUr) -> None:
         assert at.distance_to(target.position) < 0.002, "it grips at the part"
         up = target.position - Position(*Position(0.0, 0.0, 0.05).rotated(target.orientation))
         assert robot.get_end_effector_pose("tcp").position.distance_to(up) < 0.002
-        placing = Doing(robot.place, target, approach=0.05, slow_speed=0.5)
+        placing = BackgroundCall(robot.place, target, approach=0.05, slow_speed=0.5)
         fake.control.wait_until(lambda t: not t["digital_outputs"] & 1)
         fake.do("set_input", bit=1, on=False)
         placing.result()
@@ -547,7 +547,7 @@ def test_a_stop_ends_the_whole_pick_and_keeps_the_gripper(fake: FakeUr) -> None:
     try:
         robot.take_control()
         start = robot.get_end_effector_pose("tcp")
-        picking = Doing(robot.pick, start, approach=0.0, slow_speed=0.5)
+        picking = BackgroundCall(robot.pick, start, approach=0.0, slow_speed=0.5)
         fake.control.wait_until(lambda t: t["digital_outputs"] & 1)
         robot.stop()
         with pytest.raises(Cancelled):

@@ -1,4 +1,4 @@
-"""The dashboard connection: deadlines, late answers, idle connections that broke."""
+"""Dashboard connection: deadlines, late answers, idle connections that broke."""
 
 import socket
 import threading

@@ -1,4 +1,4 @@
-"""Observing a UR: typed errors that name the address, nothing written, nothing lost, back by itself."""
+"""Observation of a UR: typed errors that name the address, nothing written, no sample missed, recovery."""
 
 import resource
 import socket

@@ -1,4 +1,4 @@
-"""Motions by programs of our own: blends, contact, force limits; their watchdog, their stop, and what comes after."""
+"""Motion programs of a UR: blends, contact, force limits, their watchdog and their stop."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ from arcor2_hw.data.robot import MoveEnd
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, NotInControl, OutOfRange, Refused, SafetyStop
 from arcor2_hw.testing.own_time import own_time
 
-from .conftest import Doing, FakeUr, make, moving, wait
+from .conftest import BackgroundCall, FakeUr, make, moving, wait
 
 
 def shifted(pose: Pose, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
@@ -32,7 +32,7 @@ def at_rest(fake: FakeUr, within: float) -> float:
     return time.monotonic() - began
 
 
-def followed(robot: UR5e, doing: Doing) -> list[Position]:
+def followed(robot: UR5e, doing: BackgroundCall) -> list[Position]:
     """Give where the TCP was while a motion ran."""
     seen = []
     while not doing.ended_at:
@@ -57,7 +57,7 @@ def test_a_motion_program_arms_its_watchdog_before_it_moves() -> None:
 def test_a_path_rounds_its_corners_and_keeps_control(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
     corner, end = shifted(start, y=-0.15), shifted(start, y=-0.15, z=-0.15)
-    doing = Doing(ready.move_path, [corner, end], 0.03, True, 0.3)
+    doing = BackgroundCall(ready.move_path, [corner, end], 0.03, True, 0.3)
     seen = [place.distance_to(corner.position) for place in followed(ready, doing)]
     result = doing.result()
     assert result.end is MoveEnd.DONE
@@ -74,7 +74,7 @@ def test_a_path_rounds_its_corners_and_keeps_control(ready: UR5e, fake: FakeUr) 
 def test_without_a_blend_each_waypoint_is_reached(ready: UR5e) -> None:
     start = ready.get_end_effector_pose("tcp")
     corner, end = shifted(start, y=-0.1), shifted(start, y=-0.1, z=0.1)
-    doing = Doing(ready.move_through, corner, end, 0.0, MoveType.JOINT, 0.5)
+    doing = BackgroundCall(ready.move_through, corner, end, 0.0, MoveType.JOINT, 0.5)
     assert min(place.distance_to(corner.position) for place in followed(ready, doing)) < 1e-3
     doing.result()
     assert ready.get_end_effector_pose("tcp").position.distance_to(end.position) < 1e-3
@@ -96,7 +96,7 @@ def test_an_invalid_path_is_refused_without_motion(ready: UR5e, fake: FakeUr) ->
 
 def test_a_stop_ends_a_path_and_the_next_command_is_accepted(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
-    doing = Doing(ready.move_path, [shifted(start, y=-0.3), shifted(start, y=-0.3, z=-0.3)], 0.02, True, 0.2)
+    doing = BackgroundCall(ready.move_path, [shifted(start, y=-0.3), shifted(start, y=-0.3, z=-0.3)], 0.02, True, 0.2)
     moving(fake)
     with pytest.raises(Refused, match="moving already"):
         ready.move_to_joints(ready.robot_joints(), 0.5)
@@ -114,7 +114,7 @@ def test_a_stop_ends_a_path_and_the_next_command_is_accepted(ready: UR5e, fake: 
 
 def test_a_path_stops_although_the_control_process_hangs(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
-    doing = Doing(ready.move_path, [shifted(start, y=-0.4)], 0.0, True, 0.1)
+    doing = BackgroundCall(ready.move_path, [shifted(start, y=-0.4)], 0.0, True, 0.1)
     moving(fake)
     assert ready._control.session is not None
     assert ready._control.session._process is not None
@@ -148,7 +148,7 @@ def test_a_path_stops_when_its_owner_is_killed(fake: FakeUr) -> None:
 
 def test_a_path_stopped_at_the_pendant_ends_control(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
-    doing = Doing(ready.move_path, [shifted(start, y=-0.3)], 0.0, True, 0.1)
+    doing = BackgroundCall(ready.move_path, [shifted(start, y=-0.3)], 0.0, True, 0.1)
     moving(fake)
     other = make(fake.host)
     other._pendant.dashboard.do("stop", "Stopped")
@@ -159,7 +159,7 @@ def test_a_path_stopped_at_the_pendant_ends_control(ready: UR5e, fake: FakeUr) -
 
 def test_a_path_does_not_resume_after_a_safeguard_stop(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
-    doing = Doing(ready.move_path, [shifted(start, y=-0.3)], 0.0, True, 0.1)
+    doing = BackgroundCall(ready.move_path, [shifted(start, y=-0.3)], 0.0, True, 0.1)
     moving(fake)
     fake.do("safeguard_stop")
     with pytest.raises(SafetyStop):

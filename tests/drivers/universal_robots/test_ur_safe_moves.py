@@ -1,4 +1,4 @@
-"""Safe moves of the UR: around what the scene says stands there, driven by the controller, or refused."""
+"""Safe moves of the UR around obstacles of the scene, and refused ones."""
 
 import itertools
 import math
@@ -14,17 +14,17 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Cancelled, NotInControl, PathBlocked
 from arcor2_hw.kinematics.model import RobotModel
-from tests.drivers.around import Around
+from tests.drivers.surroundings import BoxSurroundings
 
-from .conftest import HOME, Doing, FakeUr, moving
+from .conftest import HOME, BackgroundCall, FakeUr, moving
 
 URDF = Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e"
 BESIDE = [1.6, *HOME[1:]]
 
 
 @pytest.fixture
-def around(robot: UR5e) -> Around:
-    around = Around()
+def around(robot: UR5e) -> BoxSurroundings:
+    around = BoxSurroundings()
     robot.surround(around)
     return around
 
@@ -39,15 +39,17 @@ def between(robot: UR5e) -> Position:
     return model.pose(np.array([0.8, *HOME[1:]])).position
 
 
-def touches(around: Around, *seen: list[float]) -> set[str]:
+def touches(around: BoxSurroundings, *seen: list[float]) -> set[str]:
     return around.touches(RobotModel.load(URDF, {"tcp_z": 0.1}), Pose(), seen)
 
 
-def test_a_joint_move_follows_the_checked_path_around_an_obstacle(ready: UR5e, around: Around, fake: FakeUr) -> None:
+def test_a_joint_move_follows_the_checked_path_around_an_obstacle(
+    ready: UR5e, around: BoxSurroundings, fake: FakeUr
+) -> None:
     at = between(ready)
     around.boxes["post"] = Position(at.x, at.y, at.z - 0.05), (0.06, 0.06, 0.5)
     seen: list[list[float]] = []
-    doing = Doing(ready.move_to_joints, joints(ready, BESIDE), 1.0)
+    doing = BackgroundCall(ready.move_to_joints, joints(ready, BESIDE), 1.0)
     while not doing.ended_at:
         time.sleep(0.01)
         seen.append(fake.truth()["q"])
@@ -62,7 +64,7 @@ def test_a_joint_move_follows_the_checked_path_around_an_obstacle(ready: UR5e, a
     assert np.allclose(fake.truth()["q"], HOME, atol=1e-3)
 
 
-def test_a_pose_is_reached_in_a_free_configuration(ready: UR5e, around: Around, fake: FakeUr) -> None:
+def test_a_pose_is_reached_in_a_free_configuration(ready: UR5e, around: BoxSurroundings, fake: FakeUr) -> None:
     goal = [0.9, -1.0, 1.4, -1.9, -1.57, 0.0]
     pose = ready.forward_kinematics("tcp", joints(ready, goal))
     model = RobotModel.load(URDF)
@@ -74,7 +76,7 @@ def test_a_pose_is_reached_in_a_free_configuration(ready: UR5e, around: Around, 
     assert touches(around, fake.truth()["q"]) == set()
 
 
-def test_inverse_kinematics_of_the_controller_in_a_free_configuration(ready: UR5e, around: Around) -> None:
+def test_inverse_kinematics_of_the_controller_in_a_free_configuration(ready: UR5e, around: BoxSurroundings) -> None:
     goal = [0.9, -1.0, 1.4, -1.9, -1.57, 0.0]
     pose = ready.forward_kinematics("tcp", joints(ready, goal))
     near = joints(ready, goal)
@@ -91,7 +93,7 @@ def test_inverse_kinematics_of_the_controller_in_a_free_configuration(ready: UR5
         ready.inverse_kinematics("tcp", pose, near)
 
 
-def test_a_line_into_an_obstacle_is_refused_without_motion(ready: UR5e, around: Around, fake: FakeUr) -> None:
+def test_a_line_into_an_obstacle_is_refused_without_motion(ready: UR5e, around: BoxSurroundings, fake: FakeUr) -> None:
     here = ready.get_end_effector_pose("tcp")
     there = Pose(here.position + Position(0.0, 0.25, 0.0), here.orientation)
     around.boxes["post"] = here.position + Position(0.0, 0.17, 0.05), (0.03, 0.03, 0.3)
@@ -103,10 +105,10 @@ def test_a_line_into_an_obstacle_is_refused_without_motion(ready: UR5e, around: 
     assert ready.get_end_effector_pose("tcp").position.distance_to(there.position) < 1e-3
 
 
-def test_a_stop_between_waypoints_ends_the_move(ready: UR5e, around: Around, fake: FakeUr) -> None:
+def test_a_stop_between_waypoints_ends_the_move(ready: UR5e, around: BoxSurroundings, fake: FakeUr) -> None:
     at = between(ready)
     around.boxes["post"] = Position(at.x, at.y, at.z - 0.05), (0.06, 0.06, 0.5)
-    doing = Doing(ready.move_to_joints, joints(ready, BESIDE), 0.3)
+    doing = BackgroundCall(ready.move_to_joints, joints(ready, BESIDE), 0.3)
     moving(fake)
     ready.stop()
     with pytest.raises(Cancelled):
@@ -120,18 +122,18 @@ def test_a_stop_between_waypoints_ends_the_move(ready: UR5e, around: Around, fak
 
 @pytest.mark.parametrize("line", [False, True])
 def test_the_arm_stops_before_an_obstacle_that_enters_its_path(
-    ready: UR5e, around: Around, fake: FakeUr, line: bool
+    ready: UR5e, around: BoxSurroundings, fake: FakeUr, line: bool
 ) -> None:
     here = ready.get_end_effector_pose("tcp")
     # Slow, so that the arm does not reach the post before it appears.
     if line:
         there = Pose(here.position + Position(0.0, 0.3, 0.0), here.orientation)
-        doing = Doing(ready.move_to_pose, "tcp", there, 0.1)
+        doing = BackgroundCall(ready.move_to_pose, "tcp", there, 0.1)
         post = here.position + Position(0.0, 0.24, 0.05)
     else:
         at = between(ready)
         post = Position(at.x, at.y, at.z - 0.05)
-        doing = Doing(ready.move_to_joints, joints(ready, BESIDE), 0.1)
+        doing = BackgroundCall(ready.move_to_joints, joints(ready, BESIDE), 0.1)
     moving(fake)
     around.boxes["post"] = post, (0.03, 0.03, 0.4)
     with pytest.raises(PathBlocked, match=r"ur stopped: post came into its path"):
@@ -145,7 +147,7 @@ def test_the_arm_stops_before_an_obstacle_that_enters_its_path(
     assert np.allclose(fake.truth()["q"], HOME, atol=1e-3)
 
 
-def test_the_tool_set_at_run_time_is_used(ready: UR5e, around: Around) -> None:
+def test_the_tool_set_at_run_time_is_used(ready: UR5e, around: BoxSurroundings) -> None:
     pose = ready.get_end_effector_pose("tcp")
     found = ready.safe_moves.forward("tcp", ready.robot_joints())
     assert found.position.distance_to(pose.position) < 1e-4
@@ -156,7 +158,9 @@ def test_the_tool_set_at_run_time_is_used(ready: UR5e, around: Around) -> None:
 
 
 @pytest.mark.parametrize("tcp", [(0.0, 0.0, 0.2), (0.12, 0.05, 0.1), (0.0, -0.15, -0.05)])
-def test_the_tool_is_kept_clear_of_obstacles(robot: UR5e, around: Around, tcp: tuple[float, float, float]) -> None:
+def test_the_tool_is_kept_clear_of_obstacles(
+    robot: UR5e, around: BoxSurroundings, tcp: tuple[float, float, float]
+) -> None:
     robot._control.stated_tool = robot._control.stated_tool._replace(tcp=Pose(Position(*tcp)))
     flange = Pose(Position(*(-value for value in tcp)))
     at = robot.safe_moves.forward("tcp", robot.robot_joints())
@@ -168,7 +172,7 @@ def test_the_tool_is_kept_clear_of_obstacles(robot: UR5e, around: Around, tcp: t
         assert any("tool of ur and chip" in pair for pair in found) is hit, (share, found)
 
 
-def test_planning_needs_control(robot: UR5e, around: Around) -> None:
+def test_planning_needs_control(robot: UR5e, around: BoxSurroundings) -> None:
     for move in (
         lambda: robot.move_to_joints(joints(robot, BESIDE), 0.5),
         lambda: robot.move_to_pose("tcp", Pose(), 0.5),

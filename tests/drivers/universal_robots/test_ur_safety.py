@@ -1,4 +1,4 @@
-"""Every state of the safety system and the way out of it, and what differs between controllers."""
+"""States of the safety system with their remedies, jogging, and differences between controllers."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -20,13 +20,13 @@ from arcor2_hw.exceptions import (
 )
 from arcor2_hw.testing.own_time import own_time
 
-from .conftest import Doing, FakeUr, make, moving, wait
+from .conftest import BackgroundCall, FakeUr, make, moving, wait
 
 
-def far_move(robot: UR5e, fake: FakeUr) -> Doing:
+def far_move(robot: UR5e, fake: FakeUr) -> BackgroundCall:
     joints = robot.robot_joints()
     joints[0].value += 2.5
-    doing = Doing(robot.move_to_joints, joints, 0.5)
+    doing = BackgroundCall(robot.move_to_joints, joints, 0.5)
     moving(fake)
     return doing
 

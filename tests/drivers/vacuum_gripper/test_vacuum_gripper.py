@@ -1,4 +1,4 @@
-"""The vacuum gripper on a block: parts held, lost and stuck; stops; a carrier that is gone or has other points."""
+"""The vacuum gripper on an I/O block: parts gripped, lost and stuck; stops; faults of the carrier."""
 
 import threading
 import time
@@ -26,7 +26,7 @@ from arcor2_hw.exceptions import (
     Stale,
 )
 from arcor2_hw.testing.own_time import own_time
-from tests.drivers.around import Carrier
+from tests.drivers.surroundings import Carrier
 from tests.fakes.conftest import FakeProcess
 
 from .conftest import Make

@@ -1,4 +1,4 @@
-"""The vacuum gripper on the outputs of a robot: it works while the robot moves, and both take control at once."""
+"""The vacuum gripper on the outputs of a robot, also while the robot moves."""
 
 import threading
 import time
@@ -10,7 +10,7 @@ from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
 from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
 from arcor2_hw.exceptions import NotFound, NotInControl
-from tests.drivers.universal_robots.conftest import Doing, FakeUr, make, moving, wait
+from tests.drivers.universal_robots.conftest import BackgroundCall, FakeUr, make, moving, wait
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +57,9 @@ def test_gripping_during_a_move_keeps_the_part_at_a_stop(robot: UR5e, gripper: S
     gripper.take_control()
     joints = robot.robot_joints()
     joints[0].value += 2.0
-    going = Doing(robot.move_to_joints, joints, 0.2)
+    going = BackgroundCall(robot.move_to_joints, joints, 0.2)
     moving(ur)
-    gripping = Doing(gripper.grip)
+    gripping = BackgroundCall(gripper.grip)
     ur.control.wait_until(lambda t: t["digital_outputs"] >> 16 & 1)
     ur.do("set_input", bit=16, on=True)
     gripping.result()
@@ -97,7 +97,7 @@ def test_gripping_during_a_motion_program(robot: UR5e, gripper: SuctionGripper, 
     robot.take_control()
     here = robot.get_end_effector_pose("tcp")
     there = type(here)(here.position - type(here.position)(0.0, 0.2, 0.0), here.orientation)
-    going = Doing(robot.move_path, [there], 0.0, True, 0.1)
+    going = BackgroundCall(robot.move_path, [there], 0.0, True, 0.1)
     moving(ur)
     gripper.on()
     assert ur.truth()["moving"]

@@ -1,4 +1,4 @@
-"""The fake YuMi on its wires: HTTP and digest, lines of the motion server, kinematics, motion in time, faults."""
+"""The fake YuMi on its wires: HTTP with digest authentication, motion servers, kinematics, motion, faults."""
 
 import hashlib
 import math

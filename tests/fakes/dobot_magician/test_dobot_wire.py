@@ -1,4 +1,4 @@
-"""The fake Magician on its wire: raw bytes written by hand, what it answers, and how it moves in time."""
+"""The fake Magician on its wire: raw bytes, their answers, and motion in time."""
 
 import itertools
 import struct

@@ -1,4 +1,4 @@
-"""The fake gripper on its ASCII port, spoken to in raw bytes; and its fingers against a clock of our own."""
+"""The fake gripper: raw bytes on its ASCII port, and fingers in simulated time."""
 
 import socket
 import time

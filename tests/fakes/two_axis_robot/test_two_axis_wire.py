@@ -1,4 +1,4 @@
-"""The fake servos on the wire: frames quoted byte for byte, the vendor's library, motion in time.
+"""The fake servos on the wire: frames of the manual, the vendor's library, motion in time.
 
 The e-Manual was not at hand: its frames are quoted from general knowledge of it. Their CRCs are right.
 """

@@ -1,4 +1,4 @@
-"""Fixtures: the fake controller as a process, and the real ur_rtde library in another one, with a time limit."""
+"""Fixtures: the fake controller in a process, and ur_rtde in another one with a time limit."""
 
 import itertools
 import json

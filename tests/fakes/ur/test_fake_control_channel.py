@@ -1,4 +1,4 @@
-"""The control channel that all fakes share, and a wire with its faults, in one event loop."""
+"""Control channel of the fakes, and a wire with faults, in one event loop."""
 
 import asyncio
 import contextlib

@@ -1,4 +1,4 @@
-"""What the fake controller does in each state, in simulated time."""
+"""States of the fake controller, in simulated time."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The fake's kinematics against itself, against numbers known from elsewhere, and at the awkward places."""
+"""Kinematics of the fake: against itself, against published numbers, and at singularities."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The fake controller as the real ur_rtde library sees it. Each case runs the library in a process of its own."""
+"""The fake controller with ur_rtde. Each case runs the library in a separate process."""
 
 import math
 import time

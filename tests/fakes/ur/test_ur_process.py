@@ -1,4 +1,4 @@
-"""The fake as a process and on the wire, with plain sockets: what a client can't be made to show."""
+"""The fake as a process and on the wire, with plain sockets: cases that no client library can produce."""
 
 import json
 import signal

@@ -1,4 +1,4 @@
-"""Programs that a client writes, run as their text says; blends, and what the tool runs into, in simulated time."""
+"""Programs of clients, blends, and collisions of the tool, in simulated time."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""A YuMi on bad days: cut cables, stops of the controller, collisions, a key turned, lines that hang."""
+"""Faults of a YuMi: cut cables, stops of the controller, collisions, mode changes, lines that hang."""
 
 import time
 
@@ -20,9 +20,9 @@ from arcor2_hw.exceptions import (
     Stale,
 )
 from arcor2_hw.testing.own_time import own_time
-from tests.drivers.busy import BUSY, stall
+from tests.drivers.stall import BUSY, stall
 
-from .conftest import Doing, FakeYumi, make, under_way, wait
+from .conftest import BackgroundCall, FakeYumi, make, under_way, wait
 from .test_yumi_motion import turned
 
 
@@ -32,8 +32,8 @@ def far(robot: YuMi, arm: str = "left") -> list[Joint]:
     return joints
 
 
-def moving_far(fake: FakeYumi, robot: YuMi, arm: str = "left") -> Doing:
-    doing = Doing(robot.move_to_joints, far(robot, arm), 0.5, arm_id=arm)
+def moving_far(fake: FakeYumi, robot: YuMi, arm: str = "left") -> BackgroundCall:
+    doing = BackgroundCall(robot.move_to_joints, far(robot, arm), 0.5, arm_id=arm)
     under_way(fake, arm)
     return doing
 

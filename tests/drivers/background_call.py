@@ -1,4 +1,4 @@
-"""A call beside the test, on a thread of its own."""
+"""A call on a separate thread."""
 
 import threading
 import time
@@ -8,7 +8,7 @@ from typing import Any
 from arcor2_hw.testing.own_time import own_time
 
 
-class Doing:
+class BackgroundCall:
     """A call on a thread of its own; `result` gives its result or raises its error."""
 
     def __init__(self, call: Callable[..., Any], *arguments: Any, **options: Any) -> None:

@@ -1,4 +1,4 @@
-"""A host process that is busy: its interpreter is kept, and no other thread of it runs."""
+"""A stalled host process: its interpreter is blocked, so that none of its threads runs."""
 
 import ctypes
 

@@ -1,4 +1,4 @@
-"""The two-axis robot on bad days: absent, silent, garbled, unplugged, killed, with hardware errors."""
+"""Faults of the two-axis robot: absent, silent, garbage, unplugged, killed, hardware errors."""
 
 import os
 import signal
@@ -29,7 +29,7 @@ from arcor2_hw.exceptions import (
 from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
 
-from .conftest import Doing, moving, standing
+from .conftest import BackgroundCall, moving, standing
 
 FAR = [Joint("joint_1", 2.0), Joint("joint_2", -2.0)]
 HOME = [Joint("joint_1", 0.0), Joint("joint_2", 0.0)]
@@ -76,7 +76,7 @@ def test_one_damaged_answer_is_tolerated(fake: FakeProcess, ready: TwoAxisRobot)
 
 @pytest.mark.parametrize("fault", ["half_frame", "garbage", "unplug"])
 def test_a_connection_loss_during_a_move(fake: FakeProcess, ready: TwoAxisRobot, wait_for: WaitFor, fault: str) -> None:
-    doing = Doing(ready.move_to_joints, FAR, 0.5)
+    doing = BackgroundCall(ready.move_to_joints, FAR, 0.5)
     moving(fake)
     fake.control.do(fault)
     with pytest.raises((ConnectionLost, NotInControl, DeviceTimeout), match="arm"):
@@ -133,7 +133,7 @@ def test_the_servos_stop_when_the_drivers_process_is_killed(fake: FakeProcess, m
 
 
 def test_a_hardware_error_is_named_and_cleared_by_a_person(fake: FakeProcess, ready: TwoAxisRobot) -> None:
-    doing = Doing(ready.move_to_joints, FAR, 0.5)
+    doing = BackgroundCall(ready.move_to_joints, FAR, 0.5)
     moving(fake)
     fake.control.do("hardware_error", servo=2, bits=0x20)
     with pytest.raises(DeviceFault, match=r"servo 2: overload") as caught:

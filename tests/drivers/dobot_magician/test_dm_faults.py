@@ -1,4 +1,4 @@
-"""The Magician's driver on its fake: the wire fails, the owner dies, somebody else moves it."""
+"""Faults of the Magician: of the wire, of the owner, and other clients."""
 
 import os
 import struct
@@ -17,8 +17,8 @@ from arcor2_drivers.dobot_magician.frames import encode
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl, Refused
 from arcor2_hw.testing.own_time import own_time
-from tests.drivers.busy import BUSY, stall
 from tests.drivers.dobot_magician.test_dm_working import in_background, joints
+from tests.drivers.stall import BUSY, stall
 from tests.fakes.conftest import FakeProcess
 
 

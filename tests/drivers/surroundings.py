@@ -1,4 +1,4 @@
-"""Surroundings of a robot that a test says: boxes, edges along the axes of the world."""
+"""Surroundings of a robot made of boxes parallel to the axes of the world."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -37,7 +37,7 @@ class Carrier(Robot):
         return set()
 
 
-class Around:
+class BoxSurroundings:
     def __init__(self) -> None:
         self.boxes: dict[str, tuple[Position, tuple[float, float, float]]] = {}
 

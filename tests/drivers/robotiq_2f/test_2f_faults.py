@@ -1,4 +1,4 @@
-"""The gripper's driver on a bad wire: absent, silent, reset, half a frame, garbage, slow; lost and back."""
+"""Faults of the wire of the 2F gripper: absent, silent, reset, half a frame, garbage, slow; loss and recovery."""
 
 import socket
 from collections.abc import Callable
