@@ -48,11 +48,11 @@ class PictureNote(Data, frozen=True):
         """
         text = picture.info.get(KEY)
         if not isinstance(text, str):
-            raise InvalidData("the image has no note on how it was taken: use an image from the camera's depth_image")
+            raise InvalidData("the image has no camera data. Use an image from depth_image of a camera.")
         try:
             return msgspec.json.decode(text, type=cls)
         except (msgspec.MsgspecError, ValueError) as error:
-            raise InvalidData("the note in the image on how it was taken is invalid: {reason}", reason=error) from error
+            raise InvalidData("the camera data of the image is not valid: {reason}", reason=error) from error
 
 
 @dataclass(frozen=True, eq=False)

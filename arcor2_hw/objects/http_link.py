@@ -56,12 +56,14 @@ class HttpLink:
                     "{device} did not answer within {timeout:g} s", str(e), device=self.who, timeout=self._timeout
                 ) from e
             except httpx.ConnectError as e:
-                raise NotConnected("{device} cannot be reached", str(e), device=self.who) from e
+                raise NotConnected(
+                    "{device} cannot be reached. Check the address, the cable and the power.", str(e), device=self.who
+                ) from e
             except httpx.HTTPError as e:
                 raise ConnectionLost("{device}: the connection was lost", str(e), device=self.who) from e
             except ValueError as e:
-                raise DeviceFault("{device} sent what it never sends", str(e), device=self.who) from e
+                raise DeviceFault("{device} sent an answer that is not JSON", str(e), device=self.who) from e
         if answer.is_error:
             why = content.get("error", answer.status_code) if isinstance(content, dict) else answer.status_code
-            raise Refused("{device} refuses: {reason}", device=self.who, reason=why)
+            raise Refused("{device} refused the request: {reason}", device=self.who, reason=why)
         return content

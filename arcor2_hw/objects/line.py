@@ -104,7 +104,7 @@ class Line:
         try:
             port.write(data)
         except TimeoutError as error:
-            raise self.broken(DeviceTimeout("{device} takes no bytes", str(error), device=self.who)) from error
+            raise self.broken(DeviceTimeout("{device} accepts no data", str(error), device=self.who)) from error
         except (OSError, TypeError) as error:
             raise self._lost(error) from error
 

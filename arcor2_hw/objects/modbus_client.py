@@ -111,7 +111,7 @@ class TcpClient(_Exchange, ModbusTcpClient):
         """Return the received bytes, or nothing after the deadline. Raises ConnectionException, OSError."""
         socket = self.socket
         if socket is None:
-            raise ConnectionException("closed meanwhile")
+            raise ConnectionException("the connection was closed")
         if (left := self.deadline - time.monotonic()) <= 0.0:
             return b""
         if not 0.0 <= self._armed - left <= 2.0 * GRAIN:
@@ -160,7 +160,7 @@ class SerialClient(_Exchange, ModbusSerialClient):
         """Return the received bytes, or nothing after the deadline. Raises ConnectionException, OSError."""
         port = self.socket
         if port is None:
-            raise ConnectionException("closed meanwhile")
+            raise ConnectionException("the connection was closed")
         try:
             waiting = select.poll()
             waiting.register(port.fileno(), select.POLLIN)
@@ -168,7 +168,7 @@ class SerialClient(_Exchange, ModbusSerialClient):
             return bytes(super().recv(size))
         while not waiting.poll(1e3 * min(max(self.deadline - time.monotonic(), 0.0), WAKE_WITHIN)):
             if self._ended:
-                raise ConnectionException("closed meanwhile")
+                raise ConnectionException("the connection was closed")
             if time.monotonic() >= self.deadline:
                 return b""
         # An unplugged port is readable without data; pyserial raises an error then.

@@ -133,7 +133,7 @@ class ModbusLink:
             from arcor2_hw.objects import modbus_client
         except ImportError as error:
             raise NotConnected(
-                "{device}: pymodbus is not installed (arcor2-hw[modbus])", str(error), device=self.who
+                "{device}: pymodbus is not installed. Install arcor2-hw[modbus].", str(error), device=self.who
             ) from error
         client: Client
         if self._serial_port:

@@ -191,7 +191,7 @@ class Observing:
         if self._ending is not None:
             self._ending.join(timeout)
             if self._ending.is_alive():
-                raise DeviceTimeout("the last connection to {what} is still being closed", what=self.what)
+                raise DeviceTimeout("the previous connection to {what} is still being closed", what=self.what)
             self._ending = None
 
     def _run(self, stopping: threading.Event) -> None:
@@ -216,8 +216,8 @@ class Observing:
             return e
         except Exception as e:
             if self._state is not Connection.LOST:  # otherwise it is in the log already
-                log.exception("%s: an error inside the driver", self.what)
-            return ConnectionLost("{what}: an error inside the driver", f"{type(e).__name__}: {e}", what=self.what)
+                log.exception("%s: internal error of the driver", self.what)
+            return ConnectionLost("{what}: internal error of the driver", f"{type(e).__name__}: {e}", what=self.what)
         return None
 
     def _reconnect(self, stopping: threading.Event, loss: DeviceError) -> None:

@@ -151,7 +151,7 @@ def _attach(world: "CollisionWorld", name: str, shape: "Shape", attachment: Atta
     frames = holder.link_frames(holder.q)
     if attachment.link not in frames:
         raise Refused(
-            "{name} is attached to {link}, which is no link of {robot}",
+            "{name} is attached to {link}, which is not a link of {robot}",
             name=name,
             link=attachment.link,
             robot=attachment.robot,

@@ -38,14 +38,14 @@ class PointActions(abc.ABC):
         point = self.io_points.get(name)
         if point is None:
             raise OutOfRange(
-                "{device} has no point {name!r}; there are {io_points}",
+                "{device} has no point {name!r}. Available: {io_points}",
                 device=self.who,
                 name=name,
                 io_points=", ".join(self.io_points),
             )
         if kind not in (None, point.kind):
             raise Refused(
-                "{device}: {name} is {point_label}; this needs a point of the other kind",
+                "{device}: {name} is {point_label}. Use a point of the other kind.",
                 device=self.who,
                 name=name,
                 point_label=self.point_label(name),
@@ -105,7 +105,7 @@ class PointActions(abc.ABC):
     def bad_reading(self, name: str) -> DeviceFault:
         """Return the error for a point whose value is bad."""
         return DeviceFault(
-            "{device}: {name} ({point_label}) is bad",
+            "{device}: the value of {name} ({point_label}) is not valid",
             fault_code="bad",
             device=self.who,
             name=name,

@@ -76,7 +76,7 @@ def io_point(
     on_loss = options.get("on_loss", default_on_loss)
     if on_loss not in safe_states:
         raise OutOfRange(
-            "{parameter} must give {name} an on_loss of {safe_states}, not {on_loss!r}",
+            "{parameter} must set on_loss of {name} to {safe_states}, not {on_loss!r}",
             parameter=parameter,
             name=name,
             safe_states=", ".join(safe_states),
@@ -92,10 +92,10 @@ def io_point(
         on_loss=OnLoss(on_loss) if kind in ("DO", "AO") else UNSET,
     )
     if point.scale == 0.0:
-        raise OutOfRange("{parameter} must give {name} a scale other than 0", parameter=parameter, name=name)
+        raise OutOfRange("{parameter} must not set scale of {name} to 0", parameter=parameter, name=name)
     if not 0.0 <= point.debounce <= LONGEST_DEBOUNCE:
         raise OutOfRange(
-            "{parameter} must give {name} a debounce of 0 to {longest_debounce:g} s",
+            "{parameter} must set debounce of {name} to 0 to {longest_debounce:g} s",
             parameter=parameter,
             name=name,
             longest_debounce=LONGEST_DEBOUNCE,
@@ -110,7 +110,7 @@ def _number(text: str, key: str, name: str, parameter: str) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise OutOfRange(
-            "{parameter} must give {name} a number as {key}, not {text!r}",
+            "{parameter} must set {key} of {name} to a number, not {text!r}",
             parameter=parameter,
             name=name,
             key=key,

@@ -47,7 +47,10 @@ class PolledMachine(PolledControl[T], Machine):
         end = self.wait(lambda read: not self.is_busy(read), timeout, "running", go_on)
         if (state := self.state_of(end)) not in (MachineState.COMPLETE, MachineState.IDLE):
             raise DeviceFault(
-                "{device} did not finish: it is {name}", fault_code=self.fault_of(end), device=self.who, name=state.name
+                "{device} did not complete; its state is {name}",
+                fault_code=self.fault_of(end),
+                device=self.who,
+                name=state.name,
             )
         return end
 
@@ -63,7 +66,7 @@ class PolledMachine(PolledControl[T], Machine):
     def _command(self, command: MachineCommand, *arguments: int, go_on: GoOn | None = None) -> None:
         if (state := self.state_of(self.fresh())) not in ALLOWED[command]:
             raise Refused(
-                "{device}: {name} is not allowed in {state_name}",
+                "{device}: {name} is not allowed in the state {state_name}",
                 device=self.who,
                 name=command.name,
                 state_name=state.name,

@@ -39,7 +39,7 @@ class RobotTools:
         self.made_of = settings, package, calibration
         self._surroundings: Surroundings = robot.surroundings
         if package is None:
-            raise Refused("{name} has no model (URDF), so kinematics cannot be computed", name=robot.name)
+            raise Refused("{name} has no URDF model, so its kinematics cannot be computed", name=robot.name)
         self.model = _load(robot, settings, package, calibration)
         self.model.name = robot.name
         self._arms: dict[str, Arm] = {}

@@ -68,7 +68,7 @@ def recipes(
             cls = classes.get(scene_object.type)
             if cls is None:
                 raise NotFound(
-                    "{name}: object type {type} is not there", name=scene_object.name, type=scene_object.type
+                    "{name}: object type {type} is not available", name=scene_object.name, type=scene_object.type
                 )
             own = secrets.get(scene_object.id, ObjectSecrets())
             found.append(recipe(scene_object, cls, models.get(scene_object.type), overridden, own))
@@ -171,12 +171,13 @@ class Cell:
         if name:
             found = self.find(name)
             if not isinstance(found, Robot):
-                raise NotFound("{name} is no robot", name=name)
+                raise NotFound("{name} is not a robot", name=name)
             return found
         robots = [device for device in self if issubclass(device.recipe.cls, Robot)]
         if len(robots) != 1:
             raise NotFound(
-                "the scene has {count} robots; name the one that carries the gripper in its settings", count=len(robots)
+                "the scene has {count} robots. Name the robot that carries the gripper in the settings of the gripper.",
+                count=len(robots),
             )
         robot = robots[0].require()
         assert isinstance(robot, Robot)
@@ -244,7 +245,7 @@ class Cell:
         object_id = how.scene_object.id
         former = self._devices.get(object_id)
         if former is not None and former.failure is None:
-            former.fail(NotConnected("{name} is being connected anew", name=former.name))
+            former.fail(NotConnected("{name} is being connected again", name=former.name))
         if former is not None and former.closed_by is not None:
             former.closed_by.wait(CLOSE_DEADLINE)  # both instances would use the same port
         device = self._make(how)

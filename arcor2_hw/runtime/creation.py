@@ -88,7 +88,9 @@ def write_sources(types: Iterable[TypeCode]) -> str | None:
     for code in uploaded:
         module = code.module or module_name(code.name)
         if not module.isidentifier():
-            raise InvalidData("object type {name}: {module!r} is no name of a module", name=code.name, module=module)
+            raise InvalidData(
+                "object type {name}: {module!r} is not a valid module name", name=code.name, module=module
+            )
         (package / f"{module}.py").write_text(code.source, encoding="utf-8")
     for known in [name for name in sys.modules if name == "object_types" or name.startswith("object_types.")]:
         del sys.modules[known]
@@ -122,7 +124,7 @@ def find_type(name: str) -> type[Generic]:
     base = getattr(objects, name, None)
     if isinstance(base, type) and issubclass(base, Generic):
         return base
-    raise NotFound("object type {name} is not known here", name=name)
+    raise NotFound("object type {name} is not installed and was not uploaded", name=name)
 
 
 # ------------------------------------------------------------------------------------------------ settings
@@ -136,7 +138,9 @@ def settings_type(cls: type[Generic]) -> type[Settings] | None:
             hint = typing.get_type_hints(constructor).get("settings")
         except (NameError, TypeError, AttributeError) as error:
             raise InvalidData(
-                "object type {cls}: the hints of __init__ cannot be read: {reason}", cls=cls.__name__, reason=error
+                "object type {cls}: the type hints of __init__ cannot be evaluated: {reason}",
+                cls=cls.__name__,
+                reason=error,
             ) from error
         if hint is None:
             if any(p.kind is p.VAR_KEYWORD for p in inspect.signature(constructor).parameters.values()):
@@ -154,7 +158,7 @@ def _setting(hint: Any, parameter: Parameter) -> Any:
     if isinstance(hint, type) and issubclass(hint, enum.Enum):
         return hint(value)
     if hint is bool and not isinstance(value, bool):
-        raise ValueError(f"{value!r} is no boolean")
+        raise ValueError(f"{value!r} is not a boolean")
     return msgspec.convert(value, hint)
 
 
@@ -188,7 +192,7 @@ def fill_settings(cls: type[Generic], name: str, parameters: Mapping[str, Parame
     if kind is None:
         if parameters:
             raise InvalidData(
-                "{name}: {cls} has no settings, but {parameters} is given",
+                "{name}: {cls} has no settings, but received {parameters}",
                 name=name,
                 cls=cls.__name__,
                 parameters=", ".join(parameters),

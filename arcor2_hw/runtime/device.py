@@ -143,7 +143,7 @@ class Device:
         """Raise ConnectionLost while the connection is lost."""
         if self.require().connection is Connection.LOST:
             raise ConnectionLost(
-                "{name}: {method} was not done: the connection is lost",
+                "{name}: {method} was not executed, because the connection is lost",
                 self.connection_reason(),
                 name=self.name,
                 method=method,
@@ -198,10 +198,10 @@ class Device:
         """Return the instance. Raises NotConnected if the device is not connected or has failed."""
         if self.failure is not None:
             raise NotConnected(
-                "{name} is not there: {failure}", self.failure.detail, name=self.name, failure=self.failure
+                "{name} is not available: {failure}", self.failure.detail, name=self.name, failure=self.failure
             )
         if self.instance is None:
-            raise NotConnected("{name} is not up", name=self.name)
+            raise NotConnected("{name} is not connected", name=self.name)
         return self.instance
 
     def take_control(self) -> None:

@@ -20,7 +20,9 @@ def read_document(path: Path, kind: type[T]) -> T:
     try:
         raw = path.read_bytes()
     except OSError as error:
-        raise InvalidPackage("the package has no readable {name}", str(error), name=path.name) from error
+        raise InvalidPackage(
+            "{name} of the package is missing or cannot be read", str(error), name=path.name
+        ) from error
     try:
         return msgspec.json.decode(raw, type=kind)
     except msgspec.MsgspecError as error:

@@ -92,15 +92,15 @@ class Holds:
                     hold.release_ids.append(message.id)
                     return hold
                 if hold.ending:
-                    raise hold.error or Refused("{name}: that hold was ended", name=device.name)
+                    raise hold.error or Refused("{name}: this hold is ending", name=device.name)
             elif message.until == 0.0:
                 return None
             elif hold is not None:
-                raise Refused("{name} is held already", name=device.name)
+                raise Refused("another client is already moving {name}", name=device.name)
             elif message.hold <= self._ended.get(message.object_id, 0):
-                raise Refused("{name}: that hold has ended", name=device.name)
+                raise Refused("{name}: this hold has ended", name=device.name)
             if message.until <= time.monotonic():
-                raise Refused("{name}: the lease had run out when it came", name=device.name)
+                raise Refused("{name}: the lease had expired when it arrived", name=device.name)
             if hold is None:
                 hold = self._held[message.object_id] = _Hold(device, message)
             hold.newest = message
@@ -145,7 +145,7 @@ class Holds:
             if hold.kind is HoldKind.JOG:
                 hold.jog = Jog(robot, hold.arm)
         if hold.ending:  # while control was being taken
-            raise hold.error or Cancelled("{name} was let go before it moved", name=device.name)
+            raise hold.error or Cancelled("{name}: the button was released before the robot moved", name=device.name)
         lease = hold.newest
         if hold.jog is not None:
             return hold.jog.drive(lease)
@@ -201,7 +201,7 @@ class Holds:
             hold.ending, hold.error = True, error
             self._teaching.set(hold.device, hold.arm, False)
             numbers, hold.lease_ids = hold.lease_ids, []
-        why = error or Cancelled("{name} was let go", name=hold.device.name)
+        why = error or Cancelled("{name}: the button was released", name=hold.device.name)
         for number in numbers:
             self._post(m.CallFailed(number, error_data(why, hold.device.id)))
         if hold.kind is HoldKind.JOG:

@@ -166,7 +166,7 @@ class Host:
             assert self._scene is not None
             self._cell.require_failure(object_id)
             if not self._retrying.acquire(blocking=False):
-                raise Refused("another object is being retried: wait for that")
+                raise Refused("another object is being connected again. Wait until that has ended.")
             try:
                 self._watch.report(object_id, Connection.CONNECTING)
                 (recipe,) = scene_recipes(self._scene, only=object_id)
@@ -256,7 +256,7 @@ class Host:
             for message in self.link.messages(self._wake):
                 self._handle(message)
         except (msgspec.MsgspecError, ValueError) as error:  # the next messages cannot be read either
-            self.link.post(m.LogLine("error", f"the server sent what is no message: {error}"))
+            self.link.post(m.LogLine("error", f"received an invalid message from the server: {error}"))
         self._shut_down()
 
     def _handle(self, message: m.HostBound) -> None:

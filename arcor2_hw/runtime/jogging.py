@@ -84,17 +84,19 @@ class Jog:
         """Return the remaining time of a lease, s. Raises Refused if it is shorter than MIN_LEASE."""
         left = lease.until - time.monotonic()
         if left < MIN_LEASE:
-            raise Refused("{name}: the lease had run out when the robot was ready for it", name=self._robot.name)
+            raise Refused("{name}: the lease had expired when the robot was ready", name=self._robot.name)
         return left
 
     def _check_end_effector(self, named: str | None) -> None:
         have = ", ".join(sorted(self._end_effectors))
         if named is not None and named not in self._end_effectors:
             raise InvalidData(
-                "{name} has no end effector {named!r}; it has {have}", name=self._robot.name, named=named, have=have
+                "{name} has no end effector {named!r}. Available: {have}", name=self._robot.name, named=named, have=have
             )
         if named is None and len(self._end_effectors) > 1:
-            raise InvalidData("{name} has several end effectors: name one of {have}", name=self._robot.name, have=have)
+            raise InvalidData(
+                "{name} has several end effectors. Select one of {have}.", name=self._robot.name, have=have
+            )
 
     def _drive_joints(self, lease: Lease, requested: list[Joint], joints: list[Joint]) -> float:
         valid_for = self._time_left(lease)
@@ -102,7 +104,7 @@ class Jog:
         names = [joint.name for joint in joints]
         if unknown := wanted.keys() - set(names):
             raise InvalidData(
-                "{name} has no joint {unknown}; it has {names}",
+                "{name} has no joint {unknown}. Available: {names}",
                 name=self._robot.name,
                 unknown=", ".join(sorted(unknown)),
                 names=", ".join(names),
@@ -151,7 +153,7 @@ class Jog:
         if left <= AT_LIMIT:
             side = "upper" if rate > 0.0 else "lower"
             raise OutOfRange(
-                "{name}: the joint {joint_name} is at its {side} limit",
+                "{name}: joint {joint_name} is at its {side} limit",
                 name=self._robot.name,
                 joint_name=joint.name,
                 side=side,

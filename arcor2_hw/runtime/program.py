@@ -116,7 +116,7 @@ class Program:
         self._joints_points = {j.id: point.id for point in project.action_points for j in point.robot_joints}
         if unknown := self.breakpoints.difference((p.id for p in project.action_points), self._action_ids.values()):
             raise NotFound(
-                "a breakpoint is set on {unknown}, which is no action point or action",
+                "a breakpoint is at {unknown}, which is not an action point or action",
                 unknown=", ".join(sorted(unknown)),
             )
 
@@ -219,7 +219,9 @@ class Program:
 
     def device_lost(self, device: Device, reason: str) -> bool:
         """Stop the program because the connection of a device is lost. Return whether the program was still running."""
-        error = ConnectionLost("{name}: the connection is lost, so the program was stopped", reason, name=device.name)
+        error = ConnectionLost(
+            "{name}: the program was stopped, because the connection is lost", reason, name=device.name
+        )
         with self._reporting:
             if self.ended or self.stop_requested or self.error is not None:
                 return False

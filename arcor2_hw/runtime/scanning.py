@@ -34,7 +34,7 @@ def serial_ports() -> list[Found]:
     try:
         from serial.tools import list_ports
     except ImportError as error:
-        raise NotFound("pyserial is not installed (arcor2-hw[serial])") from error
+        raise NotFound("pyserial is not installed. Install arcor2-hw[serial].") from error
     found = []
     for port in sorted(list_ports.comports()):
         if port.hwid in ("", "n/a") and port.description in ("", "n/a"):
@@ -54,7 +54,7 @@ def bus_options(named: str) -> dict[str, Any]:
     if kind == "slcan" and rest:
         channel, _, rate = rest.partition("@")
         if rate and not rate.isdigit():
-            raise InvalidData("{named}: {rate!r} is no bit rate", named=named, rate=rate)
+            raise InvalidData("{named}: {rate!r} is not a bit rate", named=named, rate=rate)
         return {
             "interface": "slcan",
             "channel": channel,
@@ -70,7 +70,7 @@ def bus_options(named: str) -> dict[str, Any]:
         if host and port.isdigit() and bus:
             return {"interface": "socketcand", "host": host, "port": int(port), "channel": bus}
     raise InvalidData(
-        "{named!r} is no CAN bus; one is slcan:/dev/ttyUSB0@500000, socketcan:can0 or socketcand:HOST:PORT/can0",
+        "{named!r} is not a CAN bus. Examples: slcan:/dev/ttyUSB0@500000, socketcan:can0 or socketcand:HOST:PORT/can0",
         named=named,
     )
 
@@ -82,7 +82,7 @@ def can_nodes(named: str) -> list[Found]:
         import can
         import canopen
     except ImportError as error:
-        raise NotFound("python-can and canopen are not installed (arcor2-hw[can])") from error
+        raise NotFound("python-can and canopen are not installed. Install arcor2-hw[can].") from error
     logging.getLogger("canopen").setLevel(
         logging.CRITICAL
     )  # it logs errors when a node lacks an object, which is normal here
@@ -97,7 +97,7 @@ def can_nodes(named: str) -> list[Found]:
         time.sleep(SEARCH_TIME)
         return [_node(network, named, number) for number in sorted(network.scanner.nodes)]
     except (can.CanError, OSError) as error:
-        raise NotConnected("{named} was lost: {reason}", named=named, reason=error) from error
+        raise NotConnected("the connection to {named} was lost: {reason}", named=named, reason=error) from error
     finally:
         network.disconnect()
 
@@ -136,7 +136,7 @@ def oak_cameras() -> list[Found]:
     try:
         import depthai
     except ImportError as error:
-        raise NotFound("depthai is not installed (arcor2-hw[depthai])") from error
+        raise NotFound("depthai is not installed. Install arcor2-hw[depthai].") from error
     library: Any = depthai
     return [
         Found("OAK camera", str(one.name), f"{one.state.name}, {one.protocol.name}", str(one.getDeviceId()))

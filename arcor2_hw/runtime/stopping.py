@@ -83,7 +83,7 @@ def _reason(stop: SentStop, deadline: float, within: float) -> str:
             return ""
         kind = device.recipe.cls.__name__
         return (
-            f"{device.name}: {running.method} cannot be stopped from here, because {kind} has neither stop() nor a "
+            f"{device.name}: {running.method} cannot be stopped, because {kind} has neither stop() nor a "
             f"CANCEL_MAPPING entry for it"
         )
     if _returned(device, running, deadline):

@@ -146,6 +146,9 @@ def decode_arguments(bound: Any, arguments: Mapping[str, bytes], whose: str) -> 
     ]
     if missing:
         raise InvalidData(
-            "{whose}: {function} needs {missing}", whose=whose, function=function.__name__, missing=", ".join(missing)
+            "{whose}: {function} requires {missing}",
+            whose=whose,
+            function=function.__name__,
+            missing=", ".join(missing),
         )
     return result

@@ -58,7 +58,7 @@ def test_a_depth_picture_keeps_its_note_on_the_wire() -> None:
     back = decode_picture(encode(picture))
     assert PictureNote.of(back) == note
     assert np.array_equal(np.asarray(back), depth)
-    with pytest.raises(InvalidData, match="has no note on how it was taken"):
+    with pytest.raises(InvalidData, match="has no camera data"):
         PictureNote.of(Image.fromarray(depth))
     back.info["arcor2_view"] = "{}"
     with pytest.raises(InvalidData, match="taken is invalid"):

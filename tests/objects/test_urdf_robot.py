@@ -254,7 +254,7 @@ def test_without_a_model_it_says_so(folder: Path, around: Around) -> None:
     cls = importlib.import_module("plain_driver.plain_arm").PlainArm
     other = type("Nameless", (cls,), {"urdf_package_name": "missing.zip", "__module__": cls.__module__})
     device = other("id", "nameless", BASE)
-    with pytest.raises(Refused, match="nameless has no model"):
+    with pytest.raises(Refused, match="nameless has no URDF model"):
         device.get_end_effectors_ids()
 
 

@@ -162,14 +162,14 @@ def test_a_lease_that_comes_late_is_thrown_away(holder: Holder) -> None:
     for number in late:
         error = holder.host.answer(number)
         assert isinstance(error, m.ErrorData)
-        assert "had run out" in error.message
+        assert "had expired" in error.message
     assert holder.told("jog") == []
 
 
 def test_another_hold_is_refused_while_one_lasts(holder: Holder) -> None:
     holder.granted(new=True)
     holder.hold += 1
-    assert "held already" in holder.refused().message
+    assert "already moving" in holder.refused().message
     holder.hold -= 1
     holder.lease(0.0)
     holder.ended()
@@ -328,7 +328,7 @@ def test_one_arm_of_several_is_held(host: HostProcess) -> None:
     assert 0.45 < holder.granted(joints=[Joint("left_turn", 1.0)], arm_id="left") <= 0.5
     holder.lease(0.0, arm_id="left")
     holder.ended()
-    assert "name one of claw, cup" in holder.refused(new=True, arm_id="right").message
+    assert "Select one of claw, cup." in holder.refused(new=True, arm_id="right").message
     holder.ended()
     assert holder.granted(new=True, arm_id="right", end_effector_id="cup") == 1.0
     holder.lease(0.0, arm_id="right")

@@ -278,7 +278,7 @@ def test_what_is_held_collides_where_the_arm_alone_would_not(scene: HostProcess)
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_arm", link="claw"))
     error = line(scene, beside)
     assert isinstance(error, m.ErrorData)
-    assert "claw, which is no link of arm" in error.message
+    assert "claw, which is not a link of arm" in error.message
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_of_another_scene", link="tcp"))
     assert line(scene, beside) is None
     scene.send(box("rod", TIP + beside, 0.03, 0.03, 0.3))

@@ -125,7 +125,7 @@ def test_without_a_cell_it_says_what_is_missing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"type": "Nonsense"}, "far: object type Nonsense is not known here"),
+        ({"type": "Nonsense"}, "far: object type Nonsense is not installed and was not uploaded"),
         ({"settings": {"hots": "127.0.0.1"}}, "far: FunctionalTester has no setting hots"),
         ({"settings": {"host": "127.0.0.1"}, "wire": ["gate"]}, "far: wire names 'gate'"),
         ({"bench": "no_such_module:Bench"}, "far: the bench no_such_module:Bench cannot be imported"),

@@ -61,5 +61,5 @@ class TimeActions(Generic):
             return time.monotonic() - self._started[stopwatch]
         except KeyError:
             raise NotFound(
-                "{name}: stopwatch {stopwatch!r} was never started", name=self.name, stopwatch=stopwatch
+                "{name}: stopwatch {stopwatch!r} was not started", name=self.name, stopwatch=stopwatch
             ) from None

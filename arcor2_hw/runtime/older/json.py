@@ -21,14 +21,16 @@ def loads(text: str | bytes) -> Any:
     try:
         return msgspec.json.decode(text)
     except (msgspec.MsgspecError, UnicodeEncodeError, RecursionError) as error:
-        raise JsonException("this is no JSON: {reason}", reason=error) from error
+        raise JsonException("invalid JSON: {reason}", reason=error) from error
 
 
 def loads_type(text: str | bytes, kind: type[T]) -> T:
     """Decode JSON whose value must be exactly of a type: 1 is not a float. Raises JsonException."""
     value = loads(text)
     if type(value) is not kind:
-        raise JsonException("this is a {type}, not a {kind_name}", type=type(value).__name__, kind_name=kind.__name__)
+        raise JsonException(
+            "the JSON value is a {type}, not a {kind_name}", type=type(value).__name__, kind_name=kind.__name__
+        )
     return value
 
 

@@ -134,7 +134,7 @@ def call(
         return [_read(each, list_return_type) for each in msgspec.convert(value, list)]
     except (msgspec.MsgspecError, ValueError, TypeError, KeyError) as error:
         raise RestException(
-            "{place}: the answer does not fit: {reason}", answer.text[:200], place=where, reason=error
+            "{place}: the answer is not valid: {reason}", answer.text[:200], place=where, reason=error
         ) from error
 
 
@@ -147,7 +147,7 @@ def get_image(url: str, timeout: Timeout | None = None) -> "Image.Image":
         picture = Image.open(io.BytesIO(answer.content))
         picture.load()
     except (UnidentifiedImageError, OSError) as error:
-        raise RestException("GET {url}: this is no picture: {reason}", url=url, reason=error) from error
+        raise RestException("GET {url}: the answer is not a picture: {reason}", url=url, reason=error) from error
     return picture
 
 

@@ -112,9 +112,9 @@ class DeviceServer(Peer):
         with self._calls.running():
             if message.epoch != self._epoch:
                 raise Cancelled(
-                    "{name}: {header_name} was stopped before it began",
+                    "{name}: {method} was stopped before it started",
                     name=self._instance.name,
-                    header_name=header.name,
+                    method=header.name,
                 )
             if self._connected:
                 value = self.perform(message)

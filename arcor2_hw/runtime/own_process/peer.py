@@ -114,7 +114,7 @@ class Peer:
 
     def lost(self) -> Arcor2Error:
         """Return the error of a call that has no answer because the other process has ended."""
-        return ConnectionLost("the connection between two processes ended")
+        return ConnectionLost("the connection to the process of the device has ended")
 
     # -------------------------------------------------------------------------------- calls
     def call(self, target: int, name: str, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
@@ -267,7 +267,7 @@ class Peer:
         if header.kind is Kind.WRITE:
             return setattr(target, header.name, self.codec.decode(message.payload))
         if header.kind is not Kind.CALL:
-            raise InvalidData("{type!r} is no request", type=header.kind)
+            raise InvalidData("{type!r} is not a request", type=header.kind)
         arguments, keywords = self.codec.decode(message.payload)
         return (getattr(target, header.name) if header.name else target)(*arguments, **keywords)
 

@@ -82,7 +82,9 @@ class Codec:
             _Pickler(buffer, self).dump(value)
         except Exception as error:
             raise InvalidData(
-                "a value of type {type} cannot leave its process: {reason}", type=type(value).__name__, reason=error
+                "a value of type {type} cannot be sent to another process: {reason}",
+                type=type(value).__name__,
+                reason=error,
             ) from error
         return buffer.getvalue()
 
@@ -95,7 +97,7 @@ class Codec:
         try:
             return _Unpickler(io.BytesIO(data), self).load()
         except Exception as error:
-            raise InvalidData("a value from another process cannot be read: {reason}", reason=error) from error
+            raise InvalidData("a value from another process cannot be decoded: {reason}", reason=error) from error
 
     def encode_error(self, error: BaseException) -> bytes:
         """Pickle an error with its traceback as a note, or its nearest base class if it cannot be pickled."""

@@ -162,7 +162,7 @@ def test_pictures_that_are_none(picture: Photographer, make: Callable[..., Bin])
     from PIL import Image
 
     crate, photo = make(), picture()
-    with pytest.raises(InvalidData, match=r"^crate: the image has no note on how it was taken"):
+    with pytest.raises(InvalidData, match=r"^crate: the image has no camera data"):
         crate.next_part(Image.fromarray(np.asarray(photo)))
     with pytest.raises(OutOfRange, match=r"^crate: depth must be an image with 16 bits"):
         crate.next_part(PictureNote.of(photo).put_on(Image.new("RGB", (64, 48))))

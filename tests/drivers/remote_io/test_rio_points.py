@@ -63,14 +63,14 @@ def test_point_list() -> None:
         ("1lamp=DO0", r"name=\.\.\."),
         ("lamp=XY0", "terminal such as DI0.*'XY0'"),
         ("lamp=DO16", "DO0 to DO15, not DO16"),
-        ("a=DO1; a=DO2", "'a' is in it twice"),
+        ("a=DO1; a=DO2", "the point 'a' only once"),
         ("a=DO1; b=DO1", "DO1 is 'a' and 'b'"),
         ("a=DI1 on_loss=off", "a .DI. only debounce"),
-        ("a=DO1 on_loss=maybe", "on_loss of hold, off, on"),
-        ("a=AO1 on_loss=on", "on_loss of hold, off"),
-        ("a=AI1 scale=x", "number as scale"),
-        ("a=AI1 scale=0", "scale other than 0"),
-        ("a=DI1 debounce=-1", "debounce of 0 to 10"),
+        ("a=DO1 on_loss=maybe", "on_loss of a to hold, off, on"),
+        ("a=AO1 on_loss=on", "on_loss of a to hold, off"),
+        ("a=AI1 scale=x", "scale of a to a number"),
+        ("a=AI1 scale=0", "scale of a to 0"),
+        ("a=DI1 debounce=-1", "debounce of a to 0 to 10"),
         ("a=DI1 debounce=0.1 debounce=0.2", "each once"),
     ],
 )
@@ -128,7 +128,7 @@ def test_reading_each_kind(fake: FakeProcess, observed: RemoteIO) -> None:
     assert observed.read("level").quality is Quality.BAD
     with pytest.raises(DeviceFault, match=r"level \(AI0\) has a broken wire"):
         observed.read_analog("level")
-    with pytest.raises(OutOfRange, match="no point 'lid'; there are part, door"):
+    with pytest.raises(OutOfRange, match="no point 'lid'. Available: part, door"):
         observed.read("lid")
     with pytest.raises(Refused, match="level is AI0"):
         observed.read_digital("level")

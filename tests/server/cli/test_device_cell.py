@@ -82,7 +82,7 @@ def test_every_problem_is_reported(tmp_path: Path, scale: FakeProcess) -> None:
     assert "printer" in found["printer"]["problem"]
     assert NOBODY in found["printer"]["problem"]
     assert found["printer"]["connection"] == "failed"
-    assert found["stranger"]["problem"] == "object type Unknown is not known here"
+    assert found["stranger"]["problem"] == "object type Unknown is not installed and was not uploaded"
     assert "typo: MtSicsScale has no setting prt" in found["typo"]["problem"]
 
 
@@ -227,8 +227,8 @@ def test_scan_lists_the_nodes_of_a_can_bus(belt: FakeProcess, adapter: str) -> N
 @pytest.mark.parametrize(
     ("bus", "said"),
     [
-        ("can0", "is no CAN bus"),
-        ("slcan:/dev/ttyX@fast", "is no bit rate"),
+        ("can0", "is not a CAN bus"),
+        ("slcan:/dev/ttyX@fast", "is not a bit rate"),
         ("slcan:/dev/does-not-exist", "cannot be opened"),
     ],
 )
