@@ -1,4 +1,4 @@
-"""Test cases of acting: control, stop, cancellation, one act at a time."""
+"""Test cases of actions: control, stop, cancellation, one action at a time."""
 
 import contextlib
 import random
@@ -11,10 +11,10 @@ from arcor2_hw.runtime.methods import OVERTAKES_WITHIN
 from arcor2_hw.testing.bench import Bench, needs
 from arcor2_hw.testing.connecting_cases import DISCONNECTS_WITHIN
 from arcor2_hw.testing.life import SLACK, raised, stays, timed, wait_until
-from arcor2_hw.testing.steps import STARTS_WITHIN, WATCHED, on_lanes, stop_of, under_way
+from arcor2_hw.testing.steps import STARTS_WITHIN, WATCHED, on_lanes, start_action, stop_of
 
-WITH_THE_ACT: Final = 20.0
-"""Time limit of a bench's `ask` on a working device, s; for some devices it is a motion."""
+ASK_TIMEOUT: Final = 20.0
+"""Time limit of `ask` of a bench, s. For some devices it is a motion."""
 
 
 class ActingCases:
@@ -25,14 +25,17 @@ class ActingCases:
         """Taking control is refused while another client has it; the error names it, nothing is written (rule 1)."""
         device = arcor2_bench.connected()
         with arcor2_bench.foreign():
-            wait_until(lambda: device.control_owner() not in (None, "us"), 2.0, "seeing that somebody else has control")
+            wait_until(lambda: device.control_owner() not in (None, "us"), 2.0, "reporting the other owner of control")
             owner = device.control_owner()
             before = arcor2_bench.writes()
             error = raised(
-                device.take_control, NotInControl, within=arcor2_bench.call_within, what="taking another's control"
+                device.take_control,
+                NotInControl,
+                within=arcor2_bench.call_within,
+                what="taking control from another client",
             )
-            assert str(owner) in str(error), f"the refusal does not name {owner!r}: {error}"
-            assert arcor2_bench.writes() == before, "refused control acted on the device"
+            assert str(owner) in str(error), f"the error does not name {owner!r}: {error}"
+            assert arcor2_bench.writes() == before, "taking control was refused, but acted on the device"
 
     @needs("command", "writes")
     def test_command_needs_control(self, arcor2_bench: Bench) -> None:
@@ -45,49 +48,47 @@ class ActingCases:
             within=arcor2_bench.call_within,
             what="a command without control",
         )
-        assert arcor2_bench.writes() == before, "a command acted without control"
+        assert arcor2_bench.writes() == before, "a command without control acted on the device"
         device.take_control()
         arcor2_bench.command(device)
-        assert arcor2_bench.writes() != before, "the bench's command does not act, or `writes` does not see it"
+        assert arcor2_bench.writes() != before, "`command` of the bench does not act, or `writes` does not detect it"
 
     @needs("run_long", "running")
     def test_stop_passes(self, arcor2_bench: Bench) -> None:
-        """stop() interrupts a running act, which ends as cancelled; the device stops and stays stopped (rule 5)."""
+        """stop() interrupts an action, which ends as cancelled. The device stops and remains stopped (rule 5)."""
         device = arcor2_bench.controlled()
         stop = stop_of(device)
         for pause in (0.0, 0.13):
-            act = under_way(arcor2_bench, device)
+            act = start_action(arcor2_bench, device)
             time.sleep(pause)
             timed(stop, arcor2_bench.stops_within, "stop")
-            assert not arcor2_bench.running(), "stop returned before the device stood"
-            error = act.outcome(arcor2_bench.stops_within, "the act that was stopped")
-            assert isinstance(error, Cancelled), f"the act that was stopped gave {error!r}, not Cancelled"
-        stays(lambda: not arcor2_bench.running(), WATCHED, "it began again after the stop")
+            assert not arcor2_bench.running(), "stop() returned before the device was at standstill"
+            error = act.outcome(arcor2_bench.stops_within, "the stopped action")
+            assert isinstance(error, Cancelled), f"the stopped action ended with {error!r}, not Cancelled"
+        stays(lambda: not arcor2_bench.running(), WATCHED, "the device started again after the stop")
 
     @needs("run_long", "running")
     def test_one_act_at_a_time(self, arcor2_bench: Bench) -> None:
-        """A second act during the first is refused, and the first continues (rule 8)."""
+        """A second action during the first is refused, and the first continues (rule 8)."""
         device = arcor2_bench.controlled()
-        act = under_way(arcor2_bench, device)
-        raised(
-            lambda: arcor2_bench.run_long(device), Refused, within=arcor2_bench.call_within, what="a second act beside"
-        )
-        assert not act.over, f"the first act ended by that: {act.error!r}"
+        act = start_action(arcor2_bench, device)
+        raised(lambda: arcor2_bench.run_long(device), Refused, within=arcor2_bench.call_within, what="a second action")
+        assert not act.over, f"the second action ended the first: {act.error!r}"
         stop_of(device)()
-        act.outcome(arcor2_bench.stops_within, "the first act")
+        act.outcome(arcor2_bench.stops_within, "the first action")
 
     @needs("run_long", "running")
     def test_disconnecting_ends_an_act(self, arcor2_bench: Bench) -> None:
-        """Calling disconnect during an act takes at most 1 s; the act ends with a typed error."""
+        """disconnect() during an action takes at most 1 s, and the action ends with a typed error."""
         device = arcor2_bench.controlled()
-        act = under_way(arcor2_bench, device)
-        timed(device.disconnect, DISCONNECTS_WITHIN, "disconnecting in an act")
-        error = act.outcome(arcor2_bench.call_within, "the act whose connection was closed")
-        assert isinstance(error, DeviceError), f"the act whose connection was closed gave {error!r}"
+        act = start_action(arcor2_bench, device)
+        timed(device.disconnect, DISCONNECTS_WITHIN, "disconnecting during an action")
+        error = act.outcome(arcor2_bench.call_within, "the disconnected action")
+        assert isinstance(error, DeviceError), f"the disconnected action ended with {error!r}"
 
     @needs("run_long", "running", like="stop_passes")
     def test_stop_at_random_phases(self, arcor2_bench: Bench, arcor2_phases: random.Random) -> None:
-        """At whatever moment the stop comes, the act ends as cancelled, and the device stops and stays stopped."""
+        """A stop at any moment ends the action as cancelled. The device stops and remains stopped."""
         device = arcor2_bench.controlled()
         held = on_lanes(device)
         try:
@@ -95,40 +96,44 @@ class ActingCases:
                 act = Job("act", lambda: arcor2_bench.run_long(device))
                 held.lane.submit(act)
                 time.sleep(phase)
-                when = f"{phase:.3f} s after the act began"
-                assert not act.ended, f"the act was over {when}: {act.error!r}"
+                when = f"{phase:.3f} s after the start of the action"
+                assert not act.ended, f"the action had ended {when}: {act.error!r}"
                 stop, _ = held.begin_stop() or (None, None)
-                assert stop is not None, "what runs for long needs a stop()"
+                assert stop is not None, "a device with run_long must have a stop()"
                 assert stop.wait(arcor2_bench.stops_within + SLACK), f"stop {when} did not return"
                 stop.outcome()
-                assert act.wait(arcor2_bench.stops_within + SLACK), f"the act did not end by a stop {when}"
-                assert isinstance(act.error, Cancelled), f"stopped {when}, the act gave {act.error!r}, not Cancelled"
-                assert not arcor2_bench.running(), f"stopped {when}, the device runs on"
+                assert act.wait(arcor2_bench.stops_within + SLACK), f"the action did not end after a stop {when}"
+                assert isinstance(act.error, Cancelled), (
+                    f"stopped {when}, the action ended with {act.error!r}, not Cancelled"
+                )
+                assert not arcor2_bench.running(), f"stopped {when}, the device still runs"
         finally:
             held.release_lanes()
-        stays(lambda: not arcor2_bench.running(), WATCHED / 2, "it began again after the stop")
+        stays(lambda: not arcor2_bench.running(), WATCHED / 2, "the device started again after the stop")
 
     @needs("run_long", "running", "observe", like="stop_passes")
     def test_cancelling_leaves_the_line_usable(self, arcor2_bench: Bench) -> None:
-        """After a call was cancelled on its lane, the next calls get their own answers (rule 8)."""
+        """After a call was cancelled, the next calls get their own answers (rule 8)."""
         device = arcor2_bench.controlled()
         kinds = type(arcor2_bench.observe(device))
         held = on_lanes(device)
         try:
             act = Job("act", lambda: arcor2_bench.run_long(device))
             held.lane.submit(act)
-            wait_until(lambda: arcor2_bench.running() or act.ended, STARTS_WITHIN, "the act of run_long")
+            wait_until(lambda: arcor2_bench.running() or act.ended, STARTS_WITHIN, "run_long")
             stop, _ = held.begin_stop() or (None, None)
-            assert stop is not None, "what runs for long needs a stop()"
+            assert stop is not None, "a device with run_long must have a stop()"
             assert stop.wait(arcor2_bench.stops_within + SLACK), "stop did not return"
-            assert act.wait(arcor2_bench.stops_within + SLACK), "the act did not end by the stop"
+            assert act.wait(arcor2_bench.stops_within + SLACK), "the action did not end after the stop"
             for _ in range(3):
                 given = held.lane.call(
                     "observe", lambda: arcor2_bench.observe(device), deadline=arcor2_bench.call_within + SLACK
                 )
-                assert type(given) is kinds, f"after the cancelled call a reading gave {given!r}, which is another's"
+                assert type(given) is kinds, (
+                    f"after the cancelled call a reading returned {given!r}, the answer of another call"
+                )
             if arcor2_bench.has("ask"):
-                with contextlib.suppress(Refused, DeviceFault):  # which is an answer
-                    held.lane.call("ask", lambda: arcor2_bench.ask(device), deadline=WITH_THE_ACT)
+                with contextlib.suppress(Refused, DeviceFault):  # a refusal is an answer too
+                    held.lane.call("ask", lambda: arcor2_bench.ask(device), deadline=ASK_TIMEOUT)
         finally:
             held.release_lanes()

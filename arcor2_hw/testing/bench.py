@@ -16,12 +16,12 @@ from arcor2_hw.testing.wire import Wire
 
 
 def missing(name: str) -> NotImplementedError:
-    """Return the error of a hook that a bench does not have; the suite checks `Bench.has` before."""
+    """Return the error of a hook that a bench does not have. The suite calls `Bench.has` first."""
     return NotImplementedError(f"this bench has no hook {name}")
 
 
 class Check(NamedTuple):
-    """A reading of the driver and the device's own value, both in SI units, and their maximum difference."""
+    """A reading of the driver, the value of the device itself, and their maximum difference, all in SI units."""
 
     what: str
     by_driver: float
@@ -78,13 +78,13 @@ class Bench(abc.ABC):
         """Return a new object for the device, not connected."""
 
     def start(self) -> None:  # noqa: B027
-        """Start the fake, or reserve the device; called once before all cases."""
+        """Start the fake or reserve the device. Called once before all cases."""
 
     def end(self) -> None:  # noqa: B027
         """End what `start` started."""
 
     def reset(self) -> None:  # noqa: B027
-        """Bring the device to standstill, without faults and free; called before each case."""
+        """Stop the device, clear its faults and release control. Called before each case."""
 
     # -------------------------------------------------------------------------------- optional hooks
     def absent(self) -> tuple[Generic, str]:
@@ -98,7 +98,7 @@ class Bench(abc.ABC):
         return self.wire.acting(self.frames)
 
     def writes(self) -> Any:
-        """Return everything that was written, switched or moved at the device; equal values mean that nothing was."""
+        """Return a value that changes with everything that is written, switched or moved at the device."""
         raise missing("writes")
 
     def cut(self) -> None:
@@ -114,35 +114,35 @@ class Bench(abc.ABC):
         self.wire.heal()
 
     def reset_link(self) -> None:
-        """Break the connection once; it can be opened again at once."""
+        """Break the connection once. It can be opened again at once."""
         if self.wire is None:
             raise missing("reset_link")
         self.wire.reset()
 
     def half_frame(self) -> None:
-        """Interrupt the next answer of the device in the middle; nothing follows."""
+        """Cut off the next answer of the device in the middle."""
         if self.wire is None:
             raise missing("half_frame")
         self.wire.half_frame()
 
     def observe(self, device: Generic) -> object:
-        """Take a reading of the device with the driver that can become stale."""
+        """Take a reading with the driver that can become stale."""
         raise missing("observe")
 
     def command(self, device: Generic) -> object:
-        """Execute a command that acts on the device and needs control."""
+        """Execute a command that acts on the device and requires control."""
         raise missing("command")
 
     def ask(self, device: Generic) -> object:
-        """Call a method that communicates with the device, and therefore fails on a silent one."""
+        """Call a method that communicates with the device, so that it fails if the device is silent."""
         raise missing("ask")
 
     def run_long(self, device: Generic) -> object:
-        """Run a motion, or another act of some seconds, to its end; the device is connected and controlled."""
+        """Run a motion or another action of some seconds to its end. The device is connected and controlled."""
         raise missing("run_long")
 
     def running(self) -> bool:
-        """Return whether the act of `run_long` is running, read from the device without the driver."""
+        """Return whether the action of `run_long` is running, read from the device without the driver."""
         raise missing("running")
 
     def foreign(self) -> AbstractContextManager[None]:
@@ -150,20 +150,20 @@ class Bench(abc.ABC):
         raise missing("foreign")
 
     def orphan(self) -> list[str]:
-        """Return the command line of a process that connects, takes control and does `run_long`; it will be killed."""
+        """Return the command line of a process that connects, takes control and runs `run_long` until it is killed."""
         raise missing("orphan")
 
-    # -------------------------------------------------------------------------------- hooks that level silver asks for
+    # -------------------------------------------------------------------------------- hooks for level silver
     def readings(self, device: Generic) -> Iterable[Check]:
-        """Return readings of a connected driver next to the device's own values: units, signs and frames."""
+        """Return readings of a connected driver with the values of the device, to check units, signs and frames."""
         raise missing("readings")
 
     def beyond_limits(self, device: Generic) -> Mapping[str, Callable[[], object]]:
-        """Return calls with values that device or driver must refuse, by description; the device is controlled."""
+        """Return calls with values that device or driver must refuse, by description. The device is controlled."""
         raise missing("beyond_limits")
 
     def works(self, device: Generic) -> Mapping[str, Callable[[], object]]:
-        """Return for each optional method a call that shows that it works; the device is controlled."""
+        """Return for each optional method a call that shows that it works. The device is controlled."""
         if capabilities.to_be_shown(self.object_type):
             raise missing("works")
         return {}
@@ -178,7 +178,7 @@ class Bench(abc.ABC):
         return self.wire is not None and (hook in OF_THE_WIRE or (hook == "actuating" and self.frames is not None))
 
     def why_not(self, hook: str) -> str | None:
-        """Return why the bench cannot have a hook, None when it should have it."""
+        """Return why the bench cannot have a hook, or None if it should have it."""
         return None
 
     @classmethod

@@ -64,7 +64,7 @@ def _raises_only(function: Any) -> bool:
         function(*[None] * _required(function))
     except Arcor2NotImplemented:
         return True
-    except Exception:  # noqa: BLE001 - it does something with what it is given: it is no mere hook
+    except Exception:  # noqa: BLE001 - it uses its arguments, so it is not only a hook
         return False
     return False
 
@@ -87,28 +87,28 @@ def contradictions(device: Generic, said: frozenset[str]) -> list[str]:
     wrong = []
     for name, hook in hooks(kind).items():
         here = inspect.getattr_static(device, name, None)
-        own = here is not None and here is not hook and (name in said or not _is_of_ours(kind, name, here))
+        own = here is not None and here is not hook and (name in said or not _is_base_member(kind, name, here))
         if name in said and not own:
-            wrong.append(f"{name} is declared and is not there")
+            wrong.append(f"{name} is declared, but does not exist")
         elif name not in said and own and not _raises_not_implemented(device, name):
-            wrong.append(f"{name} is there, and analysis does not see it")
+            wrong.append(f"{name} exists, but the analysis does not find it")
         elif name not in said and not own and not _raises_not_implemented(device, name):
-            wrong.append(f"{name} is not declared, and does not say that it is not implemented")
+            wrong.append(f"{name} is not declared, but does not raise Arcor2NotImplemented")
     return wrong
 
 
-def _is_of_ours(kind: type, name: str, member: object) -> bool:
+def _is_base_member(kind: type, name: str, member: object) -> bool:
     return any(vars(base).get(name) is member for base in kind.__mro__ if base.__module__.startswith(OURS))
 
 
 def _raises_not_implemented(device: Generic, name: str) -> bool:
-    """Return whether an optional method raises the not-implemented error on an object that is not connected."""
+    """Return whether an optional method raises Arcor2NotImplemented on a disconnected object."""
     method = getattr(device, name)
     try:
         method(*[None] * _required(method))
     except Arcor2NotImplemented:
         return True
-    except Exception:  # noqa: BLE001 - whatever it is, it is not that
+    except Exception:  # noqa: BLE001 - any other error
         return False
     return False
 
@@ -161,7 +161,7 @@ def unhinted(kind: type[Generic]) -> list[str]:
             hints = plain.__annotations__
             parameters = list(inspect.signature(plain).parameters)[0 if isinstance(member, staticmethod) else 1 :]
             missing = [each for each in parameters if each not in hints]
-            missing += [] if "return" in hints or name == "__init__" else ["what it returns"]
+            missing += [] if "return" in hints or name == "__init__" else ["its result"]
             lacking += [f"{base.__name__}.{name}: {each}" for each in missing]
     return sorted(set(lacking))
 

@@ -26,7 +26,7 @@ from arcor2_hw.testing.serial_wire import SerialWire
 
 READ: Final = ("machine_state", "robot_joints", "position", "state", "status", "vacuum", "identify")
 """Methods of which the first available one is used for readings of an unknown device."""
-ASKED: Final = ("identify", "machine_state", "position", "status")
+QUERIED: Final = ("identify", "machine_state", "position", "status")
 """Methods that communicate with the device."""
 
 
@@ -49,7 +49,7 @@ class CellBench(Bench):
         self._closed: socket.socket | None = None
         said = capabilities.declared(self.object_type)
         self._read = self._first(READ, said)
-        self._asked = self._first(ASKED, said) or self._read
+        self._queried = self._first(QUERIED, said) or self._read
 
     def _first(self, names: Iterable[str], said: frozenset[str]) -> str:
         abstract = {name for base in self.object_type.__mro__ for name in getattr(base, "__abstractmethods__", ())}
@@ -136,7 +136,7 @@ class CellBench(Bench):
 
     def ask(self, device: Generic) -> object:
         """Call a method that communicates with the device."""
-        return self._call(device, self._asked)
+        return self._call(device, self._queried)
 
     def _call(self, device: Generic, name: str) -> object:
         if name == "read" and isinstance(device, IOBlock):
@@ -157,15 +157,15 @@ class CellBench(Bench):
 
     def _lack(self, hook: str) -> str | None:
         if hook in OF_THE_WIRE and self.wire is None:
-            return "no wire is possible: `wire` must name host and port, or the port, or fixed ports"
+            return "no wire is possible. `wire` must name host and port, the port, or fixed ports."
         if hook == "absent" and (self.place is None or len(self.place.ports) > 1 or not self.place.error_text):
-            return "its settings do not tell where a missing device could be"
+            return "its settings do not contain an address for a missing device"
         if hook in ("writes", "actuating") and (self.wire is None or self.frames is None):
-            return "its frames are unknown: quality.yaml has no `frames` for this wire"
+            return "its frames are unknown, because quality.yaml has no `frames` for this wire"
         if hook in ("observe", "ask") and not self._read:
             return "it has no reading without arguments"
         if hook in _UNKNOWN and not (hook == "works" and super().has(hook)):
-            return "its commands are unknown: name a bench by `bench: module:Class`"
+            return "its commands are unknown. Name a bench by `bench: module:Class`."
         return None
 
 

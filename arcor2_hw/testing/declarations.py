@@ -60,18 +60,18 @@ def _of_the_type(file: SourceFile, found: TypeAnalysis) -> list[str]:
     name = file.name
     wrong = []
     if found.meta.abstract:
-        wrong.append(f"{name} may not be placed in a scene: _ABSTRACT, or a mandatory method is missing")
+        wrong.append(f"{name} cannot be added to a scene: it is _ABSTRACT, or a mandatory method is missing")
     if found.meta.disabled:
         wrong.append(f"{name} is disabled: {found.meta.problem}")
     if found.meta.description in ("", NO_DESCRIPTION):
         wrong.append(f"{name} has no docstring")
     wrong += [f"{name}: setting {each.name} is not described" for each in found.meta.settings if not each.description]
     for action in found.actions:
-        wrong += [f"{name}.{action.name} {lack}" for lack in _of_an_action(action)]
+        wrong += [f"{name}.{action.name} {fault}" for fault in _of_an_action(action)]
     if set(MOTION) & found.implemented and "stop" not in found.implemented:
-        wrong.append(f"{name} moves and has no stop()")
+        wrong.append(f"{name} can move, but has no stop()")
     if found.robot is not None and "state" not in found.implemented:
-        wrong.append(f"{name} is a robot and has no state()")
+        wrong.append(f"{name} is a robot, but has no state()")
     if not any(_declares_reaction(each.source) for each in (file, *found.modules)):
         wrong.append(f"{name} does not declare loss_reaction")
     return wrong
@@ -80,8 +80,8 @@ def _of_the_type(file: SourceFile, found: TypeAnalysis) -> list[str]:
 def _of_an_action(action: ObjectAction) -> list[str]:
     if action.disabled:
         return [f"is disabled: {action.problem}"]
-    lacks = [] if action.description else ["has no docstring"]
-    return lacks + [
+    faults_found = [] if action.description else ["has no docstring"]
+    return faults_found + [
         f"does not describe its parameter {each.name}" for each in action.parameters if not each.description
     ]
 

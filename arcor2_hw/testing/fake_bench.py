@@ -1,4 +1,4 @@
-"""FakeBench: a bench whose device is a fake of `arcor2_fakes.registers`, in a process of its own."""
+"""FakeBench: a bench whose device is a fake of `arcor2_fakes.registers` in its own process."""
 
 import contextlib
 import json
@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 
 from arcor2_hw.testing.bench import Bench
 
-ANSWERS_WITHIN = 5.0
-"""Time the control channel has to answer, s."""
+ANSWER_TIMEOUT = 5.0
+"""Time limit of an answer on the control channel, s."""
 
 
 class FakeBench(Bench):
-    """Starts the fake, and passes faults and commands to it over its control channel."""
+    """Start the fake, and send faults and commands over its control channel."""
 
     fake: ClassVar[str]
     """Module of the fake, as in `python -m`."""
@@ -28,7 +28,7 @@ class FakeBench(Bench):
         ready = json.loads(self._process.stdout.readline().removeprefix(b"ready "))
         self._address = str(ready["address"])
         host, _, port = ready["control"].rpartition(":")
-        self._control = socket.create_connection((host, int(port)), ANSWERS_WITHIN)
+        self._control = socket.create_connection((host, int(port)), ANSWER_TIMEOUT)
         self._answers = self._control.makefile("rb")
 
     def end(self) -> None:
@@ -36,7 +36,7 @@ class FakeBench(Bench):
         self._answers.close()
         self._control.close()
         self._process.terminate()
-        self._process.wait(ANSWERS_WITHIN)
+        self._process.wait(ANSWER_TIMEOUT)
         assert self._process.stdout is not None
         self._process.stdout.close()
 
@@ -58,7 +58,7 @@ class FakeBench(Bench):
         self.do("rest")
 
     def writes(self) -> Any:
-        """Return everything that was ever written."""
+        """Return everything that was written to the fake."""
         return self.do("truth")["written"]
 
     def cut(self) -> None:
@@ -74,12 +74,12 @@ class FakeBench(Bench):
         self.do("reset")
 
     def half_frame(self) -> None:
-        """Let the next answer break off."""
+        """Cut off the next answer in the middle."""
         self.do("half_frame")
 
     @contextlib.contextmanager
     def foreign(self) -> Iterator[None]:
-        """Give control to the operator panel meanwhile."""
+        """Give control to the operator panel in this context."""
         self.do("panel", on=True)
         try:
             yield

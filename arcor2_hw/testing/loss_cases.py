@@ -8,7 +8,7 @@ from arcor2_hw.exceptions import DeviceError, NotInControl
 from arcor2_hw.testing.bench import Bench, needs
 from arcor2_hw.testing.connecting_cases import DISCONNECTS_WITHIN
 from arcor2_hw.testing.life import SLACK, named, raised, stays, timed, wait_until
-from arcor2_hw.testing.steps import GONE, STARTS_WITHIN, WATCHED, back, lose, observed, seen_again, under_way
+from arcor2_hw.testing.steps import GONE, STARTS_WITHIN, WATCHED, back, lose, observed, seen_again, start_action
 
 
 class LossCases:
@@ -16,16 +16,16 @@ class LossCases:
 
     @needs("cut", "heal", "ask")
     def test_silence_in_a_call(self, arcor2_bench: Bench) -> None:
-        """A call on a silent device raises a typed error in time that names object and address."""
+        """A call of a silent device raises a typed error in time, which names object and address."""
         device = arcor2_bench.controlled()
         arcor2_bench.cut()
         error = raised(lambda: arcor2_bench.ask(device), *GONE, within=arcor2_bench.call_within, what="the call")
-        named(error, device.name, arcor2_bench.address, "a call on a silent device")
+        named(error, device.name, arcor2_bench.address, "a call of a silent device")
         timed(device.disconnect, DISCONNECTS_WITHIN, "disconnecting from a silent device")
 
     @needs("cut", "heal", "observe")
     def test_stale_is_an_error(self, arcor2_bench: Bench) -> None:
-        """A reading from before the silence is not returned after `stale_after` (rule 6)."""
+        """A reading from before the cut is not returned after `stale_after` (rule 6)."""
         device = arcor2_bench.connected()
         arcor2_bench.observe(device)
         arcor2_bench.cut()
@@ -42,7 +42,7 @@ class LossCases:
         lose(arcor2_bench, device)
         arcor2_bench.heal()
         back(arcor2_bench, device)
-        wait_until(lambda: observed(arcor2_bench, device), arcor2_bench.back_within, "reading again after the loss")
+        wait_until(lambda: observed(arcor2_bench, device), arcor2_bench.back_within, "a reading after the loss")
 
     @needs("cut", "heal", "command")
     def test_control_does_not_come_back(self, arcor2_bench: Bench) -> None:
@@ -52,7 +52,7 @@ class LossCases:
         lose(arcor2_bench, device)
         arcor2_bench.heal()
         back(arcor2_bench, device)
-        assert device.control_owner() != "us", "control came back by itself"
+        assert device.control_owner() != "us", "control was taken again without a request"
         error = raised(
             lambda: arcor2_bench.command(device),
             NotInControl,
@@ -63,50 +63,54 @@ class LossCases:
 
     @needs("cut", "heal", "run_long", "running")
     def test_nothing_resumes(self, arcor2_bench: Bench) -> None:
-        """An interrupted act ends with a typed error; when the device is back, nothing starts again (rule 3)."""
+        """An interrupted action ends with a typed error. When the device is back, nothing starts again (rule 3)."""
         device = arcor2_bench.controlled()
-        act = under_way(arcor2_bench, device)
+        act = start_action(arcor2_bench, device)
         arcor2_bench.cut()
-        error = act.outcome(arcor2_bench.lost_within + arcor2_bench.call_within, "an act on a device that is lost")
-        assert isinstance(error, DeviceError), f"the act that was cut off gave {error!r}"
+        error = act.outcome(arcor2_bench.lost_within + arcor2_bench.call_within, "an action of a lost device")
+        assert isinstance(error, DeviceError), f"the interrupted action ended with {error!r}"
         if type(device).loss_reaction.kind is LossKind.STOPS_WITHIN:
             limit = type(device).loss_reaction.within
-            wait_until(lambda: not arcor2_bench.running(), limit + SLACK, "the device's own reaction to the loss")
+            wait_until(lambda: not arcor2_bench.running(), limit + SLACK, "the reaction of the device to the loss")
         arcor2_bench.heal()
         back(arcor2_bench, device)
-        stays(lambda: not arcor2_bench.running(), WATCHED, "it went on by itself when it was back")
+        stays(lambda: not arcor2_bench.running(), WATCHED, "the device continued by itself after the loss")
 
     @needs("orphan", "running")
     def test_loss_reaction(self, arcor2_bench: Bench) -> None:
-        """When the driver's process is killed during an act, the device reacts as declared (rule 2)."""
+        """When the process of the driver is killed during an action, the device reacts as declared (rule 2)."""
         reaction = arcor2_bench.object_type.loss_reaction
-        process = subprocess.Popen(arcor2_bench.orphan())  # noqa: S603 - the bench's own words
+        process = subprocess.Popen(arcor2_bench.orphan())  # noqa: S603 - the command line of the bench
         try:
-            wait_until(arcor2_bench.running, STARTS_WITHIN, "the act of the process that will be killed")
+            wait_until(arcor2_bench.running, STARTS_WITHIN, "the action of the process to be killed")
         finally:
             process.kill()
             process.wait()
         if reaction.kind is LossKind.STOPS_WITHIN:
-            wait_until(lambda: not arcor2_bench.running(), reaction.within + SLACK, "standing after the process died")
-            stays(lambda: not arcor2_bench.running(), WATCHED, "it began again after its owner had died")
+            wait_until(
+                lambda: not arcor2_bench.running(), reaction.within + SLACK, "standstill after the process was killed"
+            )
+            stays(lambda: not arcor2_bench.running(), WATCHED, "the device started again after the process was killed")
         elif reaction.kind is LossKind.CONTINUES:
-            assert arcor2_bench.running(), "it is declared to continue, and stopped"
+            assert arcor2_bench.running(), "the device is declared to continue, but stopped"
 
     @needs("reset_link", "observe", for_silver=True)
     def test_reset_and_back(self, arcor2_bench: Bench) -> None:
-        """A connection that is reset is opened again by itself, even if the loss was too short to be reported."""
+        """A connection that was reset is opened again, even if the loss was too short to be reported."""
         device = arcor2_bench.connected()
         arcor2_bench.observe(device)
         arcor2_bench.reset_link()
-        time.sleep(arcor2_bench.stale_after)  # until then, a reading may be from before
+        time.sleep(arcor2_bench.stale_after)  # until then, a reading may be older than the reset
         seen_again(arcor2_bench, device)
 
     @needs("half_frame", "heal", "ask", "observe", for_silver=True)
     def test_half_a_frame(self, arcor2_bench: Bench) -> None:
-        """An incomplete answer is a typed error in time, never a value; afterwards everything works again."""
+        """An incomplete answer raises a typed error in time. Afterwards everything works again."""
         device = arcor2_bench.controlled()
         arcor2_bench.observe(device)
         arcor2_bench.half_frame()
-        raised(lambda: arcor2_bench.ask(device), DeviceError, within=arcor2_bench.call_within, what="half an answer")
+        raised(
+            lambda: arcor2_bench.ask(device), DeviceError, within=arcor2_bench.call_within, what="an incomplete answer"
+        )
         arcor2_bench.heal()
         seen_again(arcor2_bench, device)

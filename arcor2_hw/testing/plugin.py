@@ -1,4 +1,4 @@
-"""The pytest plugin: options and fixtures of the suite. It does nothing until a test class uses the suite."""
+"""The pytest plugin: options and fixtures of the conformance suite. It only acts on test classes of the suite."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from arcor2_hw.testing.outcomes import Outcomes, Ran, Verdict
     from arcor2_hw.testing.quality import Quality
 
-_REWRITTEN = ("acting_cases", "acts", "conformance", "connecting_cases", "life", "loss_cases", "written_cases")
+_REWRITTEN = ("acting_cases", "conformance", "connecting_cases", "life", "loss_cases", "steps", "written_cases")
 pytest.register_assert_rewrite(*(f"arcor2_hw.testing.{each}" for each in _REWRITTEN))
 
 OUTCOMES: pytest.StashKey[Outcomes] = pytest.StashKey()
@@ -36,7 +36,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--real",
         action="store_true",
-        help="touch real devices: those, and only those, that --real-device names",
+        help="use real devices, but only those named by --real-device",
     )
     group.addoption(
         "--real-device",
@@ -49,17 +49,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--report",
         metavar="FILE",
-        help="write what the conformance suite found, as evidence for level gold",
+        help="write the results of the conformance suite, as evidence for level gold",
     )
     group.addoption(
         "--phases",
         type=int,
         metavar="SEED",
-        help="stop at the moments of an earlier run, whose seed was printed",
+        help="repeat the random moments of an earlier run, which printed this seed",
     )
 
 
-# ---------------------------------------------------------------------------------------------------- what ran
+# ---------------------------------------------------------------------------------------------------- results
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Record the collected tests before any is deselected."""
@@ -71,7 +71,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """With `--dist loadgroup`, run the cases of a bench in one process, because they share a fake or a device."""
+    """With `--dist loadgroup`, run all cases of a bench in one process, because they share a fake or a device."""
     if config.getvalue("dist") != "loadgroup":
         return None
     from xdist.scheduler import LoadGroupScheduling  # type: ignore[import-untyped]
@@ -81,13 +81,13 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
     cases = {f"test_{case}" for case in (*Conformance.cases(), LEVEL_CASE)}
 
-    class TogetherOnOneBench(LoadGroupScheduling):  # type: ignore[misc] # no hints there
+    class OneProcessPerBench(LoadGroupScheduling):  # type: ignore[misc] # xdist has no type hints
         def _split_scope(self, nodeid: str) -> str:
             place, _, test = nodeid.rpartition("::")
             case, _, bench = test.partition("[")
             return f"{place}[{bench}" if bench and case in cases else str(super()._split_scope(nodeid))
 
-    return TogetherOnOneBench(config, log)
+    return OneProcessPerBench(config, log)
 
 
 def _bench_of(item: pytest.Item) -> type[Bench] | None:
@@ -97,7 +97,7 @@ def _bench_of(item: pytest.Item) -> type[Bench] | None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Store the bench in the reports of a case, also for the processes of xdist."""
+    """Store the bench and the case in the reports, also those of xdist processes."""
     from arcor2_hw.testing.outcomes import PROPERTY
 
     kind = _bench_of(item)
@@ -115,8 +115,8 @@ def _values(item: pytest.Item) -> dict[str, Any]:
     return values
 
 
-class _Listening:
-    """Records the reports of the suite, in the main process and in those that run the cases."""
+class _Recorder:
+    """Record the reports of the suite, in the main process and in the processes that run the cases."""
 
     def __init__(self, config: pytest.Config) -> None:
         self._config = config
@@ -133,11 +133,11 @@ class _Listening:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Start recording."""
-    config.pluginmanager.register(_Listening(config), "arcor2_hw_outcomes")
+    config.pluginmanager.register(_Recorder(config), "arcor2_hw_outcomes")
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Write the requested report; with xdist, in the main process, which has all results."""
+    """Write the requested report. With xdist, only the main process has all results."""
     file = session.config.getoption("--report")
     if file and not hasattr(session.config, "workerinput"):
         from arcor2_hw.testing import report
@@ -161,8 +161,8 @@ def _line(name: str, ran: Ran) -> str:
 
     assert ran.reached is not None
     counts = ", ".join(f"{number} {kind}" for kind in Kind if (number := ran.count(kind)))
-    lacks = f"; next: {'; '.join(ran.missing[:3])}" + (" …" if len(ran.missing) > 3 else "") if ran.missing else ""
-    return f"{name}: {ran.reached.name.lower()} (claimed {ran.claimed.name.lower()}), {counts}{lacks}"
+    missing = f"; next: {'; '.join(ran.missing[:3])}" + (" …" if len(ran.missing) > 3 else "") if ran.missing else ""
+    return f"{name}: {ran.reached.name.lower()} (claimed {ran.claimed.name.lower()}), {counts}{missing}"
 
 
 # ---------------------------------------------------------------------------------------------------- fixtures
@@ -172,7 +172,7 @@ def arcor2_running_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
     kind: type[Bench] = request.param
     option = request.config.getoption
     if kind.real and not (option("--real") and kind.name() in option("--real-device")):
-        pytest.skip(f"{kind.name()} is a real device: name it by --real --real-device {kind.name()}")
+        pytest.skip(f"{kind.name()} is a real device. Use --real --real-device {kind.name()}.")
     bench = kind()
     try:
         bench.start()
@@ -201,11 +201,11 @@ def arcor2_identity(request: pytest.FixtureRequest, arcor2_running_bench: Bench)
 def arcor2_bench(
     request: pytest.FixtureRequest, arcor2_running_bench: Bench, arcor2_identity: dict[str, str]
 ) -> Iterator[Bench]:
-    """Return the bench, reset, for one case for which it has the hooks; otherwise a reason is required."""
+    """Return the bench after a reset. Skip or fail a case for which it lacks hooks."""
     bench = arcor2_running_bench
     values = _values(request.node)
     values |= {"address": bench.address, "identity": arcor2_identity}
-    _fit(request, bench, values)
+    _check_hooks(request, bench, values)
     try:
         bench.reset()
         yield bench
@@ -214,7 +214,7 @@ def arcor2_bench(
         bench.reset()
 
 
-def _fit(request: pytest.FixtureRequest, bench: Bench, values: dict[str, Any]) -> None:
+def _check_hooks(request: pytest.FixtureRequest, bench: Bench, values: dict[str, Any]) -> None:
     """Skip or fail a case for which the bench lacks hooks, or that quality.yaml excludes."""
     from arcor2_hw.exceptions import Arcor2Error
     from arcor2_hw.testing.outcomes import Kind
@@ -229,7 +229,7 @@ def _fit(request: pytest.FixtureRequest, bench: Bench, values: dict[str, Any]) -
     except Arcor2Error as error:
         if not bench.guessed:
             pytest.fail(str(error), pytrace=False)
-        reason = None  # a faulty quality.yaml must not prevent the cases; the case `described` reports it
+        reason = None  # the case `described` reports an invalid quality.yaml
 
     def skip(kind: Kind, why: str) -> None:
         values.update(kind=kind.value, reason=why)
@@ -261,16 +261,16 @@ def _claims(bench: Bench) -> Quality:
 
 @pytest.fixture
 def arcor2_phases(request: pytest.FixtureRequest) -> random.Random:
-    """Return the moments at which a case stops, from a seed that is printed."""
+    """Return the random numbers of a case. Their seed is printed."""
     seed = request.config.getoption("--phases")
     seed = random.SystemRandom().randrange(1 << 32) if seed is None else seed
-    print(f"the moments of this case again: --phases {seed}")  # noqa: T201 - pytest shows it where the case fails
+    print(f"To repeat the moments of this case, use --phases {seed}")  # noqa: T201 - pytest shows it on failure
     return random.Random(seed)
 
 
 @pytest.fixture
 def arcor2_verdict(request: pytest.FixtureRequest, arcor2_running_bench: Bench) -> Verdict:
-    """Return the level reached by the cases of the bench, all of which must have run in this process."""
+    """Return the level that the cases of the bench show, if all of them ran in this process."""
     from arcor2_hw.exceptions import Arcor2Error
     from arcor2_hw.testing import outcomes, report, rules
     from arcor2_hw.testing.quality import Level

@@ -1,4 +1,4 @@
-"""Report: evidence for level gold from a run of the suite on real devices, and its check against a claim."""
+"""Report: results of the suite on real devices as evidence for level gold, and their check against a claim."""
 
 import importlib.metadata
 import platform

@@ -13,8 +13,8 @@ from typing import Final
 from arcor2_hw.testing.wire import Wire
 
 _CHUNK: Final = 4096
-_LOOK: Final = 0.1
-"""Time between checks for an unplugged port, s."""
+_CHECK_PERIOD: Final = 0.1
+"""Period of the check whether an unplugged port is back, s."""
 
 
 class SerialWire(Wire):
@@ -25,7 +25,7 @@ class SerialWire(Wire):
         self._path = path
         self._device = -1
         self._ends: tuple[int, int] | None = (
-            None  # ours, and the driver's, kept open so that a driver may close and open it
+            None  # our end and that of the driver, which stays open so that a driver may reopen it
         )
         self._mode: list[object] = []
         self._thread: threading.Thread | None = None
@@ -105,7 +105,7 @@ class SerialWire(Wire):
             self._plug()
         os.write(self._alarm, b"!")
 
-    def _mended(self) -> None:
+    def _healed(self) -> None:
         """Discard everything: data on a cut line is lost."""
 
     # -------------------------------------------------------------------------------- forwarding
@@ -115,8 +115,8 @@ class SerialWire(Wire):
                 ends, device = self._ends, self._device
             watched = [each for each in (self._alarm_in, device, ends[0] if ends else -1) if each >= 0]
             try:
-                ready, _, _ = select.select(watched, [], [], _LOOK if device < 0 else None)
-            except OSError:  # unplugged since
+                ready, _, _ = select.select(watched, [], [], _CHECK_PERIOD if device < 0 else None)
+            except OSError:  # another thread has unplugged it
                 continue
             with self._lock:
                 if self._alarm_in in ready:
@@ -136,7 +136,7 @@ class SerialWire(Wire):
         self._keep("driver", self._count, data)
         if self._cut or self._device < 0:
             return
-        self._set_as_the_driver_did(end)
+        self._copy_line_settings(end)
         self._write(self._device, data)
 
     def _from_device(self, device: int) -> None:
@@ -146,7 +146,7 @@ class SerialWire(Wire):
             return
         except OSError:
             data = b""
-        if not data:  # unplugged, and so is the driver's
+        if not data:  # the port was unplugged, so the port of the driver is unplugged too
             os.close(device)
             self._device = -1
             self._unplug()
@@ -162,7 +162,7 @@ class SerialWire(Wire):
             self._device = self._open_device()
             self._plug()
 
-    def _set_as_the_driver_did(self, end: int) -> None:
+    def _copy_line_settings(self, end: int) -> None:
         with contextlib.suppress(termios.error):
             wanted = termios.tcgetattr(end)
             mode = [wanted[2], wanted[4], wanted[5]]
@@ -174,7 +174,7 @@ class SerialWire(Wire):
 
     @staticmethod
     def _write(end: int, data: bytes) -> None:
-        """Write what fits into the buffer: unread data of a serial line is lost."""
+        """Write the data that fits into the buffer. Unread data of a serial line is lost."""
         while data:
             try:
                 data = data[os.write(end, data) :]

@@ -1,4 +1,4 @@
-"""Steps of several cases: start an act, lose the device, wait until it is back, observe and ask it."""
+"""Common steps of the cases: start an action, lose the device, wait until it is back, observe it."""
 
 import time
 from collections.abc import Callable
@@ -14,31 +14,31 @@ from arcor2_hw.testing.bench import Bench
 from arcor2_hw.testing.life import POLL, BackgroundCall, wait_until
 
 WATCHED: Final = 0.5
-"""Time for which nothing may start to move again, s."""
+"""Time in which nothing may start to move again, s."""
 STARTS_WITHIN: Final = 15.0
-"""Time limit until a long act is running at the device, s; a process that imports a vendor library needs some time."""
+"""Time limit until a long action runs at the device, s. A process that imports a vendor library needs some time."""
 GONE: Final = (NotConnected, ConnectionLost, DeviceTimeout, Stale)
-"""Errors that a call on a device that does not answer may raise."""
+"""Errors that a call of a silent device may raise."""
 UP: Final = (Connection.ONLINE, Connection.BACK)
 
 
-def under_way(bench: Bench, device: Generic) -> BackgroundCall:
-    """Start the long act and wait until it is running at the device."""
+def start_action(bench: Bench, device: Generic) -> BackgroundCall:
+    """Start `run_long` and wait until the action runs at the device."""
     act = BackgroundCall(lambda: bench.run_long(device))
-    wait_until(lambda: bench.running() or act.over, STARTS_WITHIN, "the act of run_long")
-    assert not act.over, f"the act of run_long ended at once: {act.error!r}"
+    wait_until(lambda: bench.running() or act.over, STARTS_WITHIN, "run_long")
+    assert not act.over, f"run_long ended at once: {act.error!r}"
     return act
 
 
 def lose(bench: Bench, device: Generic) -> None:
     """Cut the cable and wait until the driver reports it."""
     bench.cut()
-    wait_until(lambda: device.connection is Connection.LOST, bench.lost_within, "telling that the connection is lost")
+    wait_until(lambda: device.connection is Connection.LOST, bench.lost_within, "reporting the connection as lost")
 
 
 def back(bench: Bench, device: Generic) -> None:
     """Wait until the device is observed again."""
-    wait_until(lambda: device.connection in UP, bench.back_within, "being connected again")
+    wait_until(lambda: device.connection in UP, bench.back_within, "reporting the connection as online again")
 
 
 def observed(bench: Bench, device: Generic) -> bool:
@@ -54,14 +54,14 @@ def observed(bench: Bench, device: Generic) -> bool:
 def seen_again(bench: Bench, device: Generic) -> None:
     """Wait until a reading is available after a connection loss, even if the loss was too short to be reported."""
 
-    def holds() -> bool:
+    def is_observed() -> bool:
         try:
             return device.connection in UP and observed(bench, device)
         except GONE:
             time.sleep(POLL)
             return False
 
-    wait_until(holds, bench.back_within, "reading again after the loss")
+    wait_until(is_observed, bench.back_within, "a reading after the loss")
 
 
 def on_lanes(device: Generic) -> Device:
@@ -74,5 +74,5 @@ def on_lanes(device: Generic) -> Device:
 def stop_of(device: Generic) -> Callable[[], object]:
     """Return the method that stops a device."""
     stop = device.halt if isinstance(device, Axis) else getattr(device, "stop", None)
-    assert callable(stop), "what runs for long needs a stop()"
+    assert callable(stop), "a device with run_long must have a stop()"
     return stop

@@ -13,7 +13,7 @@ from arcor2_hw.testing.wire import MAX_HELD, Side, Wire
 
 _RESETS: Final = struct.pack("ii", 1, 0)  # struct linger: on, 0 s: closing sends RST
 _CHUNK: Final = 65536
-_REACH_WITHIN: Final = 3.0
+_CONNECT_TIMEOUT: Final = 3.0
 """Time limit of a connection to the device, s."""
 
 
@@ -28,7 +28,7 @@ class _Link:
         self.waiting: dict[Side, bytearray] = {"driver": bytearray(), "device": bytearray()}  # by sender
         self.ended: set[Side] = set()
         self.shut: set[Side] = set()
-        self.torn = device is None  # opened while the cable was cut: unknown to the device
+        self.torn = device is None  # opened while the cable was cut, so the device does not know it
 
     def end_of(self, by: Side) -> socket.socket | None:
         return self.ends.get("device" if by == "driver" else "driver")
@@ -62,7 +62,7 @@ class TcpWire(Wire):
 
     # -------------------------------------------------------------------------------- life
     def start(self) -> None:
-        """Listen and forward."""
+        """Start to listen and forward."""
         family = socket.AF_INET6 if _is_v6(self._listen_at) else socket.AF_INET
         self._selector = selectors.DefaultSelector()
         self._alarm, alarm = socket.socketpair()
@@ -113,9 +113,9 @@ class TcpWire(Wire):
             for link in {link for link, _ in self._links.values()}:
                 self._drop(link)
 
-    def _mended(self) -> None:
+    def _healed(self) -> None:
         for link in {link for link, _ in self._links.values()}:
-            # A torn stream cannot be synchronized again. An end that was closed meanwhile will send nothing again.
+            # A torn stream cannot be synchronized again. An end that was closed during the cut sends nothing more.
             if link.torn or "driver" in link.ended:
                 self._drop(link)
             else:
@@ -128,7 +128,7 @@ class TcpWire(Wire):
             for key, events in self._selector.select():
                 end = key.fileobj
                 if not isinstance(end, socket.socket) or end.fileno() < 0:
-                    continue  # closed by another thread since
+                    continue  # another thread has closed it
                 if end in self._listeners:
                     self._accept(end)
                 elif end is self._woken:
@@ -146,8 +146,8 @@ class TcpWire(Wire):
         device: socket.socket | None = None
         if not self._cut:
             try:
-                device = socket.create_connection((self._host, self._listeners[listener]), _REACH_WITHIN)
-            except OSError:  # the device is missing; a reset is the closest equivalent
+                device = socket.create_connection((self._host, self._listeners[listener]), _CONNECT_TIMEOUT)
+            except OSError:  # a missing device is represented by a reset
                 _abort(driver)
                 return
         with self._lock:
@@ -175,7 +175,7 @@ class TcpWire(Wire):
                 self._write(link, "driver")
                 self._write(link, "device")
         except OSError:
-            if self._cut:  # a cut end does not notice what the other end does
+            if self._cut:  # while the cable is cut, an end is not affected by the other
                 link.ended |= {side}
                 link.torn = True
             else:
@@ -190,7 +190,7 @@ class TcpWire(Wire):
         data = end.recv(_CHUNK)
         if not data:
             link.ended.add(side)
-            if link.torn and side == "driver":  # nobody waits for it
+            if link.torn and side == "driver":  # the device does not know this connection
                 link.shut.add(side)
             return
         self._keep(side, link.number, data)

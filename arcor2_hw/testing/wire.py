@@ -1,4 +1,4 @@
-"""Wire: the cable between a driver and its device, real or simulated; it can be cut, and records its traffic."""
+"""Wire: a cable between a driver and its device, real or simulated, that can be cut and records its traffic."""
 
 import abc
 import collections
@@ -10,16 +10,16 @@ from typing import Final, Literal
 from arcor2_hw.data.base import Data
 from arcor2_hw.testing.frames import Frames
 
-LONGEST_RECORD: Final = 200_000
-"""Maximum number of recorded pieces; a camera with 30 images per second fills half of it in an hour."""
+MAX_RECORD: Final = 200_000
+"""Maximum number of recorded pieces. A camera with 30 images per second fills half of it in an hour."""
 MAX_HELD: Final = 1 << 20
-"""Data that a cut cable holds back, bytes, like the buffers of both ends."""
+"""Maximum amount of data that a cut wire buffers, bytes."""
 
 Side = Literal["driver", "device"]
 
 
 class Piece(Data, frozen=True):
-    """Data that one end sent at one moment: monotonic time in s, sender, number of the connection."""
+    """Data that one end sent at once: monotonic time, s; sender; number of the connection."""
 
     at: float
     by: Side
@@ -28,10 +28,10 @@ class Piece(Data, frozen=True):
 
 
 class Wire(abc.ABC):
-    """Forwards bytes both ways on its own thread. For one driver; all methods may be called from any thread."""
+    """Forward bytes in both directions on its own thread. All methods may be called from any thread."""
 
     def __init__(self) -> None:
-        self._record: collections.deque[Piece] = collections.deque(maxlen=LONGEST_RECORD)
+        self._record: collections.deque[Piece] = collections.deque(maxlen=MAX_RECORD)
         self._lock = threading.RLock()
         self._cut = False
         self._tear_next = False
@@ -40,7 +40,7 @@ class Wire(abc.ABC):
     @property
     @abc.abstractmethod
     def address(self) -> str:
-        """Return what the driver has to open instead of the device: `host:port`, or a path."""
+        """Return the address that the driver opens instead of the device: `host:port` or a path."""
 
     @abc.abstractmethod
     def start(self) -> None:
@@ -60,16 +60,16 @@ class Wire(abc.ABC):
         """Break the connection once at both ends; a new one is accepted at once."""
 
     @abc.abstractmethod
-    def _mended(self) -> None:
-        """Handle data that was held back; the lock is held."""
+    def _healed(self) -> None:
+        """Handle the buffered data after a cut. The caller holds the lock."""
 
     def cut(self) -> None:
-        """Forward nothing from now on and notify nobody, as when the cable is unplugged."""
+        """Stop forwarding without closing connections, as when the cable is unplugged."""
         with self._lock:
             self._cut = True
 
     def half_frame(self) -> None:
-        """Forward half of what the device sends next, and nothing from then on."""
+        """Forward half of the next data from the device, then nothing more."""
         with self._lock:
             self._tear_next = True
 
@@ -79,10 +79,10 @@ class Wire(abc.ABC):
             self._tear_next = False
             if self._cut:
                 self._cut = False
-                self._mended()
+                self._healed()
 
     def _torn(self, data: bytes) -> tuple[bytes, bool]:
-        """Return the part of the device's bytes to forward, and whether the rest was torn off; the lock is held."""
+        """Return the bytes of the device to forward, and whether the rest is discarded. The caller holds the lock."""
         if not self._tear_next:
             return data, False
         self._tear_next, self._cut = False, True
@@ -93,7 +93,7 @@ class Wire(abc.ABC):
         self._record.append(Piece(time.monotonic(), by, link, data))
 
     def record(self) -> Sequence[Piece]:
-        """Return what was forwarded since `forget`, in order of time."""
+        """Return the recorded data since `forget`, in order of time."""
         with self._lock:
             return tuple(self._record)
 

@@ -18,14 +18,14 @@ class WrittenCases:
     def test_types_complete(self, arcor2_bench: Bench) -> None:
         """Every public method has a type hint for each parameter and for the result."""
         lacking = capabilities.unhinted(arcor2_bench.object_type)
-        assert not lacking, f"there is no hint at {', '.join(lacking)}"
+        assert not lacking, f"type hints are missing at {', '.join(lacking)}"
 
     def test_long_actions_can_be_stopped(self, arcor2_bench: Bench) -> None:
         """Every action that may last longer than 1 s is ended by stop() or by its method in CANCEL_MAPPING."""
         found = capabilities.unstoppable(arcor2_bench.object_type)
         assert not found, (
-            f"nothing stops {', '.join(found)}: define stop(), name a method in CANCEL_MAPPING, or declare that an "
-            f"action is over within {capabilities.STOPPABLE_FROM:g} s by @action(quick=True)"
+            f"{', '.join(found)} cannot be stopped: define stop(), name a method in CANCEL_MAPPING, or declare that an "
+            f"action ends within {capabilities.STOPPABLE_FROM:g} s by @action(quick=True)"
         )
 
     def test_capabilities_declared(self, arcor2_bench: Bench) -> None:
@@ -42,47 +42,51 @@ class WrittenCases:
             try:
                 getattr(device, name)()
             except (Refused, InvalidData, NotFound):
-                continue  # not in this state, or not without arguments
+                continue  # it needs another state or arguments
             except Exception as error:
                 raise AssertionError(f"{name}() raised {type(error).__name__}: {error}") from error
 
     @needs("works", for_silver=True)
     def test_capabilities_work(self, arcor2_bench: Bench) -> None:
-        """Every declared optional method that acts works; readings are tried elsewhere."""
+        """Every declared optional method that acts on the device works."""
         device = arcor2_bench.controlled()
         said, wanted = (each(type(device)) for each in (capabilities.declared, capabilities.to_be_shown))
         shown = dict(arcor2_bench.works(device))
-        assert not (more := set(shown) - said), f"the bench shows what is not declared: {', '.join(sorted(more))}"
-        assert not (less := wanted - set(shown)), f"nothing shows that these work: {', '.join(sorted(less))}"
+        assert not (undeclared := set(shown) - said), (
+            f"the bench calls methods that are not declared: {', '.join(sorted(undeclared))}"
+        )
+        assert not (missing := wanted - set(shown)), f"the bench does not call {', '.join(sorted(missing))}"
         for name, call in shown.items():
             try:
                 call()
             except Exception as error:
-                raise AssertionError(f"{name} is declared and raised {type(error).__name__}: {error}") from error
+                raise AssertionError(f"{name} is declared, but raised {type(error).__name__}: {error}") from error
 
     @needs("readings", for_silver=True)
     def test_units_and_frames(self, arcor2_bench: Bench) -> None:
         """Readings equal the values of the device itself, in SI units, with its signs and in the declared frame."""
         checks = list(arcor2_bench.readings(arcor2_bench.connected()))
-        assert checks, "the bench compares no reading"
+        assert checks, "the bench does not compare any reading"
         for each in checks:
             apart = abs(each.by_driver - each.by_device)
             assert apart <= each.within, (
-                f"{each.what}: the driver says {each.by_driver:g}, the device {each.by_device:g}: more than "
-                f"{each.within:g} apart"
+                f"{each.what}: the driver reads {each.by_driver:g}, the device {each.by_device:g}; they differ by more "
+                f"than {each.within:g}"
             )
-        assert any(each.by_device for each in checks), "all is zero at the device: no unit or sign could be wrong"
+        assert any(each.by_device for each in checks), (
+            "all values of the device are zero, so units and signs are not tested"
+        )
 
     @needs("beyond_limits", for_silver=True)
     def test_limits_are_refused(self, arcor2_bench: Bench) -> None:
         """Values beyond a limit are refused with a typed error that names the device, without effect."""
         device = arcor2_bench.controlled()
         calls = arcor2_bench.beyond_limits(device)
-        assert calls, "the bench tries no limit"
+        assert calls, "the bench does not try any limit"
         for what, call in calls.items():
             before = arcor2_bench.writes() if arcor2_bench.has("writes") else None
             error = raised(call, OutOfRange, Refused, KinematicsError, within=arcor2_bench.call_within, what=what)
             text = f"{error} {error.detail}"
             assert device.name in text, f"the refusal of {what} does not name {device.name!r}: {text}"
             if before is not None:
-                assert arcor2_bench.writes() == before, f"{what} was refused and acted all the same"
+                assert arcor2_bench.writes() == before, f"{what} was refused, but acted on the device"

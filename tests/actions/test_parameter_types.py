@@ -67,7 +67,7 @@ def check(kind: str, value: str, index: ProjectIndex | None = None, extra: str |
     PARAMETER_TYPES[kind].check(Parameter("p", kind, value), meta, index, **more)
 
 
-def test_exactly_the_types_of_the_protocol() -> None:
+def test_all_types_of_the_protocol_exist() -> None:
     assert sorted(PARAMETER_TYPES) == PROTOCOL["parameter_types"]
 
 
@@ -88,7 +88,7 @@ def test_exactly_the_types_of_the_protocol() -> None:
         ("IntEnum", "integer_enum"),
     ],
 )
-def test_hints(hint: str, name: str) -> None:
+def test_type_hints_map_to_parameter_types(hint: str, name: str) -> None:
     found = by_annotation(hint)
     assert found is not None
     assert found.name == name
@@ -104,7 +104,7 @@ ACCEPTED = {
 
 
 @pytest.mark.parametrize("kind", ACCEPTED)
-def test_a_literal_has_exactly_its_kind(kind: str) -> None:
+def test_a_literal_must_have_exactly_its_type(kind: str) -> None:
     for other, values in ACCEPTED.items():
         for value in values:
             if other == kind:
@@ -116,12 +116,12 @@ def test_a_literal_has_exactly_its_kind(kind: str) -> None:
 
 @pytest.mark.parametrize("value", ["", "nope", "NaN", "1e400", "[", "[" * 5000, "null", '{"a":1}', "1 2"])
 @pytest.mark.parametrize("kind", PARAMETER_TYPES)
-def test_what_is_no_literal_is_refused_by_name(kind: str, value: str, index: ProjectIndex) -> None:
+def test_an_invalid_literal_is_refused_by_name(kind: str, value: str, index: ProjectIndex) -> None:
     with pytest.raises(InvalidData, match="parameter p"):
         check(kind, value, index)
 
 
-def test_ranges_and_lists_of_the_action_count() -> None:
+def test_declared_ranges_and_values_are_checked() -> None:
     bounds = '{"minimum":0.0,"maximum":1.0}'
     for inside in ("0.0", "0.5", "1.0"):
         check("double", inside, extra=bounds)
@@ -141,14 +141,14 @@ def test_ranges_and_lists_of_the_action_count() -> None:
         check("integer", "5", extra='{"maximum":"x"}')
 
 
-def test_the_stated_type_counts() -> None:
+def test_a_different_declared_type_is_refused() -> None:
     with pytest.raises(InvalidData, match="must be of type double"):
         PARAMETER_TYPES["double"].check(Parameter("p", "integer", "1.0"), ParameterMeta("p", "double"))
     with pytest.raises(InvalidData, match="must be of type string"):
         PARAMETER_TYPES["double"].check(Parameter("p", "double", "1.0"), ParameterMeta("p", "string"))
 
 
-def test_references_are_looked_up_and_given_in_the_world(index: ProjectIndex) -> None:
+def test_references_are_resolved_to_world_coordinates(index: ProjectIndex) -> None:
     for kind, known in (("pose", "ori"), ("position", "acp"), ("joints", "joi")):
         check(kind, f'"{known}"', index)
         with pytest.raises(InvalidData, match=r"parameter p.*unknown_id"):
@@ -163,7 +163,7 @@ def test_references_are_looked_up_and_given_in_the_world(index: ProjectIndex) ->
     assert list(position) == pytest.approx([1, 1, 1])
 
 
-def test_what_an_action_gets_is_its_own(index: ProjectIndex) -> None:
+def test_an_action_gets_copies(index: ProjectIndex) -> None:
     for kind, known in (("pose", "ori"), ("position", "acp_parent"), ("joints", "joi")):
         first = PARAMETER_TYPES[kind].value(Parameter("p", kind, f'"{known}"'), index)
         if kind == "joints":
@@ -174,13 +174,13 @@ def test_what_an_action_gets_is_its_own(index: ProjectIndex) -> None:
         assert second != first
 
 
-def test_joints_belong_to_the_robot(index: ProjectIndex) -> None:
+def test_joints_of_another_robot_are_refused(index: ProjectIndex) -> None:
     check("joints", '"joi"', index, robot_id="obj_robot")
     with pytest.raises(InvalidData, match="parameter p: joints j belong to another robot"):
         check("joints", '"joi"', index, robot_id="obj_other")
 
 
-def test_a_picture_is_never_a_literal(index: ProjectIndex) -> None:
+def test_an_image_is_never_a_literal(index: ProjectIndex) -> None:
     parameter = Parameter("p", "image", '"x"')
     for call in (
         lambda kind: kind.check(parameter, None, index),
@@ -192,7 +192,7 @@ def test_a_picture_is_never_a_literal(index: ProjectIndex) -> None:
 
 
 @given(st.one_of(st.booleans(), st.integers(), st.floats(allow_nan=False, allow_infinity=False), st.text()))
-def test_a_scalar_comes_back_from_script_and_event(value: object) -> None:
+def test_scalars_survive_script_and_event(value: object) -> None:
     kind = {bool: "boolean", int: "integer", float: "double", str: "string"}[type(value)]
     try:
         text = PARAMETER_TYPES[kind].encode(value)
@@ -221,11 +221,11 @@ def test_a_scalar_comes_back_from_script_and_event(value: object) -> None:
         ("double", "-0.0", "-0.0"),
     ],
 )
-def test_scripts_name_what_they_use(kind: str, value: str, source: str) -> None:
+def test_scripts_refer_to_points_by_name(kind: str, value: str, source: str) -> None:
     assert ast.unparse(PARAMETER_TYPES[kind].expression(Parameter("p", kind, value), Names())) == source
 
 
-def test_results_keep_their_kind_on_the_wire() -> None:
+def test_results_keep_their_type() -> None:
     assert PARAMETER_TYPES["double"].encode(2) == "2.0"
     assert PARAMETER_TYPES["integer"].encode(2) == "2"
     for kind, wrong in (
@@ -246,7 +246,7 @@ def test_results_keep_their_kind_on_the_wire() -> None:
         encode(object())
 
 
-def test_a_picture_travels_without_loss_where_it_must() -> None:
+def test_depth_images_are_encoded_without_loss() -> None:
     image = pytest.importorskip("PIL.Image")
     depth = image.new("I;16", (3, 2))
     depth.putpixel((1, 1), 4711)

@@ -30,18 +30,18 @@ class Recorder(Requests):
         return names, limit
 
 
-def test_the_file_is_what_the_structs_say() -> None:
+def test_the_generated_file_is_current() -> None:
     assert generating.FILE.read_text() == generating.source(), "run python -m arcor2_hw.client.generating"
 
 
-def test_there_is_a_method_for_every_request_and_no_other() -> None:
+def test_every_request_has_a_method() -> None:
     methods = {name for name, _ in inspect.getmembers(Requests, inspect.iscoroutinefunction)} - {"call"}
     assert methods == {signatures.method_name(name) for name in RPCS}
     assert signatures.method_name("AddApUsingRobot") == "add_ap_using_robot"
 
 
 @pytest.mark.parametrize("rpc", RPCS.values(), ids=lambda rpc: rpc.name)
-async def test_arguments_arrive_and_what_is_left_out_is_as_the_struct_has_it(rpc: Any) -> None:
+async def test_omitted_arguments_have_the_defaults_of_the_struct(rpc: Any) -> None:
     client = Recorder()
     method = getattr(client, signatures.method_name(rpc.name))
     given: dict[str, Any] = {}
@@ -74,7 +74,7 @@ async def test_every_argument_reaches_the_field_of_its_name() -> None:
     assert "AddAction" in {name for name, *_ in client.sent}
 
 
-def test_streams_know_their_names() -> None:
+def test_unknown_event_names_are_refused() -> None:
     client: Any = Recorder()
     assert client.follow("SceneState", limit=5) == ({"SceneState"}, 5)
     with pytest.raises(ValueError, match=r"SceneStat$"):
@@ -83,14 +83,14 @@ def test_streams_know_their_names() -> None:
     assert all(f'Literal["{name}"]' in text for name in EVENTS)
 
 
-def test_what_is_asked_again_reads_and_touches_no_device() -> None:
+def test_repeated_requests_only_read() -> None:
     assert RPCS.keys() >= READING
     assert not any(RPCS[name].dry_run for name in READING)
     harmless = ("Get", "List", "History", "SystemInfo", "ObjectTypeUsage", "SceneObjectUsage", "ProjectsWith")
     assert all(name.startswith(harmless) for name in READING)
 
 
-def test_a_struct_that_cannot_be_written_is_refused() -> None:
+def test_an_unsupported_default_is_refused() -> None:
     names = generating._Names()
 
     class Odd(msgspec.Struct):

@@ -43,7 +43,7 @@ async def server(tmp_path: Path) -> AsyncIterator[ServerProcess]:
         yield server
 
 
-async def test_a_project_is_written_in_methods_and_its_events_are_typed(server: ServerProcess) -> None:
+async def test_a_project_is_edited_by_methods_with_typed_events(server: ServerProcess) -> None:
     async with Client(server.url, "ann") as ann, Client(server.url, "bob") as bob:
         with bob.follow("ActionPointChanged") as points, ann.follow("SceneState") as states:
             await ann.new_scene("bench")
@@ -160,7 +160,7 @@ async def test_documents_assets_and_packages_over_http(server: ServerProcess, tm
     assert issubclass(InTheWay, Conflict)
 
 
-async def test_a_token_gives_its_role_and_no_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_token_grants_only_its_role(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     data = tmp_path / "data"
     data.mkdir()
     _, secret = TokenFile(data).add("line control", Role.OPERATOR)
@@ -210,7 +210,7 @@ class Killed:
         await self.process.communicate()
 
 
-async def test_a_killed_server_costs_at_most_the_answer_of_one_edit(tmp_path: Path) -> None:
+async def test_a_killed_server_loses_at_most_one_answer(tmp_path: Path) -> None:
     server = Killed(tmp_path / "data")
     url = await server.start()
     try:

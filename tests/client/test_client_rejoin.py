@@ -33,7 +33,7 @@ async def lose(server: ScriptedServer, client: Client) -> None:
 INFO = {"version": "1", "api_version": "1"}
 
 
-async def test_an_edit_whose_answer_is_lost_is_not_sent_again() -> None:
+async def test_an_edit_without_an_answer_is_not_repeated() -> None:
     async with scripted() as server, Client(server.url, "ann") as client:
         server.script["AddActionPoint"] = [cut]
         with pytest.raises(AnswerUnknown, match="may or may not have been executed") as unknown:
@@ -43,7 +43,7 @@ async def test_an_edit_whose_answer_is_lost_is_not_sent_again() -> None:
         assert server.asked == [["RegisterUser", "AddActionPoint"], ["RegisterUser", "SaveProject"]]
 
 
-async def test_a_question_and_a_dry_run_are_asked_again() -> None:
+async def test_reads_and_dry_runs_are_repeated() -> None:
     async with scripted() as server, Client(server.url, "ann") as client:
         server.data["SystemInfo"] = INFO
         server.script = {"SystemInfo": [cut, cut], "SaveProject": [cut]}
@@ -53,7 +53,7 @@ async def test_a_question_and_a_dry_run_are_asked_again() -> None:
         assert (flat.count("SystemInfo"), flat.count("SaveProject"), flat.count("RegisterUser")) == (3, 2, 4)
 
 
-async def test_it_is_again_who_it_was_before_anything_else_is_sent() -> None:
+async def test_the_client_registers_again_before_other_requests() -> None:
     async with scripted() as server, Client(server.url, "ann", token="secret") as client:
         for name in ("RegisterForRobotEvent",):
             server.data[name] = []
@@ -74,7 +74,7 @@ async def test_it_is_again_who_it_was_before_anything_else_is_sent() -> None:
         assert server.tokens == ["Bearer secret"] * 2
 
 
-async def test_streams_tell_the_gap_before_the_greeting_and_what_is_not_resumed() -> None:
+async def test_streams_report_the_gap_after_a_reconnect() -> None:
     async def refuse(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
         await server.answer(socket, request, False, "The scene is offline.", "request_refused")
 
@@ -98,7 +98,7 @@ async def test_streams_tell_the_gap_before_the_greeting_and_what_is_not_resumed(
         assert server.asked[-1] == []  # what was refused is not asked for again
 
 
-async def test_a_name_that_is_held_for_taken_is_tried_until_it_is_free() -> None:
+async def test_registering_is_repeated_until_the_name_is_free() -> None:
     async def taken(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
         await server.answer(socket, request, False, "The name is taken.", "request_refused")
 
@@ -119,7 +119,7 @@ async def test_a_name_that_is_held_for_taken_is_tried_until_it_is_free() -> None
             await Client(server.url, "ann").open()
 
 
-async def test_a_token_that_is_revoked_ends_it_for_good() -> None:
+async def test_a_revoked_token_closes_the_client() -> None:
     async with scripted() as server, Client(server.url, token="old") as client:
         server.admits = False
         await server.sockets[-1].close(4401, "the token is not valid any more")
@@ -136,7 +136,7 @@ async def test_a_token_that_is_revoked_ends_it_for_good() -> None:
             await Client(server.url, token="old").open()
 
 
-async def test_without_reconnecting_the_first_loss_is_the_end() -> None:
+async def test_without_reconnect_the_first_loss_closes_the_client() -> None:
     async with scripted() as server, Client(server.url, reconnect=False) as client:
         server.script["SystemInfo"] = [cut]
         with pytest.raises(AnswerUnknown):
@@ -148,7 +148,7 @@ async def test_without_reconnecting_the_first_loss_is_the_end() -> None:
         assert len(server.asked) == 1
 
 
-async def test_a_deadline_holds_whether_the_answer_is_late_or_nobody_is_there() -> None:
+async def test_time_limits_hold_for_late_answers_and_missing_servers() -> None:
     async def silent(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
         kept.append(request)
 
@@ -175,7 +175,7 @@ async def test_a_deadline_holds_whether_the_answer_is_late_or_nobody_is_there() 
         await client.save_scene()
 
 
-async def test_a_server_that_starts_late_is_waited_for() -> None:
+async def test_the_client_waits_for_a_server_that_starts_late() -> None:
     server = ScriptedServer()
     async with server.running():
         pass
@@ -189,7 +189,7 @@ async def test_a_server_that_starts_late_is_waited_for() -> None:
         await client.close()
 
 
-async def test_what_cannot_be_read_is_told_and_does_not_end_the_connection() -> None:
+async def test_an_invalid_message_does_not_end_the_connection() -> None:
     async with scripted() as server, Client(server.url) as client:
         await client.next_event()
         await server.tell(event="SceneState", data={"state": "upside down"})
@@ -208,7 +208,7 @@ async def test_what_cannot_be_read_is_told_and_does_not_end_the_connection() -> 
     ("code", "kind"),
     [("locked", LockedByOther), ("safety_stop", DeviceFailed), ("of_the_future", RequestFailed), ("", RequestFailed)],
 )
-async def test_a_refusal_is_typed_by_its_code(code: str, kind: type[RequestFailed]) -> None:
+async def test_the_code_of_a_refusal_selects_the_error_class(code: str, kind: type[RequestFailed]) -> None:
     async def refuse(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
         await server.answer(socket, request, False, "No.", code)
 
@@ -219,7 +219,7 @@ async def test_a_refusal_is_typed_by_its_code(code: str, kind: type[RequestFaile
         assert (type(failed.value), failed.value.reason, failed.value.request) == (kind, code, "SaveScene")
 
 
-async def test_closing_lets_those_who_wait_go() -> None:
+async def test_close_ends_waiting_requests() -> None:
     async def silent(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
         pass
 
@@ -238,7 +238,7 @@ async def test_closing_lets_those_who_wait_go() -> None:
         await client.close()
 
 
-async def test_followers_come_and_go() -> None:
+async def test_streams_can_be_opened_and_closed() -> None:
     async with scripted() as server, Client(server.url) as client:
         with client.follow("SceneSaved") as saved, client.follow("SceneSaved", limit=1) as narrow:
             for _ in range(2):
@@ -252,7 +252,7 @@ async def test_followers_come_and_go() -> None:
         assert len(client._streams) == 1
 
 
-async def test_what_nobody_foresaw_is_told_to_all_who_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_an_unexpected_error_is_raised_in_waiting_requests(monkeypatch: pytest.MonkeyPatch) -> None:
     async def broken(*args: Any) -> Any:
         raise ZeroDivisionError("a bug")
 

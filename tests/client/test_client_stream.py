@@ -16,7 +16,7 @@ async def taken(from_stream: EventStream[Event]) -> list[str]:
     return [event.event async for event in from_stream]
 
 
-async def test_events_come_in_order_and_the_end_after_them() -> None:
+async def test_events_arrive_in_order_before_the_end() -> None:
     told = stream()
     for name in "abc":
         told.put(Event(name))
@@ -26,7 +26,7 @@ async def test_events_come_in_order_and_the_end_after_them() -> None:
     assert await taken(told) == []
 
 
-async def test_only_the_names_that_are_followed_take_room() -> None:
+async def test_only_followed_events_are_queued() -> None:
     told = stream("a", limit=2)
     for name in "bababb":
         told.put(Event(name))
@@ -34,7 +34,7 @@ async def test_only_the_names_that_are_followed_take_room() -> None:
     assert await taken(told) == ["a", "a"]
 
 
-async def test_what_found_no_room_is_counted_before_what_is_left() -> None:
+async def test_dropped_events_are_counted_before_the_remaining_ones() -> None:
     told = stream(limit=3)
     for number in range(8):
         told.put(Event(str(number)))
@@ -45,7 +45,7 @@ async def test_what_found_no_room_is_counted_before_what_is_left() -> None:
     assert await taken(told) == ["5", "6", "7"]
 
 
-async def test_a_gap_stands_where_it_was_and_two_become_one() -> None:
+async def test_consecutive_gaps_are_merged_at_their_position() -> None:
     told = stream(limit=5)
     told.put(Event("before"))
     told.put(EventsMissed(rejoined=True, seconds=1.0, not_resumed=("joints of r",)))
@@ -58,7 +58,7 @@ async def test_a_gap_stands_where_it_was_and_two_become_one() -> None:
     assert (await anext(told)).event == "after"
 
 
-async def test_a_gap_that_found_no_room_is_not_forgotten() -> None:
+async def test_a_dropped_gap_is_still_reported() -> None:
     told = stream(limit=2)
     told.put(Event("1"))
     told.put(EventsMissed(rejoined=True, seconds=1.5))
@@ -70,7 +70,7 @@ async def test_a_gap_that_found_no_room_is_not_forgotten() -> None:
     assert (await anext(told)).event == "2"
 
 
-async def test_a_reader_who_gives_up_waiting_loses_nothing() -> None:
+async def test_a_reader_that_times_out_loses_no_event() -> None:
     told = stream()
     for _ in range(3):
         with pytest.raises(TimeoutError):
@@ -80,7 +80,7 @@ async def test_a_reader_who_gives_up_waiting_loses_nothing() -> None:
     assert (await anext(told)).event == "a"
 
 
-async def test_why_it_ended_is_raised_after_what_still_waits() -> None:
+async def test_the_final_error_is_raised_after_the_queued_events() -> None:
     told = stream()
     told.put(Event("a"))
     told.end(NotAdmitted("no"))
@@ -90,6 +90,6 @@ async def test_why_it_ended_is_raised_after_what_still_waits() -> None:
             await anext(told)
 
 
-def test_a_stream_without_room_makes_no_sense() -> None:
+def test_a_stream_needs_a_positive_limit() -> None:
     with pytest.raises(ValueError, match="limit of at least one"):
         stream(limit=0)

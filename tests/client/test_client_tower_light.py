@@ -68,7 +68,7 @@ class Watched:
         return lit == (set() if lamp is None else {lamp})
 
 
-async def test_the_light_follows_the_server_and_says_when_nobody_drives_it(tmp_path: Path, block: FakeProcess) -> None:
+async def test_the_tower_light_example_shows_the_state_of_the_server(tmp_path: Path, block: FakeProcess) -> None:
     lamps = Watched(block)
     host, _, port = block.ready["modbus"].rpartition(":")
     server = Killed(tmp_path / "data")

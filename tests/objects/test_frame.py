@@ -20,7 +20,7 @@ LENSES = {
 
 
 @pytest.mark.parametrize("coefficients", LENSES.values(), ids=LENSES)
-def test_rays_are_those_of_opencv(coefficients: list[float]) -> None:
+def test_rays_equal_those_of_opencv(coefficients: list[float]) -> None:
     import cv2
 
     parameters = CameraParameters(912.5, 912.1, 642.3, 357.8, coefficients)
@@ -34,7 +34,7 @@ def test_rays_are_those_of_opencv(coefficients: list[float]) -> None:
         found[0, 0] = 0
 
 
-def test_cloud_of_a_plane() -> None:
+def test_point_cloud_of_a_plane() -> None:
     parameters = CameraParameters(500.0, 500.0, 160.0, 120.0, [0.0] * 4)
     depth = np.full((240, 320), 750, np.uint16)
     depth[0, 0] = 0
@@ -44,7 +44,7 @@ def test_cloud_of_a_plane() -> None:
     assert np.isnan(points[0, 0]).all()
 
 
-def test_a_depth_picture_keeps_its_note_on_the_wire() -> None:
+def test_a_depth_image_keeps_its_camera_data() -> None:
     from PIL import Image
 
     note = PictureNote(

@@ -78,7 +78,7 @@ def line(arm: Any, target: Pose) -> None:
     arm.move_to_pose("tcp", target, 0.5)
 
 
-def test_a_gripped_part_counts_until_it_is_released(arm: Any, around: Around, claw: Claw) -> None:
+def test_a_gripped_part_is_considered_until_released(arm: Any, around: Around, claw: Claw) -> None:
     target = below_tip(around, arm)
     claw.grip(0.0, 1.0, 1.0)
     line(arm, target)  # of an unknown size
@@ -118,7 +118,7 @@ def test_an_object_of_the_scene_moves_with_the_tool(arm: Any, around: Around, cl
     assert arm.parts == {}, "only the next grip takes the object"
 
 
-def test_a_part_may_rest_on_what_it_was_taken_from(arm: Any, around: Around, claw: Claw) -> None:
+def test_a_gripped_part_may_touch_the_surface_below(arm: Any, around: Around, claw: Claw) -> None:
     here = arm.get_end_effector_pose("tcp")
     at = (BASE.inverted() * here).position
     around.box("table", at + Position(0.0, 0.0, -0.07), 0.3, 0.3, 0.1)  # its top 20 mm below the tip
@@ -132,7 +132,7 @@ def test_a_part_may_rest_on_what_it_was_taken_from(arm: Any, around: Around, cla
         arm.move_to_pose("tcp", moved(here, 0.0, 0.0, 0.1), 0.5)
 
 
-def test_a_part_of_a_suction_cup_hangs_below_it(arm: Any, claw: Claw) -> None:
+def test_a_part_hangs_below_a_suction_cup(arm: Any, claw: Claw) -> None:
     claw.set_part(0.1, 0.08, 0.02)
     for hanging, middle in ((False, 0.0), (True, 0.01)):
         claw.attach_part(hanging=hanging)
@@ -147,7 +147,7 @@ def test_a_part_of_a_suction_cup_hangs_below_it(arm: Any, claw: Claw) -> None:
     assert part.in_link.position.z == -0.01
 
 
-def test_gripping_succeeds_when_the_robot_is_unknown(claw: Claw) -> None:
+def test_gripping_succeeds_without_a_known_robot(claw: Claw) -> None:
     def none(name: str) -> Robot:
         raise NotFound("the scene has 2 robots")
 

@@ -44,7 +44,7 @@ def last_message(reading: int, silence: float) -> float:
     return last
 
 
-def test_messages_are_written_while_pulses_come_and_cease_when_they_do(line: tuple[int, int]) -> None:
+def test_messages_are_written_only_while_pulses_arrive(line: tuple[int, int]) -> None:
     writing, reading = line
     keep_alive = KeepAlive(writing, MESSAGE, 0.02)
     try:
@@ -64,7 +64,7 @@ def test_messages_are_written_while_pulses_come_and_cease_when_they_do(line: tup
         keep_alive.pulse()
 
 
-def test_a_line_with_answers_is_left_alone_while_the_parent_works(line: tuple[int, int]) -> None:
+def test_no_message_is_written_while_the_line_is_in_use(line: tuple[int, int]) -> None:
     writing, reading = line
     keep_alive = KeepAlive(writing, MESSAGE, 0.02, quiet=0.3)
     try:
@@ -78,7 +78,7 @@ def test_a_line_with_answers_is_left_alone_while_the_parent_works(line: tuple[in
         keep_alive.close()
 
 
-def test_messages_cease_at_once_when_the_parent_dies() -> None:
+def test_messages_stop_at_once_when_the_parent_dies() -> None:
     with subprocess.Popen([sys.executable, "-c", OWNER], stdout=subprocess.PIPE) as owner:
         assert owner.stdout is not None
         assert owner.stdout.read(4) == b"kick"
@@ -88,7 +88,7 @@ def test_messages_cease_at_once_when_the_parent_dies() -> None:
         assert own_time() - killed < FROZEN_AFTER / 2.0
 
 
-def test_a_parent_is_judged_by_when_a_pulse_was_sent() -> None:
+def test_the_time_of_sending_a_pulse_counts() -> None:
     reading, writing = os.pipe()
     try:
         parent = Parent(reading)

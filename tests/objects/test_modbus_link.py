@@ -126,7 +126,7 @@ EXAMPLES: list[tuple[str, str, str, Callable[[ModbusLink], object], object]] = [
 @pytest.mark.parametrize(
     ("request_", "answer", "call", "result"), [e[1:] for e in EXAMPLES], ids=[e[0] for e in EXAMPLES]
 )
-def test_frames_of_the_protocols_document(
+def test_frames_match_the_modbus_specification(
     peer: Peer, link: ModbusLink, request_: str, answer: str, call: Callable[[ModbusLink], object], result: object
 ) -> None:
     peer.script = lambda _: adu(answer)
@@ -134,7 +134,7 @@ def test_frames_of_the_protocols_document(
     assert peer.requests == [adu(request_)]
 
 
-def test_exception_of_the_protocols_document(peer: Peer, link: ModbusLink) -> None:
+def test_exceptions_match_the_modbus_specification(peer: Peer, link: ModbusLink) -> None:
     """Section 7: reading a coil that is not there."""
     peer.script = lambda _: adu("81 02")
     with pytest.raises(DeviceFault) as refused:
@@ -146,7 +146,7 @@ def test_exception_of_the_protocols_document(peer: Peer, link: ModbusLink) -> No
     assert refused.value.fault_code == 2
 
 
-def test_identification(peer: Peer, link: ModbusLink) -> None:
+def test_the_identification_is_read(peer: Peer, link: ModbusLink) -> None:
     """Section 6.21, the basic objects; the texts are ours."""
     objects = b"".join(bytes([number, len(text)]) + text for number, text in enumerate((b"Maker", b"P-7", b"V2.11")))
     peer.script = lambda _: adu("2B 0E 01 01 00 00 03" + objects.hex())
@@ -156,13 +156,13 @@ def test_identification(peer: Peer, link: ModbusLink) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ bad days on TCP
-def test_answers_of_others_are_passed_over(peer: Peer, link: ModbusLink) -> None:
+def test_answers_with_another_transaction_id_are_ignored(peer: Peer, link: ModbusLink) -> None:
     """Another transaction's number, another unit's answer, then ours, all in one segment."""
     peer.script = lambda _: adu("04 02 0001", number=7) + adu("04 02 0002", unit=9) + adu("04 02 0003")
     assert link.read_input_registers(0, 1) == [3]
 
 
-def test_an_answer_that_dribbles_in_is_taken_whole(peer: Peer, link: ModbusLink) -> None:
+def test_an_answer_in_pieces_is_assembled(peer: Peer, link: ModbusLink) -> None:
     def script(_: bytes) -> None:
         for byte in adu("04 02 0003"):
             peer.connections[0].sendall(bytes([byte]))
@@ -173,7 +173,7 @@ def test_an_answer_that_dribbles_in_is_taken_whole(peer: Peer, link: ModbusLink)
     assert len(peer.requests) == 1
 
 
-def test_the_time_limit_is_exact_though_bytes_keep_coming(peer: Peer, link: ModbusLink) -> None:
+def test_the_time_limit_is_exact_although_bytes_keep_arriving(peer: Peer, link: ModbusLink) -> None:
     def script(_: bytes) -> None:
         for byte in itertools.repeat(b"\0", 100):
             peer.connections[-1].sendall(byte)
@@ -189,7 +189,7 @@ def test_the_time_limit_is_exact_though_bytes_keep_coming(peer: Peer, link: Modb
     assert len(peer.requests) == 1
 
 
-def test_a_reading_is_asked_for_twice_and_a_write_once(peer: Peer, link: ModbusLink) -> None:
+def test_a_read_is_repeated_once_and_a_write_never(peer: Peer, link: ModbusLink) -> None:
     with pytest.raises(DeviceTimeout, match=r"no answer within 0.2 s \(reading input registers 0 to 0\) twice$"):
         link.read_input_registers(0, 1)
     assert len(peer.requests) == 2
@@ -201,13 +201,13 @@ def test_a_reading_is_asked_for_twice_and_a_write_once(peer: Peer, link: ModbusL
     assert link.read_input_registers(0, 1) == [5]
 
 
-def test_too_few_registers(peer: Peer, link: ModbusLink) -> None:
+def test_too_few_registers_are_an_error(peer: Peer, link: ModbusLink) -> None:
     peer.script = lambda _: adu("04 02 0005")
     with pytest.raises(DeviceFault, match="sent 1 of 3 input registers"):
         link.read_input_registers(0, 3)
 
 
-def test_closed_by_the_other_end_stays_lost_until_it_is_opened(peer: Peer, link: ModbusLink) -> None:
+def test_a_connection_closed_by_the_device_stays_lost(peer: Peer, link: ModbusLink) -> None:
     peer.script = lambda _: peer.connections[0].shutdown(socket.SHUT_RDWR)
     for _ in range(2):
         with pytest.raises(ConnectionLost, match=f"^press at 127.0.0.1:{peer.port}: the connection was lost$"):
@@ -218,7 +218,7 @@ def test_closed_by_the_other_end_stays_lost_until_it_is_opened(peer: Peer, link:
     assert link.read_input_registers(0, 1) == [5]
 
 
-def test_closing_wakes_who_waits(peer: Peer) -> None:
+def test_close_wakes_waiting_threads(peer: Peer) -> None:
     link = ModbusLink("press", "127.0.0.1", peer.port, request_timeout=5.0)
     link.open(1.0)
     came = threading.Event()
@@ -243,7 +243,7 @@ def test_closing_wakes_who_waits(peer: Peer) -> None:
         link.write_coil(0, True)
 
 
-def test_a_request_that_is_broken_off_leaves_the_line_usable(peer: Peer, link: ModbusLink) -> None:
+def test_an_interrupted_request_leaves_the_line_usable(peer: Peer, link: ModbusLink) -> None:
     """A program's thread may be told to end at any instruction; the answer of then must not be the next one's."""
 
     class ToldToEnd(BaseException):
@@ -267,7 +267,7 @@ def test_a_request_that_is_broken_off_leaves_the_line_usable(peer: Peer, link: M
     assert len(peer.connections) == 2
 
 
-def test_requests_of_many_threads_do_not_mix(peer: Peer, link: ModbusLink) -> None:
+def test_requests_of_several_threads_do_not_mix(peer: Peer, link: ModbusLink) -> None:
     def script(request: bytes) -> bytes:
         return adu(f"04 02 {request[8:10].hex()}", number=int.from_bytes(request[:2], "big"))
 
@@ -286,7 +286,7 @@ def test_requests_of_many_threads_do_not_mix(peer: Peer, link: ModbusLink) -> No
     assert len(peer.connections) == 1
 
 
-def test_nobody_there() -> None:
+def test_an_unreachable_device_is_named() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))  # not listening: refuses
         link = ModbusLink("press", *taken.getsockname())
@@ -326,7 +326,7 @@ def answer_on(end: int, answers: list[bytes], delay: float = 0.0) -> tuple[threa
     return thread, requests
 
 
-def test_rtu_frames_with_their_check_sum(line: tuple[int, ModbusLink]) -> None:
+def test_rtu_frames_have_a_checksum(line: tuple[int, ModbusLink]) -> None:
     """The sums are of general knowledge of the protocol: reading ten registers, and one that holds 10."""
     end, link = line
     thread, requests = answer_on(end, [bytes.fromhex("0103020000B844")])
@@ -336,7 +336,7 @@ def test_rtu_frames_with_their_check_sum(line: tuple[int, ModbusLink]) -> None:
     assert requests == [bytes.fromhex("01030000000AC5CD")]
 
 
-def test_rtu_with_a_wrong_check_sum_is_no_answer(line: tuple[int, ModbusLink]) -> None:
+def test_an_rtu_answer_with_a_wrong_checksum_is_ignored(line: tuple[int, ModbusLink]) -> None:
     end, link = line
     thread, requests = answer_on(end, [bytes.fromhex("0103020000B845")] * 2)
     with pytest.raises(DeviceTimeout, match="no valid answer"):
@@ -345,7 +345,7 @@ def test_rtu_with_a_wrong_check_sum_is_no_answer(line: tuple[int, ModbusLink]) -
     assert len(requests) == 2
 
 
-def test_a_late_answer_on_a_serial_line_answers_nothing(line: tuple[int, ModbusLink]) -> None:
+def test_a_late_answer_on_a_serial_line_is_discarded(line: tuple[int, ModbusLink]) -> None:
     """It comes while the line is drained; the reading that is asked for again has its own answer."""
     end, link = line
     late, fresh = bytes.fromhex("0103020000B844"), bytes.fromhex("010302000A3843")
@@ -363,7 +363,7 @@ def test_a_late_answer_on_a_serial_line_answers_nothing(line: tuple[int, ModbusL
     thread.join()
 
 
-def test_frames_are_parted_by_silence(line: tuple[int, ModbusLink]) -> None:
+def test_rtu_frames_are_separated_by_silence(line: tuple[int, ModbusLink]) -> None:
     """Modbus over serial line 1.02, 2.5.1.1: at least 1.75 ms beyond 19200 bit/s."""
     end, link = line
     gaps: list[float] = []

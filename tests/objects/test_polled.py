@@ -72,13 +72,13 @@ def failing(call: Callable[[], object]) -> tuple[threading.Thread, list[BaseExce
     return thread, errors
 
 
-def test_fresh_is_asked_for_after_the_call(polled: Polled[int], device: Device) -> None:
+def test_fresh_returns_a_state_requested_after_the_call(polled: Polled[int], device: Device) -> None:
     for _ in range(20):
         began = time.monotonic()
         assert polled.fresh().asked >= began
 
 
-def test_nothing_is_told_that_was_being_read_when_one_began_to_wait(polled: Polled[int], device: Device) -> None:
+def test_wait_ignores_a_reading_in_progress(polled: Polled[int], device: Device) -> None:
     device.answers.clear()
     polled.hurry()
     time.sleep(0.1)  # it is being read now
@@ -92,14 +92,14 @@ def test_nothing_is_told_that_was_being_read_when_one_began_to_wait(polled: Poll
     assert seen[0] >= count + 2
 
 
-def test_it_reads_faster_while_somebody_waits(polled: Polled[int], device: Device) -> None:
+def test_reading_is_faster_while_a_thread_waits(polled: Polled[int], device: Device) -> None:
     before = device.count
     with pytest.raises(DeviceTimeout, match=r"^thing at home: nothing ever took longer than 0\.5 s$"):
         polled.wait(lambda _: False, 0.5, "nothing ever")
     assert device.count - before > 15  # 10 at the quiet pace
 
 
-def test_a_state_gets_stale(polled: Polled[int], device: Device) -> None:
+def test_an_old_state_is_stale(polled: Polled[int], device: Device) -> None:
     assert polled.current().value >= 1
     device.answers.clear()
     time.sleep(0.5)
@@ -108,7 +108,7 @@ def test_a_state_gets_stale(polled: Polled[int], device: Device) -> None:
     assert polled.newest() is not None
 
 
-def test_a_stop_ends_what_was_begun_and_nothing_else(polled: Polled[int], device: Device) -> None:
+def test_a_stop_cancels_only_work_that_has_started(polled: Polled[int], device: Device) -> None:
     go_on = polled.begin("pressing")
     thread, errors = failing(lambda: polled.wait(lambda _: False, 5.0, "pressing", go_on))
     time.sleep(0.05)
@@ -121,7 +121,7 @@ def test_a_stop_ends_what_was_begun_and_nothing_else(polled: Polled[int], device
     polled.begin("pressing again")()
 
 
-def test_a_loss_ends_what_waits_even_when_it_is_over_at_once(polled: Polled[int], device: Device) -> None:
+def test_a_short_connection_loss_ends_waiting(polled: Polled[int], device: Device) -> None:
     go_on = polled.begin("pressing")
     thread, errors = failing(lambda: polled.wait(lambda _: False, 5.0, "pressing"))
     time.sleep(0.05)
@@ -140,7 +140,7 @@ def test_a_loss_ends_what_waits_even_when_it_is_over_at_once(polled: Polled[int]
     assert polled.fresh().value
 
 
-def test_disconnecting_ends_what_waits_and_tells_no_loss(polled: Polled[int], device: Device) -> None:
+def test_disconnecting_ends_waiting_without_reporting_a_loss(polled: Polled[int], device: Device) -> None:
     thread, errors = failing(lambda: polled.wait(lambda _: False, 5.0, "pressing"))
     time.sleep(0.05)
     device.answers.clear()
@@ -151,7 +151,7 @@ def test_disconnecting_ends_what_waits_and_tells_no_loss(polled: Polled[int], de
     assert polled.newest() is None
 
 
-def test_nothing_is_taken_while_somebody_holds_it(device: Device) -> None:
+def test_no_state_is_stored_while_the_lock_is_held(device: Device) -> None:
     """What `taken` sees and what others see is one instant."""
     taken: list[int] = []
 
@@ -172,7 +172,7 @@ def test_nothing_is_taken_while_somebody_holds_it(device: Device) -> None:
         polled.disconnect()
 
 
-def test_a_state_that_comes_unasked(device: Device) -> None:
+def test_an_unsolicited_state_is_stored(device: Device) -> None:
     """What is read may be nothing then; what is put counts since when it holds."""
     polled: Polled[int] = Polled("thing", device.open, lambda: None, lambda: None, busy=0.002)
     polled.connect(1.0)

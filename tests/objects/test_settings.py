@@ -39,17 +39,17 @@ def test_serial_ports(port: str) -> None:
         str(Path(__file__).parent),
     ],
 )
-def test_everything_else_is_no_serial_port(port: str) -> None:
+def test_other_texts_are_not_serial_ports(port: str) -> None:
     with pytest.raises(OutOfRange, match=r"^line must be "):
         check_serial_port("line", port)
 
 
-def test_a_port_that_is_never_a_socket() -> None:
+def test_a_port_may_exclude_sockets() -> None:
     with pytest.raises(OutOfRange, match=r"^port must be the path of a serial device, not "):
         check_serial_port("port", "socket://10.0.0.7:4001", sockets=False)
 
 
-def test_the_links_check_their_ports_too(tmp_path: Path) -> None:
+def test_links_check_their_ports(tmp_path: Path) -> None:
     victim = tmp_path / "tokens.json"
     victim.write_text("[]")
     port = f"spy:///dev/null?file={victim}"
@@ -85,7 +85,7 @@ def test_urls() -> None:
         "http://x/\0",
     ],
 )
-def test_everything_else_is_no_url(url: str) -> None:
+def test_other_texts_are_not_urls(url: str) -> None:
     with pytest.raises(OutOfRange, match=r"^url must be http://host:port or https://host:port") as refusal:
         check_url("url", url, "http", "https")
     assert "secret" not in str(refusal.value)
@@ -97,12 +97,12 @@ def test_hosts(host: str) -> None:
 
 
 @pytest.mark.parametrize("host", ["", " ", "a b", "http://x", "x/y", "me@x", "x:502", "x\n"])
-def test_everything_else_is_no_host(host: str) -> None:
+def test_other_texts_are_not_hosts(host: str) -> None:
     with pytest.raises(OutOfRange, match=r"^host must be "):
         check_host(host, 502)
 
 
-def test_files_are_where_the_server_allows_them(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_must_be_in_permitted_directories(monkeypatch: pytest.MonkeyPatch) -> None:
     assert device_file("mesh", "anywhere/part.stl") == "anywhere/part.stl"
     monkeypatch.setenv(DEVICE_FILES, os.pathsep.join(["/data/device-files", "/etc/cell"]))
     assert device_file("mesh", "") == ""
@@ -113,7 +113,7 @@ def test_files_are_where_the_server_allows_them(monkeypatch: pytest.MonkeyPatch)
             device_file("mesh", path)
 
 
-def test_a_secret_goes_to_the_host_that_its_directory_is_named_after(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_secret_file_is_sent_only_to_its_host(monkeypatch: pytest.MonkeyPatch) -> None:
     assert secret_file("token_file", "t", "erp.example") == "t"
     monkeypatch.setenv(DEVICE_FILES, "/data/device-files")
     assert secret_file("token_file", "", "erp.example") == ""

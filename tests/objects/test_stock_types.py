@@ -22,7 +22,7 @@ STOCK = [CounterActions, FlowActions, LogicActions, RandomActions, TimeActions]
 
 
 @pytest.mark.parametrize("cls", STOCK)
-def test_every_stock_type_is_announced_and_may_be_placed(cls: type[Generic]) -> None:
+def test_every_stock_type_is_installed_and_can_be_added(cls: type[Generic]) -> None:
     (found,) = [e for e in entry_points(group="arcor2_hw.object_types") if e.name == cls.__name__]
     assert found.value == f"{cls.__module__}:{cls.__name__}"
     assert getattr(importlib.import_module(cls.__module__), cls.__name__) is cls
@@ -33,7 +33,7 @@ def test_every_stock_type_is_announced_and_may_be_placed(cls: type[Generic]) -> 
     assert set(cls.CANCEL_MAPPING) <= {method.__name__ for method in actions}
 
 
-def test_finish_passes_an_except_clause_for_errors() -> None:
+def test_an_except_clause_does_not_catch_finish() -> None:
     def script() -> None:
         try:
             FlowActions("obj", "flow").finish(an="end")
@@ -45,7 +45,7 @@ def test_finish_passes_an_except_clause_for_errors() -> None:
 
 
 @pytest.mark.parametrize(("obj", "method"), [(FlowActions("o", "flow"), "wait"), (TimeActions("o", "time"), "sleep")])
-def test_waiting_ends_in_time_or_when_it_is_cancelled(obj: FlowActions | TimeActions, method: str) -> None:
+def test_a_wait_ends_in_time_or_when_cancelled(obj: FlowActions | TimeActions, method: str) -> None:
     wait = getattr(obj, method)
     assert deadline_of(wait) is None
     began = time.monotonic()
@@ -73,7 +73,7 @@ def test_waiting_ends_in_time_or_when_it_is_cancelled(obj: FlowActions | TimeAct
         wait(-1.0, an="a")
 
 
-def test_repeat_counts_for_each_action_and_starts_again() -> None:
+def test_repeat_counts_separately_for_each_action() -> None:
     flow = FlowActions("obj", "flow")
     outer = [flow.repeat(2, an="outer") for _ in range(7)]
     assert outer == [True, True, False, True, True, False, True]
@@ -117,7 +117,7 @@ def test_logic() -> None:
     assert logic.logical_not(False)
 
 
-def test_chance_keeps_to_its_range_and_a_seed_to_its_sequence() -> None:
+def test_random_numbers_keep_their_range_and_seed() -> None:
     def draw(seed: int) -> list[int]:
         chance = RandomActions("obj", "chance", RandomSettings(seed))
         return [chance.random_integer(1, 6) for _ in range(50)]

@@ -40,7 +40,7 @@ def assert_free(arm: Any, around: Around, way: list[list[Joint]]) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ what a type can do
-def test_analysis_shows_what_comes_from_the_urdf(folder: Path) -> None:
+def test_analysis_finds_features_of_the_urdf(folder: Path) -> None:
     path = folder / "plain_arm.py"
     library = Library([SourceFile("PlainArm", "plain_driver.plain_arm", path.read_text(), str(path))])
     found = library.analyse("PlainArm")
@@ -59,13 +59,13 @@ def test_analysis_shows_what_comes_from_the_urdf(folder: Path) -> None:
     assert not found.meta.abstract
 
 
-def test_a_type_without_a_stop_may_not_be_placed(folder: Path) -> None:
+def test_a_type_without_stop_cannot_be_added_to_a_scene(folder: Path) -> None:
     text = SOURCE[: SOURCE.index("    def stop")]
     found = Library([SourceFile("PlainArm", "plain_driver.plain_arm", text, str(folder / "plain_arm.py"))])
     assert found.analyse("PlainArm").meta.abstract
 
 
-def test_kinematics_in_the_world(arm: Any) -> None:
+def test_kinematics_use_world_coordinates(arm: Any) -> None:
     assert arm.get_end_effectors_ids() == {"tcp"}
     there = arm.get_end_effector_pose("tcp")
     model = RobotModel.load(URDF).arm("tcp")
@@ -83,7 +83,7 @@ def test_kinematics_in_the_world(arm: Any) -> None:
         arm.forward_kinematics("tcp", joints(READY)[:2])
 
 
-def test_inverse_kinematics_avoids_what_is_there_if_asked(arm: Any, around: Around) -> None:
+def test_inverse_kinematics_avoids_obstacles_on_request(arm: Any, around: Around) -> None:
     goal = moved(arm.get_end_effector_pose("tcp"), 0.0, 0.1, 0.0)
     first = arm.inverse_kinematics("tcp", goal)
     model = RobotModel.load(URDF)
@@ -97,7 +97,7 @@ def test_inverse_kinematics_avoids_what_is_there_if_asked(arm: Any, around: Arou
 
 
 # ------------------------------------------------------------------------------------------------ moves
-def test_a_safe_move_leads_around_and_an_unsafe_one_straight(arm: Any, around: Around) -> None:
+def test_only_a_safe_move_avoids_obstacles(arm: Any, around: Around) -> None:
     around.box("wall", *WALL)
     arm.move_to_joints(joints(ACROSS), 0.5)
     (way,) = arm.ways
@@ -111,7 +111,7 @@ def test_a_safe_move_leads_around_and_an_unsafe_one_straight(arm: Any, around: A
         assert_free(arm, around, arm.ways[-1].waypoints)
 
 
-def test_a_safe_move_to_a_pose_leads_around(arm: Any, around: Around) -> None:
+def test_a_safe_move_to_a_pose_avoids_obstacles(arm: Any, around: Around) -> None:
     around.box("wall", *WALL)
     goal = arm.forward_kinematics("tcp", joints(ACROSS))
     arm.move_to_pose("tcp", goal, 0.5, safe=True, linear=False)
@@ -119,7 +119,7 @@ def test_a_safe_move_to_a_pose_leads_around(arm: Any, around: Around) -> None:
     assert np.allclose(arm.get_end_effector_pose("tcp").matrix(), goal.matrix(), atol=1e-5)
 
 
-def test_a_line_is_a_line_or_refused(arm: Any, around: Around) -> None:
+def test_a_linear_move_is_straight_or_refused(arm: Any, around: Around) -> None:
     here = arm.get_end_effector_pose("tcp")
     goal = moved(here, 0.0, 0.3, 0.0)
     arm.move_to_pose("tcp", goal, 0.5)
@@ -140,7 +140,7 @@ def test_a_line_is_a_line_or_refused(arm: Any, around: Around) -> None:
     assert len(arm.ways) == 2
 
 
-def test_down_to_a_table_that_it_stands_on_nearly(arm: Any, around: Around) -> None:
+def test_a_move_may_end_close_to_an_obstacle(arm: Any, around: Around) -> None:
     """A pick ends nearer to the table than ways keep away from it, but does not touch it."""
     here = BASE.inverted() * arm.get_end_effector_pose("tcp")
     around.box("table", here.position + Position(0.0, 0.0, -0.152), 0.4, 0.4, 0.1)
@@ -150,7 +150,7 @@ def test_down_to_a_table_that_it_stands_on_nearly(arm: Any, around: Around) -> N
         arm.move_to_pose("tcp", moved(BASE * here, 0.0, 0.0, -0.105), 0.2)
 
 
-def test_refused_naming_why(arm: Any, around: Around) -> None:
+def test_a_refused_move_names_the_reason(arm: Any, around: Around) -> None:
     tip = BASE.inverted() * arm.forward_kinematics("tcp", joints(ACROSS))
     around.box("crate", tip.position, 0.1, 0.1, 0.1)
     with pytest.raises(arm.KinematicsException, match="in collision at the goal: plain/wrist_3_link and crate"):
@@ -169,7 +169,7 @@ def test_refused_naming_why(arm: Any, around: Around) -> None:
     assert len(arm.ways) == 1
 
 
-def test_what_it_holds_goes_with_it_and_is_led_past(folder: Path, arm: Any, around: Around) -> None:
+def test_a_held_part_moves_with_the_robot_and_avoids_obstacles(folder: Path, arm: Any, around: Around) -> None:
     middle = BASE.inverted() * arm.forward_kinematics("tcp", joints((1.2, *READY[1:])))
     around.box("bin", middle.position + Position(0.0, 0.0, -0.3), 0.06, 0.06, 0.1)
     goal = joints((2.4, *READY[1:]))
@@ -214,7 +214,7 @@ def test_what_it_holds_goes_with_it_and_is_led_past(folder: Path, arm: Any, arou
         arm.safe_moves.hold("bin", "claw", arm.now)
 
 
-def test_another_robot_is_in_the_way_as_it_stands(folder: Path, arm: Any, around: Around) -> None:
+def test_another_robot_is_an_obstacle(folder: Path, arm: Any, around: Around) -> None:
     beside = BASE * Pose(Position(0.75, 0.0, 0.0), Orientation.from_rotation_vector(0.0, 0.0, np.pi))
     second = made(folder, Around(), "second", beside)
     around.others = [(second, joints((0.0, -1.57, 0.0, -1.57, 0.0, 0.0)))]
@@ -225,7 +225,7 @@ def test_another_robot_is_in_the_way_as_it_stands(folder: Path, arm: Any, around
         arm.move_to_pose("tcp", here, 0.5)
 
 
-def test_a_mesh_that_is_not_here_is_a_refusal_and_one_that_is_counts(arm: Any, around: Around, tmp_path: Path) -> None:
+def test_a_missing_mesh_refuses_moves_and_a_present_one_is_considered(arm: Any, around: Around, tmp_path: Path) -> None:
     import trimesh
 
     around.things.append(Obstacle("shield", object_type.Mesh("shield", "shield.stl"), BASE * Pose(WALL[0])))
@@ -239,7 +239,7 @@ def test_a_mesh_that_is_not_here_is_a_refusal_and_one_that_is_counts(arm: Any, a
     assert_free(arm, around, arm.ways[-1].waypoints)
 
 
-def test_an_uploaded_model_stands_before_the_drivers(arm: Any, around: Around, tmp_path: Path) -> None:
+def test_an_uploaded_model_takes_precedence(arm: Any, around: Around, tmp_path: Path) -> None:
     longer = tmp_path / "88c1"
     text = URDF.read_text().replace('xyz="0 0 0.0996"', 'xyz="0 0 0.1996"')
     assert text != URDF.read_text()
@@ -250,7 +250,7 @@ def test_an_uploaded_model_stands_before_the_drivers(arm: Any, around: Around, t
     assert nominal.distance_to(tip) == pytest.approx(0.1, abs=1e-6)
 
 
-def test_without_a_model_it_says_so(folder: Path, around: Around) -> None:
+def test_a_missing_model_is_reported(folder: Path, around: Around) -> None:
     cls = importlib.import_module("plain_driver.plain_arm").PlainArm
     other = type("Nameless", (cls,), {"urdf_package_name": "missing.zip", "__module__": cls.__module__})
     device = other("id", "nameless", BASE)
@@ -259,7 +259,7 @@ def test_without_a_model_it_says_so(folder: Path, around: Around) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ time, and stop
-def test_a_way_by_time(arm: Any, around: Around) -> None:
+def test_a_path_can_be_sampled_over_time(arm: Any, around: Around) -> None:
     around.box("wall", *WALL)
     arm.move_to_joints(joints(ACROSS), 0.5)
     way = arm.ways[-1]
@@ -283,7 +283,7 @@ def fences(around: Around) -> None:
 BEFORE, BEHIND = (0.8, *READY[1:]), (0.8 + np.pi, *READY[1:])
 
 
-def test_no_way_is_a_refusal(arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_move_without_a_path_is_refused(arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(safe_moves, "WITHIN", 0.3)
     fences(around)
     arm.now = joints(BEFORE)
@@ -292,7 +292,7 @@ def test_no_way_is_a_refusal(arm: Any, around: Around, monkeypatch: pytest.Monke
     assert arm.ways == []
 
 
-def test_a_stop_ends_what_is_planned(arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stop_ends_planning(arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(safe_moves, "WITHIN", 60.0)
     fences(around)
     arm.now = joints(BEFORE)

@@ -119,7 +119,7 @@ def holder(hosted: Holder) -> Holder:
     return hosted
 
 
-def test_renewed_until_it_is_let_go(holder: Holder) -> None:
+def test_the_robot_moves_while_leases_are_renewed(holder: Holder) -> None:
     assert holder.granted(new=True) == 1.0
     for _ in range(8):
         time.sleep(0.1)
@@ -134,7 +134,7 @@ def test_renewed_until_it_is_let_go(holder: Holder) -> None:
     assert stops[0][1] > jogs[-1][1]
 
 
-def test_what_is_not_renewed_is_stopped_and_does_not_begin_again(holder: Holder) -> None:
+def test_an_expired_hold_stops_and_does_not_start_again(holder: Holder) -> None:
     began = time.monotonic()
     holder.granted(0.15, new=True)
     ended = holder.ended()
@@ -150,7 +150,7 @@ def test_what_is_not_renewed_is_stopped_and_does_not_begin_again(holder: Holder)
     holder.ended()
 
 
-def test_a_lease_that_comes_late_is_thrown_away(holder: Holder) -> None:
+def test_a_late_lease_is_refused(holder: Holder) -> None:
     """The host hangs for longer than the leases last that wait for it, and with them a new press."""
     pid = holder.host.process.pid
     os.kill(pid, signal.SIGSTOP)
@@ -166,7 +166,7 @@ def test_a_lease_that_comes_late_is_thrown_away(holder: Holder) -> None:
     assert holder.told("jog") == []
 
 
-def test_another_hold_is_refused_while_one_lasts(holder: Holder) -> None:
+def test_a_second_hold_of_a_robot_is_refused(holder: Holder) -> None:
     holder.granted(new=True)
     holder.hold += 1
     assert "already moving" in holder.refused().message
@@ -175,7 +175,7 @@ def test_another_hold_is_refused_while_one_lasts(holder: Holder) -> None:
     holder.ended()
 
 
-def test_control_is_taken_as_long_as_it_takes_and_motion_begins_only_if_still_held(holder: Holder) -> None:
+def test_motion_starts_after_slow_control_only_if_the_hold_continues(holder: Holder) -> None:
     holder.host.call(OBJ, "set", key="taking", value=0.6)
     holder.host.call(OBJ, "lose_control")
     numbers = [holder.lease(new=True)]
@@ -195,7 +195,7 @@ def test_control_is_taken_as_long_as_it_takes_and_motion_begins_only_if_still_he
     assert holder.told("jog") == []
 
 
-def test_a_driver_that_hangs_is_stopped_past_it(holder: Holder) -> None:
+def test_a_stop_reaches_a_robot_whose_driver_hangs(holder: Holder) -> None:
     holder.host.call(OBJ, "set", key="hangs", value=0.8)
     began = time.monotonic()
     holder.lease(0.2, new=True)
@@ -205,7 +205,7 @@ def test_a_driver_that_hangs_is_stopped_past_it(holder: Holder) -> None:
     assert 0.2 <= stops[0][1] - began < 0.6
 
 
-def test_stop_ends_it(holder: Holder) -> None:
+def test_a_stop_ends_the_hold(holder: Holder) -> None:
     holder.granted(new=True)
     holder.host.send(m.StopMotion(77, OBJ))
     assert holder.host.answer(77) is None
@@ -215,7 +215,7 @@ def test_stop_ends_it(holder: Holder) -> None:
     assert holder.refused().message
 
 
-def test_what_the_driver_says_ends_it(holder: Holder) -> None:
+def test_an_error_of_the_driver_ends_the_hold(holder: Holder) -> None:
     holder.granted(new=True)
     holder.host.call(OBJ, "set_fault", fault="protective stop of 192.0.2.1")
     assert "protective stop" in holder.refused().message
@@ -227,7 +227,7 @@ def test_what_the_driver_says_ends_it(holder: Holder) -> None:
     holder.ended()
 
 
-def test_the_end_effector_is_never_faster_than_a_person_may_be_near(holder: Holder) -> None:
+def test_the_end_effector_never_exceeds_the_reduced_speed(holder: Holder) -> None:
     assert holder.granted(new=True, twist=(0.3, 0.0, 0.4, 0.0, 0.0, 1.0)) == pytest.approx(0.5)
     assert holder.granted(joints=[Joint("turn", 0.1)]) == 1.0
     scale = holder.granted(joints=[Joint("turn", 1.0)])
@@ -254,7 +254,7 @@ def test_a_joint_slows_down_before_its_limit_and_stops_there(holder: Holder) -> 
     holder.ended()
 
 
-def test_a_jog_in_space_that_leads_a_joint_to_its_limit(holder: Holder) -> None:
+def test_a_twist_slows_down_before_a_joint_limit(holder: Holder) -> None:
     assert holder.granted(new=True) == 1.0
     time.sleep(0.1)
     holder.host.call(OBJ, "set", key="at", value=0.95)
@@ -277,13 +277,13 @@ def test_a_jog_in_space_that_leads_a_joint_to_its_limit(holder: Holder) -> None:
         ({"end_effector_id": "claw"}, "no end effector 'claw'"),
     ],
 )
-def test_names_that_the_robot_does_not_have(holder: Holder, more: Any, text: str) -> None:
+def test_unknown_joints_and_end_effectors_are_refused(holder: Holder, more: Any, text: str) -> None:
     assert text in holder.refused(new=True, **more).message
     holder.ended()
     assert holder.told("jog") == []
 
 
-def test_hand_teaching_lasts_as_long_as_it_is_held(holder: Holder) -> None:
+def test_hand_teaching_lasts_while_it_is_held(holder: Holder) -> None:
     for _ in range(3):
         holder.granted(0.3, kind=HoldKind.HAND_TEACHING, new=not holder.told())
         time.sleep(0.1)
@@ -320,7 +320,7 @@ class Arms(MultiArmRobot):
 """
 
 
-def test_one_arm_of_several_is_held(host: HostProcess) -> None:
+def test_one_of_several_arms_is_held(host: HostProcess) -> None:
     host.send(open_scene([type_code("Arms", ARMS)], scene_object("arm", "Arms", pose=True)))
     host.expect(m.SceneOpened)
     holder = Holder(host)
@@ -343,7 +343,7 @@ def test_one_arm_of_several_is_held(host: HostProcess) -> None:
     assert told[3:] == [["hand", True, "right"], ["hand", False, "right"]]
 
 
-def test_a_host_without_its_server_stops_what_is_held() -> None:
+def test_the_host_stops_held_robots_when_the_server_ends() -> None:
     host = HostProcess()
     try:
         host.send(open_scene([type_code("Arm", ARM)], scene_object("arm", "Arm", pose=True)))

@@ -45,7 +45,7 @@ def changes(host: HostProcess, object_id: str) -> list[tuple[Connection, str]]:
     return [(s.connection, s.reason) for s in host.seen if isinstance(s, m.DeviceChanged) and s.object_id == object_id]
 
 
-def test_the_others_come_up_and_what_failed_is_refused_by_name(host: HostProcess, tmp_path: Path) -> None:
+def test_a_scene_opens_without_failed_objects(host: HostProcess, tmp_path: Path) -> None:
     here, away = tmp_path / "here", tmp_path / "away"
     here.touch()
     host.send(
@@ -72,7 +72,7 @@ def test_the_others_come_up_and_what_failed_is_refused_by_name(host: HostProcess
     assert Path(f"{away}.log").read_text().split() == ["made", "closed"]
 
 
-def test_a_retry_brings_it_in(host: HostProcess, tmp_path: Path) -> None:
+def test_a_failed_object_connects_on_retry(host: HostProcess, tmp_path: Path) -> None:
     file = tmp_path / "switch"
     host.send(open_scene(TYPES, scene_object("box", "Box", file=str(file)), keep_going=True))
     host.expect(m.SceneOpened)
@@ -109,7 +109,7 @@ def test_a_retry_loads_a_type_that_could_not_be_loaded(host: HostProcess, tmp_pa
     assert retry(host, "obj_broken", 502) is None
 
 
-def test_without_keep_going_nothing_is_different(host: HostProcess, tmp_path: Path) -> None:
+def test_a_failed_object_fails_the_scene_without_keep_going(host: HostProcess, tmp_path: Path) -> None:
     host.send(open_scene(TYPES, scene_object("box", "Box", file=str(tmp_path / "away"))))
     assert "192.0.2.7:502" in host.expect(m.SceneFailed).error.message
     assert host.gone() == 0
@@ -131,7 +131,7 @@ def streamed(host: HostProcess, event: str, rate: float) -> list[dict[str, Any]]
     return [msgspec.json.decode(one.encoded)["data"] for one in found]
 
 
-def test_streams_at_rates_of_their_own(host: HostProcess) -> None:
+def test_streams_at_different_rates(host: HostProcess) -> None:
     host.send(open_scene([type_code("Arm", ARM)], scene_object("arm", "Arm", pose=True)))
     host.expect(m.SceneOpened)
     host.send(m.Subscribe("obj_arm", True, False))

@@ -164,7 +164,7 @@ def run(host: HostProcess, package: Package, tmp_path: Path) -> Run:
     return Run(host, package, tmp_path)
 
 
-def test_events_of_a_whole_run(run: Run) -> None:
+def test_events_of_a_complete_run(run: Run) -> None:
     run.start(
         """
         from object_types.arm import Arm
@@ -219,7 +219,7 @@ def test_robots_are_streamed_while_an_action_runs(run: Run) -> None:
     run.host.expect_state("stopped")
 
 
-def test_pause_waits_for_the_action_and_holds_the_next(run: Run) -> None:
+def test_pause_waits_for_the_running_action_and_blocks_the_next(run: Run) -> None:
     run.start('arm.slow(0.4, an="a1")\narm.slow(0.0, an="a2")')
     run.host.expect_event("ActionStateBefore")
     run.host.send(m.Pause())
@@ -232,7 +232,7 @@ def test_pause_waits_for_the_action_and_holds_the_next(run: Run) -> None:
     assert run.host.events()[5:] == ["running", "ActionStateBefore", "ActionStateAfter", "stopped"]
 
 
-def test_pause_outside_actions_is_told_at_once(run: Run) -> None:
+def test_pause_between_actions_is_reported_at_once(run: Run) -> None:
     run.start('time.sleep(0.5)\narm.slow(0.0, an="a1")')
     run.host.expect_event("PackageInfo")
     began = own_time()
@@ -272,7 +272,7 @@ def test_a_breakpoint_pauses_at_its_action_point(run: Run) -> None:
     assert run.host.expect_state("stopped").finished
 
 
-def test_a_breakpoint_pauses_before_its_action_and_shared_ones_may_be_unknown_and_change(run: Run) -> None:
+def test_shared_breakpoints_may_be_unknown_and_change(run: Run) -> None:
     run.directory = run.write(
         'for _ in range(2):\n    arm.slow(0.0, an="a1")\n    arm.slow(0.0, an="a2")\n    arm.slow(0.0, an="a3")',
         PROJECT,
@@ -293,7 +293,7 @@ def test_a_breakpoint_pauses_before_its_action_and_shared_ones_may_be_unknown_an
     assert run.host.expect_state("stopped").finished
 
 
-def test_each_action_is_told_with_its_time_and_how_it_ended(run: Run) -> None:
+def test_each_action_is_reported_with_time_and_result(run: Run) -> None:
     run.start(
         """
         arm.slow(0.2, an="a1")
@@ -321,7 +321,7 @@ def test_each_action_is_told_with_its_time_and_how_it_ended(run: Run) -> None:
     assert exception["action_id"] == "act_a3"
 
 
-def test_a_program_that_is_faster_than_the_server_waits_and_loses_nothing(run: Run) -> None:
+def test_a_program_waits_for_a_slow_server_without_losing_events(run: Run) -> None:
     run.start('for _ in range(6000):\n    arm.slow(0.0, an="a1")')
     time.sleep(1.5)  # nothing is read meanwhile: more than what waits here and in the socket is never made
     done = len([note for note in run.notes() if note == "slow"])
@@ -340,7 +340,7 @@ def test_an_unknown_breakpoint_fails_the_start(run: Run) -> None:
     assert run.host.events() == ["ProjectException", "stopped"]
 
 
-def test_the_flow_action_ends_the_program_as_meant(run: Run) -> None:
+def test_a_flow_action_finishes_the_program(run: Run) -> None:
     run.start("try:\n    arm.finish(an='a1')\nexcept Exception:\n    pass\narm.slow(0.0, an='a2')")
     ended = run.host.expect_state("stopped")
     assert (ended.finished, ended.error) == (True, None)
@@ -358,7 +358,7 @@ def test_the_flow_action_ends_the_program_as_meant(run: Run) -> None:
         ("1 / 0", "ZeroDivisionError", False),
     ],
 )
-def test_an_exception_is_told_and_everything_is_stopped(run: Run, body: str, kind: str, handled: bool) -> None:
+def test_an_exception_is_reported_and_all_devices_stop(run: Run, body: str, kind: str, handled: bool) -> None:
     run.start(body)
     ended = run.host.expect_state("stopped")
     [told] = run.told("ProjectException")
@@ -372,7 +372,7 @@ def test_an_exception_is_told_and_everything_is_stopped(run: Run, body: str, kin
     assert run.host.gone() == 0
 
 
-def test_an_exception_that_the_script_deals_with_ends_nothing(run: Run) -> None:
+def test_a_handled_exception_does_not_end_the_program(run: Run) -> None:
     run.start('try:\n    arm.fail("lost", an="a1")\nexcept ConnectionLost:\n    arm.slow(0.0, an="a2")')
     assert run.host.expect_state("stopped").finished
     assert "ProjectException" not in run.host.events()
@@ -391,7 +391,7 @@ def test_an_exception_that_the_script_deals_with_ends_nothing(run: Run) -> None:
     ],
     ids=["action", "sleep", "loop", "lock", "swallows", "swallows all", "thread"],
 )
-def test_stop_ends_whatever_the_script_does(run: Run, body: str) -> None:
+def test_stop_ends_the_script_in_any_state(run: Run, body: str) -> None:
     run.start(body)
     run.wait_note("slow")
     began = own_time()
@@ -406,7 +406,7 @@ def test_stop_ends_whatever_the_script_does(run: Run, body: str) -> None:
     assert run.host.gone() == 0
 
 
-def test_stop_while_paused(run: Run) -> None:
+def test_stop_ends_a_paused_program(run: Run) -> None:
     run.start('arm.slow(0.0, an="a1")', start_paused=True)
     run.host.expect_state("paused")
     run.host.send(m.StopProgram())
@@ -414,7 +414,7 @@ def test_stop_while_paused(run: Run) -> None:
     assert "slow" not in run.notes()
 
 
-def test_a_driver_that_does_not_come_back_does_not_keep_the_host(run: Run) -> None:
+def test_a_hanging_driver_does_not_keep_the_host_running(run: Run) -> None:
     run.start('arm.unstoppable(an="a1")')
     run.wait_note("unstoppable")
     began = own_time()
@@ -425,7 +425,7 @@ def test_a_driver_that_does_not_come_back_does_not_keep_the_host(run: Run) -> No
     assert run.notes()[-1] == "disconnected"
 
 
-def test_a_server_killed_while_a_program_runs(run: Run) -> None:
+def test_the_host_stops_the_program_when_the_server_is_killed(run: Run) -> None:
     run.start('arm.slow(1000.0, an="a1")')
     run.wait_note("slow")
     began = own_time()
@@ -436,7 +436,7 @@ def test_a_server_killed_while_a_program_runs(run: Run) -> None:
     assert "stop" in run.notes()
 
 
-def test_a_script_with_a_syntax_error(run: Run) -> None:
+def test_a_syntax_error_of_the_script_is_reported(run: Run) -> None:
     run.directory = run.write("pass")
     (run.directory / "script.py").write_text("def broken(:\n")
     run.host.send(m.RunPackage("pkg_1", str(run.directory)))
@@ -455,7 +455,7 @@ def _by_hand(directory: Path, *arguments: str) -> "subprocess.Popen[str]":
     )
 
 
-def test_by_hand_events_are_lines_and_commands_letters(run: Run) -> None:
+def test_a_script_run_by_hand_prints_events_and_reads_commands(run: Run) -> None:
     directory = run.write('arm.slow(0.0, an="a1")\narm.slow(0.0, an="a2")')
     with _by_hand(directory, "-p") as process:
         assert process.stdin is not None
@@ -474,7 +474,7 @@ def test_by_hand_events_are_lines_and_commands_letters(run: Run) -> None:
     assert run.notes() == ["control", "slow", "slow", "disconnected"]
 
 
-def test_by_hand_ctrl_c_stops(run: Run) -> None:
+def test_ctrl_c_stops_a_script_run_by_hand(run: Run) -> None:
     directory = run.write('arm.slow(1000.0, an="a1")')
     with _by_hand(directory) as process:
         run.wait_note("slow")

@@ -134,7 +134,7 @@ def go(host: HostProcess, values: tuple[float, ...], safe: bool = True) -> Any:
     return host.call("obj_arm", "move_to_joints", target_joints=joints(values), speed=0.5, safe=safe)
 
 
-def test_it_goes_around_what_stands_there_now(scene: HostProcess) -> None:
+def test_a_safe_move_avoids_the_current_obstacles(scene: HostProcess) -> None:
     assert go(scene, ACROSS) is None
     assert scene.call("obj_arm", "waypoints") > 2
     # A wall that does not count, and one that was moved away, are no obstacle.
@@ -156,7 +156,7 @@ def test_it_goes_around_what_stands_there_now(scene: HostProcess) -> None:
     assert "wall" in error.message
 
 
-def test_another_robot_is_known_by_its_joints_or_the_move_is_refused(scene: HostProcess) -> None:
+def test_a_move_is_refused_if_the_joints_of_another_robot_are_unknown(scene: HostProcess) -> None:
     assert go(scene, ACROSS) is None
     scene.call("obj_other", "fall_silent")
     error = go(scene, READY)
@@ -192,7 +192,7 @@ def collision(answer: Any, *names: str) -> None:
         assert name in answer.message
 
 
-def test_what_was_put_in_stands_in_the_way_until_it_is_taken_out(scene: HostProcess, tmp_path: Path) -> None:
+def test_an_added_body_is_an_obstacle_until_it_is_removed(scene: HostProcess, tmp_path: Path) -> None:
     up, beside = Position(0.0, 0.0, 0.2), Position(0.0, 0.25, 0.0)
     assert line(scene, beside) is None
     scene.send(box("crate", TIP + Position(0.0, 0.25, 0.0), 0.1, 0.1, 0.1))
@@ -224,7 +224,7 @@ def pan(host: HostProcess) -> float:
     return float(host.call("obj_arm", "robot_joints")[0]["value"])
 
 
-def test_a_move_stops_before_what_is_put_into_its_path_meanwhile(host: HostProcess) -> None:
+def test_a_move_stops_before_a_body_added_to_its_path(host: HostProcess) -> None:
     objects = [placed("arm", "SlowArm", Pose()), placed("wall", "Wall", Pose(Position(0.0, 9.0, 0.0)))]
     types = [type_code("SlowArm", SLOW_ARM), type_code("Wall", WALL)]
     host.send(open_scene(types, *objects, models=MODELS, assets={"arm.urdf": str(URDF)}))
@@ -249,7 +249,7 @@ def test_a_move_stops_before_what_is_put_into_its_path_meanwhile(host: HostProce
         assert go(host, READY, safe=False) is None
 
 
-def test_it_stops_in_a_program_too(host: HostProcess, package: Package) -> None:
+def test_a_move_of_a_program_stops_before_an_added_body(host: HostProcess, package: Package) -> None:
     body = f"""
     from arcor2_hw.data.robot import Joint
     arm = res.objects["obj_arm"]
@@ -267,7 +267,7 @@ def test_it_stops_in_a_program_too(host: HostProcess, package: Package) -> None:
     host.expect_state("stopped")
 
 
-def test_what_is_held_collides_where_the_arm_alone_would_not(scene: HostProcess) -> None:
+def test_a_held_body_collides_where_the_arm_does_not(scene: HostProcess) -> None:
     beside = Position(0.0, 0.25, 0.0)
     scene.send(box("table", TIP + Position(0.0, 0.25, -0.2), 0.1, 0.1, 0.02))
     assert line(scene, beside) is None
@@ -292,7 +292,7 @@ def held(host: HostProcess) -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("alone", [True, False])
-def test_a_gripped_part_collides_where_the_arm_alone_would_not(host: HostProcess, alone: bool) -> None:
+def test_a_gripped_part_collides_where_the_arm_does_not(host: HostProcess, alone: bool) -> None:
     named = [] if alone else [Parameter("robot", "string", '"arm"')]
     objects = [
         placed("arm", "Arm", Pose()),
@@ -318,7 +318,7 @@ def test_a_gripped_part_collides_where_the_arm_alone_would_not(host: HostProcess
     assert line(host, beside) is None
 
 
-def test_another_arm_is_in_the_way_where_it_is_now(host: HostProcess) -> None:
+def test_another_arm_is_an_obstacle_at_its_current_joints(host: HostProcess) -> None:
     objects = [placed("arm", "Arm", Pose()), placed("other", "Arm", Pose(Position(0.0, 1.0, 0.0)))]
     host.send(open_scene([type_code("Arm", ARM)], *objects, assets={"arm.urdf": str(URDF)}))
     host.expect(m.SceneOpened)
@@ -375,7 +375,7 @@ class Pair(MultiArmRobot):
 """.replace("START", repr(list(zip(NAMES, (-1.57, *READY[1:]), strict=True))))
 
 
-def test_a_robot_with_several_arms_is_in_the_way_when_all_of_it_is_known(host: HostProcess) -> None:
+def test_a_robot_with_several_arms_is_an_obstacle_if_all_joints_are_known(host: HostProcess) -> None:
     objects = [placed("arm", "Arm", Pose()), placed("pair", "Pair", Pose(Position(0.0, 1.0, 0.0)))]
     host.send(open_scene([type_code("Arm", ARM), type_code("Pair", PAIR)], *objects, assets={"arm.urdf": str(URDF)}))
     host.expect(m.SceneOpened)
@@ -402,7 +402,7 @@ def tip(host: HostProcess) -> Position:
     return Position(*(found[axis] for axis in "xyz"))
 
 
-def test_the_arm_is_computed_as_its_controller_told(host: HostProcess) -> None:
+def test_the_kinematic_calibration_of_the_controller_is_used(host: HostProcess) -> None:
     objects = [placed("arm", "Arm", Pose())]
     calibrated = {"obj_arm": calibration(0.002), "obj_gone": calibration(0.003)}
     given = {"assets": {"arm.urdf": str(URDF)}, "calibrations": calibrated}

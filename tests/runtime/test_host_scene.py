@@ -88,7 +88,7 @@ def _open(host: HostProcess, *names: str, **settings: object) -> None:
     host.expect(m.SceneOpened)
 
 
-def test_arguments_are_read_by_the_hints_and_results_come_back(host: HostProcess) -> None:
+def test_arguments_are_decoded_by_type_hints_and_results_returned(host: HostProcess) -> None:
     _open(host, "a")
     pose = {"position": {"x": 1, "y": 2, "z": 3}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
     assert host.call("obj_a", "echo", value=2, pose=pose, joints=[{"name": "j", "value": 1}]) == [2.0, pose]
@@ -101,7 +101,7 @@ def test_arguments_are_read_by_the_hints_and_results_come_back(host: HostProcess
     assert host.call("obj_none", "quick").code == "not_found"
 
 
-def test_a_hung_device_fails_in_time_and_hinders_no_other(host: HostProcess) -> None:
+def test_a_hanging_call_fails_in_time_without_delaying_other_devices(host: HostProcess) -> None:
     _open(host, "a", "b")
     hang = host.begin("obj_a", "hang", deadline=0.3, seconds=1.0)
     waiting = host.begin("obj_a", "quick")
@@ -122,7 +122,7 @@ def test_a_hung_device_fails_in_time_and_hinders_no_other(host: HostProcess) -> 
         time.sleep(0.05)
 
 
-def test_stop_passes_the_busy_device(host: HostProcess, tmp_path: Path) -> None:
+def test_stop_reaches_the_device_during_an_action(host: HostProcess, tmp_path: Path) -> None:
     _open(host, "a", file=str(tmp_path / "notes"))
     move = host.begin("obj_a", "move")
     queued = host.begin("obj_a", "quick")
@@ -137,7 +137,7 @@ def test_stop_passes_the_busy_device(host: HostProcess, tmp_path: Path) -> None:
     assert host.call("obj_a", "quick") == "quick"
 
 
-def test_a_command_that_overtakes_the_stop_is_stopped_too(host: HostProcess, tmp_path: Path) -> None:
+def test_a_command_that_arrives_after_the_stop_is_stopped_too(host: HostProcess, tmp_path: Path) -> None:
     # This device forgets a stop that comes before its motion, as one does whose frames cross on the wire.
     source = DEVICE.replace('self.note("move")', 'self.note("move"); time.sleep(0.03); self.stopped.clear()')
     host.send(open_scene([type_code("Device", source)], scene_object("a", "Device", file=str(tmp_path / "notes"))))
@@ -152,7 +152,7 @@ def test_a_command_that_overtakes_the_stop_is_stopped_too(host: HostProcess, tmp
     assert (tmp_path / "notes").read_text().count("stop") == 2
 
 
-def test_a_stop_while_control_is_taken_lets_nothing_begin(host: HostProcess, tmp_path: Path) -> None:
+def test_a_stop_while_control_is_taken_prevents_the_action(host: HostProcess, tmp_path: Path) -> None:
     # Longer than a second stop would wait; and this device knows of no stop from before its motion.
     taking = """
     def control_owner(self):
@@ -177,7 +177,7 @@ def test_a_stop_while_control_is_taken_lets_nothing_begin(host: HostProcess, tmp
     assert host.call("obj_a", "quick") == "quick"
 
 
-def test_twenty_slow_devices_come_up_at_once(host: HostProcess) -> None:
+def test_twenty_slow_devices_connect_concurrently(host: HostProcess) -> None:
     began = own_time()
     _open(host, *(f"d{n}" for n in range(20)), connect_takes=0.5)
     ended = own_time()
@@ -186,7 +186,7 @@ def test_twenty_slow_devices_come_up_at_once(host: HostProcess) -> None:
 
 
 @pytest.mark.parametrize(("fail", "words"), [("refused", "192.0.2.1:30004"), ("odd", "ZeroDivisionError")])
-def test_one_that_fails_takes_the_others_down_again(host: HostProcess, tmp_path: Path, fail: str, words: str) -> None:
+def test_one_failed_device_closes_the_others(host: HostProcess, tmp_path: Path, fail: str, words: str) -> None:
     notes = str(tmp_path / "notes")
     objects = [scene_object("good", "Device", file=notes), scene_object("bad", "Device", fail=fail, connect_takes=0.0)]
     host.send(open_scene([type_code("Device", DEVICE)], *objects))
@@ -198,7 +198,7 @@ def test_one_that_fails_takes_the_others_down_again(host: HostProcess, tmp_path:
     assert (tmp_path / "notes").read_text().splitlines() == ["good connected", "good disconnected"]
 
 
-def test_a_device_that_hangs_on_connect_is_named(host: HostProcess) -> None:
+def test_a_device_that_hangs_while_connecting_is_named(host: HostProcess) -> None:
     source = DEVICE.replace("timeout: float = 5.0", "timeout: float = 0.2")
     host.send(open_scene([type_code("Device", source)], scene_object("slow", "Device", connect_takes=30)))
     error = host.expect(m.SceneFailed, within=5).error
@@ -210,14 +210,14 @@ def test_a_device_that_hangs_on_connect_is_named(host: HostProcess) -> None:
     ("settings", "words"),
     [({"nonsense": 1}, "nonsense"), ({"connect_takes": "long"}, "connect_takes")],
 )
-def test_a_bad_setting_names_object_and_setting(host: HostProcess, settings: dict[str, object], words: str) -> None:
+def test_an_invalid_setting_is_named(host: HostProcess, settings: dict[str, object], words: str) -> None:
     host.send(open_scene([type_code("Device", DEVICE)], scene_object("a", "Device", **settings)))
     error = host.expect(m.SceneFailed).error
     assert (error.code, error.object_id) == ("invalid_data", "obj_a")
     assert words in error.message
 
 
-def test_overrides_lie_over_parameters(host: HostProcess, tmp_path: Path) -> None:
+def test_overrides_replace_parameters(host: HostProcess, tmp_path: Path) -> None:
     override = SceneObjectOverride("obj_a", [Parameter("file", "string", f'"{tmp_path}/over"')])
     objects = [scene_object("a", "Device", file=str(tmp_path / "under"))]
     host.send(open_scene([type_code("Device", DEVICE)], *objects, overrides=[override]))
@@ -225,7 +225,7 @@ def test_overrides_lie_over_parameters(host: HostProcess, tmp_path: Path) -> Non
     assert [p.name for p in tmp_path.iterdir()] == ["over"]
 
 
-def test_references_to_secrets(host: HostProcess, tmp_path: Path) -> None:
+def test_references_to_secrets_are_replaced(host: HostProcess, tmp_path: Path) -> None:
     reference = new_reference()
     objects = [scene_object("a", "Device", file=reference)]
     message = open_scene([type_code("Device", DEVICE)], *objects)
@@ -234,7 +234,7 @@ def test_references_to_secrets(host: HostProcess, tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["secret"]
 
 
-def test_a_secret_that_is_not_stored_is_named(host: HostProcess) -> None:
+def test_a_missing_secret_is_named(host: HostProcess) -> None:
     host.send(open_scene([type_code("Device", DEVICE)], scene_object("a", "Device", file=new_reference())))
     error = host.expect(m.SceneFailed).error
     assert error.object_id == "obj_a"
@@ -250,14 +250,14 @@ def test_a_secret_for_another_address_is_withheld(host: HostProcess) -> None:
     assert (error.object_id, error.code, error.message) == ("obj_a", "address_changed", "Enter the file again.")
 
 
-def test_a_source_that_breaks_is_named(host: HostProcess) -> None:
+def test_a_source_that_cannot_be_imported_is_named(host: HostProcess) -> None:
     host.send(open_scene([type_code("Device", "def broken(:\n")], scene_object("a", "Device")))
     error = host.expect(m.SceneFailed).error
     assert "Device" in error.message
     assert "SyntaxError" in error.message
 
 
-def test_the_older_convention_works(host: HostProcess, tmp_path: Path) -> None:
+def test_types_of_the_older_convention_work(host: HostProcess, tmp_path: Path) -> None:
     source = f"""
     class OldBox(GenericWithPose):
         _ABSTRACT = False
@@ -276,7 +276,7 @@ def test_the_older_convention_works(host: HostProcess, tmp_path: Path) -> None:
     assert (tmp_path / "old").read_text() == "closed"
 
 
-def test_the_server_gone_means_stop_disconnect_exit_within_two_seconds(host: HostProcess, tmp_path: Path) -> None:
+def test_the_host_stops_devices_and_exits_when_the_server_ends(host: HostProcess, tmp_path: Path) -> None:
     notes = tmp_path / "notes"
     _open(host, "a", "b", file=str(notes))
     host.begin("obj_a", "move")
@@ -293,7 +293,7 @@ def test_the_server_gone_means_stop_disconnect_exit_within_two_seconds(host: Hos
     assert "b disconnected" in lines  # past its hung lane
 
 
-def test_sigterm_means_the_same(host: HostProcess, tmp_path: Path) -> None:
+def test_the_host_stops_devices_and_exits_on_sigterm(host: HostProcess, tmp_path: Path) -> None:
     notes = tmp_path / "notes"
     _open(host, "a", file=str(notes))
     host.begin("obj_a", "move")
@@ -306,7 +306,7 @@ def test_sigterm_means_the_same(host: HostProcess, tmp_path: Path) -> None:
     assert notes.read_text().splitlines()[-2:] == ["a stop", "a disconnected"]
 
 
-def test_what_drivers_do_to_a_process_stays_theirs(host: HostProcess) -> None:
+def test_prints_and_warnings_of_drivers_do_not_break_the_host(host: HostProcess) -> None:
     _open(host, "a")
     left = host.call("obj_a", "leave")
     assert "SystemExit" in left.message
@@ -321,7 +321,7 @@ def test_what_drivers_do_to_a_process_stays_theirs(host: HostProcess) -> None:
     assert host.call("obj_a", "quick") == "quick"
 
 
-def test_a_call_that_holds_the_interpreter_is_silence_not_death(host: HostProcess) -> None:
+def test_a_call_that_blocks_the_interpreter_does_not_end_the_host(host: HostProcess) -> None:
     _open(host, "a")
     began = time.monotonic()
     host.begin("obj_a", "freeze")
@@ -329,7 +329,7 @@ def test_a_call_that_holds_the_interpreter_is_silence_not_death(host: HostProces
     assert time.monotonic() - began > 1.5
 
 
-def test_the_end_of_the_process_is_seen(host: HostProcess) -> None:
+def test_the_end_of_the_host_is_detected(host: HostProcess) -> None:
     _open(host, "a")
     host.begin("obj_a", "crash")
     with pytest.raises(EOFError):
@@ -362,7 +362,7 @@ class Reaching(Generic):
 """
 
 
-def test_an_object_reaches_another_by_name_while_that_is_busy(host: HostProcess) -> None:
+def test_an_object_calls_another_one_that_is_busy(host: HostProcess) -> None:
     objects = [scene_object("a", "Reaching"), scene_object("b", "Device", connect_takes=0.2)]
     host.send(open_scene([type_code("Device", DEVICE), type_code("Reaching", REACHING)], *objects))
     host.expect(m.SceneOpened)

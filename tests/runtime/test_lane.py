@@ -36,7 +36,7 @@ def test_calls_run_in_order_on_one_thread(lane: Lane) -> None:
     assert not on_any_lane()
 
 
-def test_errors_go_to_the_caller(lane: Lane) -> None:
+def test_the_caller_receives_errors(lane: Lane) -> None:
     def fail(error: BaseException) -> None:
         raise error
 
@@ -46,7 +46,7 @@ def test_errors_go_to_the_caller(lane: Lane) -> None:
     assert lane.call("after", lambda: 1) == 1
 
 
-def test_a_late_answer_is_dropped_and_the_lane_is_usable_again(lane: Lane) -> None:
+def test_a_late_result_is_dropped_and_the_lane_is_usable_again(lane: Lane) -> None:
     gate = threading.Event()
     with pytest.raises(DeviceTimeout, match=r"arm: slow did not finish within 0\.05 s"):
         lane.call("slow", lambda: gate.wait(5), deadline=0.05)
@@ -62,7 +62,7 @@ def test_a_late_answer_is_dropped_and_the_lane_is_usable_again(lane: Lane) -> No
     assert lane.call("next", lambda: 2, deadline=5.0) == 2
 
 
-def test_a_call_that_did_not_get_its_turn_never_runs(lane: Lane) -> None:
+def test_a_queued_call_that_expired_never_runs(lane: Lane) -> None:
     gate = threading.Event()
     ran: list[int] = []
     first = Job("first", lambda: gate.wait(5))
@@ -74,7 +74,7 @@ def test_a_call_that_did_not_get_its_turn_never_runs(lane: Lane) -> None:
     assert ran == []
 
 
-def test_a_stop_cancels_what_waits_and_what_runs(lane: Lane) -> None:
+def test_a_stop_cancels_queued_and_running_calls(lane: Lane) -> None:
     gate, begun = threading.Event(), threading.Event()
     ran: list[int] = []
 
@@ -97,7 +97,7 @@ def test_a_stop_cancels_what_waits_and_what_runs(lane: Lane) -> None:
     assert lane.call("next", lambda: 1) == 1
 
 
-def test_what_the_device_says_of_its_stop_is_kept(lane: Lane) -> None:
+def test_a_stopped_call_keeps_the_error_of_the_device(lane: Lane) -> None:
     begun, gate = threading.Event(), threading.Event()
 
     def move() -> None:
@@ -114,7 +114,7 @@ def test_what_the_device_says_of_its_stop_is_kept(lane: Lane) -> None:
     assert isinstance(job.error, DeviceFault)
 
 
-def test_a_stop_at_a_random_moment_lets_nothing_from_before_it_pass(lane: Lane) -> None:
+def test_no_call_from_before_a_stop_runs_after_it(lane: Lane) -> None:
     """At most the one call that was just beginning runs, and it is told as cancelled."""
     source = random.Random(7)
     cut = 0
@@ -142,7 +142,7 @@ def test_a_stop_at_a_random_moment_lets_nothing_from_before_it_pass(lane: Lane) 
     assert lane.call("next", lambda: 1) == 1
 
 
-def test_a_call_ends_once() -> None:
+def test_a_call_ends_exactly_once() -> None:
     ends: list[Job] = []
     for _ in range(200):
         job = Job("x", lambda: None, notify=ends.append)

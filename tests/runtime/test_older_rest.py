@@ -101,7 +101,7 @@ class Own:
         return cls(data["own_value"])
 
 
-def test_what_goes_out_is_camel_case_and_what_comes_in_is_not(service: Service, url: str) -> None:
+def test_requests_are_camel_case_and_results_snake_case(service: Service, url: str) -> None:
     order = Order("o1", Kind.FAST, Pose(Position(1, 2, 3)))
     service.content = b'{"orderId": "o2", "someKind": "fast", "whereTo": {"position": {"x": 1}}}'
     params = {"how_many": 2, "really": True, "kind": Kind.FAST, "left_out": None}
@@ -114,7 +114,7 @@ def test_what_goes_out_is_camel_case_and_what_comes_in_is_not(service: Service, 
     assert sent["whereTo"]["position"] == {"x": 1, "y": 2, "z": 3}
 
 
-def test_lists_plain_values_bytes_and_own_classes(service: Service, url: str) -> None:
+def test_results_as_lists_scalars_bytes_and_classes(service: Service, url: str) -> None:
     service.content = b"[1, 2.5]"
     assert rest.call(rest.Method.GET, url, list_return_type=float) == [1.0, 2.5]
     assert rest.call(rest.Method.GET, url, return_type=bytes) == b"[1, 2.5]"
@@ -145,7 +145,7 @@ def test_a_picture_is_fetched(service: Service, url: str) -> None:
         (400, b"[]", "400 Bad Request"),
     ],
 )
-def test_a_refusal_is_told_as_the_service_tells_it(
+def test_an_error_has_the_message_of_the_service(
     service: Service, url: str, status: int, content: bytes, words: str
 ) -> None:
     service.status, service.content = status, content
@@ -157,14 +157,14 @@ def test_a_refusal_is_told_as_the_service_tells_it(
 
 
 @pytest.mark.parametrize(("content", "kind"), [(b"", int), (b"{", int), (b'"x"', int), (b"[]", Pose), (b"{}", Own)])
-def test_an_answer_that_does_not_fit_is_named(service: Service, url: str, content: bytes, kind: Any) -> None:
+def test_an_invalid_answer_is_named(service: Service, url: str, content: bytes, kind: Any) -> None:
     service.content = content
     with pytest.raises(rest.RestException, match="not valid") as caught:
         rest.call(rest.Method.GET, url, return_type=kind)
     assert url in str(caught.value)
 
 
-def test_a_service_that_does_not_answer_is_given_up_in_time(service: Service, url: str) -> None:
+def test_a_silent_service_times_out(service: Service, url: str) -> None:
     service.delay = 30.0
     began = own_time()
     with pytest.raises(rest.RestException, match=r"PUT http://.*: no answer in time"):
@@ -174,7 +174,7 @@ def test_a_service_that_does_not_answer_is_given_up_in_time(service: Service, ur
         rest.call(rest.Method.GET, "nowhere")
 
 
-def test_json() -> None:
+def test_json_functions() -> None:
     assert older_json.loads('{"a": [1, 2.0, null]}') == {"a": [1, 2.0, None]}
     assert older_json.loads_type("1", int) == 1
     assert json.loads(older_json.dumps({"pose": Pose(), "kind": Kind.FAST}))["kind"] == "fast"
@@ -188,7 +188,7 @@ def test_json() -> None:
         older_json.dumps(object())
 
 
-def test_an_older_action_may_take_its_time() -> None:
+def test_an_older_action_has_a_long_deadline() -> None:
     class Arm:
         def home(self, *, an: str | None = None) -> None: ...
 

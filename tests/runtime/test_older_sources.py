@@ -136,7 +136,7 @@ def codes(*names: str) -> list[m.TypeCode]:
 
 
 # ---------------------------------------------------------------------------------------------- as they are read
-def test_they_are_read_as_they_are_meant() -> None:
+def test_older_sources_are_analysed() -> None:
     library = Library(SourceFile(name, module_name(name), source) for name, source in SOURCES.items())
     for name in SOURCES:
         analysis = library.analyse(name)
@@ -199,7 +199,7 @@ def test_they_are_read_as_they_are_meant() -> None:
         ("from arcor2_object_types.upload import up", "arcor2_object_types.upload is not available"),
     ],
 )
-def test_what_is_not_offered_is_named_by_who_reads_and_by_who_runs(host: HostProcess, line: str, words: str) -> None:
+def test_analysis_and_import_name_missing_older_modules(host: HostProcess, line: str, words: str) -> None:
     source = f"from arcor2_object_types.abstract import Generic\n{line}\n\nclass Odd(Generic):\n    _ABSTRACT = False\n"
     problem = Library([SourceFile("Odd", "odd", source)]).analyse("Odd").problem
     assert problem is not None
@@ -211,7 +211,7 @@ def test_what_is_not_offered_is_named_by_who_reads_and_by_who_runs(host: HostPro
     assert "Odd" in error.message
 
 
-def test_a_source_may_do_without_what_is_not_offered(host: HostProcess) -> None:
+def test_a_source_may_handle_the_import_error_of_a_missing_module(host: HostProcess) -> None:
     source = """
 from arcor2_object_types.abstract import Generic
 try:
@@ -228,7 +228,7 @@ class Odd(Generic):
 
 
 # ---------------------------------------------------------------------------------------------- in a scene
-def test_a_robot_behind_a_service(host: HostProcess, arm_service: ArmService) -> None:
+def test_an_older_robot_behind_a_rest_service(host: HostProcess, arm_service: ArmService) -> None:
     arm = SceneObject(
         "arm", "ArmM1", Pose(Position(10, 0, 0)), scene_object("arm", "x", url=arm_service.url).parameters, "obj_arm"
     )
@@ -265,7 +265,7 @@ def test_a_robot_behind_a_service(host: HostProcess, arm_service: ArmService) ->
     assert arm_service.asked[-1][:2] == ("PUT", "/state/stop")
 
 
-def test_a_constructor_that_fails_is_told_with_its_sentence(host: HostProcess, arm_service: ArmService) -> None:
+def test_the_error_of_a_constructor_is_reported(host: HostProcess, arm_service: ArmService) -> None:
     arm_service.started = True
     arm = scene_object("arm", "ArmM1", pose=True, url=arm_service.url)
     host.send(open_scene(codes("KinematicsMixin", "AbstractArm", "ArmM1"), arm))
@@ -275,14 +275,16 @@ def test_a_constructor_that_fails_is_told_with_its_sentence(host: HostProcess, a
     assert arm_service.url in error.message
 
 
-def test_a_service_that_is_not_there_is_named(host: HostProcess) -> None:
+def test_an_unreachable_service_is_named(host: HostProcess) -> None:
     arm = scene_object("arm", "ArmM1", pose=True, url="http://127.0.0.1:1")
     host.send(open_scene(codes("KinematicsMixin", "AbstractArm", "ArmM1"), arm))
     error = host.expect(m.SceneFailed).error
     assert (error.code, "GET http://127.0.0.1:1/state/started" in error.message) == ("rest", True)
 
 
-def test_a_machine_with_settings_dynamic_values_and_cancel(host: HostProcess, bench_service: BenchService) -> None:
+def test_an_older_machine_with_settings_dynamic_values_and_cancel(
+    host: HostProcess, bench_service: BenchService
+) -> None:
     bench = scene_object("bench", "TestBench", port=bench_service.server_address[1], level=2)
     host.send(open_scene(codes("TestBench"), bench))
     host.expect(m.SceneOpened)
@@ -299,7 +301,7 @@ def test_a_machine_with_settings_dynamic_values_and_cancel(host: HostProcess, be
     assert bench_service.left.wait(5)
 
 
-def test_camera_and_collision_object(host: HostProcess) -> None:
+def test_an_older_camera_and_collision_object(host: HostProcess) -> None:
     crate = scene_object("crate", "Crate", pose=True)
     models = {"Crate": ObjectModel.of(Box("Crate", 0.1, 0.2, 0.5))}
     camera = scene_object("camera", "ShopCamera", pose=True)
@@ -312,7 +314,7 @@ def test_camera_and_collision_object(host: HostProcess) -> None:
 
 
 # ---------------------------------------------------------------------------------------------- in a package
-def test_a_whole_package_as_it_came_from_arcor2(
+def test_a_package_built_by_arcor2_runs(
     host: HostProcess, package: Package, arm_service: ArmService, bench_service: BenchService
 ) -> None:
     names = [f"a{number}" for number in range(1, 7)]
@@ -351,7 +353,7 @@ def test_a_whole_package_as_it_came_from_arcor2(
     assert bench_service.left.wait(5)
 
 
-def test_a_script_of_ours_over_older_types_runs_by_hand(package: Package, bench_service: BenchService) -> None:
+def test_a_script_with_older_types_runs_by_hand(package: Package, bench_service: BenchService) -> None:
     script = """
 from arcor2_hw.runtime.resources import Resources
 from object_types.test_bench import Level, TestBench
@@ -391,7 +393,7 @@ def run_python(code: str, path: Path | None = None) -> str:
     return done.stdout
 
 
-def test_every_name_of_the_table_is_there() -> None:
+def test_every_older_name_can_be_imported() -> None:
     lines = [f"from {module} import {', '.join(names)}" for module, names in OLDER_NAMES.items() if names]
     code = "from arcor2_hw.runtime.older import install\ninstall(); install()\n" + "\n".join(lines)
     code += """
@@ -403,7 +405,7 @@ print(arcor2.data.common.Pose.__module__)
     assert out.split() == ["1", "arcor2_hw.data.geometry"]
 
 
-def test_an_installed_package_of_that_name_is_never_looked_at(tmp_path: Path) -> None:
+def test_an_installed_package_of_the_same_name_is_ignored(tmp_path: Path) -> None:
     (tmp_path / "arcor2").mkdir()
     (tmp_path / "arcor2" / "__init__.py").write_text("raise SystemExit('looked at')")
     code = """
@@ -424,7 +426,7 @@ except ImportError as error:
     assert "arcor2.nothing is not available" in run_python(code, tmp_path)
 
 
-def test_the_server_has_none_of_it() -> None:
+def test_the_server_does_not_import_older_modules() -> None:
     out = run_python("""
 import sys
 import arcor2_server.cli.serve

@@ -196,7 +196,7 @@ def _kept_interpreter(
             pipe.write(b"x")
 
 
-def test_an_instance_has_a_process_of_its_own(host: HostProcess, notes: Path) -> None:
+def test_an_instance_runs_in_its_own_process(host: HostProcess, notes: Path) -> None:
     _open(host, notes, "w1", "w2", "p")
     pids = [host.call(f"obj_{name}", "pid") for name in ("w1", "w2", "p")]
     assert len(set(pids)) == 3
@@ -209,7 +209,7 @@ def test_an_instance_has_a_process_of_its_own(host: HostProcess, notes: Path) ->
     assert sorted(notes.read_text().splitlines()[-3:]) == ["p disconnected", "w1 disconnected", "w2 disconnected"]
 
 
-def test_a_type_that_keeps_the_interpreter_delays_no_other_device(
+def test_a_type_that_blocks_the_interpreter_does_not_delay_other_devices(
     host: HostProcess, notes: Path, tmp_path: Path
 ) -> None:
     _open(host, notes, "w1", "w2", "p")
@@ -227,7 +227,7 @@ def test_a_type_that_keeps_the_interpreter_delays_no_other_device(
     assert host.answer(kept) == "released"
 
 
-def test_a_stop_passes_an_action_that_computes(host: HostProcess, notes: Path, tmp_path: Path) -> None:
+def test_a_stop_interrupts_an_action_that_computes(host: HostProcess, notes: Path, tmp_path: Path) -> None:
     _open(host, notes, "w1")
     spin = host.begin("obj_w1", "spin", file=str(tmp_path / "never"))
     queued = host.begin("obj_w1", "pid")
@@ -239,7 +239,7 @@ def test_a_stop_passes_an_action_that_computes(host: HostProcess, notes: Path, t
     assert isinstance(host.call("obj_w1", "pid"), int)
 
 
-def test_a_stop_wins_over_a_call_that_could_not_start_yet(host: HostProcess, notes: Path, tmp_path: Path) -> None:
+def test_a_stop_cancels_a_call_that_has_not_started(host: HostProcess, notes: Path, tmp_path: Path) -> None:
     # The call has left the lane of the cell host, but the process cannot start it while its interpreter is kept.
     _open(host, notes, "w1", "w2", "p", other="w1")
     with _kept_interpreter(host, notes, tmp_path, "obj_w2", "let_other_keep"):
@@ -263,7 +263,7 @@ def test_a_stop_wins_over_a_call_that_could_not_start_yet(host: HostProcess, not
         ("value", "invalid_data", "generator", ""),
     ],
 )
-def test_errors_keep_their_type(host: HostProcess, notes: Path, how: str, code: str, text: str, detail: str) -> None:
+def test_errors_keep_their_class(host: HostProcess, notes: Path, how: str, code: str, text: str, detail: str) -> None:
     _open(host, notes, "w1")
     error = host.call("obj_w1", "fail", how=how)
     assert (error.code, error.detail, error.object_id) == (code, detail, "obj_w1")
@@ -271,7 +271,7 @@ def test_errors_keep_their_type(host: HostProcess, notes: Path, how: str, code: 
     assert "w1" in error.message
 
 
-def test_references_between_objects_lead_to_the_other_process(host: HostProcess, notes: Path) -> None:
+def test_object_references_work_across_processes(host: HostProcess, notes: Path) -> None:
     _open(host, notes, "w1", "w2", "p", other="p")
     name, other, own, is_plain = host.call("obj_w1", "other")
     assert (name, other, is_plain) == ("p", host.process.pid, True)
@@ -306,7 +306,7 @@ def test_a_process_that_is_killed_is_reported_and_can_be_retried(host: HostProce
 
 
 @pytest.mark.parametrize(("fail", "text"), [("refused", "192.0.2.1:30004"), ("dies", "ended with status 7")])
-def test_one_that_does_not_connect_fails_the_scene(host: HostProcess, notes: Path, fail: str, text: str) -> None:
+def test_a_device_that_does_not_connect_fails_the_scene(host: HostProcess, notes: Path, fail: str, text: str) -> None:
     objects = [scene_object("w1", "Worker", pose=True, file=str(notes), fail=fail)]
     host.send(open_scene([m.TypeCode("Worker", module="plain", source=type_code("Plain", DEVICE).source)], *objects))
     error = host.expect(m.SceneFailed).error
@@ -327,7 +327,7 @@ def test_the_process_ends_with_the_cell_host(host: HostProcess, notes: Path, han
     assert ("w1 disconnected" in notes.read_text()) is not hangs
 
 
-def test_the_loss_of_the_server_stops_and_disconnects_the_device(host: HostProcess, notes: Path) -> None:
+def test_the_end_of_the_server_stops_and_disconnects_the_device(host: HostProcess, notes: Path) -> None:
     _open(host, notes, "w1")
     pid = host.call("obj_w1", "pid")
     host.begin("obj_w1", "move")
@@ -338,7 +338,7 @@ def test_the_loss_of_the_server_stops_and_disconnects_the_device(host: HostProce
     assert notes.read_text().splitlines()[-2:] == ["w1 stop", "w1 disconnected"]
 
 
-def test_a_program_uses_a_device_in_a_process_of_its_own(host: HostProcess, package: Package, notes: Path) -> None:
+def test_a_program_uses_a_device_in_its_own_process(host: HostProcess, package: Package, notes: Path) -> None:
     body = """
     w, p = res.objects["obj_w"], res.objects["obj_p"]
     assert isinstance(w, GenericWithPose) and w.pid() not in (os.getpid(), p.pid())

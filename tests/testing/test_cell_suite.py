@@ -80,7 +80,7 @@ def run(folder: Path, cell: list[dict[str, object]], *arguments: str) -> str:
     return ended.stdout + ended.stderr
 
 
-def test_every_device_of_a_cell_is_tried_and_a_report_written(
+def test_every_device_of_a_cell_is_tested_and_reported(
     tmp_path: Path, tester: FakeProcess, reader: FakeProcess
 ) -> None:
     cell: list[dict[str, object]] = [
@@ -90,7 +90,7 @@ def test_every_device_of_a_cell_is_tried_and_a_report_written(
     ]
     output = run(tmp_path, cell, "--report", "report.json")
     assert "failed" not in output, output
-    assert "far is a real device: name it by --real --real-device far" in output
+    assert "far is a real device. Use --real --real-device far." in output
     report = msgspec.json.decode((tmp_path / "report.json").read_bytes(), type=Report)
     by_name = {each.device: each for each in report.devices}
     assert by_name["tester"].identity.firmware
@@ -104,21 +104,21 @@ def test_every_device_of_a_cell_is_tried_and_a_report_written(
     assert {reached[case].result for case in ("half_a_frame", "reset_and_back", "connecting_observes")} == {Kind.PASSED}
 
 
-def test_a_bench_may_add_what_it_knows(tmp_path: Path, tester: FakeProcess) -> None:
+def test_a_bench_class_of_the_cell_is_used(tmp_path: Path, tester: FakeProcess) -> None:
     (tmp_path / "my_bench.py").write_text(BENCH)
     entry = {"name": "tester", "type": "FunctionalTester", "settings": at(tester), "bench": "my_bench:KnowsMore"}
     output = run(tmp_path, [entry], "-k", "control_does_not_come_back or command_needs_control")
     assert "2 passed" in output, output
 
 
-def test_an_entry_may_say_that_it_is_real(tmp_path: Path, tester: FakeProcess) -> None:
+def test_an_entry_may_be_declared_real(tmp_path: Path, tester: FakeProcess) -> None:
     entry = {"name": "tester", "type": "FunctionalTester", "settings": at(tester), "real": True}
     one = ("-k", "connect_is_idempotent and not disconnect")
     assert "1 skipped" in run(tmp_path, [entry], *one, "--real-device", "tester")
     assert "1 passed" in run(tmp_path, [entry], *one, "--real", "--real-device", "tester")
 
 
-def test_without_a_cell_it_says_what_is_missing(tmp_path: Path) -> None:
+def test_a_missing_cell_file_is_an_error(tmp_path: Path) -> None:
     assert "name a cell.yaml by --device FILE" in run(tmp_path, [])
 
 
@@ -135,20 +135,20 @@ def test_without_a_cell_it_says_what_is_missing(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_mistake_in_a_cell_names_the_device(changes: dict[str, object], told: str) -> None:
+def test_an_error_in_a_cell_names_the_device(changes: dict[str, object], told: str) -> None:
     entry = {"name": "far", "type": "FunctionalTester", "settings": {"host": "127.0.0.1"}} | changes
     with pytest.raises(Arcor2Error, match=told):
         bench_of(msgspec.convert(entry, CellDevice))
 
 
-def test_one_name_in_two_cells_is_refused(tmp_path: Path) -> None:
+def test_a_name_in_two_cells_is_refused(tmp_path: Path) -> None:
     for file in ("a.yaml", "b.yaml"):
         (tmp_path / file).write_text("devices: [{name: far, type: FunctionalTester, settings: {host: 127.0.0.1}}]\n")
     with pytest.raises(Arcor2Error, match=r"several cell\.yaml files have devices of the same name: far"):
         benches_of_files([str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml")])
 
 
-def test_the_wire_sees_what_only_the_device_could_have_counted(tester: FakeProcess) -> None:
+def test_the_wire_records_acting_frames(tester: FakeProcess) -> None:
     """A recorded wire tells apart what observes and what acts, without asking the fake."""
     host, _, port = str(tester.ready["modbus"]).rpartition(":")
     wire = TcpWire(host, [int(port)])

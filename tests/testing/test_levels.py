@@ -28,19 +28,21 @@ TYPE = "FunctionalTester"
         ("units_and_frames", (Kind.LACKING, "no hook readings"), Level.BRONZE, "no hook readings"),
     ],
 )
-def test_what_a_case_costs(case: str, outcome: tuple[Kind, str], level: Level, told: str) -> None:
+def test_failed_and_skipped_cases_lower_the_level(
+    case: str, outcome: tuple[Kind, str], level: Level, told: str
+) -> None:
     reached, missing = judge(ALL_PASSED | {case: outcome}, [], [])
     assert reached is level
     assert told in "; ".join(missing)
 
 
-def test_tests_are_of_silver_and_a_report_of_gold() -> None:
+def test_silver_requires_tests_and_gold_a_report() -> None:
     assert judge(ALL_PASSED, ["no test"], ["no report"]) == (Level.BRONZE, ["no test"])
     assert judge(ALL_PASSED, [], ["no report"]) == (Level.SILVER, ["no report"])
     assert judge(ALL_PASSED, [], []) == (Level.GOLD, [])
 
 
-def test_a_later_failure_of_a_case_counts() -> None:
+def test_a_failure_in_teardown_counts() -> None:
     outcomes = Outcomes()
     told = [("arcor2_case", {"bench": "press", "type": "Press", "real": False, "case": "stop_passes"})]
     outcomes.add(told, True, False, "call", "")
@@ -64,7 +66,7 @@ def test_a_later_failure_of_a_case_counts() -> None:
         ("press_tests.py::test_stops", "that pytest does not collect"),
     ],
 )
-def test_a_test_of_a_rule_has_to_be_there_and_to_run(tmp_path: Path, named: str, told: str) -> None:
+def test_the_test_of_a_rule_must_exist_and_run(tmp_path: Path, named: str, told: str) -> None:
     folder = tmp_path / "press"
     folder.mkdir()
     file = folder / "test_press.py"
@@ -79,7 +81,7 @@ def test_a_test_of_a_rule_has_to_be_there_and_to_run(tmp_path: Path, named: str,
     assert told in "".join(found)
 
 
-def test_no_rules_at_all_are_told(tmp_path: Path) -> None:
+def test_missing_rules_are_reported(tmp_path: Path) -> None:
     assert rules.missing_tests({"1 connecting observes": []}, [tmp_path], "press", {}) == ["rules names no test"]
 
 
@@ -118,7 +120,7 @@ def written(tmp_path: Path, **changes: Any) -> None:
     (tmp_path / "real.json").write_bytes(msgspec.json.encode(whole))
 
 
-def test_a_report_that_fits_is_gold(tmp_path: Path) -> None:
+def test_a_matching_report_reaches_gold(tmp_path: Path) -> None:
     written(tmp_path)
     assert report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED) == []
 
@@ -138,12 +140,12 @@ def test_a_report_that_fits_is_gold(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_report_that_does_not_fit_says_why(tmp_path: Path, changes: dict[str, Any], told: str) -> None:
+def test_differences_of_a_report_are_named(tmp_path: Path, changes: dict[str, Any], told: str) -> None:
     written(tmp_path, **changes)
     assert told in "; ".join(report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED))
 
 
-def test_a_report_that_is_not_there_or_none_is_told(tmp_path: Path) -> None:
+def test_a_missing_or_invalid_report_is_named(tmp_path: Path) -> None:
     assert report.unmatched(tmp_path, claims(), TYPE, {}) == ["the report real.json does not exist"]
     (tmp_path / "real.json").write_text("{}")
     assert "cannot be read" in report.unmatched(tmp_path, claims(), TYPE, {})[0]
@@ -167,13 +169,13 @@ def test_a_report_that_is_not_there_or_none_is_told(tmp_path: Path) -> None:
         ({"channel": "can0", "interface": "socketcan"}, False, "channel can0"),
     ],
 )
-def test_where_a_device_is(settings: dict[str, Any], here: bool, error_text: str) -> None:
+def test_the_address_is_found_in_the_settings(settings: dict[str, Any], here: bool, error_text: str) -> None:
     found = places(settings)
     assert all(place.here for place in found) is here
     assert found[0].error_text == error_text
 
 
-def test_settings_may_be_named_and_ports_given() -> None:
+def test_settings_and_ports_may_be_named() -> None:
     settings = {"box": "127.0.0.1", "door": 7, "port": 8}
     assert places(settings) == []
     (place,) = places(settings, ["box", "door"])

@@ -76,7 +76,7 @@ def failed(output: str) -> list[str]:
     return sorted({line.partition("test_toy.py::TestToy::test_")[2].partition("[")[0] for line in lines})
 
 
-def test_a_driver_that_keeps_the_rules_passes_and_reaches_silver(tmp_path: Path) -> None:
+def test_a_correct_driver_passes_and_reaches_silver(tmp_path: Path) -> None:
     output = run(tmp_path, "test_toy.py::TestToy")
     assert f"{len(Conformance.cases()) + 1} passed in" in output, output
     assert f"ToyPress: silver (claimed silver), {len(Conformance.cases())} passed; next: quality.yaml names" in output
@@ -87,7 +87,7 @@ def test_there_is_a_broken_driver_for_each_case() -> None:
 
 
 @pytest.mark.timeout(180)
-def test_each_broken_rule_fails_in_its_case_and_in_no_other(tmp_path: Path) -> None:
+def test_each_broken_driver_fails_only_its_case(tmp_path: Path) -> None:
     options = ("-pxdist", "-n8", "--dist=load", "--phases=1")
     output = run(tmp_path, "test_toy.py::TestBroken", *options, selected="not test_level", cases=True)
     found: dict[str, set[str]] = {}
@@ -96,7 +96,7 @@ def test_each_broken_rule_fails_in_its_case_and_in_no_other(tmp_path: Path) -> N
     assert found == {case: {case} for case in BROKEN}, output[-6000:]
 
 
-def test_a_hook_that_is_missing_needs_a_written_reason(tmp_path: Path) -> None:
+def test_a_missing_hook_requires_a_reason(tmp_path: Path) -> None:
     output = run(tmp_path, selected="TestToy and loss_reaction", conftest=NO_ORPHAN)
     assert failed(output) == ["loss_reaction"]
     assert "lacks orphan: implement it, or give the reason in quality.yaml under not_run" in output
@@ -105,7 +105,7 @@ def test_a_hook_that_is_missing_needs_a_written_reason(tmp_path: Path) -> None:
     assert "the press would die with its driver" in output
 
 
-def test_a_reason_for_what_can_be_run_is_refused(tmp_path: Path) -> None:
+def test_a_reason_for_a_case_that_can_run_is_refused(tmp_path: Path) -> None:
     output = run(tmp_path, selected="TestToy and loss_reaction", quality=QUALITY + REASON)
     assert failed(output) == ["loss_reaction"]
     assert "excludes loss_reaction, but the bench can run it" in output
@@ -124,7 +124,7 @@ def test_a_reason_for_what_can_be_run_is_refused(tmp_path: Path) -> None:
         ("actions: [clamp, press, stroke]", "actions: [clamp, press, stroke, jump]", "has no action jump"),
     ],
 )
-def test_a_quality_file_that_is_not_in_order_is_named(tmp_path: Path, old: str, new: str, told: str) -> None:
+def test_an_invalid_quality_file_is_named(tmp_path: Path, old: str, new: str, told: str) -> None:
     assert old in QUALITY
     (tmp_path / "quality.yaml").write_text(QUALITY.replace(old, new))
     source = (PACKAGE / "toy_press.py").read_bytes()
@@ -133,7 +133,7 @@ def test_a_quality_file_that_is_not_in_order_is_named(tmp_path: Path, old: str, 
     assert told in wrong[0]
 
 
-def test_a_real_device_is_not_touched_unless_named(tmp_path: Path) -> None:
+def test_a_real_device_is_used_only_if_named(tmp_path: Path) -> None:
     real = "from broken.toy_press import ToyBench\n\nToyBench.real = True\n"
     for options in (["--real"], ["--real-device", "ToyPress"]):
         assert "1 skipped, " in run(tmp_path, *options, selected="TestToy and stop_passes", conftest=real)

@@ -53,9 +53,7 @@ def is_quiet(end: socket.socket) -> bool:
     return not select.select([end], [], [], QUIET)[0]
 
 
-def test_bytes_pass_both_ways_and_are_kept_with_side_and_time(
-    wire: TcpWire, ends: tuple[socket.socket, socket.socket]
-) -> None:
+def test_bytes_are_forwarded_and_recorded(wire: TcpWire, ends: tuple[socket.socket, socket.socket]) -> None:
     driver, device = ends
     driver.sendall(b"ask")
     assert device.recv(9) == b"ask"
@@ -68,7 +66,7 @@ def test_bytes_pass_both_ways_and_are_kept_with_side_and_time(
     assert not wire.record()
 
 
-def test_much_passes_whole_though_nobody_reads_at_first(ends: tuple[socket.socket, socket.socket]) -> None:
+def test_large_data_is_forwarded_to_a_slow_reader(ends: tuple[socket.socket, socket.socket]) -> None:
     driver, device = ends
     much = os.urandom(3 << 20)
     device.setblocking(False)
@@ -85,9 +83,7 @@ def is_quiet_now(end: socket.socket) -> bool:
     return not select.select([], [end], [], 0.0)[1]
 
 
-def test_a_cut_is_silence_both_ways_and_what_was_under_way_comes_late(
-    wire: TcpWire, ends: tuple[socket.socket, socket.socket]
-) -> None:
+def test_a_cut_delays_data_until_it_is_healed(wire: TcpWire, ends: tuple[socket.socket, socket.socket]) -> None:
     driver, device = ends
     wire.cut()
     driver.sendall(b"lost?")
@@ -99,9 +95,7 @@ def test_a_cut_is_silence_both_ways_and_what_was_under_way_comes_late(
     assert driver.recv(9) == b"late"
 
 
-def test_who_closes_while_it_is_cut_is_not_heard_afterwards(
-    wire: TcpWire, ends: tuple[socket.socket, socket.socket]
-) -> None:
+def test_a_close_during_a_cut_is_not_forwarded(wire: TcpWire, ends: tuple[socket.socket, socket.socket]) -> None:
     driver, device = ends
     wire.cut()
     driver.sendall(b"start")
@@ -113,9 +107,7 @@ def test_who_closes_while_it_is_cut_is_not_heard_afterwards(
         device.recv(9)
 
 
-def test_a_connection_made_while_it_is_cut_is_half_open_and_reset_at_the_end(
-    wire: TcpWire, device: socket.socket
-) -> None:
+def test_a_connection_opened_during_a_cut_is_reset(wire: TcpWire, device: socket.socket) -> None:
     wire.cut()
     with dial(wire) as driver:
         driver.sendall(b"hello")
@@ -128,7 +120,7 @@ def test_a_connection_made_while_it_is_cut_is_half_open_and_reset_at_the_end(
         device.accept()[0].close()
 
 
-def test_half_a_frame_passes_and_nothing_after_it(wire: TcpWire, ends: tuple[socket.socket, socket.socket]) -> None:
+def test_half_a_frame_is_forwarded_and_nothing_more(wire: TcpWire, ends: tuple[socket.socket, socket.socket]) -> None:
     driver, device = ends
     wire.half_frame()
     driver.sendall(b"ask")
@@ -142,7 +134,7 @@ def test_half_a_frame_passes_and_nothing_after_it(wire: TcpWire, ends: tuple[soc
         driver.recv(9)
 
 
-def test_a_reset_is_told_to_both_ends_and_a_new_connection_is_taken(
+def test_a_reset_reaches_both_ends_and_new_connections_work(
     wire: TcpWire, device: socket.socket, ends: tuple[socket.socket, socket.socket]
 ) -> None:
     wire.reset()
@@ -153,7 +145,7 @@ def test_a_reset_is_told_to_both_ends_and_a_new_connection_is_taken(
         pass
 
 
-def test_a_connection_that_is_being_made_is_reset_too(
+def test_a_connection_in_progress_is_reset_too(
     wire: TcpWire, device: socket.socket, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     connect = socket.create_connection
@@ -168,7 +160,7 @@ def test_a_connection_that_is_being_made_is_reset_too(
         driver.recv(9)
 
 
-def test_a_device_that_is_not_there_is_a_reset() -> None:
+def test_a_missing_device_resets_the_connection() -> None:
     with socket.socket() as closed:
         closed.bind(("127.0.0.1", 0))
         wire = TcpWire("127.0.0.1", [closed.getsockname()[1]])
@@ -191,7 +183,7 @@ def port() -> Iterator[tuple[int, str]]:
         os.close(end)
 
 
-def test_a_serial_line_passes_is_cut_torn_and_pulled(port: tuple[int, str]) -> None:
+def test_a_serial_wire_forwards_cuts_and_unplugs(port: tuple[int, str]) -> None:
     device, path = port
     wire = SerialWire(path)
     wire.start()
@@ -237,22 +229,20 @@ def hexed(text: str) -> bytes:
         (ModbusRtu(), "11 01 0013 0025 0e84", "11 10 0001 0002 04 000a 0102 c6f0", "function 16"),
     ],
 )
-def test_modbus_requests_are_told_apart_by_what_they_do(
-    frames: ModbusTcp | ModbusRtu, read: str, acts: str, words: str
-) -> None:
+def test_modbus_writes_count_as_acting(frames: ModbusTcp | ModbusRtu, read: str, acts: str, words: str) -> None:
     stream = hexed(read) + hexed(acts) + hexed(read)
     assert frames.split(stream) == [hexed(read), hexed(acts), hexed(read)]
     assert frames.acting(hexed(read)) == ""
     assert frames.acting(hexed(acts)).startswith(words)
 
 
-def test_what_is_no_frame_is_not_taken_for_harmless() -> None:
+def test_an_invalid_frame_counts_as_acting() -> None:
     for frames in (ModbusTcp(), ModbusRtu()):
         assert frames.split(b"\xff\xfe\xfd") == [b"\xff\xfe\xfd"]
         assert "invalid Modbus" in frames.acting(b"\xff\xfe\xfd")
 
 
-def test_lines_act_by_their_beginnings() -> None:
+def test_lines_act_by_their_first_word() -> None:
     frames = Lines(["LON", "RST"])
     assert frames.split(b"STAT\rLON 5\r\nVER\r") == [b"STAT", b"LON 5", b"VER"]
     assert [frames.acting(each) for each in (b"STAT", b"LON 5", b"PLON")] == ["", "LON 5", ""]
@@ -275,6 +265,6 @@ def test_canopen_acts_by_nmt_process_data_and_downloads(line: str, words: str) -
     assert CanopenSlcan(["0x1017"]).acting(line.encode()) == words
 
 
-def test_a_kind_that_is_not_known_is_named() -> None:
+def test_an_unknown_kind_of_frames_is_named() -> None:
     with pytest.raises(InvalidData, match="morse"):
         reader("morse", [])

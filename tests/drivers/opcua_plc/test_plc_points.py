@@ -132,7 +132,7 @@ def test_what_cannot_be_written(fake: FakeProcess, plc: OpcUaPlc) -> None:
         plc.write_analog("speed", -0.01)
     with pytest.raises(OutOfRange, match="pressure must be a finite number"):
         plc.write_analog("pressure", float("nan"))
-    with pytest.raises(OutOfRange, match="no point 'lamb'. Available: part"):
+    with pytest.raises(OutOfRange, match=r"no point 'lamb'. Available: part"):
         plc.write_digital("lamb", True)
     assert [each for each in fake.truth()["written"] if each[0].startswith("Cell.")] == before
 

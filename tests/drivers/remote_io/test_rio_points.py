@@ -128,7 +128,7 @@ def test_reading_each_kind(fake: FakeProcess, observed: RemoteIO) -> None:
     assert observed.read("level").quality is Quality.BAD
     with pytest.raises(DeviceFault, match=r"level \(AI0\) has a broken wire"):
         observed.read_analog("level")
-    with pytest.raises(OutOfRange, match="no point 'lid'. Available: part, door"):
+    with pytest.raises(OutOfRange, match=r"no point 'lid'. Available: part, door"):
         observed.read("lid")
     with pytest.raises(Refused, match="level is AI0"):
         observed.read_digital("level")
