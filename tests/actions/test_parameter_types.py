@@ -1,4 +1,4 @@
-"""The ten parameter types: exact kinds, ranges, references, what a script and an event get."""
+"""The ten parameter types: exact types, ranges, references, and their form in scripts and events."""
 
 import ast
 import math
@@ -47,7 +47,7 @@ def index() -> ProjectIndex:
 
 
 class Names:
-    """Names that show what they were asked for."""
+    """Script names that contain the requested id."""
 
     def pose(self, orientation_id: str) -> ast.expr:
         return ast.Name(f"pose_{orientation_id}")

@@ -1,4 +1,4 @@
-"""A server of a few lines whose every misdeed is said by the test: what it was asked is kept."""
+"""A minimal server whose answers and faults are scripted by the test. It records the requests."""
 
 import asyncio
 import contextlib
@@ -17,12 +17,12 @@ async def granted(server: "ScriptedServer", socket: ServerConnection, request: d
 
 
 async def cut(server: "ScriptedServer", socket: ServerConnection, request: dict[str, Any]) -> None:
-    """The connection breaks as a cable does, without a word."""
+    """Break the connection without a close frame, like an unplugged cable."""
     socket.transport.abort()
 
 
 class ScriptedServer:
-    """`script[name]` is a list of what to do at each request of that name; then, and otherwise, it is granted."""
+    """Answer requests by `script[name]`, a list of functions for that request. Other requests succeed."""
 
     def __init__(self) -> None:
         self.asked: list[list[str]] = []

@@ -1,4 +1,4 @@
-"""The generated methods: current, one for each request, and with the defaults of the Structs."""
+"""The methods of requests: one for each request, with the defaults of the Structs, and a current stub file."""
 
 import inspect
 from typing import Any
@@ -17,7 +17,7 @@ from arcor2_hw.data.rpc import RPCS
 
 
 class Recorder(Requests):
-    """Keeps what would be sent."""
+    """Record the requests instead of sending them."""
 
     def __init__(self) -> None:
         self.sent: list[tuple[str, Any, bool]] = []

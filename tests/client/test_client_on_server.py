@@ -1,4 +1,4 @@
-"""The client with the real server: typed answers, typed refusals, tokens, and a server that is killed under it."""
+"""The client with the real server: typed answers and errors, tokens, and a server that is killed."""
 
 import asyncio
 import contextlib
@@ -183,7 +183,7 @@ async def test_a_token_grants_only_its_role(tmp_path: Path, monkeypatch: pytest.
 
 
 class Killed:
-    """A server on one port that dies without a word and is started again."""
+    """A server on a fixed port that is killed and started again."""
 
     def __init__(self, data: Path) -> None:
         self.data = data
@@ -250,7 +250,7 @@ async def test_a_killed_server_loses_at_most_one_answer(tmp_path: Path) -> None:
 
 
 async def _opened_again(client: Client):  # type: ignore[no-untyped-def]
-    """Read on to the gap, and to the greeting behind it."""
+    """Read the stream up to the gap and the initial events after it."""
     missed = None
     while missed is None:
         try:

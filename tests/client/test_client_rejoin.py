@@ -1,4 +1,4 @@
-"""What the client does when the connection is lost, against a server that does what the test says."""
+"""Reconnecting of the client, against a scripted server."""
 
 import asyncio
 from typing import Any
@@ -23,7 +23,7 @@ from tests.client.scripted import ScriptedServer, cut, scripted
 
 
 async def lose(server: ScriptedServer, client: Client) -> None:
-    """Break the connection; the client has noticed."""
+    """Break the connection and wait until the client has noticed."""
     server.sockets[-1].transport.abort()
     async with asyncio.timeout(5.0):
         while client.connected:

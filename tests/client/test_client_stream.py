@@ -1,4 +1,4 @@
-"""The stream of events by itself: order, filter, room, and what is missing is told where it is missing."""
+"""The event stream alone: order, filter, limit, and gaps at their position."""
 
 import asyncio
 

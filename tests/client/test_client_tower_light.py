@@ -1,4 +1,4 @@
-"""docs/examples/tower_light_client.py: a program of its own, between a real server and the fake block of a light."""
+"""The example docs/examples/tower_light_client.py between a real server and a simulated tower light."""
 
 import asyncio
 import signal
@@ -45,19 +45,19 @@ def block() -> Iterator[FakeProcess]:
 
 
 class Watched:
-    """The lamps, as the block has them."""
+    """The lamps at the simulated block."""
 
     def __init__(self, block: FakeProcess) -> None:
         self.block = block
 
     async def shows(self, lamp: int | None, blinking: bool = False) -> None:
-        """Wait until one lamp is lit, or blinks, and no other is."""
+        """Wait until exactly one lamp is lit or blinks."""
         async with asyncio.timeout(WITHIN):
             while not await asyncio.to_thread(self._shown, lamp, blinking):
                 await asyncio.sleep(0.05)
 
     def _shown(self, lamp: int | None, blinking: bool) -> bool:
-        """Look at the changes of the last 1.1 s, in which a blinking lamp goes on and off."""
+        """Return the lamps from the changes of the last 1.1 s, in which a blinking lamp switches on and off."""
         truth: dict[str, Any] = self.block.truth()
         lit = {number for number in range(3) if truth["outputs"][number]}
         changes = [entry for entry in truth["history"] if entry["output"] < 3][-3:]

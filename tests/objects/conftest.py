@@ -1,4 +1,4 @@
-"""A plain robot arm from a URDF, among obstacles that the test places."""
+"""A simple robot arm with a URDF, and obstacles placed by the test."""
 
 import importlib
 import shutil
@@ -55,7 +55,7 @@ class PlainArm(UrdfRobot):
 
 
 class Around:
-    """Surroundings that the test says."""
+    """Surroundings defined by the test."""
 
     def __init__(self) -> None:
         self.things: list[Obstacle] = []
@@ -83,7 +83,7 @@ class Around:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The driver as it would lie in a distribution."""
+    """Folder of the driver, as in an installed distribution."""
     root = tmp_path_factory.mktemp("plain")
     package = root / "plain_driver"
     (package / "urdf" / "plain_arm").mkdir(parents=True)
@@ -124,7 +124,7 @@ def values(found: list[Joint]) -> Any:
 
 
 def moved(pose: Pose, x: float, y: float, z: float) -> Pose:
-    """In the axes of the robot's base."""
+    """Return a position in the frame of the robot's base."""
     return Pose(pose.position + Position(x, y, z).rotated(BASE.orientation), pose.orientation)
 
 

@@ -1,4 +1,4 @@
-"""Which settings say where a device is, and at which host that is."""
+"""Detection of settings with the address of a device, and of its host."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Frames: rays against OpenCV's lens, points of a plane, and what a picture keeps of how it was taken."""
+"""Frames: rays compared with OpenCV, points of a plane, and camera data in images."""
 
 import numpy as np
 import pytest

@@ -33,7 +33,7 @@ class Claw(Gripper):
 
 
 class Board(CollisionObject):
-    """Something to grip."""
+    """A part to grip."""
 
     _ABSTRACT = False
 
@@ -65,7 +65,7 @@ def claw(arm: Any, board: Board) -> Claw:
 
 
 def below_tip(around: Around, arm: Any) -> Any:
-    """Put a bin below a line to the side, which only a long part touches; return the target."""
+    """Put a bin below a sideways line, so that only a long part touches it. Return the target."""
     here = arm.get_end_effector_pose("tcp")
     target = moved(here, 0.0, 0.25, 0.0)
     at = (BASE.inverted() * target).position

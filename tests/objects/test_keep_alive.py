@@ -1,4 +1,4 @@
-"""Watchdogs kept quiet by a child process, and deadlines by running time."""
+"""Feeding of watchdogs by a child process, and time limits in running time."""
 
 import os
 import select
@@ -29,7 +29,7 @@ while True:
 
 @pytest.fixture
 def line() -> Iterator[tuple[int, int]]:
-    """Both ends of a device's line: what the child writes to, and what the device reads from."""
+    """Both ends of the line: the one that the child writes to and the one that the device reads."""
     reading, writing = os.pipe()
     yield writing, reading
     os.close(reading)
@@ -37,7 +37,7 @@ def line() -> Iterator[tuple[int, int]]:
 
 
 def last_message(reading: int, silence: float) -> float:
-    """Return when the last message came, once none has come for `silence` s."""
+    """Return the time of the last message, after `silence` s without a message."""
     last = 0.0
     while select.select([reading], [], [], silence)[0] and os.read(reading, 4096):
         last = time.monotonic()
@@ -115,7 +115,7 @@ def test_a_stall_does_not_count_as_waiting() -> None:
     lock.acquire()
 
     def answer() -> None:
-        """Answer 0.1 s after the stall: later than the others wait by the wall clock."""
+        """Answer 0.1 s after the stall, when the wall-clock time limit of the others has passed."""
         ready.wait()
         time.sleep(0.1)
         future.set_result(1)

@@ -1,4 +1,4 @@
-"""The Modbus link on a socket and on a pty: frames byte for byte, answers that are late, torn or another's."""
+"""The Modbus link on a socket and a pty: exact frames, and late, incomplete or foreign answers."""
 
 import contextlib
 import itertools
@@ -16,11 +16,11 @@ from arcor2_hw.objects.modbus_link import ModbusLink
 from arcor2_hw.testing.own_time import own_time
 
 Script = Callable[[bytes], bytes | None]
-"""Gives the answer to a request, or None for none."""
+"""Returns the answer to a request, or None for no answer."""
 
 
 class Peer:
-    """Listens, and answers each request by `script`; remembers what came."""
+    """Listen, answer each request by `script`, and record the requests."""
 
     def __init__(self) -> None:
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -79,7 +79,7 @@ def link(peer: Peer) -> Iterator[ModbusLink]:
 
 
 def adu(pdu: str, number: int = 1, unit: int = 1) -> bytes:
-    """Give a PDU with its MBAP header (Modbus messaging on TCP/IP 1.0b, 3.1.3)."""
+    """Return a PDU with its MBAP header (Modbus messaging on TCP/IP 1.0b, 3.1.3)."""
     data = bytes.fromhex(pdu)
     return number.to_bytes(2, "big") + b"\0\0" + (len(data) + 1).to_bytes(2, "big") + bytes([unit]) + data
 
@@ -135,7 +135,7 @@ def test_frames_match_the_modbus_specification(
 
 
 def test_exceptions_match_the_modbus_specification(peer: Peer, link: ModbusLink) -> None:
-    """Section 7: reading a coil that is not there."""
+    """Section 7: reading a coil that does not exist."""
     peer.script = lambda _: adu("81 02")
     with pytest.raises(DeviceFault) as refused:
         link.read_coils(0x04A1, 1)
@@ -147,7 +147,7 @@ def test_exceptions_match_the_modbus_specification(peer: Peer, link: ModbusLink)
 
 
 def test_the_identification_is_read(peer: Peer, link: ModbusLink) -> None:
-    """Section 6.21, the basic objects; the texts are ours."""
+    """Section 6.21, the basic objects, with texts of this test."""
     objects = b"".join(bytes([number, len(text)]) + text for number, text in enumerate((b"Maker", b"P-7", b"V2.11")))
     peer.script = lambda _: adu("2B 0E 01 01 00 00 03" + objects.hex())
     identity = link.identify()
@@ -157,7 +157,7 @@ def test_the_identification_is_read(peer: Peer, link: ModbusLink) -> None:
 
 # ------------------------------------------------------------------------------------------------ bad days on TCP
 def test_answers_with_another_transaction_id_are_ignored(peer: Peer, link: ModbusLink) -> None:
-    """Another transaction's number, another unit's answer, then ours, all in one segment."""
+    """Send the answer of another transaction, that of another unit, and the right one in one segment."""
     peer.script = lambda _: adu("04 02 0001", number=7) + adu("04 02 0002", unit=9) + adu("04 02 0003")
     assert link.read_input_registers(0, 1) == [3]
 
@@ -244,7 +244,7 @@ def test_close_wakes_waiting_threads(peer: Peer) -> None:
 
 
 def test_an_interrupted_request_leaves_the_line_usable(peer: Peer, link: ModbusLink) -> None:
-    """A program's thread may be told to end at any instruction; the answer of then must not be the next one's."""
+    """A stop may interrupt a thread anywhere; its answer must not be returned to the next request."""
 
     class ToldToEnd(BaseException):
         pass
@@ -310,7 +310,7 @@ def line() -> Iterator[tuple[int, ModbusLink]]:
 
 
 def answer_on(end: int, answers: list[bytes], delay: float = 0.0) -> tuple[threading.Thread, list[bytes]]:
-    """Answer as many requests as there are answers, each some bytes at a time."""
+    """Answer one request per answer, in pieces of some bytes."""
     requests: list[bytes] = []
 
     def serve() -> None:
@@ -327,7 +327,7 @@ def answer_on(end: int, answers: list[bytes], delay: float = 0.0) -> tuple[threa
 
 
 def test_rtu_frames_have_a_checksum(line: tuple[int, ModbusLink]) -> None:
-    """The sums are of general knowledge of the protocol: reading ten registers, and one that holds 10."""
+    """The checksums are well-known examples: reading ten registers, and one register with the value 10."""
     end, link = line
     thread, requests = answer_on(end, [bytes.fromhex("0103020000B844")])
     with pytest.raises(DeviceFault, match="sent 1 of 10 holding registers"):
@@ -346,7 +346,7 @@ def test_an_rtu_answer_with_a_wrong_checksum_is_ignored(line: tuple[int, ModbusL
 
 
 def test_a_late_answer_on_a_serial_line_is_discarded(line: tuple[int, ModbusLink]) -> None:
-    """It comes while the line is drained; the reading that is asked for again has its own answer."""
+    """The late answer arrives while the line is drained, and the repeated read gets its own answer."""
     end, link = line
     late, fresh = bytes.fromhex("0103020000B844"), bytes.fromhex("010302000A3843")
 
@@ -364,7 +364,7 @@ def test_a_late_answer_on_a_serial_line_is_discarded(line: tuple[int, ModbusLink
 
 
 def test_rtu_frames_are_separated_by_silence(line: tuple[int, ModbusLink]) -> None:
-    """Modbus over serial line 1.02, 2.5.1.1: at least 1.75 ms beyond 19200 bit/s."""
+    """Modbus over serial line 1.02, 2.5.1.1: at least 1.75 ms above 19200 bit/s."""
     end, link = line
     gaps: list[float] = []
 

@@ -1,4 +1,4 @@
-"""A safe move is checked again while it runs: it stops before what comes into its path, and names it."""
+"""Monitoring of safe moves: the robot stops before an obstacle that enters its path, and names it."""
 
 import itertools
 import threading
@@ -23,11 +23,11 @@ from .conftest import ACROSS, BASE, READY, URDF, Around, joints, made, moved, va
 
 STEP = 0.005
 SPEED = 1.0
-"""rad/s of the fastest joint."""
+"""Speed of the fastest joint, rad/s."""
 
 
 class Motion:
-    """Drives a plain arm at a speed, and brakes after a stop as a real one does."""
+    """Move a simple arm with a constant speed, and brake after a stop."""
 
     def __init__(self, arm: Any, braking: float = 0.05) -> None:
         self.arm, self.braking = arm, braking
@@ -66,13 +66,13 @@ def motion(arm: Any) -> Motion:
 
 
 def tip_at(arm: Any, pan: float) -> Position:
-    """Return where the tool is with the first joint at a value, in the robot's base."""
+    """Return the position of the tool in the robot's base for a value of the first joint."""
     position: Position = (BASE.inverted() * arm.forward_kinematics("tcp", joints((pan, *READY[1:])))).position
     return position
 
 
 def touches(around: Around, now: Any) -> set[str]:
-    """Name what the arm touches, by a world of the test's own."""
+    """Return the contacts of the arm in a separate collision world."""
     world = CollisionWorld()
     world.add_robot("arm", RobotModel.load(URDF), BASE, values(now))
     for thing in around.things:

@@ -1,4 +1,4 @@
-"""Polled: states that are new enough, waits that end for every reason there is."""
+"""Polled: current states, and all reasons that end waiting."""
 
 import threading
 import time
@@ -12,7 +12,7 @@ from arcor2_hw.objects.polled import Polled, Snapshot
 
 
 class Device:
-    """Counts how often it was read; can hold its answer back, and break."""
+    """Count the readings. It can delay its answer and fail."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -152,7 +152,7 @@ def test_disconnecting_ends_waiting_without_reporting_a_loss(polled: Polled[int]
 
 
 def test_no_state_is_stored_while_the_lock_is_held(device: Device) -> None:
-    """What `taken` sees and what others see is one instant."""
+    """The hook and other threads see the same state."""
     taken: list[int] = []
 
     def note(snapshot: Snapshot[int]) -> None:
@@ -173,7 +173,7 @@ def test_no_state_is_stored_while_the_lock_is_held(device: Device) -> None:
 
 
 def test_an_unsolicited_state_is_stored(device: Device) -> None:
-    """What is read may be nothing then; what is put counts since when it holds."""
+    """`read` may return None; a state from `put` is valid since the given time."""
     polled: Polled[int] = Polled("thing", device.open, lambda: None, lambda: None, busy=0.002)
     polled.connect(1.0)
     try:

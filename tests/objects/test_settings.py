@@ -1,4 +1,4 @@
-"""The checks that every setting goes through that names a port, a URL or a file."""
+"""Checks of settings with a port, a URL or a file."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The stock object types do what a program relies on."""
+"""The stock object types: flow, time, logic, counters, random numbers."""
 
 import importlib
 import inspect

@@ -1,4 +1,4 @@
-"""A robot type that says how to drive joints, and nothing else about its moves: what it can do, what it refuses."""
+"""A UrdfRobot that implements only joint motion: its features and refusals."""
 
 import importlib
 import itertools
@@ -26,7 +26,7 @@ from .conftest import ACROSS, BASE, READY, SOURCE, URDF, WALL, Around, joints, m
 
 
 def assert_free(arm: Any, around: Around, way: list[list[Joint]]) -> None:
-    """By a world of the test's own, finer than what was looked at."""
+    """Check a path in a separate collision world with a finer resolution."""
     model = RobotModel.load(URDF)
     world = CollisionWorld()
     world.add_robot("arm", model, BASE)
@@ -141,7 +141,7 @@ def test_a_linear_move_is_straight_or_refused(arm: Any, around: Around) -> None:
 
 
 def test_a_move_may_end_close_to_an_obstacle(arm: Any, around: Around) -> None:
-    """A pick ends nearer to the table than ways keep away from it, but does not touch it."""
+    """A pick ends nearer to the table than the margin, without touching it."""
     here = BASE.inverted() * arm.get_end_effector_pose("tcp")
     around.box("table", here.position + Position(0.0, 0.0, -0.152), 0.4, 0.4, 0.1)
     arm.move_to_pose("tcp", moved(arm.get_end_effector_pose("tcp"), 0.0, 0.0, -0.1), 0.2)
@@ -275,7 +275,7 @@ def test_a_path_can_be_sampled_over_time(arm: Any, around: Around) -> None:
 
 
 def fences(around: Around) -> None:
-    """Plates from the foot outwards on both sides, higher than the arm: its shoulder cannot turn past them."""
+    """Plates on both sides of the base, higher than the arm, so that its shoulder cannot turn past them."""
     for side in (-1.0, 1.0):
         around.box(f"fence {side:+.0f}", Position(0.0, side * 0.68, 0.5), 0.02, 1.06, 3.0)
 

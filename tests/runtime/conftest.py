@@ -1,4 +1,4 @@
-"""A cell host as a process of its own, spoken to as the server does, but one step at a time."""
+"""A cell host in its own process, controlled by the test in place of the server."""
 
 import os
 import select
@@ -66,7 +66,7 @@ class HostProcess:
             self._buffer += chunk
 
     def expect(self, kind: type[T], where: Callable[[T], bool] = lambda _: True, within: float = PATIENCE) -> T:
-        """Give the next message of a kind for which `where` holds; others are remembered in `seen`."""
+        """Return the next message of a type for which `where` is true. Others are stored in `seen`."""
         deadline = time.monotonic() + within
         while True:
             message = self._next(deadline)
@@ -100,7 +100,7 @@ class HostProcess:
         return self.answer(self.begin(object_id, method, deadline, **arguments))
 
     def events(self) -> list[str]:
-        """Name what the program told so far, in order, without streams."""
+        """Return the names of the events of the program so far, without streams."""
         names = []
         for message in self.seen:
             if isinstance(message, m.ProgramEvent):
@@ -179,7 +179,7 @@ if __name__ == "__main__":
 
 
 class Package:
-    """Writes a package: `types` are sources by type name, `body` is what main does."""
+    """Write a package. `types`: sources by type name; `body`: body of main()."""
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory

@@ -1,4 +1,4 @@
-"""Object types as people wrote them for ARCOR2: nothing in here knows of us."""
+"""Object types as written for ARCOR2, without references to ARCOR2-HW."""
 
 FIT_MIXIN = '''
 from arcor2.data.common import Joint, Pose

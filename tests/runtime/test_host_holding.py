@@ -1,4 +1,4 @@
-"""Held motion in the cell host: leases, their end whoever hangs, speed and limits, hand teaching."""
+"""Hold-to-run in the cell host: leases, their expiry, speed and joint limits, hand teaching."""
 
 import os
 import signal
@@ -69,7 +69,7 @@ ALONG_X = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Holder:
-    """Sends leases as the server does."""
+    """Send leases like the server."""
 
     def __init__(self, host: HostProcess) -> None:
         self.host = host
@@ -151,7 +151,7 @@ def test_an_expired_hold_stops_and_does_not_start_again(holder: Holder) -> None:
 
 
 def test_a_late_lease_is_refused(holder: Holder) -> None:
-    """The host hangs for longer than the leases last that wait for it, and with them a new press."""
+    """The host hangs longer than the duration of the queued leases."""
     pid = holder.host.process.pid
     os.kill(pid, signal.SIGSTOP)
     while psutil.Process(pid).status() != psutil.STATUS_STOPPED:

@@ -1,4 +1,4 @@
-"""A scene that comes up without what is missing, objects that are retried, streams at rates of their own."""
+"""Scenes that open without failed objects, retries of objects, and streams at different rates."""
 
 import time
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The cell host with a package: events, pacing, the ways a program ends."""
+"""The cell host with a package: events, pause and breakpoints, and the ends of a program."""
 
 import json
 import os

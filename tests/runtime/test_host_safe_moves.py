@@ -1,4 +1,4 @@
-"""In the host a robot knows what stands in the scene: it goes around that, as it is now."""
+"""Safe moves in the cell host: a robot avoids the current obstacles of the scene."""
 
 import math
 from pathlib import Path
@@ -24,7 +24,7 @@ NAMES = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_
 READY = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 ACROSS = (2.74, -1.57, 1.57, -1.57, -1.57, 0.0)
 MEETING = (1.04, -1.57, 1.57, -1.57, -1.57, 0.0)
-"""Where the tip is where that of another arm is that reaches over."""
+"""A pose of the tip that another arm reaches too."""
 ARM = """
 from arcor2_hw.objects.safe_moves import Way
 from arcor2_hw.objects.urdf_robot import UrdfRobot
@@ -74,7 +74,7 @@ class SlowArm(Arm):
             self.now = [Joint(goal[0].name, turned), *goal[1:]]
         self.now = goal
 """
-"""An arm that turns its first joint at 1 rad/s, some 0.5 m/s at the tip."""
+"""An arm that turns its first joint at 1 rad/s, about 0.5 m/s at the tip."""
 WALL = """
 class Wall(CollisionObject):
     _ABSTRACT = False
@@ -168,11 +168,11 @@ def test_a_move_is_refused_if_the_joints_of_another_robot_are_unknown(scene: Hos
 
 # ---------------------------------------------------------------------------------------------------- what is put in
 TIP = Position(0.4922, 0.1334, 0.4878)
-"""Where the tip is in READY; the tool points down."""
+"""Position of the tip in READY, where the tool points down."""
 
 
 def line(host: HostProcess, by: Position) -> Any:
-    """Lead the tip in a line from READY, safely; gives what was said."""
+    """Move the tip in a safe line from READY, and return the error or None."""
     assert go(host, READY, safe=False) is None
     target = Pose(TIP + by, UPSIDE_DOWN)
     return host.call("obj_arm", "move_to_pose", end_effector_id="tcp", target_pose=target, speed=0.5)
@@ -286,7 +286,7 @@ def test_a_held_body_collides_where_the_arm_does_not(scene: HostProcess) -> None
 
 
 def held(host: HostProcess) -> list[tuple[str, str]]:
-    """Return the names of the parts that the arm holds, and the links, as the host reported them last."""
+    """Return names and links of the held parts in the last report of the host."""
     reported = [each for each in host.seen if isinstance(each, m.DeviceChanged) and each.object_id == "obj_arm"]
     return [(part.name, part.link) for part in reported[-1].held]
 
@@ -390,7 +390,7 @@ def test_a_robot_with_several_arms_is_an_obstacle_if_all_joints_are_known(host: 
 
 # ---------------------------------------------------------------------------------------------------- the very arm
 def calibration(longer: float) -> KinematicCalibration:
-    """That of an arm whose upper arm is longer by so much."""
+    """Return the calibration of an arm with a longer upper arm."""
     half = math.pi / 2
     d, a = (0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996), (0.0, -0.425 - longer, -0.3922, 0.0, 0.0, 0.0)
     rows = zip(d, a, (half, 0.0, 0.0, half, -half, 0.0), strict=True)

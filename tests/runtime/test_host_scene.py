@@ -1,4 +1,4 @@
-"""The cell host with a scene online: creation, calls, deadlines, the stop lane, loss of the server."""
+"""The cell host with an online scene: creation, calls, deadlines, stops, and the end of the server."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""A lane: order, deadlines, late answers, stops; each call ends exactly once, whatever races with it."""
+"""Lanes: order, deadlines, late results and stops. Each call ends exactly once, also in a race."""
 
 import random
 import threading
@@ -115,7 +115,7 @@ def test_a_stopped_call_keeps_the_error_of_the_device(lane: Lane) -> None:
 
 
 def test_no_call_from_before_a_stop_runs_after_it(lane: Lane) -> None:
-    """At most the one call that was just beginning runs, and it is told as cancelled."""
+    """Only the call that was just starting may run, and it ends as cancelled."""
     source = random.Random(7)
     cut = 0
     for _ in range(300):

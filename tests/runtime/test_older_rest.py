@@ -1,4 +1,4 @@
-"""REST, JSON and marks as older sources use them: what goes over the wire, and what each error says."""
+"""REST client, JSON and action metadata of older sources: requests, answers and errors."""
 
 import json
 import threading
@@ -88,7 +88,7 @@ class Order:
 
 
 class Own:
-    """What has its own way to a dictionary and back."""
+    """A class with its own conversion to and from dictionaries."""
 
     def __init__(self, value: int) -> None:
         self.value = value

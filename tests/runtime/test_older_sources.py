@@ -1,4 +1,4 @@
-"""Object types and scripts written for ARCOR2 load and run as they are: read by analysis, in a scene, in a package."""
+"""Object types and scripts written for ARCOR2 run unchanged: in the analysis, a scene and a package."""
 
 import contextlib
 import json
@@ -29,7 +29,7 @@ from .older_sources import ACTION_POINTS, SCRIPT, SOURCES
 
 # ---------------------------------------------------------------------------------------------- what they talk to
 class ArmService(ThreadingHTTPServer):
-    """A robot's REST service: camelCase, 204 for what went well, WebApiError for what did not."""
+    """A REST service of a robot: camelCase, 204 for success, WebApiError for errors."""
 
     def __init__(self) -> None:
         super().__init__(("127.0.0.1", 0), ArmHandler)

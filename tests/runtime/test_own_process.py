@@ -1,4 +1,4 @@
-"""Object types whose instances run in a process of their own."""
+"""Object types whose instances run in their own process."""
 
 import contextlib
 import os
@@ -151,7 +151,7 @@ def notes(tmp_path: Path) -> Path:
 
 
 def _open(host: HostProcess, notes: Path, *names: str, **settings: object) -> None:
-    """Open a scene; names that start with w are in a process of their own."""
+    """Open a scene. Objects whose names start with w run in their own process."""
     objects = [
         scene_object(name, "Worker" if name.startswith("w") else "Plain", pose=True, file=str(notes), **settings)
         for name in names
@@ -184,7 +184,7 @@ def _wait_noted(notes: Path, text: str) -> None:
 def _kept_interpreter(
     host: HostProcess, notes: Path, directory: Path, caller: str = "obj_w1", method: str = "keep_interpreter"
 ) -> Iterator[int]:
-    """Have w1 keep its interpreter in a C call; the number of the call that leads to it."""
+    """Make w1 block its interpreter in a C call. Return the number of the call."""
     fifo = directory / "fifo"
     os.mkfifo(fifo)
     call = host.begin(caller, method, fifo=str(fifo))

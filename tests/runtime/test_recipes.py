@@ -1,4 +1,4 @@
-"""What is done before the devices of a scene or package are created."""
+"""Preparation before the devices of a scene or package are created."""
 
 import importlib
 from types import ModuleType

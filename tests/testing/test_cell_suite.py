@@ -1,4 +1,4 @@
-"""`pytest --pyargs arcor2_hw.testing --device my_cell.yaml`, as an integrator runs it: no test file of their own."""
+"""`pytest --pyargs arcor2_hw.testing --device my_cell.yaml`, as an integrator runs it, without a test file."""
 
 import os
 import subprocess
@@ -149,7 +149,7 @@ def test_a_name_in_two_cells_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_wire_records_acting_frames(tester: FakeProcess) -> None:
-    """A recorded wire tells apart what observes and what acts, without asking the fake."""
+    """The recorded frames show which calls observe and which act, without access to the fake."""
     host, _, port = str(tester.ready["modbus"]).rpartition(":")
     wire = TcpWire(host, [int(port)])
     wire.start()

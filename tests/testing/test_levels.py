@@ -1,4 +1,4 @@
-"""Levels: a claim needs its cases, its tests and its report; places and wires are found in settings."""
+"""Levels require cases, tests and a report. Addresses and wires are found in settings."""
 
 from pathlib import Path
 from typing import Any

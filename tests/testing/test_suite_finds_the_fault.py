@@ -1,4 +1,4 @@
-"""The suite passes a driver that keeps the rules; it fails one that breaks a rule in that case and in no other."""
+"""The suite passes a correct driver. A driver that breaks one rule fails only the case of that rule."""
 
 import os
 import re
@@ -49,7 +49,7 @@ class TestBroken(Conformance):
 def run(
     folder: Path, *arguments: str, selected: str = "", quality: str = QUALITY, conftest: str = "", cases: bool = False
 ) -> str:
-    """Run the suite on the press in a process of its own; give what pytest printed."""
+    """Run the suite on the press in its own process and return the output of pytest."""
     shutil.copytree(PACKAGE, folder / "broken", dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
     for name, text in {
         "test_of_toy.py": "def test_connecting_observes():\n    pass\n",

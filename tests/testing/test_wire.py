@@ -1,4 +1,4 @@
-"""The wire between driver and device: what it lets pass, holds back, tears, and keeps; how frames are told apart."""
+"""The wire between driver and device: forwarding, cuts, torn frames, recording, and decoding of frames."""
 
 import contextlib
 import os
@@ -37,7 +37,7 @@ def wire(device: socket.socket) -> Iterator[TcpWire]:
 
 @pytest.fixture
 def ends(device: socket.socket, wire: TcpWire) -> Iterator[tuple[socket.socket, socket.socket]]:
-    """The driver's end and the device's of one connection."""
+    """The ends of driver and device of one connection."""
     with dial(wire) as driver:
         at_device, _ = device.accept()
         at_device.settimeout(5.0)
@@ -175,7 +175,7 @@ def test_a_missing_device_resets_the_connection() -> None:
 # ------------------------------------------------------------------------------------------------ serial
 @pytest.fixture
 def port() -> Iterator[tuple[int, str]]:
-    """A device's end of a serial line, and the path of the other."""
+    """The device's end of a serial line, and the path of the other end."""
     ours, theirs = os.openpty()
     tty.setraw(theirs)
     yield ours, os.ttyname(theirs)

@@ -1,1 +1,1 @@
-"""Per case of the suite a driver, or a device, that breaks only that one; each runs beside toy_press.py."""
+"""For each case of the suite a driver or device that fails only this case, based on toy_press.py."""

@@ -1,4 +1,4 @@
-"""An error that does not say where nobody was."""
+"""The error for a missing device lacks the address."""
 
 from arcor2_hw.exceptions import NotConnected
 

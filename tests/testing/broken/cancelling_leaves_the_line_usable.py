@@ -1,4 +1,4 @@
-"""The answer to a stop is taken for the next reading."""
+"""The answer to a stop is returned as the next reading."""
 
 from .toy_press import ToyPress
 

@@ -1,4 +1,4 @@
-"""An optional method that is there only at run time, where no analysis can see it."""
+"""An optional method exists only at run time, so that the analysis cannot find it."""
 
 from .toy_press import NOWHERE, ToyPress
 

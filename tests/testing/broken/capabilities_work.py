@@ -1,4 +1,4 @@
-"""An optional method that looks as if it were implemented."""
+"""An optional method only looks implemented."""
 
 from arcor2_hw.objects import Machine, MachineState
 

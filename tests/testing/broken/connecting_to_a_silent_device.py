@@ -1,4 +1,4 @@
-"""A silent press is waited for, however long was said."""
+"""Connecting to a silent press ignores the timeout."""
 
 import time
 

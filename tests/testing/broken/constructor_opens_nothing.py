@@ -1,4 +1,4 @@
-"""A constructor that begins to watch."""
+"""The constructor starts to observe."""
 
 import threading
 import weakref

@@ -1,4 +1,4 @@
-"""Control is taken again after a loss, unless an act was cut off."""
+"""Control is taken again after a loss, unless the loss interrupted an action."""
 
 from .toy_press import ToyPress
 

@@ -1,4 +1,4 @@
-"""Control is taken from whoever has it."""
+"""Control is taken from another client."""
 
 from .toy_press import ToyPress
 

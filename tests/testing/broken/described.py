@@ -1,4 +1,4 @@
-"""An action without a word of what it does."""
+"""An action has no description."""
 
 from arcor2_hw.actions import action
 

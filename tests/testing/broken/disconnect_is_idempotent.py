@@ -1,4 +1,4 @@
-"""A second disconnect waits for somebody who has left."""
+"""A second disconnect waits for a thread that has ended."""
 
 import time
 

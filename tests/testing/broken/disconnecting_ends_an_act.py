@@ -1,4 +1,4 @@
-"""Whoever waits for a stroke waits on when the connection is closed."""
+"""Waiting for a stroke continues after the connection is closed."""
 
 import time
 

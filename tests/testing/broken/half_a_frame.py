@@ -1,4 +1,4 @@
-"""Half an answer is read as far as it goes."""
+"""Half an answer is decoded as a value."""
 
 from .toy_press import ToyPress
 

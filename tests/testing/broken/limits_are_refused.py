@@ -1,4 +1,4 @@
-"""A force beyond the limit is cut to it in silence."""
+"""A force beyond the limit is silently reduced to it."""
 
 from .toy_press import ToyPress
 
@@ -7,4 +7,4 @@ class BrokenPress(ToyPress):
     """A press."""
 
     def _limit(self, force: float) -> None:
-        """Every force will do."""
+        """Accept every force."""

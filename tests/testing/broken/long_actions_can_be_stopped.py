@@ -1,4 +1,4 @@
-"""A type without stop(): only its objects have one, which neither analysis nor a reader of the class can know."""
+"""Only the objects have stop(), so neither the analysis nor a reader of the class can find it."""
 
 from typing import Any
 

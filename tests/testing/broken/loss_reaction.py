@@ -1,4 +1,4 @@
-"""A press that goes on without its owner, and is declared to stop."""
+"""The press continues without its driver, but is declared to stop."""
 
 from .toy_press import ToyBench, ToyPress
 

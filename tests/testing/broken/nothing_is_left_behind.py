@@ -1,4 +1,4 @@
-"""What watched a controlled press goes on watching."""
+"""A thread keeps observing a controlled press after disconnect."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""Once lost, lost for ever; only a loss that somebody had to do with is mended."""
+"""Observation does not resume after a loss; only a loss during control is repaired."""
 
 from .toy_press import ToyPress
 

@@ -1,4 +1,4 @@
-"""Who it is cannot be told: an error that is nobody's type."""
+"""identify() raises an error that is not a typed error."""
 
 from arcor2_hw.data.device import Identity
 

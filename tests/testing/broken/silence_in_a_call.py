@@ -1,4 +1,4 @@
-"""Silence in a call is an error of the library below."""
+"""A silent device raises an error of the underlying library."""
 
 from .toy_press import ToyPress
 

@@ -1,4 +1,4 @@
-"""The last reading is given for ever."""
+"""The last reading is returned at any age."""
 
 from .toy_press import ToyPress
 

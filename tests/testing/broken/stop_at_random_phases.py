@@ -1,4 +1,4 @@
-"""A stop late in the third stroke of a connection is forgotten."""
+"""A stop late in the third stroke of a connection is ignored."""
 
 import time
 

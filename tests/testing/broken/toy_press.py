@@ -42,10 +42,10 @@ while True:
 
 
 class Press:
-    """The device. A stroke ends by its time, by stop, or by the watchdog when nobody can reach the press.
+    """The device. A stroke ends after its duration, by a stop, or by the watchdog when the press is unreachable.
 
-    The watchdog counts from the moment at which the press falls silent, not from the last question: a thread that
-    runs late on a busy machine does not trip it.
+    The watchdog counts from the moment at which the press falls silent, not from the last request, so a thread that
+    runs late on a busy computer does not trip it.
     """
 
     def __init__(self) -> None:
@@ -71,7 +71,7 @@ class Press:
         self.silent_since, self.torn = math.inf, False
 
     def scrap(self) -> None:
-        """End all that still uses this press: threads which a broken driver leaves behind."""
+        """End the threads that a broken driver has left behind."""
         self.scrapped, self.until = True, 0.0
 
     def ask(self, write: str = "", link: int | None = None) -> None:
@@ -223,12 +223,12 @@ class ToyPress(Machine, Generic):
         return self._read_at
 
     def force(self) -> float:
-        """Give the force, N."""
+        """Return the force, N."""
         self._check()
         return self._press.force
 
     def measure(self) -> int:
-        """Ask the press."""
+        """Read the force from the press."""
         try:
             self._press.ask()
         except TimeoutError:

@@ -1,4 +1,4 @@
-"""A public method that does not say what it takes."""
+"""A public method lacks type hints."""
 
 from .toy_press import ToyPress
 

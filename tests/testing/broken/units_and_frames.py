@@ -1,4 +1,4 @@
-"""A force in kN."""
+"""A force is returned in kN."""
 
 from .toy_press import ToyPress
 
