@@ -46,7 +46,7 @@ _BY_ANNOTATION: Final = {hint: kind for kind in PARAMETER_TYPES.values() for hin
 
 
 def by_annotation(name: str) -> ParameterType | None:
-    """Return the parameter type of a type hint, None when there is none.
+    """Return the parameter type of a type hint, or None if there is none.
 
     A dotted hint is matched by its end (`common.Pose`). For an enumeration pass its base class (StrEnum, IntEnum).
     """

@@ -62,7 +62,7 @@ def _taken(owner: ClassInfo, node: FunctionNode, parameter: str, hierarchy: Hier
 
 
 def _path(kind: ClassInfo) -> str | None:
-    """Return the name of a class in its module, None when it is local to a function."""
+    """Return the name of a class in its module, or None if it is local to a function."""
     top = kind.module.bindings
     if top.get(kind.name) is kind:
         return kind.name

@@ -321,7 +321,7 @@ class Library:
         )
 
     def _type_name(self, info: ClassInfo) -> str | None:
-        """Return the name under which clients know a class, None when they do not."""
+        """Return the name under which clients know a class, or None if they do not."""
         if is_framework(info):
             return info.name if info.name in BUILT_IN else None
         file = self._files.get(info.name)

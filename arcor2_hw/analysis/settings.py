@@ -48,7 +48,7 @@ class SettingsReader:
         return [] if found is None else self._fields(found)
 
     def _class(self, info: ClassInfo) -> ClassInfo | None:
-        """Return the dataclass that annotates `settings` of `__init__`, None when the type has no settings."""
+        """Return the dataclass that annotates `settings` of `__init__`, or None if the type has no settings."""
         constructor = self._hierarchy.method(info, "__init__")
         if constructor is None or is_framework(constructor[0]):
             return None

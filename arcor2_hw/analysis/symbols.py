@@ -72,13 +72,13 @@ def dotted_name(expression: ast.expr) -> list[str] | None:
 
 
 class Resolver:
-    """Resolves names. `load` returns a module by its dotted name, None when it is not to be read."""
+    """Resolves names. `load` returns a module by its dotted name, or None if it is not to be read."""
 
     def __init__(self, load: Load) -> None:
         self._load = load
 
     def expression(self, expression: ast.expr, module: Module, owner: ClassInfo | None = None) -> Symbol | None:
-        """Return the symbol of a dotted name, None when it is not bound, or is not a dotted name."""
+        """Return the symbol of a dotted name, or None if it is not bound, or is not a dotted name."""
         parts = dotted_name(expression)
         return None if parts is None else self.parts(parts, module, owner)
 

@@ -45,7 +45,7 @@ _WORDS: Final = {
 
 
 def unit_in(description: str) -> str | None:
-    """Return the unit in a description, None when there is none."""
+    """Return the unit in a description, or None if there is none."""
     text = description.strip()
     if (found := _IN_BRACKETS.search(text)) is not None:
         return found[1]

@@ -24,7 +24,7 @@ class Hit(Data, frozen=True):
 def first_hit(
     start: Position, end: Position, obstacles: Iterable[tuple[str, Obstacle]], inflation: float
 ) -> Hit | None:
-    """Return the first obstacle that a straight line meets, None when the line is free.
+    """Return the first obstacle that a straight line meets, or None if the line is free.
 
     Only fixed primitives are checked; other obstacles are skipped.
 
@@ -72,7 +72,7 @@ def _near(obstacle: Obstacle, a: Position, d: Position, within: float) -> bool:
 def entry(
     shape: Box | Cylinder | Capsule | Sphere, start: Sequence[float], way: Sequence[float], inflation: float = 0.0
 ) -> float | None:
-    """Return the position along a line, 0 to 1, at which it enters a shape, None when it does not.
+    """Return the position along a line, 0 to 1, at which it enters a shape, or None if it does not.
 
     The position is 0 for a line that starts inside. Edges, lengths and radii are enlarged by `inflation`, as the
     protocol demands.
@@ -98,7 +98,7 @@ def entry(
 
 
 def _common(spans: list[_Span | None]) -> float | None:
-    """Return the beginning of the intersection of all spans with the line, None when it is empty."""
+    """Return the beginning of the intersection of all spans with the line, or None if it is empty."""
     low, high = 0.0, 1.0
     for span in spans:
         if span is None:

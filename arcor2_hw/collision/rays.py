@@ -18,7 +18,7 @@ _CONTACTS: Final = 1000
 
 
 def entry(shape: Shape, start: Array, way: Array, inflation: float = 0.0) -> float | None:
-    """Return the position along a line, 0 to 1, at which it enters a shape, None when it does not.
+    """Return the position along a line, 0 to 1, at which it enters a shape, or None if it does not.
 
     The position is 0 for a line that starts inside.
 

@@ -141,7 +141,7 @@ class Sweep:
         return self._q
 
     def first_hit(self, waypoints: Sequence[Array]) -> Hit | None:
-        """Return the first collision along a path through waypoints, None when there is none."""
+        """Return the first collision along a path through waypoints, or None if there is none."""
         lengths = [self.travel(a, b) for a, b in itertools.pairwise(waypoints)]
         whole, done = sum(lengths), 0.0
         if what := self.hit(waypoints[0]):

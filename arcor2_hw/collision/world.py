@@ -156,7 +156,7 @@ class CollisionWorld(WorldState):
 
     # -------------------------------------------------------------------------------- distances and lines
     def clearance(self, robot: str, q: Array, within: float = np.inf) -> Clearance | None:
-        """Return the nearest pair of a robot and its surroundings, None when no pair is nearer than `within`.
+        """Return the nearest pair of a robot and its surroundings, or None if no pair is nearer than `within`.
 
         Links count as surroundings of each other where contact between them is not allowed.
 
@@ -213,7 +213,7 @@ class CollisionWorld(WorldState):
                         yield _gap(part, their), part, their.object, _name(other, their)
 
     def ray(self, start: Position, end: Position, ignore: Iterable[str] = (), inflation: float = 0.0) -> RayHit | None:
-        """Return the first thing that a straight line meets, None when the line is free.
+        """Return the first thing that a straight line meets, or None if the line is free.
 
         Robots are at their present joint values.
 
@@ -289,7 +289,7 @@ def _name(robot: CollisionRobot, part: RobotPart) -> str:
 
 
 def _depth(one: Any, other: Any, margin: float) -> float | None:
-    """Return the penetration depth of two objects: 0 when only the margin is violated, None when they are free."""
+    """Return the penetration depth of two objects: 0 when only the margin is violated, or None if they are free."""
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     request.security_margin = margin
     if not coal.collide(one, other, request, result):

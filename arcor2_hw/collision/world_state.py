@@ -290,7 +290,7 @@ class WorldState:
         self.move(name, pose)
         return pose
 
-    # -------------------------------------------------------------------------------- who may touch
+    # -------------------------------------------------------------------------------- allowed contacts
     def allow(self, one: str, other: str, allowed: bool = True) -> None:
         """Allow or forbid contact between two bodies, robots, or links ("robot/link")."""
         for first, second in ((one, other), (other, one)):
@@ -313,7 +313,7 @@ class WorldState:
 
     # -------------------------------------------------------------------------------- inside
     def changed_since(self, revision: int) -> list[Change] | None:
-        """Return the changes after a revision, None when they are no longer recorded."""
+        """Return the changes after a revision, or None if they are no longer recorded."""
         if revision < self.revision - len(self.changes):
             return None
         return [change for change in self.changes if change.revision > revision]

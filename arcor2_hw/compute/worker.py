@@ -90,7 +90,7 @@ def _answer(work: m.Work, state: WorkerState) -> m.Done | m.Failed:
         )
     except MemoryError:
         return failed(InvalidData("There is not enough memory for this computation."))
-    except Exception as error:  # noqa: BLE001 - whatever a library raises is told to who asked
+    except Exception as error:  # noqa: BLE001 - a library may raise anything; the caller receives it
         sys.excepthook(type(error), error, error.__traceback__)
         return m.Failed(
             ["compute", "error"],
@@ -126,7 +126,7 @@ def _messages(sock: socket.socket) -> Iterator[m.ToWorker]:
 
 
 def _exactly(sock: socket.socket, size: int) -> bytearray | None:
-    """Read exactly `size` bytes, None when the socket is closed before."""
+    """Read exactly `size` bytes, or None if the socket is closed before."""
     buffer = bytearray(size)
     view, got = memoryview(buffer), 0
     while got < size:

@@ -176,7 +176,7 @@ class WorldReplica:
             self._meshes.popitem(last=False)
         return found
 
-    # -------------------------------------------------------------------------------- what is kept of robots
+    # -------------------------------------------------------------------------------- cached robot models
     def reachability(self, robot: str, end_effector: str) -> Reachability:
         """Return the reachability of an end effector, with its cache.
 

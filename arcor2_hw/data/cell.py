@@ -55,7 +55,7 @@ class Cell(Data, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"several devices have the same name: {', '.join(twice)}")
 
     def device(self, name: str) -> CellDevice | None:
-        """Return a device by its name, None when there is none."""
+        """Return a device by its name, or None if there is none."""
         return next((device for device in self.devices if device.name == name), None)
 
 

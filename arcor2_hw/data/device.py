@@ -116,5 +116,5 @@ class LossReaction(Data, frozen=True):
 
     @classmethod
     def continues(cls) -> "LossReaction":
-        """Declare that it continues what it is doing."""
+        """Declare that the device continues."""
         return cls(LossKind.CONTINUES)

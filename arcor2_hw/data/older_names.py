@@ -68,7 +68,7 @@ def is_older(module: str) -> bool:
 
 
 def not_offered(module: str, name: str | None = None) -> str | None:
-    """Return a message that a module or name of ARCOR2 is not available, None when it is, or is not part of ARCOR2."""
+    """Return a message that a module or name of ARCOR2 is not available, or None if it is, or is not part of ARCOR2."""
     if not is_older(module):
         return None
     known, *rest = module.split(".")

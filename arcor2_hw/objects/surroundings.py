@@ -44,7 +44,7 @@ class Surroundings(Protocol):
         """
 
     def asset(self, asset_id: str) -> Path | None:
-        """Return the file of an uploaded mesh or robot model, None when it is not available."""
+        """Return the file of an uploaded mesh or robot model, or None if it is not available."""
 
     def calibration(self, robot_id: str) -> KinematicCalibration | None:
         """Return the calibrated kinematics of a robot, read from its controller; None: nominal kinematics."""

@@ -250,12 +250,12 @@ class _Search:
         return None
 
     def _grow(self, tree: _Tree, target: Array, resolution: float) -> int | None:
-        """Add one step towards `target` and return its node, None when the step is not free."""
+        """Add one step towards `target` and return its node, or None if the step is not free."""
         near = tree.nearest(target)
         return self._step(tree, near, target, resolution)
 
     def _connect(self, tree: _Tree, target: Array, resolution: float) -> int | None:
-        """Add steps until `target` is reached and return its node, None when it is not reached."""
+        """Add steps until `target` is reached and return its node, or None if it is not reached."""
         node: int | None = tree.nearest(target)
         while node is not None:
             if float(np.abs(tree.points[node] - target).max()) < _GIVEN:

@@ -160,7 +160,7 @@ class Reachability:
         return bool(((boxes[:, 0] <= entry.box[1]) & (boxes[:, 1] >= entry.box[0])).all(axis=1).any())
 
     def _changes_since(self, revision: int) -> Array | None:
-        """Return the bounding boxes (n, 2, 3) of changes after a revision, None when they are no longer recorded."""
+        """Return the bounding boxes (n, 2, 3) of changes after a revision, or None if they are no longer recorded."""
         changes = self._world.changed_since(revision)
         if changes is None:
             return None

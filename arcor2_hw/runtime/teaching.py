@@ -65,7 +65,7 @@ class Teaching:
             return
         with self._lock:
             if self._arms.pop(_key(device, arm), None) is None:
-                return  # switched off meanwhile
+                return  # a request has switched it off
         error: Arcor2Error = Cancelled("{name}: hand teaching was ended by the robot", name=device.name)
         if safety in ENDED_BY:
             what = safety.replace("_", " ")

@@ -9,7 +9,7 @@ from arcor2_hw.testing.life import held, left_behind, named, raised, timed
 from arcor2_hw.testing.steps import GONE
 
 DISCONNECTS_WITHIN: Final = 1.0
-"""Time limit of disconnect, s, whatever the wire does."""
+"""Time limit of disconnect, s, in any state of the wire."""
 
 
 class ConnectingCases:

@@ -101,7 +101,7 @@ class BackgroundCall:
     def _run(self, call: Callable[[], Any]) -> None:
         try:
             self.result = call()
-        except BaseException as error:  # noqa: BLE001 - told to who waits
+        except BaseException as error:  # noqa: BLE001 - the waiting thread receives it
             self.error = error
 
     @property

@@ -10,7 +10,7 @@ from arcor2_hw.testing.quality import Level
 LEVEL_CASE: Final = "level"
 """The case that judges the others."""
 RECOVERY: Final = frozenset({"silence_in_a_call", "observation_comes_back", "reset_and_back", "half_a_frame"})
-"""Cases required for silver, whatever reason is given."""
+"""Cases required for silver, even if quality.yaml gives a reason."""
 PROPERTY: Final = "arcor2_case"
 """Property of a pytest report that names bench and case."""
 

@@ -97,7 +97,7 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
         return self.actions.get(type_name, []) if isinstance(self.actions, dict) else self.actions
 
     def reason(self, type_name: str, case: str) -> str | None:
-        """Return the reason why a case is not run on a type, None when there is none."""
+        """Return the reason why a case is not run on a type, or None if there is none."""
         for key in (f"{type_name}.{case}", case):
             if key in self.not_run:
                 return self.not_run[key]
