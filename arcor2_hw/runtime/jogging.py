@@ -153,7 +153,7 @@ class Jog:
         if left <= AT_LIMIT:
             side = "upper" if rate > 0.0 else "lower"
             raise OutOfRange(
-                "{name}: joint {joint_name} is at its {side} limit",
+                "{name}: the joint {joint_name} is at its {side} limit",
                 name=self._robot.name,
                 joint_name=joint.name,
                 side=side,
