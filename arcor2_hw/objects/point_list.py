@@ -95,7 +95,7 @@ def io_point(
         raise OutOfRange("{parameter} must not set scale of {name} to 0", parameter=parameter, name=name)
     if not 0.0 <= point.debounce <= LONGEST_DEBOUNCE:
         raise OutOfRange(
-            "{parameter} must set debounce of {name} to 0 to {longest_debounce:g} s",
+            "{parameter} must set debounce of {name} to a value from 0 to {longest_debounce:g} s",
             parameter=parameter,
             name=name,
             longest_debounce=LONGEST_DEBOUNCE,
