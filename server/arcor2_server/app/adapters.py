@@ -27,7 +27,6 @@ from arcor2_server.rpc.build import BuildRequests
 from arcor2_server.rpc.calibration import CalibrationRequests
 from arcor2_server.rpc.calibration_records import CalibrationRecordRequests
 from arcor2_server.rpc.cameras import CameraRequests
-from arcor2_server.rpc.change_events import ChangeEvents
 from arcor2_server.rpc.copying import CopyRequests
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.editor import SharedStateRequests
@@ -43,7 +42,6 @@ from arcor2_server.rpc.object_types import ObjectTypeRequests
 from arcor2_server.rpc.operation import OperationRequests
 from arcor2_server.rpc.orientations import OrientationRequests
 from arcor2_server.rpc.parameters import ParameterRequests
-from arcor2_server.rpc.perpendicular import PerpendicularRequests
 from arcor2_server.rpc.project import ProjectRequests
 from arcor2_server.rpc.reachability import ReachabilityRequests
 from arcor2_server.rpc.registry import Handlers
@@ -57,31 +55,14 @@ from arcor2_server.rpc.scene_objects import SceneObjectRequests
 def request_handlers(s: Server) -> Handlers:
     """Return the handlers of the protocol's requests."""
     answers = AnswerCache()
-    editing = Editing(s.locks, s.storage, s.session, s.online, s.execution, s.secrets)
-    motion_requests = RobotMotionRequests(s.locks, s.types, s.session, s.online, s.robots, s.motion)
+    editing = Editing(s.locks, s.storage, s.session, s.execution, s.secrets)
     scenes = SceneRequests(s.locks, s.storage, s.session, s.online, s.type_notifications, s.dependents, editing)
     objects = SceneObjectRequests(s.locks, s.storage, s.assets, s.types, s.session, s.online, s.dependents, editing)
     return Handlers(
         ActionPointRequests(s.locks, s.session, s.online, editing),
         ActionRequests(s.locks, s.types, s.session, editing),
         BuildRequests(s.locks, s.execution, s.build, s.tasks),
-        CalibrationRequests(
-            s.hub,
-            s.locks,
-            s.types,
-            s.session,
-            s.online,
-            s.calibration,
-            s.calibration_records,
-            s.markers,
-            s.running_calibrations,
-            s.tasks,
-            s.robots,
-            s.robot_models,
-            s.motion,
-            editing,
-            s.cameras,
-        ),
+        CalibrationRequests(s.session, s.online, s.calibration, s.scene_calibration),
         CalibrationRecordRequests(s.session, s.calibration_records),
         CameraRequests(s.session, s.online, editing, s.cameras),
         CopyRequests(s.locks, s.session, editing),
@@ -103,9 +84,7 @@ def request_handlers(s: Server) -> Handlers:
             s.edit_notifications,
             s.reachability,
         ),
-        HistoryRequests(
-            s.locks, s.storage, s.types, s.session, s.online, s.dependents, editing, ChangeEvents(s.session)
-        ),
+        HistoryRequests(s.session, s.undo, editing),
         JointsRequests(s.locks, s.session, s.online, editing),
         ListRequests(s.storage, s.types, s.type_notifications, answers, s.saved_problems),
         LockRequests(s.users, s.locks, s.lock_takeover),
@@ -115,11 +94,10 @@ def request_handlers(s: Server) -> Handlers:
         OperationRequests(s.types, s.session, s.online, s.execution, s.motion, s.stop_all),
         OrientationRequests(s.locks, s.session, s.online, editing),
         ParameterRequests(s.locks, s.types, s.session, editing),
-        PerpendicularRequests(s.locks, s.online, s.motion, motion_requests),
         ProjectRequests(s.locks, s.storage, s.types, s.session, s.online, s.type_notifications, editing, scenes),
         ReachabilityRequests(s.reachability),
         RobotRequests(s.locks, s.types, s.session, s.online, s.robots, s.kinematics, s.motion),
-        motion_requests,
+        RobotMotionRequests(s.locks, s.types, s.session, s.online, s.robots, s.motion),
         RunRequests(s.runs),
         scenes,
         objects,

@@ -37,6 +37,8 @@ from arcor2_server.online.cameras import Cameras
 from arcor2_server.online.motion import RobotMotion
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.online.opening import SceneOpening
+from arcor2_server.online.scene_calibration import SceneCalibration
+from arcor2_server.online.undo import Undo
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
 from arcor2_server.storage.calibrations import Calibrations
@@ -47,7 +49,7 @@ from arcor2_server.storage.secret_store import SecretStore
 from arcor2_server.storage.setting_secrets import SettingSecrets
 from arcor2_server.storage.shared_data import SharedData
 from arcor2_server.websocket.hub import Hub
-from arcor2_server.workspace.calibration import Calibration, RunningCalibrations
+from arcor2_server.workspace.calibration import Calibration
 from arcor2_server.workspace.display_models import DisplayModels
 from arcor2_server.workspace.host_world import HostWorld
 from arcor2_server.workspace.kinematics import Kinematics
@@ -90,7 +92,7 @@ class Server:
     markers: Markers
     calibration: Calibration
     calibration_records: Calibrations
-    running_calibrations: RunningCalibrations
+    scene_calibration: SceneCalibration
     object_aiming: ObjectAimings
     robots: SceneRobots
     robot_calibrations: RobotCalibrations
@@ -102,6 +104,7 @@ class Server:
     display_models: DisplayModels
     online: OnlineScene
     motion: RobotMotion
+    undo: Undo
     cameras: Cameras
     build: BuildService
     package_import: PackageImport
@@ -159,9 +162,7 @@ async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
         stack.push_async_callback(saved_problems.close)
         edit_notifications = EditNotifications(hub, session)
         stack.callback(edit_notifications.close)
-        locks = Locks(settings.lock_retries, settings.lock_retry_wait)
-        locks.tree = session
-        locks.stored = is_known(types, storage)
+        locks = Locks(session, is_stored(types, storage), settings.lock_retries, settings.lock_retry_wait)
         users = Users(hub, locks, settings)
         stack.callback(users.close)
         lock_takeover = LockTakeover(locks, users, session.name_of)
@@ -199,6 +200,14 @@ async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
         opening = SceneOpening(settings, types, session, secrets, host_world)
         online = OnlineScene(scene_host, opening, hub, locks, session, robots, tasks, robot_calibrations)
         stack.push_async_callback(online.close)
+        motion = RobotMotion(hub, types, session, online, robots, kinematics)
+        cameras = Cameras(types, session, online)
+        calibration = Calibration(compute, markers)
+        calibration_records = Calibrations(storage)
+        scene_calibration = SceneCalibration(
+            hub, locks, types, session, online, calibration, calibration_records, markers, tasks, robot_models,
+            motion, cameras,
+        )  # fmt: skip
         build = BuildService(settings, storage, types)
         package_import = PackageImport(storage, assets, types, session, type_notifications)
         runs = Runs(hub)
@@ -240,9 +249,9 @@ async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
             view_states=view_states,
             presence=presence,
             markers=markers,
-            calibration=Calibration(compute, markers),
-            calibration_records=Calibrations(storage),
-            running_calibrations=RunningCalibrations(),
+            calibration=calibration,
+            calibration_records=calibration_records,
+            scene_calibration=scene_calibration,
             object_aiming=ObjectAimings(),
             robots=robots,
             robot_calibrations=robot_calibrations,
@@ -253,8 +262,9 @@ async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
             reachability=reachability,
             display_models=display_models,
             online=online,
-            motion=RobotMotion(hub, types, session, online, robots, kinematics),
-            cameras=Cameras(types, session, online),
+            motion=motion,
+            undo=Undo(locks, storage, types, session, online, dependents),
+            cameras=cameras,
             build=build,
             package_import=package_import,
             execution=execution,
@@ -266,13 +276,13 @@ async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
         )
 
 
-def is_known(types: ObjectTypes, storage: Storage) -> Callable[[str], Awaitable[bool]]:
-    """Return a function that tells whether an id names an object type, or a saved scene or project."""
+def is_stored(types: ObjectTypes, storage: Storage) -> Callable[[str], Awaitable[bool]]:
+    """Return a function that returns whether an id names an object type, or a saved scene or project."""
 
-    async def known(item: str) -> bool:
+    async def check(item: str) -> bool:
         return types.known(item) or await storage.identify(item) is not None
 
-    return known
+    return check
 
 
 def connect_edits(edits: EditNotifications, previews: Previews, breakpoints: SharedBreakpoints) -> None:

@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
@@ -36,20 +36,6 @@ class LockTree(Protocol):
         """Return the ids below a root; empty if it is not a root."""
 
 
-class _EmptyTree:
-    """The trees of an empty document."""
-
-    def root_of(self, item: str) -> str:
-        raise NotFound("{item!r} is not known.", item=item)
-
-    def tree_of(self, root: str) -> Iterable[str]:  # noqa: ARG002
-        return ()
-
-
-async def _none_stored(item: str) -> bool:  # noqa: ARG001
-    return False
-
-
 @dataclass(slots=True)
 class _Root:
     """The locks of one tree. `readers` has per id the number of read locks of each user."""
@@ -66,13 +52,12 @@ class _Root:
 class LockTable:
     """The locks of all users. Its methods do not wait, so each change is atomic.
 
-    The composition root sets `tree`, the open document, and `stored`, a function that returns whether an id belongs
-    to a stored scene, a stored project or an object type.
+    Args:
+        tree: The open document.
     """
 
-    def __init__(self) -> None:
-        self.tree: LockTree = _EmptyTree()
-        self.stored: Callable[[str], Awaitable[bool]] = _none_stored
+    def __init__(self, tree: LockTree) -> None:
+        self._tree = tree
         self._roots: dict[str, _Root] = {}
         self._root_ids: dict[str, str] = {}
         self._announced: dict[str, dict[str, set[str]]] = {}
@@ -234,7 +219,7 @@ class LockTable:
             root_id = item
             if item not in OWN_ROOTS:
                 with contextlib.suppress(NotFound):
-                    root_id = self.tree.root_of(item)
+                    root_id = self._tree.root_of(item)
         return self._roots.get(root_id)
 
     def _is_writer(self, user: str, item: str) -> bool:
@@ -302,7 +287,7 @@ class LockTable:
         if root_id is not None and (root := self._roots.get(root_id)) is not None:
             root.writers.pop(item, None)
             if root.tree:
-                freed |= {root_id, *self.tree.tree_of(root_id)}
+                freed |= {root_id, *self._tree.tree_of(root_id)}
                 root.tree = False
             self._remove_unused(root_id, item)
         self._notify()

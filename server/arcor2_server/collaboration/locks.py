@@ -1,7 +1,7 @@
 """Acquires and releases locks for clients and requests, and waits for busy ones (protocol, section 6)."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Iterable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import asynccontextmanager
 from typing import Any, Final
 
@@ -33,12 +33,17 @@ class Locks(LockTable):
     duration of a request are silent.
 
     Args:
+        tree: The open document.
+        is_stored: Returns whether an id belongs to an object type, or to a saved scene or project.
         retries: Number of further attempts to acquire a busy lock.
         retry_wait: Time between two attempts, s.
     """
 
-    def __init__(self, retries: int = 13, retry_wait: float = 0.15) -> None:
-        super().__init__()
+    def __init__(
+        self, tree: LockTree, is_stored: Callable[[str], Awaitable[bool]], retries: int = 13, retry_wait: float = 0.15
+    ) -> None:
+        super().__init__(tree)
+        self._is_stored = is_stored
         self._wait_limit = retries * retry_wait
         self._exclusive: asyncio.Task[Any] | None = None
 
@@ -56,7 +61,7 @@ class Locks(LockTable):
         self._add_write(user, root_id, item, tree)
         ids = {item}
         if tree:
-            ids |= {root_id, *self.tree.tree_of(root_id)}
+            ids |= {root_id, *self._tree.tree_of(root_id)}
         self._announced.setdefault(user, {})[item] = ids
         self._since[user, item] = now()
         return sorted(ids)
@@ -91,7 +96,7 @@ class Locks(LockTable):
         root = self._roots[root_id]
         if root.tree is tree:
             raise Locked("The lock of {item!r} is of that type already.", item=item)
-        whole = {root_id, *self.tree.tree_of(root_id)} - {item}
+        whole = {root_id, *self._tree.tree_of(root_id)} - {item}
         announced = self._announced.setdefault(user, {})
         self._since.setdefault((user, item), now())
         if tree:
@@ -177,9 +182,9 @@ class Locks(LockTable):
         if item in OWN_ROOTS:
             return item
         try:
-            return self.tree.root_of(item)
+            return self._tree.root_of(item)
         except NotFound:
-            if await self.stored(item):
+            if await self._is_stored(item):
                 return item
             raise
 

@@ -1,15 +1,31 @@
 """Access to the cameras of the online scene."""
 
+from typing import Final
+
 import msgspec
 
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.scene import SceneObject
-from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_server.documents import Session
 from arcor2_server.errors import RequestRefused
 from arcor2_server.hosts.session import OBSERVE_WITHIN
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
+
+PICTURE_WITHIN: Final = 15.0
+"""Time limit for taking a picture, s. A long exposure or an average of many frames takes a while."""
+
+
+def picture_file(image: str) -> bytes:
+    """Return the picture file that was sent as a string with one character per byte. Raise InvalidData if invalid."""
+    try:
+        data = image.encode("latin-1")
+    except UnicodeEncodeError:
+        raise InvalidData("The image is no picture's bytes: it has characters beyond 255.") from None
+    if not data:
+        raise InvalidData("The image is empty.")
+    return data
 
 
 class Cameras:
@@ -36,3 +52,11 @@ class Cameras:
             return msgspec.json.decode(raw, type=CameraParameters)
         except msgspec.MsgspecError as error:
             raise Arcor2Error("{name} gave no parameters of a camera.", str(error), name=camera.name) from error
+
+    async def take_picture(self, camera: SceneObject, method: str, **arguments: int) -> bytes:
+        """Take a picture by a method of the camera; return its file."""
+        raw = await self._online.call(camera.id, method, arguments, deadline=PICTURE_WITHIN)
+        try:
+            return picture_file(msgspec.json.decode(raw, type=str))
+        except msgspec.MsgspecError:
+            raise Arcor2Error("{name} gave no picture.", name=camera.name) from None

@@ -83,11 +83,11 @@ class RobotMotion:
         if cell.running_action is not None and cell.running_action.object_id == robot_id:
             raise RequestRefused("{name} is executing an action.", name=name)
 
-    async def require_ready(self, robot_id: str, feature: str, arm_id: str | None) -> None:
-        """Raise RequestRefused unless the robot may begin a motion now."""
+    async def require_ready(self, robot_id: str, feature: str, arm_id: str | None, *, held: bool = False) -> None:
+        """Raise RequestRefused unless the robot may begin a motion now. `held`: see `require_not_moving`."""
         cell = self._online
         arm = cell.arm(robot_id, arm_id)
-        self.require_not_moving(robot_id)
+        self.require_not_moving(robot_id, held=held)
         self.require_feature(robot_id, feature)
         robot = cell.robot(robot_id)
         if self._types.robot_meta(robot.type).features.hand_teaching and await cell.ask(

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
+from dataclasses import dataclass
 from typing import IO
 
 from msgspec import UNSET
@@ -42,12 +43,12 @@ async def _pieces(file: IO[bytes]) -> AsyncIterator[bytes]:
         yield chunk
 
 
+@dataclass(frozen=True, slots=True)
 class AssetOperations:
     """Assets over REST: files that come and go as streams (protocol, section 13)."""
 
-    def __init__(self, assets: AssetStore, type_notifications: TypeNotifications) -> None:
-        self._assets = assets
-        self._type_notifications = type_notifications
+    _assets: AssetStore
+    _type_notifications: TypeNotifications
 
     @operation(
         "POST",

@@ -2,6 +2,7 @@
 
 import asyncio
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
@@ -30,13 +31,13 @@ def _copy(source: IO[bytes], target: Path) -> None:
             file.write(chunk)
 
 
+@dataclass(frozen=True, slots=True)
 class BuildOperations:
     """The Build service over REST."""
 
-    def __init__(self, storage: Storage, build: BuildService, package_import: PackageImport) -> None:
-        self._storage = storage
-        self._build = build
-        self._package_import = package_import
+    _storage: Storage
+    _build: BuildService
+    _package_import: PackageImport
 
     @operation("GET", "/project/publish", BUILD, Role.STANDARD_USER, media_type=ZIP)
     async def publish(self, query: PublishQuery) -> Binary:

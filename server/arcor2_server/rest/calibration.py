@@ -1,6 +1,7 @@
 """The Calibration service over REST (protocol, section 15)."""
 
 import asyncio
+from dataclasses import dataclass
 from typing import Final, TypeVar
 
 import msgspec
@@ -69,12 +70,12 @@ def read_args(text: str, kind: type[T]) -> T:
     return args
 
 
+@dataclass(frozen=True, slots=True)
 class CalibrationOperations:
     """The Calibration service over REST as the original has it (protocol, section 15)."""
 
-    def __init__(self, calibration: Calibration, robots: SceneRobots) -> None:
-        self._calibration = calibration
-        self._robots = robots
+    _calibration: Calibration
+    _robots: SceneRobots
 
     @operation("PUT", "/calibrate/camera", CALIBRATION, Role.TECHNICIAN, file="image", limit=MAX_IMAGE)
     async def calibrate_camera(self, query: CameraPoseQuery, upload: Upload) -> EstimatedPose:

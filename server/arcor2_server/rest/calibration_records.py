@@ -1,5 +1,6 @@
 """Calibration records over REST (docs/protocol.md)."""
 
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import msgspec
@@ -16,6 +17,7 @@ from arcor2_hw.calibration.records import (
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc import ListCalibrationsArgs
 from arcor2_server.rest.calibration import CALIBRATION
 from arcor2_server.rest.operations import operation
 from arcor2_server.storage.calibrations import Calibrations
@@ -79,15 +81,6 @@ async def store_touch_record(
 
 
 # ------------------------------------------------------------------------------------------------ records
-class RecordsQuery(Data, frozen=True):
-    """Of an object, of a kind, older than a date; at most so many."""
-
-    object_id: str | Unset = UNSET
-    kind: CalibrationKind | Unset = UNSET
-    before: str | Unset = UNSET
-    limit: Annotated[int, Meta(ge=0, le=1000)] = 100
-
-
 class ByHandArgs(Data, frozen=True):
     """A pose that somebody typed in. remark: why, or from where."""
 
@@ -107,17 +100,16 @@ class CheckArgs(Data, frozen=True):
     angle_limit: Annotated[float, Meta(gt=0)] = 0.0035
 
 
+@dataclass(frozen=True, slots=True)
 class CalibrationRecordOperations:
     """Records of calibrations over REST (docs/protocol.md): kept, listed, checked later."""
 
-    def __init__(self, calibration_records: Calibrations) -> None:
-        self._calibration_records = calibration_records
+    _calibration_records: Calibrations
 
     @operation("GET", "/api/calibrations", CALIBRATION, Role.OPERATOR, plain=True)
-    async def list_calibrations(self, query: RecordsQuery) -> list[CalibrationRecord]:
+    async def list_calibrations(self, query: ListCalibrationsArgs) -> list[CalibrationRecord]:
         """List the records of calibrations, newest first."""
-        given = {name: value for name, value in msgspec.structs.asdict(query).items() if not isinstance(value, Unset)}
-        return await self._calibration_records.find(**given)
+        return await self._calibration_records.find(query)
 
     @operation("POST", "/api/calibrations", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def record_by_hand(self, body: ByHandArgs, person: str) -> CalibrationRecord:

@@ -1,6 +1,7 @@
 """Further calibrations over REST, with complete results (docs/protocol.md)."""
 
 import asyncio
+from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
 from msgspec import Meta, field
@@ -136,16 +137,14 @@ class DirectionsArgs(Data, frozen=True):
     record: RecordAs | Unset = UNSET
 
 
+@dataclass(frozen=True, slots=True)
 class MeasurementCalibrationOperations:
     """Calibrations beyond the original's, over REST (docs/protocol.md): whole results, and more kinds."""
 
-    def __init__(
-        self, calibration_records: Calibrations, compute: Compute, markers: Markers, robots: SceneRobots
-    ) -> None:
-        self._calibration_records = calibration_records
-        self._compute = compute
-        self._markers = markers
-        self._robots = robots
+    _calibration_records: Calibrations
+    _compute: Compute
+    _markers: Markers
+    _robots: SceneRobots
 
     # ------------------------------------------------------------------------------------------------ markers
     @operation("GET", "/api/calibration/markers", CALIBRATION, Role.OPERATOR, plain=True)

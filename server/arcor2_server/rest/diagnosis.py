@@ -1,6 +1,7 @@
 """The diagnosis bundle over REST."""
 
 import asyncio
+from dataclasses import dataclass
 
 import msgspec
 
@@ -15,12 +16,12 @@ ZIP = "application/zip"
 FILE = "diagnosis.zip"
 
 
+@dataclass(frozen=True, slots=True)
 class DiagnosisOperations:
     """The bundle for diagnosis over REST."""
 
-    def __init__(self, secrets: SettingSecrets, diagnosis: Diagnosis) -> None:
-        self._secrets = secrets
-        self._diagnosis = diagnosis
+    _secrets: SettingSecrets
+    _diagnosis: Diagnosis
 
     @operation("GET", "/api/diagnosis", SERVER, Role.TECHNICIAN, media_type=ZIP)
     async def diagnosis(self) -> Binary:

@@ -7,6 +7,7 @@ import io
 import platform
 import zipfile
 from collections.abc import Iterable, Set
+from dataclasses import dataclass
 from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any, Final
@@ -86,26 +87,17 @@ def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else repr(value)
 
 
+@dataclass(frozen=True, slots=True)
 class Diagnosis:
     """Collects the content of the diagnosis bundle."""
 
-    def __init__(
-        self,
-        settings: ServerSettings,
-        hub: EventHub,
-        types: ObjectTypes,
-        session: Session,
-        online: OnlineScene,
-        execution: Execution,
-        runs: Runs,
-    ) -> None:
-        self._settings = settings
-        self._hub = hub
-        self._types = types
-        self._session = session
-        self._online = online
-        self._execution = execution
-        self._runs = runs
+    _settings: ServerSettings
+    _hub: EventHub
+    _types: ObjectTypes
+    _session: Session
+    _online: OnlineScene
+    _execution: Execution
+    _runs: Runs
 
     def parts(self) -> dict[str, Any]:
         """Return the content of the bundle by file name, not yet encoded. Call this on the event loop."""

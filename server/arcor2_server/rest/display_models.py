@@ -1,6 +1,7 @@
 """Meshes and robot models converted for display, over REST (docs/protocol.md)."""
 
 import asyncio
+from dataclasses import dataclass
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import NotFound
@@ -10,11 +11,11 @@ from arcor2_server.workspace.display_models import DisplayModels
 MEDIA_TYPE = "model/gltf-binary"
 
 
+@dataclass(frozen=True, slots=True)
 class DisplayModelOperations:
     """Meshes and robots made ready for clients, over REST (docs/protocol.md)."""
 
-    def __init__(self, display_models: DisplayModels) -> None:
-        self._display_models = display_models
+    _display_models: DisplayModels
 
     @operation("GET", "/api/assets/{asset_id}/shown", "ARCOR2-HW", Role.OPERATOR, media_type=MEDIA_TYPE)
     async def asset_shown(self, asset_id: str) -> CacheableContent:

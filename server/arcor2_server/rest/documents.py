@@ -3,6 +3,7 @@
 import functools
 import typing
 from collections.abc import Iterable
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, Final
 
@@ -189,11 +190,11 @@ def service_at(settings: ServerSettings, port: int) -> str:
 SERVER: Final = "ARCOR2-HW"
 
 
+@dataclass(frozen=True, slots=True)
 class ApiDocumentOperations:
     """The OpenAPI documents."""
 
-    def __init__(self, settings: ServerSettings) -> None:
-        self._settings = settings
+    _settings: ServerSettings
 
     @operation("GET", "/openapi", SERVER, Role.OPERATOR, plain=True)
     async def openapi(self) -> dict[str, Any]:

@@ -4,6 +4,7 @@ import asyncio
 import enum
 import os
 from collections.abc import AsyncIterator
+from dataclasses import dataclass
 from typing import IO, Any, Final
 
 import msgspec
@@ -123,14 +124,14 @@ _STATES: Final = {
 }
 
 
+@dataclass(frozen=True, slots=True)
 class ExecutionOperations:
     """The Execution service over REST."""
 
-    def __init__(self, hub: EventHub, storage: Storage, execution: Execution, package_runs: PackageRuns) -> None:
-        self._hub = hub
-        self._storage = storage
-        self._execution = execution
-        self._package_runs = package_runs
+    _hub: EventHub
+    _storage: Storage
+    _execution: Execution
+    _package_runs: PackageRuns
 
     @operation("GET", "/packages", EXECUTION, Role.OPERATOR)
     async def list_packages(self) -> list[SummaryPackage]:

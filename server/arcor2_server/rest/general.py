@@ -1,6 +1,7 @@
 """Routes that belong to no service: readiness, devices."""
 
 import asyncio
+from dataclasses import dataclass
 
 from arcor2_hw.data.role import Role
 from arcor2_server.access.addresses import Joining, joining
@@ -13,13 +14,13 @@ from arcor2_server.settings import ServerSettings
 SERVER = "ARCOR2-HW"
 
 
+@dataclass(frozen=True, slots=True)
 class GeneralOperations:
     """Routes of no service: readiness, devices."""
 
-    def __init__(self, settings: ServerSettings, online: OnlineScene, execution: Execution) -> None:
-        self._settings = settings
-        self._online = online
-        self._execution = execution
+    _settings: ServerSettings
+    _online: OnlineScene
+    _execution: Execution
 
     @operation("GET", "/healthz/ready", SERVER, Role.OPERATOR, open=True, media_type="text/plain")
     async def ready(self) -> str:

@@ -1,5 +1,7 @@
 """The kinematic calibration of a robot that is in use, over REST (docs/protocol.md)."""
 
+from dataclasses import dataclass
+
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.role import Role
 from arcor2_server.online.online_scene import OnlineScene
@@ -23,13 +25,13 @@ class RobotKinematics(Data, frozen=True):
     refused: str | Unset = UNSET
 
 
+@dataclass(frozen=True, slots=True)
 class KinematicsOperations:
     """Which kinematics of a robot are in force, over REST (docs/protocol.md)."""
 
-    def __init__(self, online: OnlineScene, robot_calibrations: RobotCalibrations, robots: SceneRobots) -> None:
-        self._online = online
-        self._robot_calibrations = robot_calibrations
-        self._robots = robots
+    _online: OnlineScene
+    _robot_calibrations: RobotCalibrations
+    _robots: SceneRobots
 
     @operation("GET", "/api/robots/{object_id}/kinematics", SERVER, Role.OPERATOR, plain=True)
     async def robot_kinematics(self, object_id: str) -> RobotKinematics:

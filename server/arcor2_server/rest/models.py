@@ -1,5 +1,7 @@
 """Collision models over REST: one model per id (protocol, section 13)."""
 
+from dataclasses import dataclass
+
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Model3dType, Models, Sphere
 from arcor2_hw.data.role import Role
@@ -17,12 +19,12 @@ class MetaModel3d(Data, frozen=True):
     type: Model3dType
 
 
+@dataclass(frozen=True, slots=True)
 class ModelOperations:
     """Collision models over REST (protocol, section 13): one model per id, of whatever kind."""
 
-    def __init__(self, storage: Storage, type_notifications: TypeNotifications) -> None:
-        self._storage = storage
-        self._type_notifications = type_notifications
+    _storage: Storage
+    _type_notifications: TypeNotifications
 
     @operation("GET", "/models", STORAGE, Role.OPERATOR)
     async def list_models(self) -> list[MetaModel3d]:

@@ -1,5 +1,6 @@
 """Object types over REST (protocol, sections 9.1 and 13)."""
 
+from dataclasses import dataclass
 from typing import Final
 
 from msgspec import UNSET
@@ -38,13 +39,13 @@ def _document(stored: ObjectTypeSource) -> ObjectType:
     return ObjectType(stored.id, stored.id, stored.source, stored.description, model, stored.created, stored.modified)
 
 
+@dataclass(frozen=True, slots=True)
 class ObjectTypeOperations:
     """Object types over REST: uploaded as source, listed, read, deleted (protocol, sections 9.1 and 13)."""
 
-    def __init__(self, storage: Storage, types: ObjectTypes, type_notifications: TypeNotifications) -> None:
-        self._storage = storage
-        self._types = types
-        self._type_notifications = type_notifications
+    _storage: Storage
+    _types: ObjectTypes
+    _type_notifications: TypeNotifications
 
     @operation("GET", "/object-types", STORAGE, Role.OPERATOR)
     async def list_object_types(self) -> list[IdDesc]:

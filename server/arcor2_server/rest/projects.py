@@ -1,6 +1,7 @@
 """Projects, their sources and parameters over REST (protocol, section 13)."""
 
 import contextlib
+from dataclasses import dataclass
 
 from msgspec import UNSET
 from msgspec.structs import replace
@@ -32,11 +33,11 @@ class CloneQuery(Data, frozen=True):
     new_description: str | Unset = UNSET
 
 
+@dataclass(frozen=True, slots=True)
 class ProjectOperations:
     """Projects over REST: documents, sources, and what is kept beside them (protocol, section 13)."""
 
-    def __init__(self, storage: Storage) -> None:
-        self._storage = storage
+    _storage: Storage
 
     @operation("GET", "/projects", STORAGE, Role.OPERATOR)
     async def list_projects(self) -> list[IdDesc]:

@@ -1,5 +1,7 @@
 """The history of runs over REST."""
 
+from dataclasses import dataclass
+
 from arcor2_hw.data.editor import Run
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import ListRunsArgs
@@ -8,11 +10,11 @@ from arcor2_server.rest.general import SERVER
 from arcor2_server.rest.operations import operation
 
 
+@dataclass(frozen=True, slots=True)
 class RunOperations:
     """The history of runs over REST."""
 
-    def __init__(self, runs: Runs) -> None:
-        self._runs = runs
+    _runs: Runs
 
     @operation("GET", "/api/runs", SERVER, Role.OPERATOR, plain=True)
     async def list_runs(self, query: ListRunsArgs) -> list[Run]:

@@ -1,5 +1,7 @@
 """The Scene service: collision models, line checks, poses from focus points (protocol, section 14)."""
 
+from dataclasses import dataclass
+
 from arcor2_hw.collision.description import Obstacle
 from arcor2_hw.compute.kinematics_tasks import ReadMesh
 from arcor2_hw.data.base import UNSET, Data, Unset
@@ -81,22 +83,15 @@ class HolderQuery(Data, frozen=True, rename="camel"):
     link: str
 
 
+@dataclass(frozen=True, slots=True)
 class SceneServiceOperations:
     """The Scene service."""
 
-    def __init__(
-        self,
-        assets: AssetStore,
-        online: OnlineScene,
-        compute: Compute,
-        collisions: ObstacleRegistry,
-        scene_collisions: SceneCollisions,
-    ) -> None:
-        self._assets = assets
-        self._online = online
-        self._compute = compute
-        self._collisions = collisions
-        self._scene_collisions = scene_collisions
+    _assets: AssetStore
+    _online: OnlineScene
+    _compute: Compute
+    _collisions: ObstacleRegistry
+    _scene_collisions: SceneCollisions
 
     def _put(self, kind: type[Models], pose: Pose, key: str, *sizes: float | str) -> str:
         check_id(key, "collision model")

@@ -1,5 +1,7 @@
 """Scenes over REST (protocol, section 13)."""
 
+from dataclasses import dataclass
+
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import Scene
@@ -33,12 +35,12 @@ def check_id(key: str, what: str) -> None:
         )
 
 
+@dataclass(frozen=True, slots=True)
 class SceneOperations:
     """Scenes over REST (protocol, section 13)."""
 
-    def __init__(self, storage: Storage, types: ObjectTypes) -> None:
-        self._storage = storage
-        self._types = types
+    _storage: Storage
+    _types: ObjectTypes
 
     @operation("GET", "/scenes", STORAGE, Role.OPERATOR)
     async def list_scenes(self) -> list[IdDesc]:

@@ -1,1 +1,1 @@
-"""The requests of the protocol, one module per subject."""
+"""Handlers of the requests of the websocket protocol, one module per subject."""

@@ -1,10 +1,15 @@
-"""Encoded answers, cached as long as their data is unchanged."""
+"""Cache of encoded answers, valid as long as their sources are unchanged."""
+
+from collections.abc import Callable
+from typing import Any
 
 from msgspec import Raw
 
+from arcor2_server.events import encode
+
 
 class AnswerCache:
-    """Answers by request; each is valid for one state of its sources, which their revisions stand for."""
+    """Encoded answers by name. An answer is valid for the revisions of its sources from which it was made."""
 
     def __init__(self) -> None:
         self._answers: dict[str, tuple[tuple[int, ...], Raw]] = {}
@@ -15,7 +20,11 @@ class AnswerCache:
         return answer[1] if answer is not None and answer[0] == revisions else None
 
     def store(self, name: str, revisions: tuple[int, ...], encoded: bytes) -> Raw:
-        """Keep an encoded answer made from these revisions, taken before its sources were read."""
+        """Store an encoded answer and return it. Take the revisions before reading the sources."""
         answer = Raw(encoded)
         self._answers[name] = (revisions, answer)
         return answer
+
+    def get_or_encode(self, name: str, revisions: tuple[int, ...], make: Callable[[], Any]) -> Raw:
+        """Return the cached answer, else encode and store the answer that `make` returns."""
+        return self.get(name, revisions) or self.store(name, revisions, encode(make()))

@@ -1,4 +1,6 @@
-"""The request that turns a project into a package."""
+"""The request that builds a package from a project."""
+
+from dataclasses import dataclass
 
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.rpc import BuildProjectArgs, BuildProjectData
@@ -9,18 +11,18 @@ from arcor2_server.execution.service import Execution
 from arcor2_server.rpc.registry import Context, rpc
 
 
+@dataclass(frozen=True, slots=True)
 class BuildRequests:
-    """The request that turns a project into a package."""
+    """The request that builds a package from a project."""
 
-    def __init__(self, locks: Locks, execution: Execution, build: BuildService, tasks: Tasks) -> None:
-        self._locks = locks
-        self._execution = execution
-        self._build = build
-        self._tasks = tasks
+    _locks: Locks
+    _execution: Execution
+    _build: BuildService
+    _tasks: Tasks
 
     @rpc("BuildProject")
     async def build_project(self, context: Context, args: BuildProjectArgs) -> BuildProjectData:
-        """Build a saved project; PackageChanged announces the new package."""
+        """Build a package from a saved project. PackageChanged publishes the new package."""
         async with self._locks.auto(context.user, args.project_id):
             title = f"Building the package {args.package_name}"
             with self._tasks.running(TaskKind.BUILD, title, context.client.name):

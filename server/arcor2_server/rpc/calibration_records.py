@@ -1,6 +1,6 @@
 """Requests about calibration records (docs/protocol.md)."""
 
-import msgspec
+from dataclasses import dataclass
 
 from arcor2_hw.calibration.records import check_against
 from arcor2_hw.data.base import Unset
@@ -13,30 +13,31 @@ from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.storage.calibrations import Calibrations
 
 
+@dataclass(frozen=True, slots=True)
 class CalibrationRecordRequests:
-    """Requests about records of calibrations."""
+    """Requests about calibration records (docs/protocol.md)."""
 
-    def __init__(self, session: Session, calibration_records: Calibrations) -> None:
-        self._session = session
-        self._calibration_records = calibration_records
+    _session: Session
+    _calibration_records: Calibrations
 
     @rpc("ListCalibrations")
     async def list_calibrations(self, context: Context, args: ListCalibrationsArgs) -> ListCalibrationsData:
-        """Return the newest records of calibrations."""
-        given = {name: value for name, value in msgspec.structs.asdict(args).items() if not isinstance(value, Unset)}
-        return ListCalibrationsData(await self._calibration_records.find(**given))
+        """Return the newest calibration records."""
+        return ListCalibrationsData(await self._calibration_records.find(args))
 
     @rpc("CheckCalibration")
     async def check_calibration(self, context: Context, args: CheckCalibrationArgs) -> CalibrationCheck:
-        """Compare a measured pose, or the pose in the open scene, with a record."""
+        """Compare a record with a measured pose, by default with the pose in the open scene."""
         record = await self._calibration_records.get(args.id)
-        pose = self._present(record) if isinstance(args.pose, Unset) else args.pose
+        pose = self._present_pose(record) if isinstance(args.pose, Unset) else args.pose
         return check_against(record, pose, distance_limit=args.distance_limit, angle_limit=args.angle_limit)
 
-    def _present(self, record: CalibrationRecord) -> Pose:
-        """Return where the object of a record is in the open scene.
+    def _present_pose(self, record: CalibrationRecord) -> Pose:
+        """Return the pose of the object of a record in the open scene.
 
-        Raise RequestRefused or NotFound if that is impossible.
+        Raises:
+            NotFound: the scene has no such object.
+            RequestRefused: no scene is open, the object has no pose, or the record is not in the world frame.
         """
         if record.parent != "world":
             raise RequestRefused(

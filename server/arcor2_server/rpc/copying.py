@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import msgspec
 from msgspec import UNSET
@@ -15,40 +16,41 @@ from arcor2_server.collaboration.locks import Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.document import OWNED, Document, reference
+from arcor2_server.rpc.change_events import EVENTS
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
 
-_EVENTS = {Kind.POINT: "ActionPointChanged", Kind.ORIENTATION: "OrientationChanged", Kind.JOINTS: "JointsChanged"}
 _PREFIXES = {Kind.POINT: "acp", Kind.ORIENTATION: "ori", Kind.JOINTS: "joi", Kind.ACTION: "act"}
+"""Prefixes of new ids by kind of item."""
 
 
-def _copy(document: Document, args: CopyActionPointArgs) -> tuple[list[Change], list[Change]]:
-    """Return the changes that add the points with orientations and joints, and those that add the actions."""
+def _copy(document: Document, args: CopyActionPointArgs) -> list[Change]:
+    """Return the changes that add the copies: first points, orientations and joints, then actions."""
     points = [document.action_point(args.id), *document.descendants(args.id)]
     owned = {point.id: [item for kind in OWNED for item in document.owned(point.id, kind)] for point in points}
     new_ids = {point.id: new_id("acp") for point in points}
     new_ids |= {item.id: new_id(_PREFIXES[item.kind]) for items in owned.values() for item in items}
-    free_point, free_action, free_output = (_names(document, kind) for kind in (Kind.POINT, Kind.ACTION, "output"))
-    places: list[Change] = []
+    free_point, free_action, free_output = (_free_names(document, kind) for kind in (Kind.POINT, Kind.ACTION, "output"))
+    points_with_poses: list[Change] = []
     actions: list[Change] = []
     for point in points:
         key = new_ids[point.id]
         parent = point.parent if point.id == args.id else new_ids[str(point.parent)]
         position = args.position if point.id == args.id and args.position is not UNSET else point.position
         copied = replace(point, id=key, name=free_point(point.name), parent=parent, position=position)
-        places.append(document.add(Kind.POINT, key, copied))
+        points_with_poses.append(document.add(Kind.POINT, key, copied))
         for item in owned[point.id]:
             value = replace(item.value, id=new_ids[item.id])
             if item.kind is Kind.ACTION:
                 value = _copied_action(value, new_ids, free_action, free_output)
                 actions.append(document.add(Kind.ACTION, value.id, value, key))
             else:
-                places.append(document.add(item.kind, value.id, value, key))
-    return places, actions
+                points_with_poses.append(document.add(item.kind, value.id, value, key))
+    return points_with_poses + actions
 
 
-def _names(document: Document, kind: Kind | str) -> Callable[[str], str]:
-    """Return what makes names of copies: `_copy`, then `_copy_1` and on, whichever is free."""
+def _free_names(document: Document, kind: Kind | str) -> Callable[[str], str]:
+    """Return a function that returns a free name for a copy: with the suffix `_copy`, `_copy_1`, `_copy_2` ..."""
     taken: set[str] = set()
 
     def free(name: str) -> str:
@@ -69,6 +71,7 @@ def _copied_action(
 
 
 def _redirected(parameter: ActionParameter, new_ids: dict[str, str]) -> ActionParameter:
+    """Return a parameter that refers to the copy of its target, if the target is copied."""
     target = reference(parameter.type, parameter.value)
     if target is None or target not in new_ids:
         return parameter
@@ -77,28 +80,24 @@ def _redirected(parameter: ActionParameter, new_ids: dict[str, str]) -> ActionPa
     return replace(parameter, value=msgspec.json.encode(new).decode())
 
 
+@dataclass(frozen=True, slots=True)
 class CopyRequests:
-    """The request that copies an action point with all that hangs on it (protocol, 7.4)."""
+    """The request that copies an action point with its children (protocol, 7.4)."""
 
-    def __init__(self, locks: Locks, session: Session, editing: Editing) -> None:
-        self._locks = locks
-        self._session = session
-        self._editing = editing
+    _locks: Locks
+    _session: Session
+    _editing: Editing
 
     @rpc("CopyActionPoint")
     async def copy_action_point(self, context: Context, args: CopyActionPointArgs) -> None:
-        """Copy an action point with its descendants; what refers to something copied refers to the copy."""
-        session = self._session
-        document = session.require_project_open()
+        """Copy an action point with its descendants. References between copied items refer to the copies."""
+        document = self._session.require_project_open()
         user = context.user
         document.action_point(args.id)
-        below = [args.id, *(point.id for point in document.descendants(args.id))]
-        async with self._locks.read(user, *below):
-            places, actions = _copy(document, args)
-            if not await self._editing.commit(context, [*places, *actions]):
+        points = [args.id, *(point.id for point in document.descendants(args.id))]
+        async with self._locks.read(user, *points):
+            changes = _copy(document, args)
+            if not await self._editing.commit(context, changes):
                 return
-        for change in places:
-            parent = None if change.kind is Kind.POINT else change.parent
-            context.emit_first(_EVENTS[change.kind], change.after, ChangeType.ADD, parent)
-        for change in actions:
-            context.emit_first("ActionChanged", change.after, ChangeType.ADD, change.parent)
+        for change in changes:
+            context.emit_first(EVENTS[change.kind], change.after, ChangeType.ADD, change.parent or None)

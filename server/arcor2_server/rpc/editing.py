@@ -1,12 +1,10 @@
-"""Shared by all requests that edit the open document."""
+"""Operations shared by the requests that edit the open document: commit, locks, free names, secrets."""
 
 from collections.abc import AsyncIterator, Iterable, Sequence
 from contextlib import asynccontextmanager
-from typing import Any
+from dataclasses import dataclass
 
-from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import ChangeType, LockData
-from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import SceneObject
 from arcor2_server.collaboration.locks import Locks
@@ -14,46 +12,45 @@ from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.service import Execution
-from arcor2_server.online.online_scene import OnlineScene
+from arcor2_server.rpc.change_events import EVENTS
 from arcor2_server.rpc.registry import Context
 from arcor2_server.storage import Storage
 from arcor2_server.storage.setting_secrets import SettingSecrets
-from arcor2_server.workspace.robots import optional
 
 
-def emit_changes(
-    context: Context, changes: Sequence[Change], event: str, change: ChangeType, parent: str | None = None
-) -> None:
-    """Send one event for each change: with the item as it is now, or as it was last."""
-    for made in changes:
-        data: Any = made.before if made.after is None else made.after
-        context.emit(event, data, change, parent)
-
-
+@dataclass(frozen=True, slots=True)
 class Editing:
-    """What requests that edit the open document have in common."""
+    """Operations shared by the requests that edit the open document."""
 
-    def __init__(
-        self,
-        locks: Locks,
-        storage: Storage,
-        session: Session,
-        online: OnlineScene,
-        execution: Execution,
-        secrets: SettingSecrets,
-    ) -> None:
-        self._locks = locks
-        self._storage = storage
-        self._session = session
-        self._online = online
-        self._execution = execution
-        self._secrets = secrets
+    _locks: Locks
+    _storage: Storage
+    _session: Session
+    _execution: Execution
+    _secrets: SettingSecrets
 
     async def commit(self, context: Context, changes: Sequence[Change]) -> bool:
-        """Make changes, unless this is a dry run; return whether they were made."""
+        """Commit changes as one edit, except in a dry run; return whether they were made."""
         if context.dry_run:
             return False
         await self._session.commit(context.client.user or "", changes, context.request)
+        return True
+
+    async def commit_one(self, context: Context, change: Change, update: ChangeType = ChangeType.UPDATE) -> bool:
+        """Commit one change and send its event, except in a dry run; return whether it was made.
+
+        Args:
+            context: the request.
+            change: the change.
+            update: change type of the event if the change replaces an item.
+        """
+        if not await self.commit(context, [change]):
+            return False
+        if change.after is None:
+            context.emit(EVENTS[change.kind], change.before, ChangeType.REMOVE)
+        elif change.before is None:
+            context.emit(EVENTS[change.kind], change.after, ChangeType.ADD, change.parent or None)
+        else:
+            context.emit(EVENTS[change.kind], change.after, update)
         return True
 
     async def hide_secrets(
@@ -65,17 +62,17 @@ class Editing:
         *,
         of_project: bool = False,
     ) -> list[Parameter]:
-        """Store the secrets among the settings of an object; return the settings with references (SettingSecrets.hide).
+        """Store the secret settings of an object; return the settings with references instead (SettingSecrets.hide).
 
-        Others may edit while this waits for the disk.
+        This waits for the disk, so other requests may change the document meanwhile.
 
         Args:
             context: the request.
             obj: the object as it is in the scene.
-            given: its settings, or with `of_project` its overrides.
-            before: the same as they are.
-            of_project: the settings are overrides. They are changed one by one, so their addresses are checked when the
-                scene or the package is started.
+            given: its new settings, or with `of_project` its new overrides.
+            before: its present settings or overrides.
+            of_project: whether the settings are overrides. They are changed one by one, so their addresses are
+                checked when the scene or the package is started.
         """
         if context.dry_run:
             return list(given)
@@ -86,33 +83,33 @@ class Editing:
         return hidden
 
     def unlock(self, context: Context, *ids: str) -> None:
-        """Release the caller's locks among `ids` and publish it."""
+        """Release the locks of the caller on these items, and publish the released ones."""
         if freed := self._locks.release_announced(context.user, ids):
             context.emit("ObjectsUnlocked", LockData(freed, context.user))
 
     def drop_locks(self, context: Context, *ids: str) -> None:
-        """Drop the locks of removed items and publish the other items that became free."""
+        """Drop the locks of removed items, and publish the other items that this unlocks."""
         for owner, freed in self._locks.drop(ids).items():
             context.emit("ObjectsUnlocked", LockData(freed, owner))
 
-    def require_held(self, context: Context, item: str, *, tree: bool = False) -> None:
-        """Raise RequestRefused unless the caller is logged in and holds the write lock."""
+    def require_locked(self, context: Context, item: str, *, tree: bool = False) -> None:
+        """Raise RequestRefused unless the caller is registered and holds the write lock of an item."""
         self._locks.require_held(context.user, item, tree=tree)
 
     @asynccontextmanager
-    async def opening_allowed(self, context: Context) -> AsyncIterator[None]:
-        """Exclude all other requests while a document is opened; refuse while a program runs."""
+    async def opening_allowed(self) -> AsyncIterator[None]:
+        """Exclude all other requests while a document is opened. Raise RequestRefused while a program runs."""
         async with self._locks.exclusive():
-            self.require_no_program(context)
+            self.require_no_program()
             yield
 
-    def require_no_program(self, context: Context) -> None:
+    def require_no_program(self) -> None:
         """Raise RequestRefused while a package runs."""
         if self._execution.busy:
             raise RequestRefused("A program is running: stop it first.")
 
-    async def require_name_free(self, context: Context, name: str, what: str) -> None:
-        """Raise RequestRefused unless the name is given and no scene or project has it, saved or open."""
+    async def require_document_name_free(self, name: str, what: str) -> None:
+        """Raise RequestRefused if the name is empty, or a saved or open scene or project has it."""
         if not name:
             raise RequestRefused("The {what} needs a name.", what=what)
         session = self._session
@@ -120,12 +117,7 @@ class Editing:
         if name in opened or await self._storage.name_taken(name):
             raise RequestRefused("There is a scene or project called {name} already: choose another name.", name=name)
 
-    def require_free(self, context: Context, kind: Kind, name: str, what: str, parent: str = "") -> None:
-        """Raise RequestRefused when something of that kind (within its action point) has the name."""
+    def require_name_free(self, kind: Kind, name: str, what: str, parent: str = "") -> None:
+        """Raise RequestRefused if an item of this kind, of the action point `parent` if given, has the name."""
         if self._session.document.named(kind, name, parent) is not None:
             raise RequestRefused("There is {what} called {name} already: choose another name.", what=what, name=name)
-
-    async def eef_pose(self, context: Context, robot_id: str, end_effector: str, arm_id: str | Unset) -> Pose:
-        """Return the pose of an end effector in the world, as the robot has it now."""
-        pose: Pose = await self._online.end_effector_pose(robot_id, end_effector, optional(arm_id))
-        return pose

@@ -1,4 +1,6 @@
-"""Requests about what clients share: view state, breakpoints, presence, previews."""
+"""Requests about state that clients share besides documents: view states, breakpoints, presence, previews."""
+
+from dataclasses import dataclass
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import MovePreview, Presence, ProjectBreakpoints, ViewScope, ViewState
@@ -22,24 +24,16 @@ from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.rpc.registry import Context, rpc
 
 
+@dataclass(frozen=True, slots=True)
 class SharedStateRequests:
-    """Requests about what clients share beside the documents."""
+    """Requests about state that clients share besides documents: view states, breakpoints, presence, previews."""
 
-    def __init__(
-        self,
-        locks: Locks,
-        session: Session,
-        previews: Previews,
-        view_states: ViewStates,
-        breakpoints: SharedBreakpoints,
-        presence: PresenceBoard,
-    ) -> None:
-        self._locks = locks
-        self._session = session
-        self._previews = previews
-        self._view_states = view_states
-        self._breakpoints = breakpoints
-        self._presence = presence
+    _locks: Locks
+    _session: Session
+    _previews: Previews
+    _view_states: ViewStates
+    _breakpoints: SharedBreakpoints
+    _presence: PresenceBoard
 
     # ---------------------------------------------------------------------------------------------- view state
     @rpc("GetViewState")
@@ -54,7 +48,7 @@ class SharedStateRequests:
 
     @rpc("SetViewState")
     async def set_view_state(self, context: Context, args: SetViewStateArgs) -> SetViewStateData:
-        """Write values of the view state of a document; ViewStateChanged tells the others."""
+        """Write values of the view state of a document. ViewStateChanged publishes them to other clients."""
         user = ""
         if args.scope is ViewScope.USER:
             user = context.user
@@ -64,7 +58,8 @@ class SharedStateRequests:
         return SetViewStateData(await views.change(args.scope, user, args.document, args.values, context.client))
 
     # ---------------------------------------------------------------------------------------------- shared breakpoints
-    def _project(self, context: Context, project_id: str | Unset) -> str:
+    def _project_id(self, project_id: str | Unset) -> str:
+        """Return the given id, else the id of the open project."""
         if not isinstance(project_id, Unset):
             return project_id
         return self._session.require_project_open().of_kind(Kind.PROJECT)[0].id
@@ -72,26 +67,26 @@ class SharedStateRequests:
     @rpc("GetBreakpoints")
     async def get_breakpoints(self, context: Context, args: GetBreakpointsArgs) -> ProjectBreakpoints:
         """Return the shared breakpoints of a project."""
-        return await self._breakpoints.get(self._project(context, args.project_id))
+        return await self._breakpoints.get(self._project_id(args.project_id))
 
     @rpc("SetBreakpoints")
     async def set_breakpoints(self, context: Context, args: SetBreakpointsArgs) -> ProjectBreakpoints:
-        """Set and remove shared breakpoints of a project; BreakpointsChanged announces them."""
+        """Set and remove shared breakpoints of a project. BreakpointsChanged publishes them."""
         if both := args.add & args.remove:
             raise RequestRefused("{both} is to be set and taken away at once.", both=min(both))
-        project = self._project(context, args.project_id)
-        return await self._breakpoints.change(project, args.add, args.remove, context.user)
+        project_id = self._project_id(args.project_id)
+        return await self._breakpoints.change(project_id, args.add, args.remove, context.user)
 
     # ---------------------------------------------------------------------------------------------- presence, previews
     @rpc("UpdatePresence")
     async def update_presence(self, context: Context, args: Presence) -> None:
-        """Say what the user looks at and edits."""
+        """Publish what the user is viewing and editing."""
         assert context.user
         self._presence.update(context.client, args)
 
     @rpc("PreviewMove")
     async def preview_move(self, context: Context, args: MovePreview) -> None:
-        """Show the others where an item is that the caller drags just now."""
+        """Show other clients the position of an item that the caller is dragging."""
         user = context.user
         document = self._session.require_scene_open()
         for kind in (Kind.OBJECT, Kind.POINT, Kind.ORIENTATION, Kind.JOINTS):

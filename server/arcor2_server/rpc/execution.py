@@ -1,4 +1,6 @@
-"""Requests that bring the scene online, execute single actions, and run packages (protocol, 7.2, 7.4, 7.6)."""
+"""Requests that start the scene, execute single actions, and run packages (protocol, 7.2, 7.4, 7.6)."""
+
+from dataclasses import dataclass
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import TaskKind
@@ -26,58 +28,47 @@ from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rpc.registry import Context, rpc
 
 
-def how(context: Context, args: RunPackageArgs | TemporaryPackageArgs) -> How:
-    """Return how a package is to be run."""
+def _run_options(context: Context, args: RunPackageArgs | TemporaryPackageArgs) -> How:
     breakpoints = frozenset[str]() if isinstance(args.breakpoints, Unset) else args.breakpoints
     return How(args.start_paused, breakpoints, args.shared_breakpoints is True, context.client.name)
 
 
+@dataclass(frozen=True, slots=True)
 class ExecutionRequests:
-    """Requests that bring the scene online, execute single actions, and run packages (protocol, 7.2, 7.4, 7.6)."""
+    """Requests that start the scene, execute single actions, and run packages (protocol, 7.2, 7.4, 7.6)."""
 
-    def __init__(
-        self,
-        locks: Locks,
-        types: ObjectTypes,
-        session: Session,
-        online: OnlineScene,
-        execution: Execution,
-        tasks: Tasks,
-        package_runs: PackageRuns,
-        temporary_runs: TemporaryRuns,
-    ) -> None:
-        self._locks = locks
-        self._types = types
-        self._session = session
-        self._online = online
-        self._execution = execution
-        self._tasks = tasks
-        self._package_runs = package_runs
-        self._temporary_runs = temporary_runs
+    _locks: Locks
+    _types: ObjectTypes
+    _session: Session
+    _online: OnlineScene
+    _execution: Execution
+    _tasks: Tasks
+    _package_runs: PackageRuns
+    _temporary_runs: TemporaryRuns
 
     # ------------------------------------------------------------------------------------------------ scene
     @rpc("StartScene")
     async def start_scene(self, context: Context, args: None) -> None:
-        """Bring the scene online; SceneState reports the progress."""
+        """Start the scene: connect its devices. SceneState reports the progress."""
         self._online.task.asked_by = context.client.name
         await self._online.begin_start(dry_run=context.dry_run)
 
     @rpc("StartSceneKeepGoing")
     async def start_scene_keep_going(self, context: Context, args: None) -> None:
-        """Bring the scene online without objects that cannot be connected; SceneState reports the progress."""
+        """Start the scene without the devices that cannot be connected. SceneState reports the progress."""
         self._online.task.asked_by = context.client.name
         await self._online.begin_start(dry_run=context.dry_run, keep_going=True)
 
     @rpc("StopScene")
     async def stop_scene(self, context: Context, args: None) -> None:
-        """Take the scene offline; SceneState reports the progress."""
+        """Stop the scene: disconnect its devices. SceneState reports the progress."""
         self._online.task.asked_by = context.client.name
         await self._online.begin_stop(dry_run=context.dry_run)
 
     # ------------------------------------------------------------------------------------------------ single actions
     @rpc("ExecuteAction")
     async def execute_action(self, context: Context, args: ExecuteActionArgs) -> None:
-        """Execute one action of the project; ActionResult tells how it ended."""
+        """Execute one action of the project. ActionResult reports its end."""
         session, cell = self._session, self._online
         session.require_project_open()
         async with self._locks.auto(context.user, ACTION):
@@ -100,7 +91,7 @@ class ExecutionRequests:
 
     @rpc("CancelAction")
     async def cancel_action(self, context: Context, args: None) -> None:
-        """Cancel the action that runs."""
+        """Cancel the running action."""
         self._session.require_project_open()
         running = self._online.running_action
         if running is None:
@@ -126,7 +117,7 @@ class ExecutionRequests:
 
     @rpc("UploadPackage")
     async def upload_package(self, context: Context, args: UploadPackageArgs) -> None:
-        """Take a package as a zip."""
+        """Store a package that was sent as a zip file."""
         with self._tasks.running(TaskKind.UPLOAD, f"Taking in the package {args.id}", context.client.name):
             summary = await self._execution.upload(args.id, args.data)
         context.emit("PackageChanged", summary, ChangeType.ADD)
@@ -139,19 +130,19 @@ class ExecutionRequests:
 
     @rpc("RenamePackage")
     async def rename_package(self, context: Context, args: RenamePackageArgs) -> None:
-        """Give a package another name."""
+        """Rename a package."""
         summary = await self._execution.rename(args.package_id, args.new_name)
         context.emit("PackageChanged", summary, ChangeType.UPDATE)
 
     @rpc("RunPackage")
     async def run_package(self, context: Context, args: RunPackageArgs) -> None:
-        """Run a package. An open document that no connected user works on does not prevent it."""
-        await self._package_runs.run_package(args.id, how(context, args))
+        """Run a package. A document left open by users who disconnected does not prevent it."""
+        await self._package_runs.run_package(args.id, _run_options(context, args))
 
     @rpc("TemporaryPackage")
     async def temporary_package(self, context: Context, args: TemporaryPackageArgs) -> None:
-        """Run the open project, which is closed meanwhile; answer once the package is built."""
-        await self._temporary_runs.run(how(context, args))
+        """Run the open project. It is closed during the run. The answer comes when the package is built."""
+        await self._temporary_runs.run(_run_options(context, args))
 
     @rpc("StopPackage")
     async def stop_package(self, context: Context, args: None) -> None:
@@ -165,10 +156,10 @@ class ExecutionRequests:
 
     @rpc("ResumePackage")
     async def resume_package(self, context: Context, args: None) -> None:
-        """Let a paused program go on."""
+        """Resume the paused program."""
         self._execution.resume()
 
     @rpc("StepAction")
     async def step_action(self, context: Context, args: None) -> None:
-        """Let a paused program go on for one action."""
+        """Resume the paused program for one action."""
         self._execution.step()

@@ -1,6 +1,7 @@
 """Requests about the server, registration and event subscriptions."""
 
 import functools
+from dataclasses import dataclass
 from typing import Any, Final
 
 from msgspec import Raw
@@ -48,53 +49,40 @@ PARAMETER_TYPES: Final = (
 
 @functools.lru_cache(maxsize=1)
 def _system_info(_handlers: int) -> Raw:
-    """Encode the answer once; the handlers only grow, and only until the server is up."""
+    """Encode the answer once per number of handlers, which is constant after all modules are imported."""
     return Raw(encode(SystemInfoData(VERSION, API_VERSION, set(PARAMETER_TYPES), set(DECLARED))))
 
 
+@dataclass(frozen=True, slots=True)
 class GeneralRequests:
-    """Requests about the server itself and about who is there."""
+    """Requests about the server, registration and event subscriptions."""
 
-    def __init__(
-        self,
-        access: Access,
-        hub: Hub,
-        users: Users,
-        locks: Locks,
-        session: Session,
-        online: OnlineScene,
-        execution: Execution,
-        object_aiming: ObjectAimings,
-        tasks: Tasks,
-        presence: PresenceBoard,
-        edit_notifications: EditNotifications,
-        reachability: ReachabilityBoard,
-    ) -> None:
-        self._access = access
-        self._hub = hub
-        self._users = users
-        self._locks = locks
-        self._session = session
-        self._online = online
-        self._execution = execution
-        self._object_aiming = object_aiming
-        self._tasks = tasks
-        self._presence = presence
-        self._edit_notifications = edit_notifications
-        self._reachability = reachability
+    _access: Access
+    _hub: Hub
+    _users: Users
+    _locks: Locks
+    _session: Session
+    _online: OnlineScene
+    _execution: Execution
+    _object_aiming: ObjectAimings
+    _tasks: Tasks
+    _presence: PresenceBoard
+    _edit_notifications: EditNotifications
+    _reachability: ReachabilityBoard
 
     @rpc("SystemInfo")
     async def system_info(self, context: Context, args: None) -> Any:
-        """Return versions, parameter types and the requests that are served (an existing client sends no other)."""
+        """Return versions, parameter types and supported requests. Existing clients send no other requests."""
         return _system_info(len(DECLARED))
 
     @cached("SystemInfo")
-    def _cached_system_info(self) -> Raw:
+    def cached_system_info(self) -> Raw:
+        """Return the encoded answer to SystemInfo."""
         return _system_info(len(DECLARED))
 
     @rpc("Authenticate")
     async def authenticate(self, context: Context, args: AuthenticateArgs) -> AuthenticateData:
-        """Show a token at a connection that could send none when it was made; the greeting follows the answer."""
+        """Authenticate a connection that was opened without a token. The greeting follows the answer."""
         client = context.client
         try:
             admission = self._access.by_token(args.token, client.address)
@@ -103,16 +91,16 @@ class GeneralRequests:
             raise
         token = admission.token
         assert token is not None
-        was_in = client.admitted
+        was_admitted = client.admitted
         client.admit(token.role, token)
-        if not was_in:
+        if not was_admitted:
             context.events_to_caller += client.greeting()
             self._hub.add(client, client.events)
         return AuthenticateData(token.name, token.role.name.lower())
 
     @rpc("RegisterUser")
     async def register_user(self, context: Context, args: RegisterUserArgs) -> None:
-        """Log in at this connection."""
+        """Register the user of this connection."""
         name = args.user_name
         context.events_to_caller += await self._users.register(context.client, name)
         if context.client in self._hub.subscribers("HistoryChanged"):
@@ -123,7 +111,7 @@ class GeneralRequests:
 
     @rpc("SubscribeEvents")
     async def subscribe_events(self, context: Context, args: SubscribeEventsArgs) -> None:
-        """Subscribe this client to additional events, or unsubscribe it. The present state is sent first."""
+        """Subscribe this client to additional events, or unsubscribe it. The present state follows the answer."""
         offered = {event.name for event in EVENTS.values() if event.additional}
         if unknown := args.events - offered:
             raise RequestRefused(

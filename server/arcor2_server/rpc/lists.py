@@ -1,6 +1,6 @@
 """Requests for saved scenes and projects. The encoded lists are cached."""
 
-from typing import Any
+from dataclasses import dataclass
 
 import msgspec
 from msgspec import UNSET, Raw
@@ -17,42 +17,32 @@ from arcor2_server.rpc.registry import Context, cached, rpc
 from arcor2_server.storage import Storage
 
 
-def _saved(stamp: Any) -> str:
-    """Everything in storage carries both time stamps."""
-    return str(stamp)
-
-
+@dataclass(frozen=True, slots=True)
 class ListRequests:
-    """Requests for saved scenes and projects; the lists are kept encoded until something is written."""
+    """Requests for saved scenes and projects. The encoded lists are cached until something is saved."""
 
-    def __init__(
-        self,
-        storage: Storage,
-        types: ObjectTypes,
-        type_notifications: TypeNotifications,
-        answer_cache: AnswerCache,
-        saved_problems: SavedProblems,
-    ) -> None:
-        self._storage = storage
-        self._types = types
-        self._type_notifications = type_notifications
-        self._answer_cache = answer_cache
-        self._saved_problems = saved_problems
+    _storage: Storage
+    _types: ObjectTypes
+    _type_notifications: TypeNotifications
+    _answer_cache: AnswerCache
+    _saved_problems: SavedProblems
 
     def _revisions(self) -> tuple[int, ...]:
         return self._storage.revision, self._types.revision
 
     @cached("ListScenes")
-    def _cached_scenes(self) -> Raw | None:
+    def cached_scenes(self) -> Raw | None:
+        """Return the cached list of scenes, None if it is outdated."""
         return self._answer_cache.get("ListScenes", self._revisions()) if self._types.up_to_date else None
 
     @cached("ListProjects")
-    def _cached_projects(self) -> Raw | None:
+    def cached_projects(self) -> Raw | None:
+        """Return the cached list of projects, None if it is outdated."""
         return self._answer_cache.get("ListProjects", self._revisions()) if self._types.up_to_date else None
 
     @rpc("ListScenes")
     async def list_scenes(self, context: Context, args: None) -> Raw:
-        """Return all saved scenes with what is wrong with them."""
+        """Return all saved scenes with their problems."""
         await self._type_notifications.publish()
         revisions = self._revisions()
         if (cached_answer := self._answer_cache.get("ListScenes", revisions)) is not None:
@@ -63,8 +53,8 @@ class ListRequests:
             ListScenesData(
                 id=scene.id,
                 name=scene.name,
-                created=_saved(scene.created),
-                modified=_saved(scene.modified),
+                created=str(scene.created),
+                modified=str(scene.modified),
                 description=scene.description or UNSET,
                 problems=problems[scene.id] or UNSET,
             )
@@ -74,7 +64,7 @@ class ListRequests:
 
     @rpc("ListProjects")
     async def list_projects(self, context: Context, args: None) -> Raw:
-        """Return all saved projects with what is wrong with them."""
+        """Return all saved projects with their problems."""
         await self._type_notifications.publish()
         revisions = self._revisions()
         if (cached_answer := self._answer_cache.get("ListProjects", revisions)) is not None:
@@ -89,10 +79,10 @@ class ListRequests:
 
     @rpc("GetScene")
     async def get_scene(self, context: Context, args: IdArgs) -> Scene:
-        """Return a scene as it was last saved."""
+        """Return a saved scene, without unsaved changes."""
         return await self._storage.scene(args.id)
 
     @rpc("GetProject")
     async def get_project(self, context: Context, args: IdArgs) -> Project:
-        """Return a project as it was last saved."""
+        """Return a saved project, without unsaved changes."""
         return await self._storage.project(args.id)

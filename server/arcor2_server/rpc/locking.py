@@ -1,6 +1,6 @@
 """Requests that acquire and release locks (protocol, section 6)."""
 
-import structlog
+from dataclasses import dataclass
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import LockData
@@ -21,43 +21,41 @@ from arcor2_server.collaboration.users import Users
 from arcor2_server.errors import RequestRefused
 from arcor2_server.rpc.registry import Context, rpc
 
-log = structlog.get_logger(__name__)
 
-
+@dataclass(frozen=True, slots=True)
 class LockRequests:
-    """Requests by which clients take and give back locks (protocol, section 6)."""
+    """Requests that acquire and release locks (protocol, section 6)."""
 
-    def __init__(self, users: Users, locks: Locks, lock_takeover: LockTakeover) -> None:
-        self._users = users
-        self._locks = locks
-        self._lock_takeover = lock_takeover
+    _users: Users
+    _locks: Locks
+    _lock_takeover: LockTakeover
 
     @rpc("WriteLock")
     async def write_lock(self, context: Context, args: WriteLockArgs) -> None:
-        """Lock an object, or the whole tree it belongs to; silent when the caller holds it already."""
+        """Lock an item, or the whole tree it belongs to. No event is sent if the caller holds the lock already."""
         user = context.user
         if ids := await self._locks.write_lock(user, args.object_id, args.lock_tree):
             context.emit("ObjectsLocked", LockData(ids, user))
 
     @rpc("WriteUnlock")
     async def write_unlock(self, context: Context, args: WriteUnlockArgs) -> None:
-        """Return a write lock back."""
+        """Release a write lock."""
         user = context.user
         context.emit("ObjectsUnlocked", LockData(await self._locks.write_unlock(user, args.object_id), user))
 
     @rpc("ReadLock")
     async def read_lock(self, context: Context, args: ReadLockArgs) -> None:
-        """Keep others from changing an object."""
+        """Prevent other users from changing an item."""
         await self._locks.read_lock(context.user, args.object_id)
 
     @rpc("ReadUnlock")
     async def read_unlock(self, context: Context, args: ReadUnlockArgs) -> None:
-        """Return a read lock back."""
+        """Release a read lock."""
         await self._locks.read_unlock(context.user, args.object_id)
 
     @rpc("UpdateLock")
     async def update_lock(self, context: Context, args: UpdateLockArgs) -> None:
-        """Widen a write lock to the tree, or narrow it to the object."""
+        """Extend a write lock to the tree of the item, or reduce it to the item."""
         user = context.user
         tree = args.new_type is LockType.TREE
         ids = await self._locks.update_lock(user, args.object_id, tree)
@@ -65,7 +63,7 @@ class LockRequests:
 
     @rpc("ListLocks")
     async def list_locks(self, context: Context, args: None) -> list[LockHolder]:
-        """Return the users with locks, since when they hold them, and which of them left."""
+        """Return the users that hold locks, the times of locking, and when a user left."""
         return [
             LockHolder(user, self._lock_takeover.held(user), self._users.left_at(user) or UNSET)
             for user in self._locks.owners()

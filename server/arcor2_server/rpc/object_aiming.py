@@ -1,5 +1,6 @@
 """Requests that determine the pose of an object by touching its focus points with a robot (protocol, 7.3)."""
 
+from dataclasses import dataclass
 from typing import Final
 
 import structlog
@@ -18,34 +19,32 @@ from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.rpc.scene_objects import SceneObjectRequests
 from arcor2_server.workspace.object_aiming import ObjectAiming, ObjectAimings
 from arcor2_server.workspace.point_registration import check_points, fit
+from arcor2_server.workspace.robots import optional
 
 log = structlog.get_logger(__name__)
 
 WORST_MISS: Final = 0.05
-"""By how much a touched point may miss, m; beyond that it was another point that was touched."""
+"""Maximum distance of a touched point from its focus point, m. If it is larger, another point was touched."""
 
 
+@dataclass(frozen=True, slots=True)
 class ObjectAimingRequests:
-    """Requests by which a robot shows where an object stands."""
+    """Requests that determine the pose of an object by touching its focus points with a robot (protocol, 7.3)."""
 
-    def __init__(
-        self,
-        types: ObjectTypes,
-        session: Session,
-        online: OnlineScene,
-        object_aiming: ObjectAimings,
-        editing: Editing,
-        scene_object_requests: SceneObjectRequests,
-    ) -> None:
-        self._types = types
-        self._session = session
-        self._online = online
-        self._object_aiming = object_aiming
-        self._editing = editing
-        self._scene_object_requests = scene_object_requests
+    _types: ObjectTypes
+    _session: Session
+    _online: OnlineScene
+    _object_aiming: ObjectAimings
+    _editing: Editing
+    _scene_object_requests: SceneObjectRequests
 
-    def _focus_points(self, context: Context, obj: SceneObject) -> list[Pose]:
-        """Return the focus points of an object's mesh; RequestRefused, InvalidData when it cannot be aimed at."""
+    def _focus_points(self, obj: SceneObject) -> list[Pose]:
+        """Return the focus points of an object's mesh.
+
+        Raises:
+            InvalidData: the focus points do not determine a pose.
+            RequestRefused: the object has no pose or no focus points.
+        """
         if isinstance(obj.pose, Unset):
             raise RequestRefused("{name} has no pose.", name=obj.name)
         wrapped = self._types.meta(obj.type).object_model
@@ -57,19 +56,19 @@ class ObjectAimingRequests:
 
     @rpc("ObjectAimingStart")
     async def object_aiming_start(self, context: Context, args: ObjectAimingStartArgs) -> None:
-        """Begin to aim at an object with a robot."""
+        """Start to touch the focus points of an object with a robot."""
         robot = args.robot
         document = self._session.require_scene_alone()
         self._online.require_online()
         user = context.user
         if self._object_aiming.of(user, document) is not None:
             raise RequestRefused("You are aiming already: finish that, or cancel it.")
-        points = self._focus_points(context, document.scene_object(args.object_id))
+        points = self._focus_points(document.scene_object(args.object_id))
         self._online.robot(robot.robot_id)
-        self._editing.require_held(context, args.object_id)
-        self._editing.require_held(context, robot.robot_id)
-        # Tells whether the robot has that arm and end effector, and knows where it is.
-        await self._editing.eef_pose(context, robot.robot_id, robot.end_effector, robot.arm_id)
+        self._editing.require_locked(context, args.object_id)
+        self._editing.require_locked(context, robot.robot_id)
+        # Check that the robot has this arm and end effector, and knows its pose.
+        await self._online.end_effector_pose(robot.robot_id, robot.end_effector, optional(robot.arm_id))
         if self._object_aiming.of(user, self._session.require_scene_alone()) is not None:
             raise RequestRefused("You are aiming already: finish that, or cancel it.")
         if not context.dry_run:
@@ -79,20 +78,19 @@ class ObjectAimingRequests:
     async def object_aiming_add_point(
         self, context: Context, args: ObjectAimingAddPointArgs
     ) -> ObjectAimingAddPointData:
-        """Use the present position of the tip for a focus point; return the finished points."""
+        """Use the present position of the tool tip for a focus point; return the indices of all touched points."""
         document = self._session.require_scene_open()
         aiming = self._object_aiming.require(context.user, document)
-        self._editing.require_held(context, aiming.object_id)
-        self._editing.require_held(context, aiming.robot.robot_id)
+        robot = aiming.robot
+        self._editing.require_locked(context, aiming.object_id)
+        self._editing.require_locked(context, robot.robot_id)
         if not 0 <= args.point_idx < len(aiming.points):
             raise RequestRefused(
                 "Focus point {point_idx} does not exist. Use 0 to {count}.",
                 point_idx=args.point_idx,
                 count=len(aiming.points) - 1,
             )
-        pose = await self._editing.eef_pose(
-            context, aiming.robot.robot_id, aiming.robot.end_effector, aiming.robot.arm_id
-        )
+        pose = await self._online.end_effector_pose(robot.robot_id, robot.end_effector, optional(robot.arm_id))
         if context.dry_run:
             return ObjectAimingAddPointData(sorted({*aiming.poses, args.point_idx}))
         aiming.poses[args.point_idx] = pose
@@ -100,7 +98,7 @@ class ObjectAimingRequests:
 
     @rpc("ObjectAimingDone")
     async def object_aiming_done(self, context: Context, args: None) -> None:
-        """Put the object where the robot found its focus points. The locks stay with the user."""
+        """Set the pose of the object from the touched points. The user keeps the locks."""
         document = self._session.require_scene_open()
         user = context.user
         aiming = self._object_aiming.require(user, document)
@@ -109,7 +107,7 @@ class ObjectAimingRequests:
         obj = document.scene_object(aiming.object_id)
         touched = [aiming.poses[index].position for index in range(len(aiming.points))]
         found = fit([point.position for point in aiming.points], touched)
-        log.info("aimed", object=obj.name, worst=found.worst)
+        log.info("pose found by touched points", object=obj.name, largest_deviation_m=found.worst)
         if found.worst > WORST_MISS:
             raise RequestRefused(
                 "The points do not fit {name}: one misses by {worst:.0f} mm. Was another one touched?",
@@ -122,7 +120,7 @@ class ObjectAimingRequests:
 
     @rpc("ObjectAimingCancel")
     async def object_aiming_cancel(self, context: Context, args: None) -> None:
-        """Stop aiming; what was found is forgotten."""
+        """Stop aiming and discard the touched points."""
         user = context.user
         self._object_aiming.require(user, self._session.document)
         if not context.dry_run:

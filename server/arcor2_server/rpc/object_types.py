@@ -1,6 +1,6 @@
 """Requests about object types."""
 
-import ast
+from dataclasses import dataclass
 
 import msgspec
 from msgspec import UNSET, Raw
@@ -11,11 +11,10 @@ from arcor2_hw.data.object_type import Mesh, Models, ObjectTypeMeta, ObjectTypeS
 from arcor2_hw.data.parameter import IdValue
 from arcor2_hw.data.rpc import ActionParamValuesArgs, DeleteObjectTypesData, IdArgs, TypeArgs
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
-from arcor2_hw.runtime.messages import TypeCode
 from arcor2_server.collaboration.locks import ADDING_OBJECT, Locks
 from arcor2_server.documents import Session
 from arcor2_server.errors import RequestRefused
-from arcor2_server.events import encode
+from arcor2_server.object_types.derived_types import derived_source
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rpc.answer_cache import AnswerCache
@@ -24,29 +23,15 @@ from arcor2_server.storage import AssetStore, Storage
 
 
 def require_mesh(assets: AssetStore, model: Models) -> None:
-    """Refuse a collision model whose mesh is not an asset."""
+    """Raise RequestRefused if the mesh of a collision model is not an asset."""
     if isinstance(model, Mesh) and not assets.exists(model.asset_id):
         raise RequestRefused(
             "There is no asset {asset_id!r} that could be the mesh of {id}.", asset_id=model.asset_id, id=model.id
         )
 
 
-def _because(meta: ObjectTypeMeta) -> str:
-    return "" if isinstance(meta.problem, Unset) else f" ({meta.problem})"
-
-
-def derived_source(name: str, base: TypeCode, description: str = "") -> str:
-    """Give the module of a type that only derives from another one."""
-    module, _, imported = base.entry_point.partition(":")
-    come_from = ast.ImportFrom(module or base.module, [ast.alias(imported or base.name)], 0 if module else 1)
-    body: list[ast.stmt] = [ast.Expr(ast.Constant(description))] if description else []
-    body.append(ast.Assign([ast.Name("_ABSTRACT", ast.Store())], ast.Constant(False)))
-    derived = ast.ClassDef(name, [ast.Name(imported or base.name, ast.Load())], [], body, [])
-    return ast.unparse(ast.fix_missing_locations(ast.Module([come_from, derived], []))) + "\n"
-
-
 def _parent_value(parent: IdValue, kind: str) -> Raw:
-    """Return the value of a parent parameter as JSON. Existing clients send text without quotes."""
+    """Return the value of a parent parameter as JSON. Existing clients send strings without quotes."""
     try:
         value = msgspec.json.decode(parent.value)
     except msgspec.DecodeError as error:
@@ -60,73 +45,55 @@ def _parent_value(parent: IdValue, kind: str) -> Raw:
     return Raw(msgspec.json.encode(value))
 
 
+@dataclass(frozen=True, slots=True)
 class ObjectTypeRequests:
     """Requests about object types."""
 
-    def __init__(
-        self,
-        locks: Locks,
-        storage: Storage,
-        assets: AssetStore,
-        types: ObjectTypes,
-        session: Session,
-        online: OnlineScene,
-        answer_cache: AnswerCache,
-    ) -> None:
-        self._locks = locks
-        self._storage = storage
-        self._assets = assets
-        self._types = types
-        self._session = session
-        self._online = online
-        self._answer_cache = answer_cache
+    _locks: Locks
+    _storage: Storage
+    _assets: AssetStore
+    _types: ObjectTypes
+    _session: Session
+    _online: OnlineScene
+    _answer_cache: AnswerCache
 
     @rpc("GetObjectTypes")
     async def get_object_types(self, context: Context, args: None) -> Raw:
-        """Return all object types, built-in and disabled ones too."""
-        types, cached_answers = self._types, self._answer_cache
-        revisions = (types.revision,)
-        return cached_answers.get("GetObjectTypes", revisions) or cached_answers.store(
-            "GetObjectTypes", revisions, encode(types.metas())
-        )
+        """Return all object types, including built-in and disabled ones."""
+        return self._answer_cache.get_or_encode("GetObjectTypes", (self._types.revision,), self._types.metas)
 
     @cached("GetObjectTypes")
-    def _cached_object_types(self) -> Raw | None:
+    def cached_object_types(self) -> Raw | None:
+        """Return the cached object types, None if they are outdated."""
         return self._answer_cache.get("GetObjectTypes", (self._types.revision,))
 
     @rpc("GetActions")
     async def get_actions(self, context: Context, args: TypeArgs) -> Raw:
-        """Return the actions of a type."""
-        types, cached_answers = self._types, self._answer_cache
-        actions = types.actions(args.type)
-        name, revisions = f"GetActions {args.type}", (types.revision,)
-        return cached_answers.get(name, revisions) or cached_answers.store(name, revisions, encode(actions))
+        """Return the actions of an object type."""
+        actions = self._types.actions(args.type)
+        return self._answer_cache.get_or_encode(f"GetActions {args.type}", (self._types.revision,), lambda: actions)
 
     @rpc("GetRobotMeta")
     async def get_robot_meta(self, context: Context, args: None) -> Raw:
-        """Return what the robot types can do."""
-        types, cached_answers = self._types, self._answer_cache
-        revisions = (types.revision,)
-        return cached_answers.get("GetRobotMeta", revisions) or cached_answers.store(
-            "GetRobotMeta", revisions, encode(types.robot_metas())
-        )
+        """Return the features of all robot types."""
+        return self._answer_cache.get_or_encode("GetRobotMeta", (self._types.revision,), self._types.robot_metas)
 
     @rpc("ObjectTypeUsage")
     async def object_type_usage(self, context: Context, args: IdArgs) -> set[str]:
         """Return the scenes in which an object type is used."""
-        return await self._scenes_with(context, args.id)
+        return await self._scenes_with(args.id)
 
-    async def _scenes_with(self, context: Context, name: str) -> set[str]:
+    async def _scenes_with(self, name: str) -> set[str]:
         storage = self._storage
         scenes = [await storage.scene(listed.id) for listed in await storage.scenes()]
         return {scene.id for scene in scenes if any(placed.type == name for placed in scene.objects)}
 
-    # ------------------------------------------------------------------------------------------------ new ones
+    # ------------------------------------------------------------------------------------------------ adding
     @rpc("NewObjectType")
     async def new_object_type(self, context: Context, args: ObjectTypeMeta) -> None:
-        """Make an object type that is its base under another name, with a collision model where the base takes one."""
+        """Create an object type that derives from a base without changes, but may have its own collision model."""
         async with self._locks.auto(context.user, ADDING_OBJECT):
-            self._check_new(context, args)
+            self._check_new(args)
             if context.dry_run:
                 return
             source = ObjectTypeSource(
@@ -137,7 +104,8 @@ class ObjectTypeRequests:
             )
             context.emit("ChangedObjectTypes", [await self._types.add(source)], ChangeType.ADD)
 
-    def _check_new(self, context: Context, new: ObjectTypeMeta) -> None:
+    def _check_new(self, new: ObjectTypeMeta) -> None:
+        """Raise RequestRefused if the name, the base or the collision model of a new object type is not allowed."""
         types = self._types
         if types.known(new.type):
             raise RequestRefused("There is an object type called {type} already: choose another name.", type=new.type)
@@ -147,7 +115,8 @@ class ObjectTypeRequests:
             )
         base = types.meta(new.base)
         if base.disabled:
-            raise RequestRefused("The object type {type} cannot be used{base}.", type=base.type, base=_because(base))
+            problem = "" if isinstance(base.problem, Unset) else f" ({base.problem})"
+            raise RequestRefused("The object type {type} cannot be used{problem}.", type=base.type, problem=problem)
         if types.derives_from(base.type, "Robot"):
             raise RequestRefused("A robot's object type has to be written, not only derived.")
         if isinstance(new.object_model, Unset):
@@ -164,24 +133,22 @@ class ObjectTypeRequests:
             raise RequestRefused("The model of {type} needs the id {type}, not {id}.", type=new.type, id=model.id)
         require_mesh(self._assets, model)
 
-    # ------------------------------------------------------------------------------------------------ deleted ones
+    # ------------------------------------------------------------------------------------------------ deleting
     @rpc("DeleteObjectTypes")
     async def delete_object_types(self, context: Context, args: set[str] | None) -> list[DeleteObjectTypesData] | None:
-        """Delete the named uploaded types, or all. Types in use stay, and the answer says why."""
-        user = context.user
-        wanted = (
-            sorted(args) if args is not None else [name for name in self._types.names() if self._given(context, name)]
-        )
-        async with self._locks.auto(user, *(name for name in wanted if self._types.known(name))):
+        """Delete the named uploaded types, or all. The answer lists the types that were not deleted, with reasons."""
+        user, types = context.user, self._types
+        names = sorted(args) if args is not None else [name for name in types.names() if types.is_uploaded(name)]
+        async with self._locks.auto(user, *(name for name in names if types.known(name))):
             failed = []
-            # What derives from others goes first, so that a whole family can be deleted at once.
-            for name in sorted(wanted, key=lambda name: -len(self._ancestors(context, name))):
+            # Derived types are deleted before their bases, so that both can be deleted by one request.
+            for name in sorted(names, key=lambda name: -len(types.bases(name)) if types.known(name) else 0):
                 try:
-                    await self._check_unused(context, name)
+                    await self._require_unused(name)
                     if not context.dry_run:
-                        context.emit_first("ChangedObjectTypes", [await self._types.remove(name)], ChangeType.REMOVE)
-                        if self._types.known(name):  # the installed type of that name is back
-                            context.emit_first("ChangedObjectTypes", [self._types.meta(name)], ChangeType.ADD)
+                        context.emit_first("ChangedObjectTypes", [await types.remove(name)], ChangeType.REMOVE)
+                        if types.known(name):  # the installed type of this name is available again
+                            context.emit_first("ChangedObjectTypes", [types.meta(name)], ChangeType.ADD)
                 except Arcor2Error as error:
                     failed.append(DeleteObjectTypesData(name, str(error)))
         if failed:
@@ -190,14 +157,8 @@ class ObjectTypeRequests:
             )
         return None
 
-    def _given(self, context: Context, name: str) -> bool:
-        return self._types.is_uploaded(name)
-
-    def _ancestors(self, context: Context, name: str) -> list[str]:
-        types = self._types
-        return types.bases(name) if types.known(name) else []
-
-    async def _check_unused(self, context: Context, name: str) -> None:
+    async def _require_unused(self, name: str) -> None:
+        """Raise RequestRefused if an object type is used; NotFound or InvalidData if it cannot be deleted at all."""
         types, session = self._types, self._session
         types.meta(name)
         types.require_deletable(name)
@@ -209,7 +170,7 @@ class ObjectTypeRequests:
             raise RequestRefused(
                 "The object type {name} is used in the open scene {opened_name}.", name=name, opened_name=opened.name
             )
-        if scenes := await self._scenes_with(context, name):
+        if scenes := await self._scenes_with(name):
             raise RequestRefused(
                 "The object type {name} is used in the scenes {scenes}.", name=name, scenes=", ".join(sorted(scenes))
             )
@@ -217,7 +178,7 @@ class ObjectTypeRequests:
     # ------------------------------------------------------------------------------------------------ dynamic values
     @rpc("ActionParamValues")
     async def action_param_values(self, context: Context, args: ActionParamValuesArgs) -> list[str]:
-        """Return the values that a parameter may take now, as the live object knows them."""
+        """Return the present values of a parameter with dynamic values, from the connected device."""
         self._session.require_scene_open()
         async with self._locks.read(context.user, args.id):
             self._online.require_online()

@@ -1,5 +1,7 @@
 """Requests about orientations of action points (protocol, 7.4)."""
 
+from dataclasses import dataclass
+
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import new_id
@@ -22,96 +24,96 @@ from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks import check_name
 from arcor2_server.errors import RequestRefused
 from arcor2_server.online.online_scene import OnlineScene
-from arcor2_server.rpc.editing import Editing, emit_changes
+from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
+from arcor2_server.workspace.robots import optional
 
 
+@dataclass(frozen=True, slots=True)
 class OrientationRequests:
     """Requests about orientations of action points (protocol, 7.4)."""
 
-    def __init__(self, locks: Locks, session: Session, online: OnlineScene, editing: Editing) -> None:
-        self._locks = locks
-        self._session = session
-        self._online = online
-        self._editing = editing
+    _locks: Locks
+    _session: Session
+    _online: OnlineScene
+    _editing: Editing
 
-    def _check_name(self, context: Context, name: str, point_id: str) -> None:
+    def _check_name(self, name: str, point_id: str) -> None:
         check_name(name, "orientation")
-        self._editing.require_free(context, Kind.ORIENTATION, name, "an orientation of this action point", point_id)
+        self._editing.require_name_free(Kind.ORIENTATION, name, "an orientation of this action point", point_id)
 
-    async def _relative(self, context: Context, point_id: str, robot: RobotArg) -> Orientation:
-        """Return the orientation of an end effector in the frame in which those of the action point are stated."""
+    async def _present_orientation(self, point_id: str, robot: RobotArg) -> Orientation:
+        """Return the present orientation of an end effector in the frame of an action point's parent."""
         document = self._session.document
-        pose = await self._editing.eef_pose(context, robot.robot_id, robot.end_effector, robot.arm_id)
+        pose = await self._online.end_effector_pose(robot.robot_id, robot.end_effector, optional(robot.arm_id))
         return relative_pose(document, document.action_point(point_id), pose).orientation
 
     async def _add(self, context: Context, point_id: str, name: str, orientation: Orientation) -> None:
         document = self._session.document
         value = NamedOrientation(name, orientation, new_id("ori"))
-        changes = [document.add(Kind.ORIENTATION, value.id, value, point_id)]
-        if await self._editing.commit(context, changes):
-            emit_changes(context, changes, "OrientationChanged", ChangeType.ADD, point_id)
+        await self._editing.commit_one(context, document.add(Kind.ORIENTATION, value.id, value, point_id))
 
-    async def _update(self, context: Context, value: NamedOrientation, change: ChangeType) -> None:
-        changes = [self._session.document.update(Kind.ORIENTATION, value.id, value)]
-        if await self._editing.commit(context, changes):
-            emit_changes(context, changes, "OrientationChanged", change)
+    async def _update(
+        self, context: Context, value: NamedOrientation, change_type: ChangeType = ChangeType.UPDATE
+    ) -> None:
+        change = self._session.document.update(Kind.ORIENTATION, value.id, value)
+        await self._editing.commit_one(context, change, change_type)
 
     @rpc("AddActionPointOrientation")
     async def add_orientation(self, context: Context, args: AddActionPointOrientationArgs) -> None:
         """Add an orientation to an action point."""
         self._session.require_project_open().action_point(args.action_point_id)
-        self._check_name(context, args.name, args.action_point_id)
-        self._editing.require_held(context, args.action_point_id)
+        self._check_name(args.name, args.action_point_id)
+        self._editing.require_locked(context, args.action_point_id)
         await self._add(context, args.action_point_id, args.name, args.orientation)
 
     @rpc("AddActionPointOrientationUsingRobot")
     async def add_orientation_using_robot(
         self, context: Context, args: AddActionPointOrientationUsingRobotArgs
     ) -> None:
-        """Add the orientation that a robot's end effector has now."""
+        """Add the present orientation of an end effector to an action point."""
         document = self._session.require_project_open()
         async with self._locks.read(context.user, args.robot.robot_id):
             self._online.require_online()
             document.action_point(args.action_point_id)
-            self._check_name(context, args.name, args.action_point_id)
-            self._editing.require_held(context, args.action_point_id)
-            orientation = await self._relative(context, args.action_point_id, args.robot)
-            self._check_name(context, args.name, args.action_point_id)
+            self._check_name(args.name, args.action_point_id)
+            self._editing.require_locked(context, args.action_point_id)
+            orientation = await self._present_orientation(args.action_point_id, args.robot)
+            self._check_name(args.name, args.action_point_id)
             await self._add(context, args.action_point_id, args.name, orientation)
 
     @rpc("UpdateActionPointOrientation")
     async def update_orientation(self, context: Context, args: UpdateActionPointOrientationArgs) -> None:
-        """Turn an orientation."""
+        """Change an orientation of an action point."""
         _, value = self._session.require_project_open().orientation(args.orientation_id)
-        self._editing.require_held(context, args.orientation_id)
-        await self._update(context, replace(value, orientation=args.orientation), ChangeType.UPDATE)
+        self._editing.require_locked(context, args.orientation_id)
+        await self._update(context, replace(value, orientation=args.orientation))
 
     @rpc("UpdateActionPointOrientationUsingRobot")
     async def update_orientation_using_robot(
         self, context: Context, args: UpdateActionPointOrientationUsingRobotArgs
     ) -> None:
-        """Turn an orientation to the one that a robot's end effector has now."""
+        """Set an orientation of an action point to the present orientation of an end effector."""
         document = self._session.require_project_open()
         async with self._locks.read(context.user, args.robot.robot_id):
             self._online.require_online()
             point, _ = document.orientation(args.orientation_id)
-            self._editing.require_held(context, args.orientation_id)
-            orientation = await self._relative(context, point.id, args.robot)
+            self._editing.require_locked(context, args.orientation_id)
+            orientation = await self._present_orientation(point.id, args.robot)
             _, value = document.orientation(args.orientation_id)
-            await self._update(context, replace(value, orientation=orientation), ChangeType.UPDATE)
+            await self._update(context, replace(value, orientation=orientation))
 
     @rpc("RenameActionPointOrientation")
     async def rename_orientation(self, context: Context, args: RenameActionPointOrientationArgs) -> None:
-        """Give an orientation another name."""
+        """Rename an orientation."""
         point, value = self._session.require_project_open().orientation(args.orientation_id)
-        self._check_name(context, args.new_name, point.id)
-        self._editing.require_held(context, args.orientation_id)
+        self._check_name(args.new_name, point.id)
+        self._editing.require_locked(context, args.orientation_id)
         await self._update(context, replace(value, name=args.new_name), ChangeType.UPDATE_BASE)
 
     @rpc("RemoveActionPointOrientation")
     async def remove_orientation(self, context: Context, args: RemoveActionPointOrientationArgs) -> None:
-        """Remove an orientation; refused while an action uses it."""
+        """Remove an orientation. Refuse while an action uses it."""
         document = self._session.require_project_open()
         async with self._locks.auto_skip_held(context.user, args.orientation_id):
             _, value = document.orientation(args.orientation_id)
@@ -121,7 +123,5 @@ class OrientationRequests:
                     name=getattr(users[0], "name", ""),
                     value_name=value.name,
                 )
-            changes = [document.remove(Kind.ORIENTATION, value.id)]
-            if await self._editing.commit(context, changes):
-                emit_changes(context, changes, "OrientationChanged", ChangeType.REMOVE)
+            if await self._editing.commit_one(context, document.remove(Kind.ORIENTATION, value.id)):
                 self._editing.drop_locks(context, value.id)

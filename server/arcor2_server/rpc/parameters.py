@@ -1,5 +1,7 @@
 """Requests about project parameters and overridden settings (protocol, 7.3, 7.4 and 10.5)."""
 
+from dataclasses import dataclass
+
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset, new_id
@@ -23,10 +25,7 @@ from arcor2_server.documents.checks import check_project_parameter, check_settin
 from arcor2_server.documents.document import Document
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes
-from arcor2_server.rpc.editing import (
-    Editing,
-    emit_changes,
-)
+from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
 
 
@@ -37,48 +36,44 @@ def _index(overrides: list[Parameter], name: str) -> int:
     raise NotFound("The setting {name} is not overridden.", name=name)
 
 
+@dataclass(frozen=True, slots=True)
 class ParameterRequests:
-    """Requests about project parameters and about settings that a project overrides (protocol, 7.3, 7.4 and 10.5)."""
+    """Requests about project parameters and overridden settings (protocol, 7.3, 7.4 and 10.5)."""
 
-    def __init__(self, locks: Locks, types: ObjectTypes, session: Session, editing: Editing) -> None:
-        self._locks = locks
-        self._types = types
-        self._session = session
-        self._editing = editing
+    _locks: Locks
+    _types: ObjectTypes
+    _session: Session
+    _editing: Editing
 
     @rpc("AddProjectParameter")
     async def add_project_parameter(self, context: Context, args: AddProjectParameterArgs) -> None:
-        """Add a constant of the project."""
+        """Add a project parameter, a constant for its actions."""
         document = self._session.require_project_open()
         async with self._locks.auto(context.user, PROJECT):
             parameter = ProjectParameter(args.name, args.type, args.value, id=new_id("pco"))
             check_project_parameter(parameter)
-            self._editing.require_free(context, Kind.PARAMETER, args.name, "a project parameter")
-            changes = [document.add(Kind.PARAMETER, parameter.id, parameter)]
-            if await self._editing.commit(context, changes):
-                emit_changes(context, changes, "ProjectParameterChanged", ChangeType.ADD)
+            self._editing.require_name_free(Kind.PARAMETER, args.name, "a project parameter")
+            await self._editing.commit_one(context, document.add(Kind.PARAMETER, parameter.id, parameter))
 
     @rpc("UpdateProjectParameter")
     async def update_project_parameter(self, context: Context, args: UpdateProjectParameterArgs) -> None:
-        """Give a constant of the project another name, another value, or both."""
+        """Change the name or the value of a project parameter, or both."""
         document = self._session.require_project_open()
         parameter = document.parameter(args.id)
-        self._editing.require_held(context, args.id)
+        self._editing.require_locked(context, args.id)
         updated = parameter
         if not isinstance(args.name, Unset) and args.name != parameter.name:
-            self._editing.require_free(context, Kind.PARAMETER, args.name, "a project parameter")
+            self._editing.require_name_free(Kind.PARAMETER, args.name, "a project parameter")
             updated = replace(updated, name=args.name)
         if not isinstance(args.value, Unset):
             updated = replace(updated, value=args.value)
         check_project_parameter(updated)
-        changes = [document.update(Kind.PARAMETER, args.id, updated)]
-        if await self._editing.commit(context, changes):
-            emit_changes(context, changes, "ProjectParameterChanged", ChangeType.UPDATE)
+        if await self._editing.commit_one(context, document.update(Kind.PARAMETER, args.id, updated)):
             self._editing.unlock(context, args.id)
 
     @rpc("RemoveProjectParameter")
     async def remove_project_parameter(self, context: Context, args: RemoveProjectParameterArgs) -> None:
-        """Remove a constant of the project; refused while an action uses it."""
+        """Remove a project parameter. Refuse while an action uses it."""
         document = self._session.require_project_open()
         async with self._locks.auto_skip_held(context.user, args.id):
             parameter = document.parameter(args.id)
@@ -89,14 +84,12 @@ class ParameterRequests:
                     name=name,
                     parameter_name=parameter.name,
                 )
-            changes = [document.remove(Kind.PARAMETER, args.id)]
-            if await self._editing.commit(context, changes):
-                emit_changes(context, changes, "ProjectParameterChanged", ChangeType.REMOVE)
+            if await self._editing.commit_one(context, document.remove(Kind.PARAMETER, args.id)):
                 self._editing.drop_locks(context, args.id)
 
     # ---------------------------------------------------------------------------------------------- overrides
-    def _overrides(self, context: Context, object_id: str, given: Parameter) -> tuple[Document, list[Parameter]]:
-        """Check that the object has such a setting; give its overrides as they are."""
+    def _overrides(self, object_id: str, given: Parameter) -> tuple[Document, list[Parameter]]:
+        """Return the document and the overrides of an object; check that `given` is a valid value of a setting."""
         document = self._session.require_project_open()
         obj = document.scene_object(object_id)
         settings = {setting.name: setting for setting in self._types.meta(obj.type).settings}
@@ -113,9 +106,10 @@ class ParameterRequests:
         object_id: str,
         overrides: list[Parameter],
         given: Parameter,
-        how: ChangeType,
+        change_type: ChangeType,
     ) -> None:
-        self._editing.require_held(context, object_id)
+        """Replace all overrides of an object, and publish the changed one, `given`."""
+        self._editing.require_locked(context, object_id)
         value = SceneObjectOverride(object_id, overrides)
         change: Change
         if document.find(Kind.OVERRIDE, object_id) is None:
@@ -125,12 +119,16 @@ class ParameterRequests:
         else:
             change = document.remove(Kind.OVERRIDE, object_id)
         if await self._editing.commit(context, [change]):
-            context.emit("OverrideUpdated", given, how, object_id)
+            context.emit("OverrideUpdated", given, change_type, object_id)
 
     async def _without_secret(self, context: Context, object_id: str, given: Parameter) -> Parameter:
-        """Store the value of a secret override; return it with a reference. Raise InvalidData if it has no value."""
-        document, overrides = self._overrides(context, object_id, given)
-        self._editing.require_held(context, object_id)
+        """Return an override. Of a secret setting the value is stored and replaced by a reference.
+
+        Raises:
+            InvalidData: a secret setting has no value.
+        """
+        document, overrides = self._overrides(object_id, given)
+        self._editing.require_locked(context, object_id)
         others = [override for override in overrides if override.name != given.name]
         obj = document.scene_object(object_id)
         hidden = await self._editing.hide_secrets(context, obj, [*others, given], overrides, of_project=True)
@@ -140,24 +138,24 @@ class ParameterRequests:
 
     @rpc("AddOverride")
     async def add_override(self, context: Context, args: AddOverrideArgs) -> None:
-        """Let the project replace a setting of an object."""
+        """Override a setting of an object in the project."""
         given = await self._without_secret(context, args.id, args.override)
-        document, overrides = self._overrides(context, args.id, given)
+        document, overrides = self._overrides(args.id, given)
         if any(override.name == args.override.name for override in overrides):
             raise InvalidData("The setting {name} is overridden already: update the override.", name=args.override.name)
         await self._set_overrides(context, document, args.id, [*overrides, given], given, ChangeType.ADD)
 
     @rpc("UpdateOverride")
     async def update_override(self, context: Context, args: UpdateOverrideArgs) -> None:
-        """Change the value by which the project replaces a setting."""
+        """Change the value of an override."""
         given = await self._without_secret(context, args.id, args.override)
-        document, overrides = self._overrides(context, args.id, given)
+        document, overrides = self._overrides(args.id, given)
         overrides[_index(overrides, given.name)] = given
         await self._set_overrides(context, document, args.id, overrides, given, ChangeType.UPDATE)
 
     @rpc("DeleteOverride")
     async def delete_override(self, context: Context, args: DeleteOverrideArgs) -> None:
-        """Let the setting of the scene count again."""
-        document, overrides = self._overrides(context, args.id, args.override)
+        """Delete an override. The setting has the value of the scene again."""
+        document, overrides = self._overrides(args.id, args.override)
         del overrides[_index(overrides, args.override.name)]
         await self._set_overrides(context, document, args.id, overrides, args.override, ChangeType.REMOVE)

@@ -1,6 +1,7 @@
 """Requests that open, save, close, rename, copy and delete projects (protocol, 7.4)."""
 
 import contextlib
+from dataclasses import dataclass
 
 import msgspec
 from msgspec import UNSET
@@ -29,47 +30,33 @@ from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
-from arcor2_server.rpc.editing import (
-    Editing,
-)
+from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.rpc.scene import SceneRequests
 from arcor2_server.storage import Storage
 
-_BARE = BareProject.__struct_fields__
+
+def _bare(project: BareProject) -> BareProject:
+    """Return a project without its content."""
+    return BareProject(**{name: getattr(project, name) for name in BareProject.__struct_fields__})
 
 
-def bare(project: BareProject) -> BareProject:
-    """Give a project without its content."""
-    return BareProject(**{name: getattr(project, name) for name in _BARE})
+def _id_parameter(name: str, value: str) -> ProjectParameter:
+    return ProjectParameter(name, "string", msgspec.json.encode(value).decode(), id=new_id("pco"))
 
 
-def _given(parameter: str, value: str) -> ProjectParameter:
-    return ProjectParameter(parameter, "string", msgspec.json.encode(value).decode(), id=new_id("pco"))
-
-
+@dataclass(frozen=True, slots=True)
 class ProjectRequests:
     """Requests that open, save, close, rename, copy and delete projects (protocol, 7.4)."""
 
-    def __init__(
-        self,
-        locks: Locks,
-        storage: Storage,
-        types: ObjectTypes,
-        session: Session,
-        online: OnlineScene,
-        type_notifications: TypeNotifications,
-        editing: Editing,
-        scene_requests: SceneRequests,
-    ) -> None:
-        self._locks = locks
-        self._storage = storage
-        self._types = types
-        self._session = session
-        self._online = online
-        self._type_notifications = type_notifications
-        self._editing = editing
-        self._scene_requests = scene_requests
+    _locks: Locks
+    _storage: Storage
+    _types: ObjectTypes
+    _session: Session
+    _online: OnlineScene
+    _type_notifications: TypeNotifications
+    _editing: Editing
+    _scene_requests: SceneRequests
 
     def _emit_opened(self, context: Context) -> None:
         session = self._session
@@ -81,7 +68,12 @@ class ProjectRequests:
             raise RequestRefused("The project {name} is open: close it first.", name=project.name)
 
     async def _scene_for(self, context: Context, scene_id: str) -> Scene:
-        """Return the open scene, which has to be that one, or the saved one when none is open."""
+        """Return the scene of a project: the open scene, or the saved one if no scene is open.
+
+        Raises:
+            NotFound: the scene does not exist.
+            RequestRefused: another scene is open.
+        """
         if (opened := self._session.scene) is None:
             return await self._storage.scene(scene_id)
         if opened.id != scene_id:
@@ -91,18 +83,18 @@ class ProjectRequests:
         return opened
 
     async def _save_scene_changes(self, context: Context) -> None:
-        """Save an open scene that has changes: a project can only be stored on a stored scene."""
+        """Save the open scene if it has changes, since a project needs a saved scene."""
         if self._session.scene_changed:
             await self._scene_requests.save_open_scene(context)
 
     @rpc("NewProject")
     async def new_project(self, context: Context, args: NewProjectArgs) -> None:
-        """Open a new project, which exists in memory alone until it is saved."""
+        """Create a project and open it. It is stored when it is saved."""
         session = self._session
         self._require_no_project(context)
         async with self._locks.auto(context.user, PROJECT):
-            self._editing.require_no_program(context)
-            await self._editing.require_name_free(context, args.name, "project")
+            self._editing.require_no_program()
+            await self._editing.require_document_name_free(args.name, "project")
             if self._locks.write_locked_roots(excluding=(PROJECT,)):
                 raise RequestRefused("Something is locked: all locks have to be given back first.")
             scene = await self._scene_for(context, args.scene_id)
@@ -110,7 +102,7 @@ class ProjectRequests:
                 raise RequestRefused(
                     "{name} cannot be opened. {problems}", name=scene.name, problems=" ".join(problems)
                 )
-            # Another request may have opened something meanwhile.
+            # Another request may have opened a project meanwhile.
             self._require_no_project(context)
             if context.dry_run:
                 return
@@ -123,7 +115,7 @@ class ProjectRequests:
                 has_logic=args.has_logic,
                 int_modified=now(),
                 id=key,
-                parameters=[_given("scene_id", args.scene_id), _given("project_id", key)],
+                parameters=[_id_parameter("scene_id", args.scene_id), _id_parameter("project_id", key)],
             )
             await session.show(session.scene or scene, project)
             self._emit_opened(context)
@@ -132,7 +124,7 @@ class ProjectRequests:
     async def open_project(self, context: Context, args: IdArgs) -> None:
         """Open a saved project with its scene."""
         session = self._session
-        async with self._editing.opening_allowed(context):
+        async with self._editing.opening_allowed():
             self._require_no_project(context)
             project = await self._storage.project(args.id)
             scene = await self._scene_for(context, project.scene_id)
@@ -173,29 +165,28 @@ class ProjectRequests:
                 return
             ids = [item.id for item in session.document.items()]
             await session.discard()
-            # Read locks keep nobody from closing; what they were on is gone.
-            self._locks.drop(ids)
+            self._locks.drop(ids)  # read locks do not prevent closing
         context.emit("ProjectClosed")
         context.emit("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id))
 
     @rpc("RenameProject")
     async def rename_project(self, context: Context, args: RenameProjectArgs) -> None:
-        """Give a project another name."""
-        await self._editing.require_name_free(context, args.new_name, "project")
-        self._editing.require_held(context, args.project_id)
+        """Rename a project."""
+        await self._editing.require_document_name_free(args.new_name, "project")
+        self._editing.require_locked(context, args.project_id)
         await self._update_base(context, args.project_id, name=args.new_name)
         if not context.dry_run:
             self._locks.release_announced(context.user, [args.project_id])
 
     @rpc("UpdateProjectDescription")
     async def update_project_description(self, context: Context, args: UpdateProjectDescriptionArgs) -> None:
-        """Give a project another description."""
+        """Change the description of a project."""
         async with self._locks.auto(context.user, args.project_id):
             await self._update_base(context, args.project_id, description=args.new_description)
 
     @rpc("UpdateProjectHasLogic")
     async def update_project_has_logic(self, context: Context, args: UpdateProjectHasLogicArgs) -> None:
-        """Return whether a project's program is made from its logic; without, the logic is dropped."""
+        """Set whether the program of a project is generated from its logic. If not, the logic is removed."""
         async with self._locks.auto(context.user, args.project_id):
             await self._update_base(context, args.project_id, has_logic=args.new_has_logic)
 
@@ -213,14 +204,14 @@ class ProjectRequests:
         project = await storage.project(project_id)
         if not context.dry_run:
             changed = replace(project, **fields, **({"logic": []} if without_logic else {}))
-            context.emit_first("ProjectChanged", bare(await storage.put_project(changed)), ChangeType.UPDATE_BASE)
+            context.emit_first("ProjectChanged", _bare(await storage.put_project(changed)), ChangeType.UPDATE_BASE)
 
     @rpc("CopyProject")
     async def copy_project(self, context: Context, args: CopyProjectArgs) -> None:
         """Copy a saved project. Its items keep their ids. Existing clients expect the change type update_base."""
         storage = self._storage
         async with self._locks.auto(context.user, args.source_id):
-            await self._editing.require_name_free(context, args.target_name, "copy of the project")
+            await self._editing.require_document_name_free(args.target_name, "copy of the project")
             source = await storage.project(args.source_id)
             key = new_id("pro")
             parameters = [
@@ -233,9 +224,9 @@ class ProjectRequests:
             if context.dry_run:
                 return
             saved = await storage.put_project(copied)
-            with contextlib.suppress(NotFound):  # it has logic, or no script was stored yet
+            with contextlib.suppress(NotFound):  # a project with logic, or without a stored script
                 await storage.put_project_source(key, await storage.project_source(source.id))
-            context.emit_first("ProjectChanged", bare(saved), ChangeType.UPDATE_BASE)
+            context.emit_first("ProjectChanged", _bare(saved), ChangeType.UPDATE_BASE)
 
     @rpc("DeleteProject")
     async def delete_project(self, context: Context, args: IdArgs) -> None:
@@ -247,4 +238,4 @@ class ProjectRequests:
             if context.dry_run:
                 return
             await storage.delete_project(args.id)
-            context.emit("ProjectChanged", bare(project), ChangeType.REMOVE)
+            context.emit("ProjectChanged", _bare(project), ChangeType.REMOVE)

@@ -11,13 +11,15 @@ __all__ = ["DECLARED", "Context", "Handlers", "cached", "rpc"]
 F = TypeVar("F", bound=Callable[..., Any])
 
 DECLARED: Final[dict[str, str]] = {}
-"""The modules that declare handlers, by request."""
+"""The module that declares the handler of each request."""
 _REQUEST: Final = "_handled_request"
+"""Attribute of a handler with the name of its request."""
 _CACHED: Final = "_cached_request"
+"""Attribute of a method that returns a cached answer, with the name of its request."""
 
 
 def rpc(name: str) -> Callable[[F], F]:
-    """Declare a method as the handler of a request of the protocol (arcor2_hw.data.rpc: arguments, answer, role)."""
+    """Declare a method as the handler of a request. arcor2_hw.data.rpc declares its arguments, answer and role."""
     if name not in RPCS:
         raise KeyError(f"The protocol has no request {name}.")
 
@@ -32,7 +34,7 @@ def rpc(name: str) -> Callable[[F], F]:
 
 
 def cached(name: str) -> Callable[[F], F]:
-    """Declare a method that returns the cached answer of a request, None where the handler has to compute it."""
+    """Declare a method that returns the cached answer of a request without arguments, None if there is none."""
     if RPCS[name].args is not None:
         raise KeyError(f"{name} has arguments.")
 

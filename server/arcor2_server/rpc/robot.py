@@ -2,12 +2,11 @@
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.events import (
-    HandTeachingModeData,
-)
+from arcor2_hw.data.events import HandTeachingModeData
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.rpc import (
@@ -28,39 +27,28 @@ from arcor2_server.collaboration.locks import Locks
 from arcor2_server.documents import Session
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes
-from arcor2_server.online.motion import (
-    RobotMotion,
-)
+from arcor2_server.online.motion import RobotMotion
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.workspace.kinematics import Kinematics
 from arcor2_server.workspace.robots import SceneRobots, optional
 
 
+@dataclass(frozen=True, slots=True)
 class RobotRequests:
-    """Requests to robots of the scene that is online (protocol, 7.5)."""
+    """Requests to robots of the online scene (protocol, 7.5)."""
 
-    def __init__(
-        self,
-        locks: Locks,
-        types: ObjectTypes,
-        session: Session,
-        online: OnlineScene,
-        robots: SceneRobots,
-        kinematics: Kinematics,
-        motion: RobotMotion,
-    ) -> None:
-        self._locks = locks
-        self._types = types
-        self._session = session
-        self._online = online
-        self._robots = robots
-        self._kinematics = kinematics
-        self._motion = motion
+    _locks: Locks
+    _types: ObjectTypes
+    _session: Session
+    _online: OnlineScene
+    _robots: SceneRobots
+    _kinematics: Kinematics
+    _motion: RobotMotion
 
     @asynccontextmanager
     async def _reading(self, context: Context, robot_id: str) -> AsyncIterator[OnlineScene]:
-        """Hold the robot's read lock meanwhile; the scene is online, and it is a robot."""
+        """Check that the object is a robot of the online scene, and hold its read lock."""
         self._session.require_scene_open()
         async with self._locks.read(context.user, robot_id):
             self._online.require_online()
@@ -103,7 +91,7 @@ class RobotRequests:
 
     @rpc("GetRobotArms")
     async def get_robot_arms(self, context: Context, args: GetRobotArmsArgs) -> list[str]:
-        """Return the names of the arms of a robot that has several."""
+        """Return the names of the arms of a robot with several arms."""
         async with self._reading(context, args.robot_id) as cell:
             robot = cell.robot(args.robot_id)
             if not self._types.robot_meta(robot.type).multi_arm:
@@ -112,13 +100,13 @@ class RobotRequests:
 
     @rpc("RegisterForRobotEvent")
     async def register_for_robot_event(self, context: Context, args: RegisterForRobotEventArgs) -> None:
-        """Send joints or end effector poses of a robot to this client, or no longer."""
+        """Start or stop sending joints or end effector poses of a robot to this client."""
         async with self._reading(context, args.robot_id) as cell:
             cell.streams.subscribe(context.client, args.robot_id, args.what, args.send)
 
     @rpc("InverseKinematics")
     async def inverse_kinematics(self, context: Context, args: InverseKinematicsArgs) -> list[Joint]:
-        """Give joints that reach a pose: as the robot computes them, else by its model, for which nothing need run."""
+        """Return joints that reach a pose: computed by the robot, else from its model, also offline."""
         async with self._modelled(context, args.robot_id, args.arm_id) as robot:
             if self._kinematics.solves(robot, "inverse_kinematics"):
                 return await self._motion.solve_inverse(args)
@@ -126,7 +114,7 @@ class RobotRequests:
 
     @asynccontextmanager
     async def _modelled(self, context: Context, robot_id: str, arm_id: str | Unset) -> AsyncIterator[SceneObject]:
-        """Hold the robot's read lock meanwhile; it is a robot, and has a model where it cannot be asked itself."""
+        """Check that the object is a robot that is online or has a model, and hold its read lock."""
         self._session.require_scene_open()
         async with self._locks.read(context.user, robot_id):
             robot = self._online.robot(robot_id)
@@ -137,7 +125,7 @@ class RobotRequests:
 
     @rpc("ForwardKinematics")
     async def forward_kinematics(self, context: Context, args: ForwardKinematicsArgs) -> Pose:
-        """Return the pose for joint values: computed by the robot, else offline from its model."""
+        """Return the pose for joint values: computed by the robot, else from its model, also offline."""
         async with self._modelled(context, args.robot_id, args.arm_id) as robot:
             if not self._kinematics.solves(robot, "forward_kinematics"):
                 return await self._kinematics.forward(robot, args)
@@ -149,7 +137,7 @@ class RobotRequests:
 
     @rpc("StopRobot")
     async def stop_robot(self, context: Context, args: StopRobotArgs) -> None:
-        """Stop a robot that moves, past whatever it does."""
+        """Stop a moving robot. The request does not wait for other requests to the robot."""
         cell = self._motion.require_robot_online(args.robot_id)
         self._motion.require_feature(args.robot_id, "stop")
         acting = cell.running_action is not None and cell.running_action.object_id == args.robot_id
@@ -159,7 +147,7 @@ class RobotRequests:
 
     @rpc("HandTeachingMode")
     async def hand_teaching_mode(self, context: Context, args: HandTeachingModeArgs) -> None:
-        """Create a robot movable by hand, or stiff again."""
+        """Switch hand teaching of a robot on or off."""
         cell = self._motion.require_robot_online(args.robot_id)
         self._locks.require_held(context.user, args.robot_id)
         arm = cell.arm(args.robot_id, optional(args.arm_id))

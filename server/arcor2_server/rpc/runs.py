@@ -1,24 +1,18 @@
 """Requests about the history of runs and the trace of the last run."""
 
-from typing import TypeVar
+from dataclasses import dataclass
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.rpc import GetExecutionTraceArgs, GetExecutionTraceData, ListRunsArgs, ListRunsData
 from arcor2_server.execution.runs import Runs
 from arcor2_server.rpc.registry import Context, rpc
 
-T = TypeVar("T")
 
-
-def _given(value: T | Unset) -> T | None:
-    return None if isinstance(value, Unset) else value
-
-
+@dataclass(frozen=True, slots=True)
 class RunRequests:
-    """Requests about the runs of packages: their history, and the actions of the last one."""
+    """Requests about the history of runs and the trace of the last run."""
 
-    def __init__(self, runs: Runs) -> None:
-        self._runs = runs
+    _runs: Runs
 
     @rpc("ListRuns")
     async def list_runs(self, context: Context, args: ListRunsArgs) -> ListRunsData:
@@ -28,4 +22,5 @@ class RunRequests:
     @rpc("GetExecutionTrace")
     async def get_execution_trace(self, context: Context, args: GetExecutionTraceArgs) -> GetExecutionTraceData:
         """Return the newest actions of the present or last run."""
-        return GetExecutionTraceData(*self._runs.trace(args.limit, _given(args.before)))
+        before = None if isinstance(args.before, Unset) else args.before
+        return GetExecutionTraceData(*self._runs.trace(args.limit, before))

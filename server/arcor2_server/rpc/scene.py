@@ -1,5 +1,7 @@
 """Requests that open, save, close, rename, copy and delete scenes (protocol, 7.2)."""
 
+from dataclasses import dataclass
+
 from msgspec import UNSET
 from msgspec.structs import replace
 
@@ -25,34 +27,23 @@ from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.storage import Storage
 
-_BARE = BareScene.__struct_fields__
+
+def _bare(scene: BareScene) -> BareScene:
+    """Return a scene without its objects."""
+    return BareScene(**{name: getattr(scene, name) for name in BareScene.__struct_fields__})
 
 
-def bare(scene: BareScene) -> BareScene:
-    """Give a scene without its objects."""
-    return BareScene(**{name: getattr(scene, name) for name in _BARE})
-
-
+@dataclass(frozen=True, slots=True)
 class SceneRequests:
     """Requests that open, save, close, rename, copy and delete scenes (protocol, 7.2)."""
 
-    def __init__(
-        self,
-        locks: Locks,
-        storage: Storage,
-        session: Session,
-        online: OnlineScene,
-        type_notifications: TypeNotifications,
-        dependents: Dependents,
-        editing: Editing,
-    ) -> None:
-        self._locks = locks
-        self._storage = storage
-        self._session = session
-        self._online = online
-        self._type_notifications = type_notifications
-        self._dependents = dependents
-        self._editing = editing
+    _locks: Locks
+    _storage: Storage
+    _session: Session
+    _online: OnlineScene
+    _type_notifications: TypeNotifications
+    _dependents: Dependents
+    _editing: Editing
 
     def _emit_opened(self, context: Context, scene: Scene) -> None:
         context.emit("OpenScene", OpenSceneData(scene))
@@ -60,11 +51,11 @@ class SceneRequests:
 
     @rpc("NewScene")
     async def new_scene(self, context: Context, args: NewSceneArgs) -> None:
-        """Open a new scene, which exists in memory alone until it is saved."""
+        """Create a scene and open it. It is stored when it is saved."""
         session = self._session
-        async with self._editing.opening_allowed(context):
+        async with self._editing.opening_allowed():
             session.require_nothing_open()
-            await self._editing.require_name_free(context, args.name, "scene")
+            await self._editing.require_document_name_free(args.name, "scene")
             if context.dry_run:
                 return
             await self._type_notifications.publish()
@@ -75,7 +66,7 @@ class SceneRequests:
     async def open_scene(self, context: Context, args: IdArgs) -> None:
         """Open a saved scene."""
         session = self._session
-        async with self._editing.opening_allowed(context):
+        async with self._editing.opening_allowed():
             session.require_nothing_open()
             scene = await self._storage.scene(args.id)
             await self._type_notifications.publish()
@@ -88,7 +79,7 @@ class SceneRequests:
 
     @rpc("CloseScene")
     async def close_scene(self, context: Context, args: CloseSceneArgs) -> None:
-        """Close the scene."""
+        """Close the open scene."""
         user = context.user
         async with self._locks.auto(user, SCENE):
             self._session.require_scene_alone()
@@ -116,7 +107,7 @@ class SceneRequests:
             await self.save_open_scene(context)
 
     async def save_open_scene(self, context: Context) -> None:
-        """Save the open scene, with all that follows for its projects and for object types made for it."""
+        """Save the open scene; update its projects, and delete generated object types that it no longer uses."""
         removed_types = await self._dependents.after_saving(self._session.save)
         context.emit("SceneSaved")
         if removed_types:
@@ -124,16 +115,16 @@ class SceneRequests:
 
     @rpc("RenameScene")
     async def rename_scene(self, context: Context, args: RenameArgs) -> None:
-        """Give a scene another name."""
-        await self._editing.require_name_free(context, args.new_name, "scene")
-        self._editing.require_held(context, args.id)
+        """Rename a scene."""
+        await self._editing.require_document_name_free(args.new_name, "scene")
+        self._editing.require_locked(context, args.id)
         await self._update_base(context, args.id, name=args.new_name)
         if not context.dry_run:
             self._editing.unlock(context, args.id)
 
     @rpc("UpdateSceneDescription")
     async def update_scene_description(self, context: Context, args: UpdateSceneDescriptionArgs) -> None:
-        """Give a scene another description."""
+        """Change the description of a scene."""
         async with self._locks.auto(context.user, args.scene_id):
             await self._update_base(context, args.scene_id, description=args.new_description)
 
@@ -147,22 +138,22 @@ class SceneRequests:
         scene = await self._storage.scene(scene_id)
         if not context.dry_run:
             saved = await self._storage.put_scene(replace(scene, **fields))
-            context.emit_first("SceneChanged", bare(saved), ChangeType.UPDATE_BASE)
+            context.emit_first("SceneChanged", _bare(saved), ChangeType.UPDATE_BASE)
 
     @rpc("CopyScene")
     async def copy_scene(self, context: Context, args: CopySceneArgs) -> None:
         """Copy a saved scene. The objects keep their ids. Existing clients expect the change type update_base."""
         storage = self._storage
         async with self._locks.auto(context.user, args.source_id):
-            await self._editing.require_name_free(context, args.target_name, "copy of the scene")
+            await self._editing.require_document_name_free(args.target_name, "copy of the scene")
             source = await storage.scene(args.source_id)
             copied = replace(source, id=new_id("scn"), name=args.target_name, created=UNSET, modified=UNSET)
             if not context.dry_run:
-                context.emit_first("SceneChanged", bare(await storage.put_scene(copied)), ChangeType.UPDATE_BASE)
+                context.emit_first("SceneChanged", _bare(await storage.put_scene(copied)), ChangeType.UPDATE_BASE)
 
     @rpc("DeleteScene")
     async def delete_scene(self, context: Context, args: IdArgs) -> None:
-        """Delete a saved scene, with the object types that were made for it alone."""
+        """Delete a saved scene, with the object types that were generated for it."""
         self._session.require_nothing_open()
         async with self._locks.auto(context.user, args.id):
             scene = await self._storage.scene(args.id)
@@ -176,13 +167,13 @@ class SceneRequests:
             if context.dry_run:
                 return
             await self._storage.delete_scene(args.id)
-            context.emit("SceneChanged", bare(scene), ChangeType.REMOVE)
+            context.emit("SceneChanged", _bare(scene), ChangeType.REMOVE)
             if removed := await self._dependents.delete_unused_types({obj.type for obj in scene.objects}):
                 context.emit("ChangedObjectTypes", removed, ChangeType.REMOVE)
 
     @rpc("SceneObjectUsage")
     async def scene_object_usage(self, context: Context, args: IdArgs) -> set[str]:
-        """Return the projects that use an object of the open scene: as parent of a point, or in an action."""
+        """Return the projects that use an object of the open scene, as parent of an action point or in an action."""
         self._session.require_scene_open()
         async with self._locks.read(context.user, args.id):
             return await self._dependents.uses_object(args.id)

@@ -1,17 +1,16 @@
 """Requests that change the objects of the open scene (protocol, 7.2 and 7.3)."""
 
-import ast
+from dataclasses import dataclass
 
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset, new_id
 from arcor2_hw.data.events import ChangeType
-from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.data.object_type import Box, Cylinder, Models, ObjectModel, ObjectTypeSource, Sphere
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.object_type import Models, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.rpc import (
     AddObjectToSceneArgs,
     AddVirtualCollisionObjectToSceneArgs,
-    Pivot,
     RemoveFromSceneArgs,
     RenameArgs,
     UpdateObjectModelArgs,
@@ -27,79 +26,41 @@ from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks import check_name, object_problems, settings_problems
 from arcor2_server.documents.dependents import VIRTUAL, Dependents
 from arcor2_server.errors import RequestRefused
+from arcor2_server.object_types.derived_types import virtual_source
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
-from arcor2_server.rpc.editing import (
-    Editing,
-    emit_changes,
-)
+from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.object_types import require_mesh
 from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.storage import AssetStore, Storage
-
-
-def virtual_source(name: str) -> str:
-    """Return the module of an object type that is a shape alone."""
-    base = ast.ImportFrom("arcor2_hw.objects", [ast.alias(VIRTUAL)], 0)
-    concrete = ast.Assign([ast.Name("_ABSTRACT", ast.Store())], ast.Constant(False))
-    of_type = ast.ClassDef(name, [ast.Name(VIRTUAL, ast.Load())], [], [concrete], [])
-    return ast.unparse(ast.fix_missing_locations(ast.Module([base, of_type], []))) + "\n"
+from arcor2_server.workspace.pivot import pivot_offset
+from arcor2_server.workspace.robots import optional
 
 
 def _model_of(model: ObjectModel) -> Models:
+    """Return the collision model. Raise InvalidData if there is none."""
     try:
         return model.model()
     except ValueError as error:
         raise InvalidData("A collision model is needed: {reason}.", reason=error) from None
 
 
-FLIPPED = Orientation(1, 0, 0, 0)
-"""The tool points at the object: their z axes are opposite."""
-
-
-def pivot_offset(model: ObjectModel | Unset, pivot: Pivot) -> float:
-    """Return by how much the centre of an object lies behind the tool's tip along the tool's z axis, m."""
-    if pivot is Pivot.MIDDLE:
-        return 0.0
-    shape = None if isinstance(model, Unset) else model.model()
-    match shape:
-        case Box():
-            half = shape.size_z / 2
-        case Cylinder():
-            half = shape.height / 2
-        case Sphere():
-            half = shape.radius / 2
-        case _:
-            raise RequestRefused("Only a box, a cylinder or a sphere has a top and a bottom: use the middle.")
-    return -half if pivot is Pivot.TOP else half
-
-
+@dataclass(frozen=True, slots=True)
 class SceneObjectRequests:
     """Requests that change the objects of the open scene (protocol, 7.2 and 7.3)."""
 
-    def __init__(
-        self,
-        locks: Locks,
-        storage: Storage,
-        assets: AssetStore,
-        types: ObjectTypes,
-        session: Session,
-        online: OnlineScene,
-        dependents: Dependents,
-        editing: Editing,
-    ) -> None:
-        self._locks = locks
-        self._storage = storage
-        self._assets = assets
-        self._types = types
-        self._session = session
-        self._online = online
-        self._dependents = dependents
-        self._editing = editing
+    _locks: Locks
+    _storage: Storage
+    _assets: AssetStore
+    _types: ObjectTypes
+    _session: Session
+    _online: OnlineScene
+    _dependents: Dependents
+    _editing: Editing
 
     @rpc("AddObjectToScene")
     async def add_object_to_scene(self, context: Context, args: AddObjectToSceneArgs) -> None:
-        """Place an object of a known type."""
+        """Add an object of a known type to the scene."""
         async with self._locks.auto(context.user, SCENE):
             self._session.require_scene_alone()
             self._online.require_offline()
@@ -109,16 +70,14 @@ class SceneObjectRequests:
             )
 
     async def _add(self, context: Context, obj: SceneObject) -> None:
-        self._editing.require_free(context, Kind.OBJECT, obj.name, "an object")
+        self._editing.require_name_free(Kind.OBJECT, obj.name, "an object")
         if problems := object_problems(obj, self._types):
             raise InvalidData(" ".join(problems))
-        changes = [self._session.document.add(Kind.OBJECT, obj.id, obj)]
-        if await self._editing.commit(context, changes):
-            emit_changes(context, changes, "SceneObjectChanged", ChangeType.ADD)
+        await self._editing.commit_one(context, self._session.document.add(Kind.OBJECT, obj.id, obj))
 
     @rpc("AddVirtualCollisionObjectToScene")
     async def add_virtual_collision_object(self, context: Context, args: AddVirtualCollisionObjectToSceneArgs) -> None:
-        """Create an object type of a shape alone, and place one object of it."""
+        """Add an object that consists of a collision model, with an object type created for it."""
         async with self._locks.auto(context.user, SCENE, ADDING_OBJECT):
             self._session.require_scene_alone()
             self._online.require_offline()
@@ -126,13 +85,13 @@ class SceneObjectRequests:
                 raise RequestRefused(
                     "There is an object type called {name} already: choose another name.", name=args.name
                 )
-            self._editing.require_free(context, Kind.OBJECT, args.name, "an object")
+            self._editing.require_name_free(Kind.OBJECT, args.name, "an object")
             check_name(args.name, "object")
             if _model_of(args.model).id != args.name:
                 raise InvalidData("The model of {name} needs the id {name}.", name=args.name)
             if context.dry_run:
                 return
-            source = ObjectTypeSource(args.name, virtual_source(args.name), model=args.model)
+            source = ObjectTypeSource(args.name, virtual_source(args.name, VIRTUAL), model=args.model)
             meta = await self._types.add(source)
             context.emit("ChangedObjectTypes", [meta], ChangeType.ADD)
             try:
@@ -143,7 +102,7 @@ class SceneObjectRequests:
 
     @rpc("RemoveFromScene")
     async def remove_from_scene(self, context: Context, args: RemoveFromSceneArgs) -> None:
-        """Remove an object. With `force`, also if projects use it: they lose its items when the scene is saved."""
+        """Remove an object. With `force`, also if projects use it; saving the scene removes its items from them."""
         session = self._session
         document = session.require_scene_alone()
         async with self._locks.auto_skip_held(context.user, args.id):
@@ -158,10 +117,8 @@ class SceneObjectRequests:
                     name=obj.name,
                     names=names,
                 )
-            changes = [document.remove(Kind.OBJECT, args.id)]
-            if await self._editing.commit(context, changes):
+            if await self._editing.commit_one(context, document.remove(Kind.OBJECT, args.id)):
                 session.removed_types.add(obj.type)
-                emit_changes(context, changes, "SceneObjectChanged", ChangeType.REMOVE)
                 self._editing.drop_locks(context, args.id)
 
     @rpc("UpdateObjectParameters")
@@ -172,19 +129,17 @@ class SceneObjectRequests:
         obj = document.scene_object(args.id)
         if problems := settings_problems(obj.name, args.parameters, self._types.meta(obj.type)):
             raise InvalidData(" ".join(problems))
-        self._editing.require_held(context, args.id)
+        self._editing.require_locked(context, args.id)
         parameters = await self._editing.hide_secrets(context, obj, args.parameters, obj.parameters)
-        self._editing.require_held(context, args.id)
+        self._editing.require_locked(context, args.id)
         await self._update(context, replace(document.scene_object(args.id), parameters=parameters))
 
     async def _update(self, context: Context, obj: SceneObject) -> None:
-        changes = [self._session.document.update(Kind.OBJECT, obj.id, obj)]
-        if await self._editing.commit(context, changes):
-            emit_changes(context, changes, "SceneObjectChanged", ChangeType.UPDATE)
+        await self._editing.commit_one(context, self._session.document.update(Kind.OBJECT, obj.id, obj))
 
     @rpc("UpdateObjectPose")
     async def update_object_pose(self, context: Context, args: UpdateObjectPoseArgs) -> None:
-        """Move an object; while online the live one moves too."""
+        """Change the pose of an object, while online also that of its device."""
         obj = self._session.require_scene_alone().scene_object(args.object_id)
         if self._online.online and self._types.derives_from(obj.type, "Robot"):
             raise RequestRefused(
@@ -192,12 +147,12 @@ class SceneObjectRequests:
             )
         if isinstance(obj.pose, Unset):
             raise RequestRefused("{name} has no pose.", name=obj.name)
-        self._editing.require_held(context, args.object_id)
+        self._editing.require_locked(context, args.object_id)
         await self.move_object(context, obj, args.pose)
 
     async def move_object(self, context: Context, obj: SceneObject, pose: Pose) -> None:
-        """Give an object another pose, and the live one too while online."""
-        # First where it may fail: a refused request must not leave an edit behind that nobody was told of.
+        """Set the pose of an object, while online also that of its device."""
+        # The device comes first, since it may fail: a refused request must not leave an edit without event.
         if not context.dry_run and self._online.online:
             await self._online.object_pose_changed(obj.id, pose)
         obj = self._session.document.scene_object(obj.id)
@@ -205,7 +160,7 @@ class SceneObjectRequests:
 
     @rpc("UpdateObjectPoseUsingRobot")
     async def update_object_pose_using_robot(self, context: Context, args: UpdateObjectPoseUsingRobotArgs) -> None:
-        """Put an object where the robot points."""
+        """Move an object to the tool tip of a robot."""
         robot = args.robot
         if args.id == robot.robot_id:
             raise RequestRefused("A robot cannot point at itself.")
@@ -215,30 +170,27 @@ class SceneObjectRequests:
             obj = document.scene_object(args.id)
             if isinstance(obj.pose, Unset):
                 raise RequestRefused("{name} has no pose.", name=obj.name)
-            model = self._types.meta(obj.type).object_model
-            offset = pivot_offset(model, args.pivot)
-            pose = await self._editing.eef_pose(context, robot.robot_id, robot.end_effector, robot.arm_id)
-            await self.move_object(
-                context, document.scene_object(args.id), pose * Pose(Position(0, 0, -offset), FLIPPED)
-            )
+            offset = pivot_offset(self._types.meta(obj.type).object_model, args.pivot)
+            tool = await self._online.end_effector_pose(robot.robot_id, robot.end_effector, optional(robot.arm_id))
+            await self.move_object(context, document.scene_object(args.id), tool * offset)
 
     @rpc("RenameObject")
     async def rename_object(self, context: Context, args: RenameArgs) -> None:
-        """Give an object another name."""
+        """Rename an object."""
         document = self._session.require_scene_alone()
         obj = document.scene_object(args.id)
         if args.new_name == obj.name:
             raise RequestRefused("The object is called {name} already.", name=obj.name)
-        self._editing.require_free(context, Kind.OBJECT, args.new_name, "an object")
+        self._editing.require_name_free(Kind.OBJECT, args.new_name, "an object")
         check_name(args.new_name, "object")
-        self._editing.require_held(context, args.id)
+        self._editing.require_locked(context, args.id)
         await self._update(context, replace(obj, name=args.new_name))
         if not context.dry_run:
             self._editing.unlock(context, args.id)
 
     @rpc("UpdateObjectModel")
     async def update_object_model(self, context: Context, args: UpdateObjectModelArgs) -> None:
-        """Give an object type another collision model."""
+        """Replace the collision model of an object type."""
         self._online.require_offline()
         self._session.require_scene_alone()
         meta = self._types.meta(args.object_type_id)
@@ -249,7 +201,7 @@ class SceneObjectRequests:
         if _model_of(args.object_model).id != meta.type:
             raise InvalidData("The model of {type} needs the id {type}.", type=meta.type)
         require_mesh(self._assets, _model_of(args.object_model))
-        self._editing.require_held(context, args.object_type_id)
+        self._editing.require_locked(context, args.object_type_id)
         try:
             stored = await self._storage.object_type(meta.type)
         except NotFound:

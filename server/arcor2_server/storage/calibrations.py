@@ -5,14 +5,14 @@ from typing import Final
 import msgspec
 from sqlalchemy import delete, func, select
 
-from arcor2_hw.calibration.records import CalibrationKind, CalibrationRecord
+from arcor2_hw.calibration.records import CalibrationRecord
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.rpc import ListCalibrationsArgs
 from arcor2_server.storage.models import CalibrationRow
 from arcor2_server.storage.store import Storage
 
 MAX_RECORDS: Final = 10_000
 """Maximum number of stored records. Beyond it the oldest are deleted, but never the latest of an object and kind."""
-MAX_ANSWER: Final = 1000
-"""Maximum number of records in one answer."""
 
 _encode = msgspec.json.Encoder().encode
 _decode = msgspec.json.Decoder(CalibrationRecord).decode
@@ -55,22 +55,14 @@ class Calibrations:
             row = await Storage.one(session, CalibrationRow, key, "calibration")
             return _decode(row.document)
 
-    async def find(
-        self,
-        *,
-        object_id: str | None = None,
-        kind: CalibrationKind | None = None,
-        before: str | None = None,
-        limit: int = 100,
-    ) -> list[CalibrationRecord]:
-        """Return records, newest first. Arguments other than None select an object, a kind, or older records."""
-        limit = min(max(limit, 0), MAX_ANSWER)
-        chosen = select(CalibrationRow.document).order_by(CalibrationRow.date.desc()).limit(limit)
-        if object_id is not None:
-            chosen = chosen.where(CalibrationRow.object_id == object_id)
-        if kind is not None:
-            chosen = chosen.where(CalibrationRow.kind == kind.value)
-        if before is not None:
-            chosen = chosen.where(CalibrationRow.date < before)
+    async def find(self, args: ListCalibrationsArgs) -> list[CalibrationRecord]:
+        """Return records, newest first."""
+        chosen = select(CalibrationRow.document).order_by(CalibrationRow.date.desc()).limit(args.limit)
+        if not isinstance(args.object_id, Unset):
+            chosen = chosen.where(CalibrationRow.object_id == args.object_id)
+        if not isinstance(args.kind, Unset):
+            chosen = chosen.where(CalibrationRow.kind == args.kind.value)
+        if not isinstance(args.before, Unset):
+            chosen = chosen.where(CalibrationRow.date < args.before)
         async with self._storage.reading() as session:
             return [_decode(document) for document in await session.scalars(chosen)]

@@ -13,7 +13,6 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
 from arcor2_server.compute.process import ProgressCallback
 from arcor2_server.compute.workers import Compute
-from arcor2_server.errors import RequestRefused
 from arcor2_server.workspace.markers import Markers
 
 EXPECTED_WITHIN = (0.3, 0.5)
@@ -82,20 +81,3 @@ class Calibration:
         placed = replace(model, base=view.robot_pose)
         task = FindRobotPose(placed, view.robot_joints, depth, view.camera_parameters, view.camera_pose)
         return await self._compute.run(task, on_progress=on_progress)
-
-
-class RunningCalibrations:
-    """The cameras and robots that are being calibrated, each at most once at a time."""
-
-    def __init__(self) -> None:
-        self._objects: set[str] = set()
-
-    def begin(self, object_id: str, name: str) -> None:
-        """Mark an object as being calibrated. Raise RequestRefused if it is being calibrated already."""
-        if object_id in self._objects:
-            raise RequestRefused("{name} is being calibrated already.", name=name)
-        self._objects.add(object_id)
-
-    def end(self, object_id: str) -> None:
-        """Remove the mark of an object."""
-        self._objects.discard(object_id)

@@ -158,16 +158,20 @@ class Server:
 async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     data_dir.mkdir(exist_ok=True)
     settings = ServerSettings(data_dir=data_dir, streaming_period=0.05)
-    hub, locks, types = Hub(), Locks(2, 0.05), Types()
+    hub, types = Hub(), Types()
     known: Any = types
     none: Any = None
-    users = Users(hub, locks, settings)
     assets = await AssetStore.open(settings.assets_dir)
     damage = DataDamage(data_dir, hub)
     secrets = SettingSecrets(known, SecretStore(settings.secrets_file))
     session = Session(settings, none, known, damage, secrets)
     await session.open()
-    locks.tree = session
+
+    async def is_stored(item: str) -> bool:
+        return False
+
+    locks = Locks(session, is_stored, 2, 0.05)
+    users = Users(hub, locks, settings)
     compute, tasks, hosts = Compute(settings.compute_idle), Tasks(hub), CellHosts(settings.device_files_dirs)
     scene_host, program_host = HostSession(hub, hosts, "scene"), HostSession(hub, hosts, "program", everybody=True)
     robots = SceneRobots(assets, known, session, scene_host)

@@ -32,9 +32,10 @@ def tree() -> Tree:
 
 @pytest.fixture
 def locks(tree: Tree) -> Locks:
-    locks = Locks(retries=3, retry_wait=0.05)
-    locks.tree = tree
-    return locks
+    async def is_stored(item: str) -> bool:
+        return item == "scn_stored"
+
+    return Locks(tree, is_stored, retries=3, retry_wait=0.05)
 
 
 WHOLE = {"box", "ap1", "ap2", "ori", "act"}
@@ -61,10 +62,6 @@ async def test_unknown_id_is_refused_unless_stored(locks: Locks) -> None:
     with pytest.raises(NotFound):
         await locks.write_lock("ann", "nothing")
 
-    async def stored(item: str) -> bool:
-        return item == "scn_stored"
-
-    locks.stored = stored
     assert await locks.write_lock("ann", "scn_stored") == ["scn_stored"]
     assert locks.holds("ann", "scn_stored")
     for special in ("SCENE", "PROJECT", "ACTION", "ADDING_OBJECT", "START", "END"):

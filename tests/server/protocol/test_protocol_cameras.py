@@ -19,6 +19,7 @@ from arcor2_hw.collision.description import RobotSource
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.camera import CameraParameters, Corner, MarkerCorners
 from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.rpc import ListCalibrationsArgs
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_server.compute.process import ProgressCallback
 from arcor2_server.workspace.calibration import RobotView
@@ -217,7 +218,7 @@ async def test_a_camera_pose_is_set_from_its_picture(tmp_path: Path) -> None:
         assert placed.pose == FOUND
         raw = await stage.services.online.ask(Pose, eye, "pose")
         assert raw == FOUND, "the live camera has moved too"
-        (record,) = await stage.services.calibration_records.find(object_id=eye)
+        (record,) = await stage.services.calibration_records.find(ListCalibrationsArgs(object_id=eye))
         assert (record.kind, record.person, record.object_name) == (CalibrationKind.CAMERA_POSE, "alice", "eye")
         assert (record.before, record.after, record.residual, record.residual_unit) == (Pose(), FOUND, 0.2, "px")
         assert [each.sha256 for each in record.inputs] == [hashlib.sha256(image).hexdigest() for image in images]
@@ -252,7 +253,7 @@ async def test_a_camera_without_visible_markers_keeps_its_pose(tmp_path: Path) -
         failed = await happens(alice, "ProcessState", state="failed")
         assert alice.names() == ["ProcessState", "ProcessState"], "nothing was moved"
         assert stage.services.session.document.scene_object(stage.ids["eye"]).pose == Pose()
-        assert await stage.services.calibration_records.find() == []
+        assert await stage.services.calibration_records.find(ListCalibrationsArgs()) == []
 
 
 async def test_a_robot_pose_is_set_from_a_camera(tmp_path: Path) -> None:
@@ -301,7 +302,7 @@ async def test_a_robot_pose_is_set_from_a_camera(tmp_path: Path) -> None:
         picture = Image.open(io.BytesIO(depth))
         assert (picture.format, picture.mode, picture.getpixel((3, 3))) == ("PNG", "I;16", 1500)
         assert stage.services.session.document.scene_object(arm).pose == FOUND
-        (record,) = await stage.services.calibration_records.find(object_id=arm)
+        (record,) = await stage.services.calibration_records.find(ListCalibrationsArgs(object_id=arm))
         assert (record.kind, record.person, record.after) == (CalibrationKind.ROBOT_POSE, "alice", FOUND)
         assert record.parameters["camera_id"] == eye
         await bob.lock(eye)

@@ -9,7 +9,7 @@ import pytest
 
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
-from arcor2_server.rpc.perpendicular import DOWN, YAWS, joint_change, yaw_of, yaws
+from arcor2_server.online.perpendicular import DOWN, YAWS, joint_change, yaw_of, yaws
 from tests.server.protocol.stage import happens, open_stage, refused
 
 

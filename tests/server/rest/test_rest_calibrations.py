@@ -17,6 +17,7 @@ from arcor2_hw.calibration.layout import Marker
 from arcor2_hw.calibration.records import CalibrationKind, CalibrationRecord
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.rpc import ListCalibrationsArgs
 from arcor2_hw.exceptions import Conflict, StorageError
 from arcor2_server.app import Server
 from arcor2_server.storage.calibrations import Calibrations
@@ -206,8 +207,8 @@ async def test_the_oldest_records_are_removed_except_the_last_of_each_object(ser
     await records.put(record("first", 0))
     for number in range(1, 12):
         await records.put(record("often", number))
-    assert [one.date[17:19] for one in await records.find(object_id="first")] == ["00"]
-    often = [one.date[17:19] for one in await records.find(object_id="often")]
+    assert [one.date[17:19] for one in await records.find(ListCalibrationsArgs(object_id="first"))] == ["00"]
+    often = [one.date[17:19] for one in await records.find(ListCalibrationsArgs(object_id="often"))]
     assert often[0] == "11"
     assert len(often) < 6
 

@@ -23,7 +23,7 @@ from arcor2_hw.exceptions import NotFound
 from arcor2_server.access.admission import Access
 from arcor2_server.app import Server
 from arcor2_server.app.application import endpoints
-from arcor2_server.app.parts import connect_edits
+from arcor2_server.app.parts import connect_edits, is_stored
 from arcor2_server.collaboration.lock_takeover import LockTakeover
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.collaboration.presence import PresenceBoard
@@ -39,6 +39,7 @@ from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.object_types.changes import Changes
 from arcor2_server.object_types.notifications import TypeNotifications
+from arcor2_server.online.undo import Undo
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
 from arcor2_server.storage.damage_notices import DataDamage
@@ -291,19 +292,16 @@ async def open_desk(directory: Path, **settings: Any) -> AsyncIterator[Desk]:
     chosen = ServerSettings(data_dir=directory, **given)
     types, cell, hub = RecordedTypes(), FakeCell(), Hub()
     storage = await Storage.open(chosen)
-    locks = Locks(chosen.lock_retries, chosen.lock_retry_wait)
-    users = Users(hub, locks, chosen)
     damage = DataDamage(directory, hub)
     damage.load()
     known: Any = types
+    online: Any = cell
     secrets = SettingSecrets(known, SecretStore(chosen.secrets_file))
     session = Session(chosen, storage, known, damage, secrets)
     shared = SharedData(storage)
 
-    async def stored(item: str) -> bool:
-        return types.known(item) or await storage.identify(item) is not None
-
-    locks.tree, locks.stored = session, stored
+    locks = Locks(session, is_stored(known, storage), chosen.lock_retries, chosen.lock_retry_wait)
+    users = Users(hub, locks, chosen)
     try:
         await session.open()
         try:
@@ -323,7 +321,8 @@ async def open_desk(directory: Path, **settings: Any) -> AsyncIterator[Desk]:
                     busy=False, greeting=list, state_and_info=None, board=SimpleNamespace(states=list, healths=list)
                 ),
                 type_notifications=TypeNotifications(known, hub),
-                dependents=Dependents(storage, known, session),
+                dependents=(dependents := Dependents(storage, known, session)),
+                undo=Undo(locks, storage, known, session, online, dependents),
                 saved_problems=SavedProblems(storage, known, chosen.problems_file),
                 edit_notifications=EditNotifications(hub, session),
                 lock_takeover=LockTakeover(locks, users, session.name_of),

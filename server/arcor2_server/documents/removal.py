@@ -1,0 +1,80 @@
+"""Rules for removing action points and actions, and the logic without a removed action."""
+
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.project import Action, BareActionPoint, LogicItem
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server.documents.changes import Change, Kind
+from arcor2_server.documents.checks import Types, action_meta
+from arcor2_server.documents.document import OWNED, Document, action_of
+from arcor2_server.documents.logic import check_logic_item
+from arcor2_server.errors import RequestRefused
+
+
+def require_point_unused(document: Document, point: BareActionPoint) -> None:
+    """Raise RequestRefused if something outside an action point depends on it or on its children."""
+    if below := document.points_of(point.id):
+        raise RequestRefused(
+            "{name} hangs on {point_name}: remove it, or hang it elsewhere, first.",
+            name=below[0].name,
+            point_name=point.name,
+        )
+    own = {item.id for item in document.owned(point.id, Kind.ACTION)}
+    for action_id in own:
+        if document.outgoing(action_id) or document.incoming(action_id):
+            raise RequestRefused(
+                "{name} on {point_name} is in the logic.",
+                name=document.action(action_id)[1].name,
+                point_name=point.name,
+            )
+    for needed in (point.id, *(item.id for kind in OWNED for item in document.owned(point.id, kind))):
+        for user in document.users_of(needed):
+            if not isinstance(user, Action):
+                raise RequestRefused("A condition of the logic uses a result of an action on {name}.", name=point.name)
+            if user.id not in own:
+                raise RequestRefused(
+                    "The action {name} uses {point_name} or what belongs to it.", name=user.name, point_name=point.name
+                )
+
+
+def require_results_unused(document: Document, before: Action, after: Action) -> None:
+    """Raise RequestRefused if `after` lacks the results of `before`, and a link or a condition uses one of them."""
+    if before.outputs() and not after.outputs() and (users := document.users_of(before.id)):
+        user = users[0]
+        who = f"The action {user.name}" if isinstance(user, Action) else "A condition of the logic"
+        raise RequestRefused(
+            "{device} uses a result of {name}: its results have to keep names.", device=who, name=before.name
+        )
+
+
+def neighbours(document: Document, action_id: str) -> set[str]:
+    """Return the actions before and after an action in the logic; START and END count as actions."""
+    before = {action_of(item.start) for item in document.incoming(action_id)}
+    return before | {action_of(item.end) for item in document.outgoing(action_id)}
+
+
+def bypass(document: Document, types: Types, action: Action) -> list[Change]:
+    """Return the changes that remove an action from the logic.
+
+    If exactly one unconditional logic item leaves the action, the incoming logic items are redirected to its end where
+    the result is valid. All other logic items of the action are removed.
+    """
+    outgoing = document.outgoing(action.id)
+    changes = [document.remove(Kind.LOGIC, item.id) for item in outgoing]
+    end = outgoing[0].end if len(outgoing) == 1 and isinstance(outgoing[0].condition, Unset) else None
+    for item in document.incoming(action.id):
+        redirected = None if end is None else replace(item, end=end)
+        if redirected is not None and _is_valid(document, types, redirected):
+            changes.append(document.update(Kind.LOGIC, item.id, redirected))
+        else:
+            changes.append(document.remove(Kind.LOGIC, item.id))
+    return changes
+
+
+def _is_valid(document: Document, types: Types, item: LogicItem) -> bool:
+    try:
+        check_logic_item(document, lambda action: action_meta(action, document, types), item)
+    except InvalidData:
+        return False
+    return True
