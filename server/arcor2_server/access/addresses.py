@@ -4,13 +4,14 @@ import ipaddress
 import socket
 
 from arcor2_hw.data.base import Data
+from arcor2_server.access.admission import is_loopback
 from arcor2_server.settings import ServerSettings
 
 _DOCUMENTATION = "192.0.2.1"
 """A documentation address (RFC 5737) for finding the outgoing interface. Nothing is sent to it."""
 
 
-class Joining(Data, frozen=True):
+class ServerAddresses(Data, frozen=True):
     """The addresses for inviting users.
 
     addresses: URLs of the editor, the best one first; empty if only this machine reaches the server.
@@ -23,15 +24,13 @@ class Joining(Data, frozen=True):
     name: str
 
 
-def joining(settings: ServerSettings, port: int) -> Joining:
-    """Return how others join; `port` is the one at which it was asked, for a server that took any free one."""
-    from arcor2_server.access.admission import is_loopback  # which needs the routes, of which this is one
-
+def server_addresses(settings: ServerSettings, port: int) -> ServerAddresses:
+    """Return the addresses of this server. `port` is used if the settings leave the choice of the port to the system."""
     scheme = "https" if settings.fingerprint else "http"
-    at = settings.port or port
+    port = settings.port or port
     hosts = [host for host in _hosts(settings.host) if not is_loopback(host)]
-    found = [f"{scheme}://{f'[{host}]' if ':' in host else host}:{at}" for host in hosts]
-    return Joining(found, settings.fingerprint, socket.gethostname())
+    urls = [f"{scheme}://{f'[{host}]' if ':' in host else host}:{port}" for host in hosts]
+    return ServerAddresses(urls, settings.fingerprint, socket.gethostname())
 
 
 def _hosts(host: str) -> list[str]:
@@ -39,13 +38,13 @@ def _hosts(host: str) -> list[str]:
     try:
         address = ipaddress.ip_address(host.strip("[]"))
     except ValueError:
-        return [host]  # a name
+        return [host]  # a host name
     if not address.is_unspecified:
         return [str(address)]
-    return [host for host in dict.fromkeys((_way_out(), *_of_name())) if host]
+    return [host for host in dict.fromkeys((_outgoing_address(), *_addresses_of_host_name())) if host]
 
 
-def _way_out() -> str:
+def _outgoing_address() -> str:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect((_DOCUMENTATION, 9))
@@ -54,7 +53,7 @@ def _way_out() -> str:
             return ""
 
 
-def _of_name() -> list[str]:
+def _addresses_of_host_name() -> list[str]:
     try:
         known = socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET, socket.SOCK_STREAM)
     except OSError:

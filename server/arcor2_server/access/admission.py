@@ -1,4 +1,4 @@
-"""Admission of clients: the role that a token, the listener or a local-only server gives them."""
+"""Admission of clients: which role a client has, by its token, its listener or the settings of the server."""
 
 import ipaddress
 import time
@@ -22,11 +22,12 @@ from arcor2_server.settings import ServerSettings
 log = structlog.get_logger(__name__)
 
 WRONG_TOKENS: Final = 10
-"""Wrong tokens from one address within `WRONG_TOKENS_WITHIN` s, after which it has to wait."""
+"""Number of wrong tokens from one address within WRONG_TOKENS_WITHIN after which further tokens are refused."""
 WRONG_TOKENS_WITHIN: Final = 60.0
+"""Period in which wrong tokens are counted, s."""
 REMEDY: Final = "Make new tokens on the server with `arcor2-hw token add`."
-REMEMBERED: Final = 1000
-"""Addresses of which wrong tokens are counted."""
+MAX_ADDRESSES: Final = 1000
+"""Maximum number of addresses whose wrong tokens are counted."""
 PARAMETER: Final = "token"
 """The query parameter that may carry the token, for clients that cannot set headers, such as browsers."""
 
@@ -61,7 +62,7 @@ def is_loopback(host: str) -> bool:
 
 
 def is_local(settings: ServerSettings) -> bool:
-    """Return whether only this machine reaches the server: it listens on loopback, and no proxy is in front of it."""
+    """Return whether only this machine reaches the server: it listens on loopback, and not behind a proxy."""
     return is_loopback(settings.host) and not settings.trusted_proxies
 
 
@@ -75,13 +76,18 @@ class Access:
 
     @property
     def open_to_all(self) -> bool:
-        """Whether no token is required: by a setting, or for a local-only server without tokens."""
+        """Whether clients need no token: by a setting, or because only this machine reaches it and no token exists."""
         if self._settings.insecure:
             return True
         return is_local(self._settings) and not self._tokens.all() and not self._tokens.unusable
 
     def by_token(self, secret: str, address: str) -> Admission:
-        """Admit a client by a token. Raise AccessRefused, or TooManyAttempts before the token is checked."""
+        """Return the admission for a token.
+
+        Raises:
+            TooManyAttempts: too many wrong tokens came from this address; the token was not checked.
+            AccessRefused: the token is not valid.
+        """
         attempts = self._attempts(address)
         if len(attempts) >= WRONG_TOKENS:
             raise TooManyAttempts("Too many wrong tokens came from {address}: wait a minute.", address=address)
@@ -93,14 +99,18 @@ class Access:
         if token is None:
             attempts.append(time.monotonic())
             self._wrong[address] = attempts
-            while len(self._wrong) > REMEMBERED:
+            while len(self._wrong) > MAX_ADDRESSES:
                 self._wrong.popitem(last=False)
             log.warning("wrong token", address=address)
             raise AccessRefused("The token is not valid: it is unknown, was revoked, or its time is over.")
         return Admission(token.role, token)
 
     def admit(self, connection: ASGIConnection[Any, Any, Any, Any]) -> Admission:
-        """Decide by the listener and by the token in header or query. Raise AccessRefused if that is impossible."""
+        """Return the admission for a connection, by its token in header or query, else by its listener.
+
+        Raises:
+            AccessRefused: the token is not valid.
+        """
         secret = _secret(connection)
         if secret is not None:
             return self.by_token(secret, address_of(connection))
@@ -110,11 +120,11 @@ class Access:
 
     @property
     def damage(self) -> str:
-        """What is wrong with the file of tokens, empty when it is intact."""
+        """The problem of the token file, empty if it is intact."""
         return self._tokens.damage
 
     def repair(self) -> str:
-        """Repair the file of tokens from its copy. Returns what was wrong with it, empty when it was intact."""
+        """Repair the token file from its copy. Return its problem, empty if it was intact."""
         return self._tokens.repair()
 
     def valid(self, token: Token) -> bool:
@@ -135,7 +145,7 @@ class Access:
 
 
 def address_of(connection: ASGIConnection[Any, Any, Any, Any]) -> str:
-    """Return the other side's address."""
+    """Return the address of the client, empty if unknown."""
     return connection.client.host if connection.client else ""
 
 
@@ -148,9 +158,9 @@ def _secret(connection: ASGIConnection[Any, Any, Any, Any]) -> str | None:
 
 
 def role_needed(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler) -> None:
-    """Refuse a REST request whose sender lacks the role of the route (a guard of Litestar).
+    """Refuse a REST request of a client without the role of the route (a guard of Litestar).
 
-    Requests on the websocket have their own roles, and its clients may send the token later.
+    The websocket is not checked here: each of its requests has its own role, and clients may send the token later.
     """
     if isinstance(handler, WebsocketRouteHandler) or handler.opt.get(OPEN):
         return

@@ -17,8 +17,9 @@ from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.files import replace_file
 
 VALID_DAYS: Final = 825
-"""Longer ones are refused by some browsers."""
+"""Period of validity, days. Some browsers refuse certificates with a longer one."""
 RENEW_DAYS: Final = 30
+"""Remaining validity below which the certificate is renewed, days."""
 CERTIFICATE: Final = "certificate.pem"
 KEY: Final = "key.pem"
 
@@ -30,7 +31,11 @@ class CertificateProblem(Arcor2Error):
 
 
 def fingerprint(files: tuple[Path, Path]) -> str:
-    """Check that certificate and key belong together; give the SHA-256 of the certificate as browsers show it."""
+    """Return the SHA-256 of a certificate as browsers show it.
+
+    Raises:
+        CertificateProblem: a file cannot be read, or the certificate does not belong to the key.
+    """
     certificate, key = files
     try:
         ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(certificate, key)
@@ -47,7 +52,7 @@ def fingerprint(files: tuple[Path, Path]) -> str:
 
 
 def self_signed(data_dir: Path, host: str) -> tuple[Path, Path]:
-    """Return certificate and key of our own, made when there are none, they end soon, or the host is another."""
+    """Return the self-signed certificate and its key. Create them if missing, expiring, or made for another host."""
     files = (data_dir / CERTIFICATE, data_dir / KEY)
     if not _serves(files[0], host):
         try:
@@ -70,7 +75,7 @@ def _serves(certificate: Path, host: str) -> bool:
 
 
 def _names(host: str) -> list[x509.GeneralName]:
-    """Return the names and addresses under which this machine may be asked."""
+    """Return the names and addresses of this machine for the certificate."""
     texts = dict.fromkeys((host, socket.gethostname(), "localhost", "127.0.0.1", "::1"))
     names: list[x509.GeneralName] = []
     for text in texts:
@@ -79,7 +84,7 @@ def _names(host: str) -> list[x509.GeneralName]:
             if not address.is_unspecified:
                 names.append(x509.IPAddress(address))
             continue
-        with contextlib.suppress(ValueError):  # no name that a certificate can hold
+        with contextlib.suppress(ValueError):  # not a valid DNS name
             names.append(x509.DNSName(text))
     return names
 
@@ -94,7 +99,7 @@ def _make(files: tuple[Path, Path], host: str) -> None:
         .issuer_name(name)
         .public_key(key.public_key())
         .serial_number(x509.random_serial_number())
-        .not_valid_before(begin - timedelta(days=1))  # clocks of tablets differ
+        .not_valid_before(begin - timedelta(days=1))  # the clock of a tablet may be behind
         .not_valid_after(begin + timedelta(days=VALID_DAYS - 1))
         .add_extension(x509.SubjectAlternativeName(_names(host)), critical=False)
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)

@@ -12,19 +12,19 @@ from arcor2_server.settings import ServerSettings
 log = structlog.get_logger(__name__)
 
 CONNECTION: Final = "arcor2_hw.connection"
-"""The key under which the extensions of a request's ASGI scope hold its Connection."""
+"""Key of the Connection in the extensions of an ASGI scope."""
 OWN_FILES: Final = 256
-"""File descriptors left for all that is no client's connection: databases, cell hosts, packages, uploads."""
+"""Number of file descriptors reserved for databases, cell hosts, packages and uploads."""
 MOST: Final = 4000
-"""Maximum number of connections, if the system allows more files."""
+"""Maximum number of connections, even if the system allows more files."""
 FEWEST: Final = 64
-"""Connections at least, however few files the system allows."""
+"""Minimum number of connections, even if the system allows fewer files."""
 RESERVE: Final = 4
-"""One connection of so many is for admitted clients alone."""
+"""Divisor of the total: this part of the connections is reserved for admitted clients."""
 
 
 class Connection:
-    """One accepted connection. Until its client is admitted, it may be dropped in favour of a new one."""
+    """One accepted connection. Until its client is admitted, it may be dropped for a new connection."""
 
     __slots__ = ("_limits", "address", "admitted", "drop")
 
@@ -33,7 +33,7 @@ class Connection:
         self.address = address
         self.admitted = False
         self.drop: Callable[[], object] = lambda: None
-        """Ends the connection at once; set by the part that holds it."""
+        """Closes the connection at once. The present owner of the connection sets it."""
 
     def admit(self) -> None:
         """Count the connection among the admitted ones, which are never dropped."""
@@ -44,16 +44,18 @@ class Connection:
         self._limits.wait(self)
 
     def close(self) -> None:
-        """Count the connection no longer; harmless when it is closed."""
+        """Stop counting the connection. Does nothing if it is closed already."""
         self._limits.close(self)
 
 
 class ConnectionLimits:
     """Counts connections. If there are too many, the unadmitted connection that has waited longest is dropped.
 
-    total: maximum number of connections; a quarter of them is reserved for admitted clients.
-    per_address: maximum number of unadmitted connections from one address.
-    proxies: addresses and networks without this limit, since many clients are behind each.
+    Args:
+        total: maximum number of connections; a quarter of them is reserved for admitted clients.
+        per_address: maximum number of unadmitted connections from one address.
+        proxies: addresses and networks of proxies. The limit per address does not apply to them, since they forward
+            the connections of many clients.
     """
 
     def __init__(self, total: int, per_address: int, proxies: Iterable[str] = ()) -> None:
@@ -79,7 +81,7 @@ class ConnectionLimits:
         return len(self._open)
 
     def open(self, address: str) -> Connection | None:
-        """Return a new connection, which waits; None where the server has no room for one."""
+        """Return a new waiting connection, None if there are too many admitted clients."""
         from_address = self._waiting.get(address, {})
         if len(from_address) >= self._per_address and not self._is_proxy(address):
             self._drop(from_address)
@@ -110,14 +112,14 @@ class ConnectionLimits:
         self._add(connection)
 
     def close(self, connection: Connection) -> None:
-        """Count a connection no longer."""
+        """Stop counting a connection. Does nothing if it is closed already."""
         if connection in self._open:
             self._open.remove(connection)
             if not connection.admitted:
                 self._remove(connection)
 
     def make_room(self) -> None:
-        """Drop the connection that has waited longest, of the address with the most of them."""
+        """Drop the longest waiting connection of the address with the most waiting connections."""
         if self._waiting_count:
             self._drop(max(self._waiting.values(), key=len))
 

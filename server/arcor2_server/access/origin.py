@@ -1,4 +1,4 @@
-"""Origin checks: web pages from elsewhere can neither command nor read this server."""
+"""Origin and host checks, so that pages of other web sites can neither control nor read this server."""
 
 import ipaddress
 import socket
@@ -14,14 +14,16 @@ from litestar.handlers import BaseRouteHandler, WebsocketRouteHandler
 from arcor2_server.settings import ServerSettings
 
 HOSTS: Final = Path("/etc/hosts")
+"""File with the names of this machine."""
 RESOLVER: Final = Path("/etc/resolv.conf")
+"""File with the domains of this machine."""
 
 
 class HostNames:
     """The valid names of this server: any IP address, localhost, the names of the machine, and configured names.
 
-    Any other name could be pointed at this machine by an attacker (DNS rebinding), whose page would then have the
-    origin of this server. An IP address cannot be misused in this way.
+    An attacker could let any other name resolve to this machine (DNS rebinding). The attacker's page would then have
+    the origin of this server. IP addresses do not have this problem.
     """
 
     def __init__(self, configured: Iterable[str] = ()) -> None:
@@ -34,7 +36,7 @@ class HostNames:
         return cls((settings.host, *legacy, *settings.allowed_hosts))
 
     def __contains__(self, name: object) -> bool:
-        """Return whether a host name, without port and brackets, is one of ours."""
+        """Return whether a host name, without port and brackets, is a name of this server."""
         if not isinstance(name, str) or not name:
             return False
         if name.lower().rstrip(".") in self._names:
@@ -47,7 +49,7 @@ class HostNames:
 
 
 def machine_names() -> set[str]:
-    """Return the names of this machine, by files alone: a name server may not answer, or be someone else's."""
+    """Return the names of this machine from files. A name server may not answer, or belong to an attacker."""
     full = socket.gethostname()
     short = full.partition(".")[0]
     names = {full, short, f"{short}.local"}
@@ -79,23 +81,24 @@ def host_of(header: str | None) -> str | None:
 def may_connect(origin: str | None, host: str | None, names: HostNames) -> bool:
     """Return whether a page of this origin may use the server that it addresses as `host`.
 
-    Only browsers send an Origin. It must be that of a page of this server.
+    Only browsers send an Origin header. It must be the origin of this server.
     """
     if origin is None:
         return True
     try:
-        page, asked = urlsplit(origin), urlsplit(f"//{host or ''}")
-        same = (page.hostname, page.port) == (asked.hostname, asked.port)
+        page, server = urlsplit(origin), urlsplit(f"//{host or ''}")
+        same = (page.hostname, page.port) == (server.hostname, server.port)
     except ValueError:
         return False
     return same and page.hostname in names
 
 
 def own_pages_only(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler) -> None:
-    """Refuse requests of foreign pages (a guard of Litestar, for routes and the websocket).
+    """Refuse requests from pages of other origins (a guard of Litestar for routes and the websocket).
 
-    A browser sends no Origin with a page's requests to its own host. Requests must therefore also name a host of ours.
-    Websockets of browsers always have an Origin, so that one without comes from another client, which may use any name.
+    A browser sends no Origin header with requests of a page to its own host. HTTP requests must therefore also have a
+    valid host name. A browser always sends an Origin header with a websocket; a websocket without one comes from
+    another kind of client, which may use any host name.
     """
     names: HostNames = connection.app.state.host_names
     origin, host = connection.headers.get("origin"), connection.headers.get("host")

@@ -1,12 +1,12 @@
-"""Keys of the options by which routes declare the role they need, and of the state that identifies the sender."""
+"""Keys in the options of routes, which declare the needed role, and in the state of requests, which name the sender."""
 
 from typing import Final
 
 ROLE: Final = "role"
-"""Key of a route's `opt`: the lowest role that may use the route."""
+"""Option of a route: the lowest role that may use it."""
 OPEN: Final = "open"
-"""Key of a route's `opt`: the route needs no token, since it reveals nothing."""
+"""Option of a route: whether it needs no token, since it reveals nothing."""
 PERSON: Final = "person"
-"""Key of a request's state: the name on its token, if it has one."""
+"""State of a request: the name of its token, if it has one."""
 AS_ROLE: Final = "as_role"
-"""Key of a request's state: the role of the sender."""
+"""State of a request: the role of the sender."""

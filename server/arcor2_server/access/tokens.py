@@ -37,7 +37,7 @@ class Token(Data, frozen=True):
 
     @property
     def expired(self) -> bool:
-        """Return whether its time is over."""
+        """Whether the token has expired."""
         return self.expires is not None and datetime.fromisoformat(self.expires) <= datetime.now(UTC)
 
 
@@ -45,10 +45,10 @@ _decode = msgspec.json.Decoder(list[Token]).decode
 
 
 class TokenFile:
-    """The tokens of one data directory. Methods raise StorageError naming the file.
+    """The tokens of one data directory. Methods raise StorageError if the file cannot be used.
 
-    Other processes may change the file at any time; a changed file is read again. Each change is written to a backup
-    first, which is used if the file is damaged.
+    Other processes may change the file at any time; a changed file is read again. Each change is first written to a
+    copy, which is used if the file is damaged.
     """
 
     def __init__(self, data_dir: Path) -> None:
@@ -57,12 +57,12 @@ class TokenFile:
         self._seen: tuple[int, int, int] | None = None
         self._tokens: list[Token] = []
         self.damage = ""
-        """What is wrong with the file and what to do, as sentences; empty when it is intact."""
+        """The problem of the file and its remedy, as sentences; empty if the file is intact."""
         self.unusable = False
-        """Whether neither the file nor its backup can be read, so that no token is valid."""
+        """Whether neither the file nor its copy can be read, so that no token is valid."""
 
     def all(self) -> list[Token]:
-        """Return all tokens, the expired too; empty when there never was one, or they are lost to damage."""
+        """Return all tokens, including expired ones; empty if there are none, or neither file nor copy can be read."""
         try:
             status = self._path.stat()
             stamp = (status.st_mtime_ns, status.st_size, status.st_ino)
@@ -96,7 +96,7 @@ class TokenFile:
         return tokens
 
     def repair(self) -> str:
-        """Replace a damaged file by its copy, or write the copy where it is missing. Returns what was wrong."""
+        """Replace a damaged file by its copy, or create a missing copy. Return the problem, empty if there is none."""
         tokens, damage = self.all(), self.damage
         if self.unusable or not (tokens or damage):
             return damage
@@ -106,22 +106,29 @@ class TokenFile:
         return damage
 
     def find(self, secret: str) -> Token | None:
-        """Return the token with this secret, None if there is none or it has expired."""
+        """Return the valid token with this secret, None if there is none."""
         digest = hashlib.sha256(secret.encode(errors="replace")).hexdigest()
         found = None
-        for token in self.all():  # all of them, so that the time taken tells nothing
+        for token in self.all():  # all of them, so that the duration reveals nothing
             if hmac.compare_digest(token.digest, digest):
                 found = token
         return None if found is None or found.expired else found
 
     def valid(self, token: Token) -> bool:
-        """Return whether a token is still there and its time is not over."""
+        """Return whether a token still exists and has not expired."""
         return not token.expired and any(each.id == token.id for each in self.all())
 
     def add(self, name: str, role: Role, days: int | None = None) -> tuple[Token, str]:
         """Create a token; return it with its secret, which is not stored.
 
-        Raise InvalidData or Conflict if that is impossible.
+        Args:
+            name: name of the user or device.
+            role: role of the token.
+            days: validity, days; None for unlimited.
+
+        Raises:
+            InvalidData: the name is not valid.
+            Conflict: there is a valid token with this name.
         """
         if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
             raise InvalidData(
@@ -141,17 +148,17 @@ class TokenFile:
         return token, secret
 
     def revoke(self, which: str) -> list[Token]:
-        """Delete the tokens with this id or name, and return them. Raise NotFound if there is none."""
+        """Delete and return the tokens with this id or name. Raise NotFound if there is none."""
         with self._changing() as tokens:
-            gone = [token for token in tokens if which in (token.id, token.name)]
-            if not gone:
+            revoked = [token for token in tokens if which in (token.id, token.name)]
+            if not revoked:
                 raise NotFound("There is no token {which!r}.", which=which)
-            tokens[:] = [token for token in tokens if token not in gone]
-        return gone
+            tokens[:] = [token for token in tokens if token not in revoked]
+        return revoked
 
     @contextlib.contextmanager
     def _changing(self) -> Generator[list[Token], None, None]:
-        """Provide the list to change; it is on disk, readable by its owner alone, when this ends."""
+        """Provide the list of tokens for a change; write it to a file that only its owner can read."""
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             with self._path.with_suffix(".lock").open("ab") as lock:

@@ -1,4 +1,4 @@
-"""The composition root: the parts of the server, its adapters, and the ASGI application."""
+"""The composition root: builds the parts of the server, the request handlers and the ASGI application."""
 
 from arcor2_server.app.application import create_app
 from arcor2_server.app.parts import Server, running_server

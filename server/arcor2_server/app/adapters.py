@@ -1,4 +1,4 @@
-"""Composition of the adapters: the handlers of requests and REST operations."""
+"""Builds the handlers of websocket requests and REST operations from the parts of the server."""
 
 from arcor2_server.app.parts import Server
 from arcor2_server.rest.api_page import ApiPageOperations
@@ -53,7 +53,7 @@ from arcor2_server.rpc.scene_objects import SceneObjectRequests
 
 
 def request_handlers(s: Server) -> Handlers:
-    """Return the handlers of the protocol's requests."""
+    """Return the handlers of the websocket requests."""
     answers = AnswerCache()
     editing = Editing(s.locks, s.storage, s.session, s.execution, s.secrets)
     scenes = SceneRequests(s.locks, s.storage, s.session, s.online, s.type_notifications, s.dependents, editing)
@@ -105,7 +105,7 @@ def request_handlers(s: Server) -> Handlers:
 
 
 def rest_groups(s: Server) -> list[object]:
-    """Return the objects that handle the REST operations."""
+    """Return the objects whose methods handle the REST operations."""
     diagnosis = Diagnosis(s.settings, s.hub, s.types, s.session, s.online, s.execution, s.runs)
     return [
         ApiPageOperations(),

@@ -1,4 +1,4 @@
-"""The ASGI application: websocket, REST routes and editor around the running parts."""
+"""The ASGI application: routes of the websocket, the REST operations and the editor."""
 
 from typing import Any
 
@@ -24,19 +24,19 @@ from arcor2_server.websocket.execution_endpoint import execution_service
 
 @websocket(["/", "/{path:path}"], opt={ROLE: Role.OPERATOR})
 async def sockets(socket: WebSocket[Any, Any, Any]) -> None:
-    """Speak the ARCOR2 protocol: at /execution or at its classic port as the Execution service, else as ARServer.
+    """Serve the Execution service at /execution and at its classic port, and ARServer elsewhere.
 
-    Each request declares its own least role.
+    The role of the route is the lowest one, since each request declares the role that it needs.
     """
     state = socket.app.state
     port = (socket.scope.get("server") or ("", None))[1]
-    own_port = state.settings.classic_ports.get(SOCKET)
-    endpoint = state.execution if socket.url.path == "/execution" or port == own_port else state.endpoint
+    execution_port = state.settings.classic_ports.get(SOCKET)
+    endpoint = state.execution if socket.url.path == "/execution" or port == execution_port else state.endpoint
     await endpoint.serve(socket)
 
 
 def no_such_route(request: Request[Any, Any, Any], error: MethodNotAllowedException) -> Response[Any]:
-    """Answer 404 where only the websocket is: Litestar takes that for a route without the method."""
+    """Answer 404 instead of 405 if only the websocket has the path, since there is no HTTP route."""
     allowed = {name.lower(): value for name, value in (error.headers or {}).items()}.get("allow")
     if allowed in (None, "websocket"):
         return http_refusal(request, NotFoundException("There is no such route."))
@@ -44,7 +44,7 @@ def no_such_route(request: Request[Any, Any, Any], error: MethodNotAllowedExcept
 
 
 class Application(Litestar):
-    """Litestar without its plugins for pydantic and attrs, which serve nothing here and cost a tenth of a second."""
+    """Litestar without its plugins for pydantic and attrs, which are not needed and take 0.1 s to load."""
 
     @staticmethod
     def _get_default_plugins(plugins: list[PluginProtocol]) -> list[PluginProtocol]:
@@ -64,7 +64,7 @@ def endpoints(server: Server) -> tuple[Endpoint, Endpoint]:
 
 
 def create_app(server: Server) -> Litestar:
-    """Return the application around parts that are running."""
+    """Return the application that serves the running parts."""
     endpoint, execution_endpoint = endpoints(server)
     app = Application(
         route_handlers=[sockets, *rest_routes(rest_groups(server), server.tasks), *editor_routes()],

@@ -1,4 +1,4 @@
-"""The composition root: builds the parts of the server bottom-up and passes each its collaborators."""
+"""Builds the parts of the server from the bottom up and passes each its collaborators."""
 
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
@@ -116,14 +116,18 @@ class Server:
     stop_all: StopAll
 
     def greeting(self) -> list[Event]:
-        """Return the events for an admitted client: what is open, what runs, or the main screen; then notices."""
+        """Return the first events for a client: the open document, the running program or main screen, and notices."""
         state = self.session.greeting(self.online.state) or self.execution.greeting() or [self.hub.main_screen]
         return state + self.damage.greeting()
 
 
 @asynccontextmanager
 async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
-    """Build and start all parts, and close them in reverse order. Raise StorageError if the data cannot be used."""
+    """Build and start all parts; close them in reverse order at the end.
+
+    Raises:
+        StorageError: the data directory cannot be used.
+    """
     async with AsyncExitStack() as stack:
         # ------------------------------------------------------------------------------------ stores
         tighten(settings.data_dir)
@@ -286,7 +290,7 @@ def is_stored(types: ObjectTypes, storage: Storage) -> Callable[[str], Awaitable
 
 
 def connect_edits(edits: EditNotifications, previews: Previews, breakpoints: SharedBreakpoints) -> None:
-    """Let edits of the open document end previews and remove breakpoints."""
+    """Subscribe the previews and breakpoints to edits: previews of edited items end, and so do unused breakpoints."""
     edits.on_edit.append(lambda changes: previews.changed({change.id for change in changes}))
     edits.on_pause.append(lambda _: previews.end_changed())
     edits.on_pause.append(breakpoints.changed)

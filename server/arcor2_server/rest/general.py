@@ -4,7 +4,7 @@ import asyncio
 from dataclasses import dataclass
 
 from arcor2_hw.data.role import Role
-from arcor2_server.access.addresses import Joining, joining
+from arcor2_server.access.addresses import ServerAddresses, server_addresses
 from arcor2_server.execution.service import Execution
 from arcor2_server.hosts.devices import DeviceStatus
 from arcor2_server.online.online_scene import OnlineScene
@@ -28,10 +28,10 @@ class GeneralOperations:
         return ""
 
     @operation("GET", "/api/joining", SERVER, Role.OPERATOR, plain=True)
-    async def how_to_join(self, port: int) -> Joining:
+    async def how_to_join(self, port: int) -> ServerAddresses:
         """Return the addresses at which others reach this server, and the fingerprint of its certificate."""
         # Names are looked up, which may take its time.
-        return await asyncio.to_thread(joining, self._settings, port)
+        return await asyncio.to_thread(server_addresses, self._settings, port)
 
     @operation("GET", "/api/devices", SERVER, Role.OPERATOR, plain=True)
     async def devices(self) -> list[DeviceStatus]:

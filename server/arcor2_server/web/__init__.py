@@ -1,1 +1,1 @@
-"""The HTTP server and the static files of the web editor."""
+"""The HTTP server, the websocket transport and the static files of the web editor."""

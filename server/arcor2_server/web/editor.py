@@ -1,4 +1,4 @@
-"""Serves the web editor: one page at `/` and its hashed files below `/editor`."""
+"""Serves the web editor: the page at `/` and its files below `/editor`."""
 
 import asyncio
 import hashlib
@@ -17,9 +17,9 @@ from arcor2_server.access.route_options import OPEN, ROLE
 from arcor2_server.web.encodings import accepted_encodings
 
 FILES: Final = Path(__file__).parents[1] / "editor_files"
-"""Folder of the built editor; missing in a checkout without a build."""
+"""Directory of the built editor; missing in a checkout without a build."""
 NONCE: Final = b"__NONCE__"
-"""Placeholder in the page for the nonce of the styles that components insert; each response has its own."""
+"""Placeholder in the page for the nonce of inserted styles. Each response has its own nonce."""
 NOT_BUILT: Final = (
     b"<!doctype html><html lang=en><meta charset=utf-8><title>ARCOR2-HW</title>"
     b"<h1>The editor is not built</h1><p>The server runs. In a checkout, <code>make run</code> builds the editor."
@@ -35,7 +35,7 @@ _MEDIA_TYPES: Final = {
     ".wasm": "application/wasm",
 }
 _ENCODINGS: Final = (("br", ".br"), ("gzip", ".gz"))
-"""Encodings, the densest first, and what the name of a file that is compressed so ends with."""
+"""Content encodings and the suffixes of compressed files, smallest files first."""
 _PAGE: Final = {
     "Cache-Control": "no-cache",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -44,7 +44,7 @@ _PAGE: Final = {
 
 
 class EditorFile(Data, frozen=True):
-    """A file with its content as it is and compressed, by encoding."""
+    """A file with its content by encoding; "" is the uncompressed content."""
 
     media_type: str
     etag: str
@@ -52,18 +52,19 @@ class EditorFile(Data, frozen=True):
 
 
 def file_names(directory: Path) -> frozenset[str]:
-    """Return the paths of the built editor's files, relative to `directory`; empty if it was not built."""
+    """Return the paths of the editor's files relative to `directory`; empty if the editor is not built."""
     endings = tuple(ending for _, ending in _ENCODINGS)
     found = (file.relative_to(directory) for file in directory.rglob("*") if file.is_file())
     return frozenset(
         name.as_posix()
         for name in found
-        if not name.name.endswith(endings) and not any(part.startswith(".") for part in name.parts)  # the build's notes
+        # Hidden files belong to the build.
+        if not name.name.endswith(endings) and not any(part.startswith(".") for part in name.parts)
     )
 
 
 def read_file(file: Path) -> EditorFile:
-    """Read a file of the built editor with its compressed copies. Raise OSError if it cannot be read."""
+    """Read a file of the editor with its compressed copies. Raise OSError if it cannot be read."""
     content = {"": file.read_bytes()}
     for encoding, ending in _ENCODINGS:
         if (compressed := file.with_name(file.name + ending)).is_file():
@@ -73,7 +74,7 @@ def read_file(file: Path) -> EditorFile:
 
 
 def page_policy(nonce: str) -> str:
-    """Return the content security policy of the page: nothing from elsewhere, no script that is not a file of ours."""
+    """Return the content security policy of the page: only content of this server, and no inline scripts."""
     return (
         "default-src 'none'; script-src 'self'; connect-src 'self'; img-src 'self' data: blob:; "
         f"style-src 'self' 'nonce-{nonce}'; font-src 'self'; worker-src 'self' blob:; media-src 'self' blob:; "
@@ -82,7 +83,7 @@ def page_policy(nonce: str) -> str:
 
 
 def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
-    """Return the routes of the page and of its files, each read once, on first use. They need no token."""
+    """Return the routes of the page and its files. They need no token. A file is read on its first request."""
     names = file_names(directory)
     page = read_file(directory / "index.html") if "index.html" in names else None
     files: dict[str, EditorFile] = {}
@@ -90,7 +91,7 @@ def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
 
     @route("/", http_method=[HttpMethod.GET, HttpMethod.HEAD], opt=open_to_all, name="editor page")
     async def editor_page() -> Response[bytes]:
-        """Answer with the page. Each response has its own nonce, so it is never cached."""
+        """Return the page. It is not cached, since each response has its own nonce."""
         nonce = secrets.token_urlsafe(16)
         content = NOT_BUILT if page is None else page.content[""].replace(NONCE, nonce.encode())
         headers = _PAGE | {"Content-Security-Policy": page_policy(nonce)}
@@ -98,13 +99,13 @@ def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
 
     @route("/editor/{path:path}", http_method=[HttpMethod.GET, HttpMethod.HEAD], opt=open_to_all, name="editor file")
     async def editor_file(request: Request[Any, Any, Any]) -> Response[bytes]:
-        """Answer with a file in an accepted encoding; 304 if the browser has it, 404 if it does not exist."""
+        """Return a file in an accepted encoding; 304 if the browser has it, 404 if it does not exist."""
         name = str(request.path_params["path"]).lstrip("/")
         if name not in names or name == "index.html":
             raise NotFoundException("The editor has no such file.")
         if (file := files.get(name)) is None:
             file = files[name] = await asyncio.to_thread(read_file, directory / name)
-        # What the build names after its content never changes.
+        # The build names these files after their content, so they never change.
         caching = IMMUTABLE if name.startswith("assets/") else "no-cache"
         headers = {"Cache-Control": caching, "ETag": file.etag, "Vary": "Accept-Encoding"}
         if request.headers.get("if-none-match") == file.etag:

@@ -1,4 +1,4 @@
-"""One HTTP connection, with deadlines for sending and receiving."""
+"""HTTP connections with time limits for sending and receiving."""
 
 import asyncio
 import functools
@@ -10,16 +10,18 @@ from arcor2_server.access.connection_limits import CONNECTION, Connection
 from arcor2_server.web.websocket_transport import WireProtocol
 
 SLOWEST: Final = 500
-"""Bytes per second that the other side must send of a body, or take of an answer, at least."""
+"""Minimum rate at which a client must send a body or receive an answer, bytes/s."""
 
 
 class HttpProtocol(HttpToolsProtocol):
-    """The HTTP protocol of uvicorn, with time limits.
+    """The HTTP protocol of uvicorn with time limits.
 
     The connection may be dropped for a new one, except while a request of an admitted client is served.
 
-    request_timeout: time limit, s, for the head of a request, for each 500 bytes of its body, and between two checks
-    that the client receives what is sent.
+    Args:
+        connection: the connection.
+        request_timeout: time limit for the head of a request, for a pause in its body, and between two checks that
+            the client receives the answer, s.
     """
 
     def __init__(self, *args: Any, connection: Connection, request_timeout: float, **kwargs: Any) -> None:
@@ -27,29 +29,29 @@ class HttpProtocol(HttpToolsProtocol):
         self._connection = connection
         self._timeout = request_timeout
         self._deadline: float | None = None
-        """When the part of a request that is being received must have come; None between requests."""
+        """Deadline for the part of a request that is being received; None between requests."""
         self._in_body = False
         self._timer: asyncio.TimerHandle | None = None
         self._sending_timer: asyncio.TimerHandle | None = None
         self._unsent = 0
-        # uvicorn makes the websocket's protocol by this when a request asks for an upgrade.
+        # uvicorn creates the websocket protocol by this class when a request asks for an upgrade.
         self.ws_protocol_class = functools.partial(WireProtocol, connection=connection)  # type: ignore[assignment]
 
-    # ------------------------------------------------------------------------------------------------ life
+    # ------------------------------------------------------------------------------------------------ connection
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Expect a request."""
+        """Start the time limit for the first request."""
         super().connection_made(cast("asyncio.Transport", transport))
         self._connection.drop = self.transport.abort
         self._expect_head()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Expect nothing more."""
+        """Stop all time limits."""
         self._end_timers()
         self._connection.close()
         super().connection_lost(exc)
 
     def handle_websocket_upgrade(self) -> None:
-        """Leave the connection to the websocket's protocol."""
+        """Hand the connection over to the websocket protocol."""
         self._end_timers()
         super().handle_websocket_upgrade()
 
@@ -62,7 +64,7 @@ class HttpProtocol(HttpToolsProtocol):
 
     # ------------------------------------------------------------------------------------------------ receiving
     def data_received(self, data: bytes) -> None:
-        """Take bytes; a body gets more time with each of them."""
+        """Process received bytes. The bytes of a body extend its time limit."""
         if self._deadline is None:
             self._expect_head()
         elif self._in_body:
@@ -71,21 +73,21 @@ class HttpProtocol(HttpToolsProtocol):
         super().data_received(data)
 
     def on_message_begin(self) -> None:
-        """Let the guards of the routes find the connection."""
+        """Put the connection into the scope for the guards of the routes."""
         super().on_message_begin()
         extensions: dict[str, Any] = {CONNECTION: self._connection}
         self.scope["extensions"] = extensions
-        if self._deadline is None:  # behind another request, in the same bytes
+        if self._deadline is None:  # a further request in the same bytes
             self._expect_head()
 
     def on_headers_complete(self) -> None:
-        """Expect the body."""
+        """Start the time limit for the body."""
         self._in_body = True
         self._expect(self.loop.time() + self._timeout)
         super().on_headers_complete()
 
     def on_message_complete(self) -> None:
-        """Expect nothing until the next request begins."""
+        """Stop the time limit until the next request."""
         self._in_body, self._deadline = False, None
         super().on_message_complete()
 
@@ -103,7 +105,7 @@ class HttpProtocol(HttpToolsProtocol):
         if self._deadline is None:
             return
         now = self.loop.time()
-        if self.flow.read_paused:  # we are the slow ones
+        if self.flow.read_paused:  # the server is slow, not the client
             self._deadline = now + self._timeout
         if now >= self._deadline:
             self.transport.abort()
@@ -131,7 +133,7 @@ class HttpProtocol(HttpToolsProtocol):
         super().resume_writing()
 
     def timeout_keep_alive_handler(self) -> None:
-        """Close an idle connection; one that still sends an answer is closed later."""
+        """Close an idle connection. One that still sends an answer is closed later."""
         if self.transport.get_write_buffer_size():
             self._watch_sending()
         else:

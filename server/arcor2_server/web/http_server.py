@@ -1,4 +1,4 @@
-"""The HTTP server: uvicorn with connection limits that apply before TLS."""
+"""The HTTP server: uvicorn, with connection limits that apply before the TLS handshake."""
 
 import asyncio
 import contextlib
@@ -20,17 +20,17 @@ from arcor2_server.web.websocket_transport import WireProtocol
 log = structlog.get_logger(__name__)
 
 GRACE: Final = 2
-"""Time limit for open requests at the end of the server, s; the contract allows 5 for everything."""
+"""Time limit for open requests when the server stops, s. The whole stop must take at most 5 s."""
 ACCEPTED_AT_ONCE: Final = 100
 """Number of connections accepted before the event loop continues."""
 PAUSE: Final = 0.5
-"""Seconds without accepting after the system had no file descriptor for a connection."""
+"""Time without accepting connections after the file descriptors were used up, s."""
 
 
 def configuration(
     app: object, settings: ServerSettings, certificate: tuple[Path, Path] | None = None
 ) -> uvicorn.Config:
-    """Return uvicorn's configuration: one process, no compression, our websocket."""
+    """Return the configuration of uvicorn: one process, no compression, our websocket protocol."""
     return uvicorn.Config(
         app,  # type: ignore[arg-type]
         ws=WireProtocol,
@@ -52,8 +52,16 @@ def configuration(
 class Listener:
     """Accepts the connections of one socket within the limits. It replaces an asyncio.Server.
 
-    connected: creates the protocol of a connection.
-    handshake_timeout: time limit of the TLS handshake, s.
+    Args:
+        listener: the bound socket.
+        limits: the connection limits.
+        connected: creates the protocol of a connection.
+        tls: TLS settings, None for plain TCP.
+        handshake_timeout: time limit of the TLS handshake, s.
+        backlog: maximum number of connections that wait to be accepted.
+
+    Raises:
+        OSError: another program listens on the address.
     """
 
     def __init__(
@@ -65,7 +73,7 @@ class Listener:
         handshake_timeout: float,
         backlog: int,
     ) -> None:
-        """Listen. OSError where another program listens there."""
+
         self._socket, self._limits, self._connected, self._tls = listener, limits, connected, tls
         self._handshake_timeout = handshake_timeout
         self._loop = asyncio.get_running_loop()
@@ -77,7 +85,7 @@ class Listener:
         self._accept_again()
 
     def close(self) -> None:
-        """Accept nothing more; the socket is left to its owner."""
+        """Stop accepting connections. The owner of the socket closes it."""
         if not self._closed:
             self._closed = True
             self._loop.remove_reader(self._socket)
@@ -85,7 +93,7 @@ class Listener:
                 task.cancel()
 
     async def wait_closed(self) -> None:
-        """Return when no connection is being made any more."""
+        """Wait until no connection is being established."""
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def _accept_again(self) -> None:
@@ -105,7 +113,7 @@ class Listener:
                 self._loop.call_later(PAUSE, self._accept_again)
                 return
             accepted.setblocking(False)
-            with contextlib.suppress(OSError):  # the other side is gone again
+            with contextlib.suppress(OSError):  # the client has disconnected already
                 accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             connection = self._limits.open(str(peer[0]))
             if connection is None:
@@ -117,7 +125,7 @@ class Listener:
             task.add_done_callback(self._tasks.discard)
 
     async def _connect(self, accepted: socket.socket, connection: Connection) -> None:
-        """Hand a connection over to its protocol, which has it when the TLS handshake is done."""
+        """Perform the TLS handshake and hand the connection over to its protocol."""
         if self._closed or accepted.fileno() < 0:  # dropped meanwhile
             accepted.close()
             connection.close()
@@ -127,15 +135,15 @@ class Listener:
         connection.drop = task.cancel
         self._connecting.add(task)
         try:
-            # From here on the event loop owns the socket, and closes it whatever happens.
+            # From here on the event loop owns the socket and closes it in any case.
             await self._loop.connect_accepted_socket(
                 lambda: self._connected(connection),
                 accepted,
                 ssl=self._tls,
                 ssl_handshake_timeout=self._handshake_timeout if self._tls else None,
             )
-        except OSError as error:  # a handshake that failed (ssl.SSLError) or took too long (TimeoutError), too
-            log.debug("no connection came about", address=connection.address, reason=str(error))
+        except OSError as error:  # includes ssl.SSLError and TimeoutError of the handshake
+            log.debug("connection failed", address=connection.address, reason=str(error))
             connection.close()
         except BaseException:
             connection.close()
@@ -145,7 +153,7 @@ class Listener:
 
 
 class Server(uvicorn.Server):
-    """The server of uvicorn, which reports when it is ready, limits connections, and leaves signals to the caller."""
+    """The server of uvicorn with connection limits and a report when it is ready. The caller handles signals."""
 
     def __init__(
         self,
@@ -162,7 +170,7 @@ class Server(uvicorn.Server):
         self._when_ready = when_ready
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Listen at the sockets, and at the one for legacy clients without TLS; then say where."""
+        """Listen on the sockets, and on the legacy socket without TLS; then print the address."""
         await super().startup(sockets=[])
         if not self.started or not sockets:
             return
@@ -192,9 +200,9 @@ class Server(uvicorn.Server):
 
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None, None, None]:
-        """Leave the signals alone: uvicorn would raise them again at the end, and the status were not 0."""
+        """Do not handle signals. uvicorn would raise them again at the end, so the exit status would not be 0."""
         yield
 
     def end(self) -> None:
-        """End in order."""
+        """Stop the server in an orderly way."""
         self.should_exit = True

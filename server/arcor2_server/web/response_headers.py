@@ -15,13 +15,13 @@ EVERYWHERE: Final = {
     "Cross-Origin-Resource-Policy": "same-origin",
 }
 PAGE_POLICY: Final = "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
-"""Content security policy of a page that does not send one of its own; it may state more in its markup."""
+"""Content security policy of pages without their own header. A page may add rules in its markup."""
 DATA_POLICY: Final = "default-src 'none'; frame-ancestors 'none'"
-"""Content security policy of everything else."""
+"""Content security policy of responses other than pages."""
 
 
 async def add_headers(message: Message, scope: Scope) -> None:
-    """Add the headers that an answer does not have (a hook of Litestar)."""
+    """Add the missing headers to a response (a hook of Litestar)."""
     if message["type"] != "http.response.start":
         return
     headers = MutableScopeHeaders.from_message(message)

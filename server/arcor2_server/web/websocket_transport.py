@@ -1,4 +1,4 @@
-"""The websocket transport on uvicorn: text frames from bytes, awaitable pings, abort."""
+"""The websocket transport on uvicorn: encoded text messages, pings that can be awaited, and abort."""
 
 import asyncio
 import secrets
@@ -12,15 +12,15 @@ from websockets.http11 import Request
 from arcor2_server.access.connection_limits import Connection
 
 CLOSE_WITHIN: Final = 1.0
-"""Seconds that a client without a pong has to take the close frame."""
+"""Time limit for sending the close frame to a client that does not answer pings, s."""
 LONGEST_UNADMITTED: Final = 64 * 1024
-"""Bytes of a message at most from a client that is not admitted; a longer one closes the connection."""
+"""Maximum length of a message from an unadmitted client, bytes. A longer message closes the connection."""
 EXTENSION: Final = "arcor2_hw.wire"
-"""The key under which an ASGI scope's extensions hold the connection's WireProtocol."""
+"""Key of the WireProtocol in the extensions of an ASGI scope."""
 
 
 class WireProtocol(WebSocketsSansIOProtocol):
-    """The websocket protocol of uvicorn, with ping, abort and encoded text, which ASGI does not offer."""
+    """The websocket protocol of uvicorn with pings, abort and encoded text messages, which ASGI does not have."""
 
     def __init__(self, *args: Any, connection: Connection, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -30,7 +30,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         self._pongs: dict[bytes, asyncio.Future[None]] = {}
 
     def handle_connect(self, event: Request) -> None:
-        """Put this object into the scope, where the endpoint finds it."""
+        """Put this object into the scope for the endpoint."""
         super().handle_connect(event)
         if (scope := getattr(self, "scope", None)) is not None:
             scope["extensions"][EXTENSION] = self
@@ -44,17 +44,17 @@ class WireProtocol(WebSocketsSansIOProtocol):
             waiter.set_result(None)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take over a connection whose handshake is to be answered."""
+        """Take over a connection from the HTTP protocol."""
         super().connection_made(transport)
         self._connection.drop = self.abort
 
     def admit(self) -> None:
-        """Count the connection among those of admitted clients, and take its long messages."""
+        """Count the connection among the admitted ones, and accept long messages."""
         self._connection.admit()
         self.conn.max_message_size = self._max_size
 
     def keepalive_timeout(self) -> None:
-        """Close the connection; drop it where the other side does not even take the close frame."""
+        """Close the connection; abort it if the client does not receive the close frame in time."""
         super().keepalive_timeout()
         self.loop.call_later(CLOSE_WITHIN, self.abort)
 
@@ -68,7 +68,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         self._pongs.clear()
 
     def send_text_now(self, message: bytes) -> bool:
-        """Send an encoded text message unless the connection is full, or closed; return whether it was sent."""
+        """Send an encoded text message unless the connection is closed or its buffer full; return whether it was sent."""
         if self.disconnected or self.close_sent or not self.writable.is_set():
             return False
         try:
@@ -79,17 +79,17 @@ class WireProtocol(WebSocketsSansIOProtocol):
         return True
 
     async def send_text(self, message: bytes) -> None:
-        """Send an encoded text message when the connection takes it; ConnectionError when it is closed."""
+        """Send an encoded text message as soon as the buffer has room. Raise ConnectionError if it is closed."""
         while not self.send_text_now(message):
             if self.writable.is_set():
                 raise ConnectionError("the connection is closed")
             await self.writable.wait()
 
     async def ping(self) -> None:
-        """Return when a ping is answered; ConnectionError when the connection ends."""
+        """Send a ping and wait for its answer. Raise ConnectionError if the connection ends."""
         if self.disconnected or self.close_sent:
             raise ConnectionError("the connection is closed")
-        payload = secrets.token_bytes(8)  # four bytes are those of uvicorn's own pings
+        payload = secrets.token_bytes(8)  # uvicorn's own pings have four bytes
         waiter = self._pongs[payload] = self.loop.create_future()
         try:
             self.conn.send_ping(payload)
@@ -99,6 +99,6 @@ class WireProtocol(WebSocketsSansIOProtocol):
             self._pongs.pop(payload, None)
 
     def abort(self) -> None:
-        """Drop the connection at once, with its buffers."""
+        """Close the connection at once, without sending buffered data."""
         if not self.disconnected:
             self.transport.abort()

@@ -23,43 +23,43 @@ class CloseCode(enum.IntEnum):
     """Close codes of the server (RFC 6455 section 7.4; 4000 and above are private)."""
 
     GOING_AWAY = 1012
-    """The server ends."""
+    """The server stops."""
     TOO_BIG = 1009
-    """A message was longer than can be drained."""
+    """A message was too long to be drained."""
     NOT_ADMITTED = 4401
-    """The token was wrong, was revoked, ran out, or did not come in time."""
+    """The token was wrong, revoked, expired, or did not arrive in time."""
     TOO_SLOW = 4008
-    """The client did not take what was sent to it."""
+    """The client received its messages too slowly."""
 
 
 class Wire(Protocol):
     """The transport of a client."""
 
     def send_now(self, message: bytes) -> bool:
-        """Send one text message if the connection takes it at once; return whether it did."""
+        """Send a text message if the buffer has room; return whether it was sent."""
 
     async def send(self, message: bytes) -> None:
-        """Send one text message when the connection takes it. ConnectionError when it is closed."""
+        """Send a text message as soon as the buffer has room. Raise ConnectionError if the connection is closed."""
 
     async def ping(self) -> None:
-        """Return when the other side has answered a ping."""
+        """Send a ping and wait for its answer."""
 
     async def close(self, code: int, reason: str) -> None:
         """Send a close frame and end the connection."""
 
     def admit(self) -> None:
-        """Count the connection among those of admitted clients."""
+        """Count the connection among the admitted ones."""
 
     def abort(self) -> None:
-        """Drop the connection at once."""
+        """Close the connection at once."""
 
 
 ABORT_AFTER: Final = 1.0
-"""Time limit for sending a close frame before the connection is dropped, s."""
+"""Time limit for sending a close frame before the connection is aborted, s."""
 
 
 class Client:
-    """A connected client. Messages are sent in order; of a stream only the newest message is queued."""
+    """A connected client. Messages are sent in order. Of each stream only the newest message is queued."""
 
     def __init__(self, wire: Wire, settings: ServerSettings) -> None:
         self.number = next(_numbers)
@@ -69,16 +69,16 @@ class Client:
         self.token: Token | None = None
         """The token of the client, if it sent one."""
         self.greeting: Callable[[], list[Event]] = list
-        """Returns the events for the client when it is admitted."""
+        """Returns the first events for the client, sent when it is admitted."""
         self.events: frozenset[str] | None = None
-        """The events for the client, None for all."""
+        """Names of the events for the client, None for all."""
         self.follows: frozenset[str] = frozenset()
         """Other users whose view states the client receives."""
         self.admitted = False
         """Before it is admitted, the client receives no events, and only Authenticate is served."""
         self._wire = wire
         self._settings = settings
-        self._waiting: deque[bytes | str] = deque()  # a str stands for the newest message of that stream
+        self._waiting: deque[bytes | str] = deque()  # a str is the name of a stream, see _newest
         self._newest: dict[str, bytes] = {}
         self._bytes = 0
         self._wake = asyncio.Event()
@@ -89,7 +89,7 @@ class Client:
         return f"<Client {self.number} {self.user or 'not logged in'}>"
 
     def admit(self, role: Role, token: Token | None = None) -> None:
-        """Let the client in."""
+        """Admit the client with a role."""
         self.role, self.token, self.admitted = role, token, True
         self._wire.admit()
         if token is not None:
@@ -97,40 +97,40 @@ class Client:
 
     @property
     def name(self) -> str:
-        """Return the name of the user, else of the token; empty if both are unknown."""
+        """The name of the user, else of the token; empty if both are unknown."""
         return self.user or ("" if self.token is None else self.token.name)
 
     @property
     def closed(self) -> bool:
-        """Return whether nothing more will be sent."""
+        """Whether no more messages are sent."""
         return self._closing is not None
 
     def put(self, message: bytes) -> None:
-        """Queue an encoded message; a client that lags too far behind is closed instead."""
-        if self._closing is not None:
-            return
-        # The usual case: nothing waits, and the connection takes it without the way through the writer.
-        if not self._waiting and self._sending_since is None and self._wire.send_now(message):
-            return
-        self._waiting.append(message)
-        self._bytes += len(message)
-        if len(self._waiting) > 1 and self._lagging():
-            self.close(CloseCode.TOO_SLOW, "too slow: messages were not taken")
-        self._wake.set()
+        """Queue an encoded message. Close the connection if the client is too slow."""
+        if not self._sent_or_closed(message):
+            self._queue(message, len(message))
 
     def put_newest(self, stream: str, message: bytes) -> None:
         """Queue the newest message of a stream in place of the one that still waits."""
-        if self._closing is not None:
-            return
-        if not self._waiting and self._sending_since is None and self._wire.send_now(message):
+        if self._sent_or_closed(message):
             return
         previous = self._newest.get(stream)
         self._newest[stream] = message
         if previous is None:
-            self._waiting.append(stream)
-            self._bytes += len(message)
+            self._queue(stream, len(message))
         else:
-            self._bytes += len(message) - len(previous)
+            self._queue(None, len(message) - len(previous))
+
+    def _sent_or_closed(self, message: bytes) -> bool:
+        """Send a message at once if no other waits; return whether it need not be queued."""
+        if self._closing is not None:
+            return True
+        return not self._waiting and self._sending_since is None and self._wire.send_now(message)
+
+    def _queue(self, item: bytes | str | None, size: int) -> None:
+        if item is not None:
+            self._waiting.append(item)
+        self._bytes += size
         if len(self._waiting) > 1 and self._lagging():
             self.close(CloseCode.TOO_SLOW, "too slow: messages were not taken")
         self._wake.set()
@@ -141,20 +141,20 @@ class Client:
         return stuck or self._bytes > limits.outgoing_bytes or len(self._waiting) > limits.outgoing_messages
 
     def close(self, code: int, reason: str) -> None:
-        """End the connection; what waits is dropped."""
+        """Close the connection. Queued messages are discarded."""
         if self._closing is not None:
             return
         log.info("client closed", client=self.number, user=self.user, code=int(code), reason=reason)
         self._end(code, reason)
         self._wake.set()
         if self._sending_since is not None:
-            # The writer hangs in a full connection: no close frame gets through either.
+            # The writer waits for a full buffer, so the close frame cannot be sent either.
             asyncio.get_running_loop().call_later(ABORT_AFTER, self._wire.abort)
 
     def lost(self) -> None:
         """Stop sending, since the connection is closed."""
         if self._closing is None:
-            self._end(1006, "the connection is gone")
+            self._end(1006, "the connection is lost")
 
     def _end(self, code: int, reason: str) -> None:
         self._closing = (code, reason)
@@ -163,7 +163,7 @@ class Client:
         self._bytes = 0
 
     async def ping(self, within: float) -> bool:
-        """Return whether the other side answers a ping within that many seconds."""
+        """Return whether the client answers a ping in time. `within`: time limit, s."""
         try:
             async with asyncio.timeout(within):
                 await self._wire.ping()
@@ -172,7 +172,7 @@ class Client:
         return True
 
     async def write(self) -> None:
-        """Send what is queued until the connection ends. Runs as a task of its own."""
+        """Send queued messages until the connection ends. Run this as a separate task."""
         waiting, newest = self._waiting, self._newest
         try:
             while True:

@@ -1,4 +1,4 @@
-"""The websocket endpoint: decodes requests, calls their handlers and answers every message."""
+"""The websocket endpoint: decodes requests, calls their handlers and answers each message."""
 
 import asyncio
 import logging
@@ -44,28 +44,28 @@ UNREADABLE: Final = "Error"
 LONGEST_NAME: Final = 200
 """Maximum length of an unknown request name in an answer, characters."""
 LONGEST_REASON: Final = 4000
-"""Maximum length of a refusal, characters; its quotations may be as long as the request."""
+"""Maximum length of the message of a refusal, characters. It may quote the request."""
 _decode_request = msgspec.json.Decoder(Request).decode
 _decode_anything = msgspec.json.Decoder().decode
 
 
 class _Head(Struct):
-    """The readable part of a message that is not served."""
+    """Id and name of a message that is refused, as far as they are readable."""
 
     id: int = 0
     request: str = UNREADABLE
 
 
-class _ReadableHead(Struct):
+class _CompleteHead(Struct):
     id: int
     request: str
 
 
-_decode_head = msgspec.json.Decoder(_ReadableHead).decode
+_decode_head = msgspec.json.Decoder(_CompleteHead).decode
 
 
 class Route(Struct, frozen=True):
-    """One request with all that is needed to serve it."""
+    """A request of the protocol, its handler, its cached answer and the decoder of its arguments."""
 
     rpc: Rpc
     handler: Handler | None
@@ -76,7 +76,7 @@ class Route(Struct, frozen=True):
 
 
 def routes(handlers: Mapping[str, Handler], cached: Mapping[str, CachedAnswer]) -> dict[str, Route]:
-    """Return a route for each request of the protocol, with its handler where there is one."""
+    """Return a route for each request of the protocol. Requests without a handler are refused."""
     table = {}
     for name, rpc in RPCS.items():
         default: Any = None
@@ -91,15 +91,18 @@ def routes(handlers: Mapping[str, Handler], cached: Mapping[str, CachedAnswer]) 
 
 
 class Service(Struct, frozen=True):
-    """What an endpoint serves: its requests, the greeting of a client, and the events for clients (None: all)."""
+    """A websocket service."""
 
     routes: dict[str, Route]
+    """The requests by name."""
     greeting: Callable[[], list[Event]]
+    """Returns the first events for a client."""
     events: frozenset[str] | None = None
+    """Names of the events that clients receive, None for all."""
 
 
 class _SocketWire:
-    """The transport of a client: the ASGI socket for closing, the protocol below it for everything else."""
+    """The transport of a client: the ASGI socket for closing, and its protocol for everything else."""
 
     def __init__(self, socket: WebSocket[Any, Any, Any], protocol: WireProtocol) -> None:
         self._socket = socket
@@ -138,10 +141,10 @@ class Endpoint:
         self._tasks: set[asyncio.Task[None]] = set()
         self._watch: asyncio.Task[None] | None = None
         self._holds: WeakKeyDictionary[Client, tuple[str, str, int, str]] = WeakKeyDictionary()
-        """The last logged hold of each client."""
+        """The last logged hold-to-run request of each client."""
 
     async def serve(self, socket: WebSocket[Any, Any, Any]) -> None:
-        """Serve one connection until it ends."""
+        """Serve a connection until it ends."""
         await socket.accept()
         if self._watch is None:
             self._watch = asyncio.create_task(self._watch_tokens(), name="tokens")
@@ -181,7 +184,7 @@ class Endpoint:
             log.info("client disconnected", client=client.number, user=client.user)
 
     async def _watch_tokens(self) -> None:
-        """Close the connections whose token became invalid, and report a damaged token file."""
+        """Close the connections with invalid tokens, and report a damaged token file."""
         reported = self._access.damage
         while True:
             await asyncio.sleep(TOKENS_PERIOD)
@@ -197,7 +200,7 @@ class Endpoint:
                 self._damage.report(reported)
 
     async def close(self) -> None:
-        """Cancel the requests that are still being worked on."""
+        """Cancel the requests that are still being handled."""
         if self._watch is not None:
             self._watch.cancel()
             await asyncio.gather(self._watch, return_exceptions=True)
@@ -251,14 +254,14 @@ class Endpoint:
                 task.add_done_callback(held.discard)
 
     def _answer_from_cache(self, client: Client, request: Request, route: Route) -> bool:
-        """Send the cached answer; return whether there was one."""
+        """Send the cached answer if there is one; return whether it was sent."""
         if client.role < route.rpc.role or route.cached is None:
             return False
         try:
             data = route.cached()
         except Exception:
-            # The handler meets the same trouble, and answers it.
-            log.exception("no kept answer", request=request.request)
+            # The handler will meet the same error and report it.
+            log.exception("cached answer failed", request=request.request)
             return False
         if data is not None:
             client.put(encode(Response(request.id, request.request, True, UNSET, data)))
@@ -306,10 +309,10 @@ class Endpoint:
         try:
             data = await route.handler(context, args)
         except RequestRefused as error:
-            # Data in a refusal means that a part was done, and its events are true.
-            partly = error.data is not UNSET
+            # A refusal with data means that a part of the request was done, so its events are sent.
+            partly_done = error.data is not UNSET
             text = _shortened(str(error))
-            self._answer(client, request, context if partly else None, False, error.data, text, error.code)
+            self._answer(client, request, context if partly_done else None, False, error.data, text, error.code)
             self._note("refused", client, rpc, args, dry_run=context.dry_run)
             return
         except Arcor2Error as error:
@@ -322,14 +325,14 @@ class Endpoint:
         self._note("done", client, rpc, args, dry_run=context.dry_run)
 
     def _note(self, outcome: str, client: Client, rpc: Rpc, args: Any, *, dry_run: bool = False) -> None:
-        """Log a command, or what was refused by role; of a hold, which is renewed ten times a second, its start."""
+        """Log a command, or any request refused by role. A hold-to-run request is logged once, not on each renewal."""
         if outcome != "forbidden" and (dry_run or not audit.is_command(rpc)):
             return
         if (hold := getattr(args, "hold", None)) is not None:
-            press = (rpc.name, args.robot_id, hold, outcome)
-            if self._holds.get(client) == press:
+            logged = (rpc.name, args.robot_id, hold, outcome)
+            if self._holds.get(client) == logged:
                 return
-            self._holds[client] = press
+            self._holds[client] = logged
         target = audit.target_of(args)
         audit.note(outcome, rpc.name, user=client.name, role=client.role, address=client.address, target=target)
 
@@ -343,8 +346,10 @@ class Endpoint:
         message: str = "",
         code: str = "",
     ) -> None:
-        told = code if code and request.codes else UNSET
-        response = encode(Response(request.id, request.request, result, [message] if message else UNSET, data, told))
+        sent_code = code if code and request.codes else UNSET
+        response = encode(
+            Response(request.id, request.request, result, [message] if message else UNSET, data, sent_code)
+        )
         if context is None:
             client.put(response)
             return
@@ -363,8 +368,8 @@ class Endpoint:
         if log.is_enabled_for(logging.DEBUG):
             log.debug("refused", client=client.number, request=name, message=message)
         try:
-            told = code if code and isinstance(request, Request) and request.codes else UNSET
-            answer = encode(Response(request.id, name, False, [message], UNSET, told))
+            sent_code = code if code and isinstance(request, Request) and request.codes else UNSET
+            answer = encode(Response(request.id, name, False, [message], UNSET, sent_code))
         except UnicodeEncodeError:
             # A name with half a surrogate pair can be read but not sent back.
             answer = encode(Response(request.id, UNREADABLE, False, [ascii(message)]))
@@ -376,7 +381,7 @@ def _shortened(message: str) -> str:
 
 
 def _read_head(text: str) -> _Head:
-    """Read the id and name of a message that is invalid or too long, as far as possible."""
+    """Return the id and name of a message that is invalid or too long, as far as they are readable."""
     try:
         readable = _decode_head(text)
     except (msgspec.DecodeError, RecursionError):

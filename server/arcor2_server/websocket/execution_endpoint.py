@@ -13,7 +13,7 @@ from arcor2_server.websocket.endpoint import AUTHENTICATE, Route, Service
 from arcor2_server.websocket.request import Context
 
 API_VERSION: Final = "1.2.0"
-"""Of the Execution service whose behaviour this is: an ARServer of the original refuses another major version."""
+"""Version of the Execution service of ARCOR2 whose behaviour this is. ARServer of ARCOR2 checks the major version."""
 REQUESTS: Final = (
     "DeletePackage",
     "ListPackages",
@@ -25,7 +25,7 @@ REQUESTS: Final = (
     "StopPackage",
     "UploadPackage",
 )
-"""Those that ARServer serves too; Version is here alone."""
+"""The requests that ARServer serves too. Only this service has the request Version."""
 EVENTS: Final = frozenset(
     {
         "ActionStateAfter",
@@ -41,7 +41,7 @@ EVENTS: Final = frozenset(
 
 
 class VersionData(Data, frozen=True):
-    """The answer to the request Version."""
+    """Answer to Version."""
 
     version: str = ""
 
@@ -51,7 +51,7 @@ async def _version(context: Context, args: Any) -> VersionData:  # noqa: ARG001
 
 
 def execution_service(routes: Mapping[str, Route], state_and_info: Callable[[], tuple[Event, bytes | None]]) -> Service:
-    """Return what the websocket of the Execution service serves.
+    """Return the websocket service of the Execution service.
 
     Args:
         routes: the routes of all requests.

@@ -1,4 +1,4 @@
-"""One request of the protocol while it is served: its client and the events that it sends."""
+"""The context of a request: its client and the events that it sends."""
 
 import time
 from collections.abc import Awaitable, Callable
@@ -14,10 +14,10 @@ from arcor2_server.websocket.client import Client
 
 
 class Context:
-    """What a handler receives next to its arguments.
+    """The context of a request, which its handler receives besides the arguments.
 
-    Events: `emit` sends to all clients after the response, `emit_first` before it (protocol, section 2). They are
-    sent when the request is granted, or refused with data. Any other error drops them.
+    `emit` sends an event to all clients after the response, `emit_first` before it (protocol, section 2). Events are
+    sent if the request succeeds or is refused with data. Any other error discards them.
     """
 
     __slots__ = (
@@ -39,11 +39,11 @@ class Context:
         self.events_before: list[Event] = []
         self.events_after: list[Event] = []
         self.events_to_caller: list[Event] = []
-        """Sent to the caller alone, after the response."""
+        """Events for the caller only, sent after the response."""
 
     @property
     def user(self) -> str:
-        """The registered name of the caller. Raises NotRegistered if there is none."""
+        """The registered name of the caller. Raise NotRegistered if there is none."""
         if self.client.user is None:
             raise NotRegistered("You are not logged in: send RegisterUser first.")
         return self.client.user

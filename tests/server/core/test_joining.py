@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from arcor2_server.access import addresses as module
-from arcor2_server.access.addresses import joining
+from arcor2_server.access.addresses import server_addresses
 from arcor2_server.settings import ServerSettings
 
 
@@ -30,16 +30,16 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_invitations_list_reachable_addresses(tmp_path: Path, host: str, addresses: list[str]) -> None:
-    assert joining(ServerSettings(data_dir=tmp_path, host=host), 1).addresses == addresses
+    assert server_addresses(ServerSettings(data_dir=tmp_path, host=host), 1).addresses == addresses
 
 
 def test_invitations_use_the_port_of_the_request(tmp_path: Path) -> None:
     settings = ServerSettings(data_dir=tmp_path, host="192.0.2.9", port=0, fingerprint="AB:CD")
-    found = joining(settings, 41234)
+    found = server_addresses(settings, 41234)
     assert (found.addresses, found.fingerprint) == (["https://192.0.2.9:41234"], "AB:CD")
 
 
 def test_without_a_network_there_is_no_invitation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "_way_out", str)
     monkeypatch.setattr(module, "_of_name", list)
-    assert joining(ServerSettings(data_dir=tmp_path, host="0.0.0.0"), 1).addresses == []
+    assert server_addresses(ServerSettings(data_dir=tmp_path, host="0.0.0.0"), 1).addresses == []
