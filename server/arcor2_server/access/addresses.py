@@ -25,7 +25,7 @@ class ServerAddresses(Data, frozen=True):
 
 
 def server_addresses(settings: ServerSettings, port: int) -> ServerAddresses:
-    """Return the addresses of this server. `port` is used if the settings leave the choice of the port to the system."""
+    """Return the addresses of this server. `port` is used if the settings do not name one."""
     scheme = "https" if settings.fingerprint else "http"
     port = settings.port or port
     hosts = [host for host in _hosts(settings.host) if not is_loopback(host)]

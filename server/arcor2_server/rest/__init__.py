@@ -1,4 +1,4 @@
-"""The REST operations of all services; each declares the role that it needs."""
+"""The REST operations of all services. Each declares the role that it needs."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -32,11 +32,11 @@ from arcor2_server.rest.operations import OPERATIONS, bound, route
 
 
 def routes(groups: Iterable[object], tasks: Tasks) -> list[HTTPRouteHandler]:
-    """Return the routes of one application.
+    """Return the routes of all operations.
 
     Args:
-        groups: the objects on which the operations are declared as methods.
-        tasks: where the progress of uploads is shown.
+        groups: the objects whose methods are the operations.
+        tasks: the tasks, for the progress of uploads.
     """
     return [route(declared, tasks) for declared in bound(OPERATIONS, groups)]
 

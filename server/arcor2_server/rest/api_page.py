@@ -16,7 +16,7 @@ PAGE: Final = Path(__file__).with_name("api_page.html")
 
 @functools.cache
 def page() -> str:
-    """Return the page; its policy allows its own style and script by their digests, and nothing else."""
+    """Return the page. Its content security policy allows only its own style and script, by their digests."""
     text = PAGE.read_text(encoding="utf-8")
     for kind, place in (("style", "STYLE"), ("script", "SCRIPT")):
         (content,) = re.findall(rf"<{kind}>(.*?)</{kind}>", text, re.DOTALL)
@@ -30,5 +30,5 @@ class ApiPageOperations:
 
     @operation("GET", "/swagger", SERVER, Role.OPERATOR, open=True, media_type="text/html")
     async def swagger_page(self) -> str:
-        """Answer with a page on which all operations can be read and tried."""
+        """Return a page for reading and trying all operations."""
         return page()

@@ -17,7 +17,7 @@ from arcor2_server.storage.assets import CHUNK, MAX_ASSET
 
 
 class AssetQuery(Data, frozen=True):
-    """The id (one is made where none is given), a remark, and whether one of that id is replaced."""
+    """Id of the asset (by default a new one), description, and whether to replace an asset with this id."""
 
     id: str | Unset = UNSET
     description: str | Unset = UNSET
@@ -25,7 +25,7 @@ class AssetQuery(Data, frozen=True):
 
 
 class AssetInfo(Data, frozen=True):
-    """What is known of an asset."""
+    """Metadata of an asset."""
 
     id: str
     created: Timestamp
@@ -38,14 +38,14 @@ def _info(asset: Asset) -> AssetInfo:
     return AssetInfo(asset.id, asset.created, asset.modified, asset.file_name, asset.description)
 
 
-async def _pieces(file: IO[bytes]) -> AsyncIterator[bytes]:
+async def _chunks(file: IO[bytes]) -> AsyncIterator[bytes]:
     while chunk := await asyncio.to_thread(file.read, CHUNK):
         yield chunk
 
 
 @dataclass(frozen=True, slots=True)
 class AssetOperations:
-    """Assets over REST: files that come and go as streams (protocol, section 13)."""
+    """Assets over REST, streamed in both directions (protocol, section 13)."""
 
     _assets: AssetStore
     _type_notifications: TypeNotifications
@@ -56,17 +56,17 @@ class AssetOperations:
         STORAGE,
         Role.TECHNICIAN,
         file="assetData",
-        title="Taking in a file",
+        title="Uploading a file",
         shown_from=MIB,
         limit=MAX_ASSET + MIB,
     )
     async def post_asset(self, query: AssetQuery, upload: Upload) -> AssetInfo:
-        """Take in a file, a mesh or a robot's description."""
+        """Upload an asset: a mesh, a robot description or any other file."""
         key = None if isinstance(query.id, Unset) else query.id
         if key is not None:
             check_id(key, "asset")
         asset = await self._assets.put(
-            _pieces(upload.file),
+            _chunks(upload.file),
             key,
             file_name=upload.filename or UNSET,
             description=query.description,
@@ -77,12 +77,12 @@ class AssetOperations:
 
     @operation("GET", "/assets/info", STORAGE, Role.OPERATOR)
     async def list_assets(self) -> list[AssetInfo]:
-        """List the assets."""
+        """Return the metadata of all assets."""
         return [_info(asset) for asset in self._assets.infos()]
 
     @operation("GET", "/assets/{asset_id}/exists", STORAGE, Role.OPERATOR)
     async def asset_exists(self, asset_id: str) -> bool:
-        """Return whether there is such an asset."""
+        """Return whether an asset exists."""
         return self._assets.exists(asset_id)
 
     @operation("GET", "/assets/{asset_id}/data", STORAGE, Role.OPERATOR, media_type="application/octet-stream")
@@ -94,6 +94,6 @@ class AssetOperations:
 
     @operation("DELETE", "/assets/{asset_id}", STORAGE, Role.TECHNICIAN)
     async def delete_asset(self, asset_id: str) -> None:
-        """Delete an asset; a type that needs it has a problem from then on."""
+        """Delete an asset. Object types that need it then report a problem."""
         await self._assets.delete(asset_id)
         await self._type_notifications.uploaded()

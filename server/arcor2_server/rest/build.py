@@ -19,7 +19,7 @@ ZIP = "application/zip"
 
 
 class PublishQuery(Data, frozen=True, rename="camel"):
-    """Of which project, and how the package is to be named: without a name as the project."""
+    """Id of the project, and name of the package, by default that of the project."""
 
     project_id: str
     package_name: str = ""
@@ -33,7 +33,7 @@ def _copy(source: IO[bytes], target: Path) -> None:
 
 @dataclass(frozen=True, slots=True)
 class BuildOperations:
-    """The Build service over REST."""
+    """The Build service over REST: builds and imports packages (protocol, section 11)."""
 
     _storage: Storage
     _build: BuildService
@@ -41,7 +41,7 @@ class BuildOperations:
 
     @operation("GET", "/project/publish", BUILD, Role.STANDARD_USER, media_type=ZIP)
     async def publish(self, query: PublishQuery) -> Binary:
-        """Return the package of a saved project as a zip."""
+        """Build a package from a saved project; return it as a zip file."""
         content = await self._build.publish(query.project_id, query.package_name)
         name = query.package_name or (await self._storage.project(query.project_id)).name
         return Binary(content, ZIP, f"{name}_package.zip")
@@ -52,11 +52,11 @@ class BuildOperations:
         BUILD,
         Role.PROGRAMMER,
         file="executionPackage",
-        title="Taking in a project",
+        title="Importing a project",
         limit=MAX_UPLOAD + MIB,
     )
     async def import_project(self, query: ImportOptions, upload: Upload) -> ImportedIds:
-        """Save the scene, project and object types of a package. Overwriting differing documents must be allowed."""
+        """Import the scene, project and object types of a package. The query allows overwriting existing ones."""
         with tempfile.TemporaryDirectory(prefix="arcor2-import-") as directory:
             path = Path(directory) / "package.zip"
             await asyncio.to_thread(_copy, upload.file, path)

@@ -21,12 +21,13 @@ from arcor2_server.workspace.robots import SceneRobots
 T = TypeVar("T")
 CALIBRATION = "Calibration"
 MAX_IMAGE: Final = 64 * MIB
+"""Maximum size of a picture file, bytes."""
 COEFFICIENTS: Final = (4, 5, 8, 12)
-"""How many distortion coefficients there may be."""
+"""Possible numbers of distortion coefficients."""
 
 
 class CameraQuery(Data, frozen=True, rename="camel"):
-    """Focal lengths and centre, pixels, and the coefficients of distortion."""
+    """Focal lengths and principal point, pixels, and distortion coefficients."""
 
     fx: float
     fy: float
@@ -35,20 +36,20 @@ class CameraQuery(Data, frozen=True, rename="camel"):
     dist_coefs: list[float]
 
     def parameters(self) -> CameraParameters:
-        """Return them as the rest of the server has them. Raise InvalidData if that is impossible."""
+        """Return the parameters as CameraParameters. Raise InvalidData for a wrong number of coefficients."""
         if len(self.dist_coefs) not in COEFFICIENTS:
             raise InvalidData("distCoefs needs 4, 5, 8 or 12 numbers, not {count}.", count=len(self.dist_coefs))
         return CameraParameters(self.fx, self.fy, self.cx, self.cy, list(self.dist_coefs))
 
 
 class CameraPoseQuery(CameraQuery, frozen=True, rename="camel"):
-    """With `inverse` the pose of the origin in the camera's frame is asked for."""
+    """Camera parameters, and whether to return the pose of the world in the camera frame instead."""
 
     inverse: bool = False
 
 
 class CalibrateRobotArgs(Data, frozen=True):
-    """A robot as a camera of known pose sees it. robot_pose: where it is taken to stand. urdf_uri: names an asset."""
+    """A robot seen by a camera with a known pose. robot_pose: assumed pose of the robot. urdf_uri: names an asset."""
 
     robot_joints: list[Joint]
     robot_pose: Pose
@@ -58,9 +59,10 @@ class CalibrateRobotArgs(Data, frozen=True):
 
 
 def read_args(text: str, kind: type[T]) -> T:
-    """Read the part `args` of a multipart body, JSON in either spelling of names.
+    """Decode the part `args` of a multipart body, JSON with names in camelCase or snake_case.
 
-    Raise InvalidData if that is impossible.
+    Raises:
+        InvalidData: the text is not JSON of this type.
     """
     try:
         args = msgspec.convert(snaked(msgspec.json.decode(text)), kind)
@@ -72,14 +74,14 @@ def read_args(text: str, kind: type[T]) -> T:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationOperations:
-    """The Calibration service over REST as the original has it (protocol, section 15)."""
+    """The Calibration service of ARCOR2 over REST (protocol, section 15)."""
 
     _calibration: Calibration
     _robots: SceneRobots
 
     @operation("PUT", "/calibrate/camera", CALIBRATION, Role.TECHNICIAN, file="image", limit=MAX_IMAGE)
     async def calibrate_camera(self, query: CameraPoseQuery, upload: Upload) -> EstimatedPose:
-        """Return the pose of the camera, which sees markers whose poses are known."""
+        """Return the pose of a camera from the configured markers in its picture."""
         parameters = query.parameters()
         image = await asyncio.to_thread(upload.file.read)
         return (await self._calibration.camera(parameters, [image])).estimated(inverse=query.inverse)
@@ -93,7 +95,7 @@ class CalibrationOperations:
 
     @operation("PUT", "/calibrate/robot", CALIBRATION, Role.TECHNICIAN, file="image", parts=("args",), limit=MAX_IMAGE)
     async def calibrate_robot(self, upload: Upload) -> Pose:
-        """Return the pose of a robot that a depth camera of known pose sees (16 bit, mm)."""
+        """Return the pose of a robot from the depth picture (16 bit, mm) of a camera with a known pose."""
         args = read_args(upload.fields["args"], CalibrateRobotArgs)
         view = RobotView(args.robot_joints, args.robot_pose, args.camera_pose, args.camera_parameters)
         model = self._robots.model_of_uri(args.urdf_uri)

@@ -1,9 +1,11 @@
-"""Further calibrations over REST, with complete results (docs/protocol.md)."""
+"""Calibrations beyond the ARCOR2 protocol, over REST (docs/protocol.md)."""
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
+import msgspec
 from msgspec import Meta, field
 from msgspec.structs import replace
 
@@ -19,7 +21,7 @@ from arcor2_hw.calibration.camera_results import (
 )
 from arcor2_hw.calibration.configuration import CalibrationConfiguration
 from arcor2_hw.calibration.layout import CharucoBoard, Layout
-from arcor2_hw.calibration.records import CalibrationKind
+from arcor2_hw.calibration.records import CalibrationInput, CalibrationKind, CalibrationRecord
 from arcor2_hw.calibration.results import RobotPose, TouchedFrame, TouchedOrientation, TouchedTip
 from arcor2_hw.compute import calibration_tasks as t
 from arcor2_hw.data.base import UNSET, Data, Unset
@@ -29,22 +31,23 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.compute.workers import Compute
 from arcor2_server.rest.calibration import CALIBRATION, CalibrateRobotArgs, read_args
-from arcor2_server.rest.calibration_records import RecordAs, store_record, store_touch_record
+from arcor2_server.rest.calibration_records import RecordAs
 from arcor2_server.rest.operations import MIB, Binary, Upload, Uploads, operation
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.workspace.markers import Markers
 from arcor2_server.workspace.robots import SceneRobots
 
 MAX_PICTURES: Final = 256 * MIB
-"""Bytes of all pictures together."""
+"""Maximum size of all pictures of a request, bytes."""
 MOST_POINTS: Final = 1000
+"""Maximum number of points of a request."""
 
 Points = Annotated[list[Position], Meta(max_length=MOST_POINTS)]
 
 
 # ------------------------------------------------------------------------------------------------ pictures
 class CameraArgs(Data, frozen=True):
-    """markers: where they stand, else as configured. options: else as configured. record: keep one of the result."""
+    """Camera parameters. markers, options: by default the configured ones. record: whether to store the result."""
 
     camera_parameters: CameraParameters
     markers: CalibrationConfiguration | Unset = UNSET
@@ -53,7 +56,7 @@ class CameraArgs(Data, frozen=True):
 
 
 class CameraPictureArgs(Data, frozen=True):
-    """result: what `camera` gave for this picture."""
+    """Camera parameters, and the result of the calibration with this picture."""
 
     camera_parameters: CameraParameters
     result: CameraPose
@@ -61,7 +64,7 @@ class CameraPictureArgs(Data, frozen=True):
 
 
 class RobotArgs(CalibrateRobotArgs, frozen=True):
-    """distance (m), angle (rad): by how much the pose may be off. record: keep one of the result."""
+    """A robot seen by a camera. distance (m), angle (rad): maximum errors of its assumed pose."""
 
     distance: Annotated[float, Meta(gt=0, le=1)] = 0.08
     angle: Annotated[float, Meta(gt=0, le=1)] = 0.14
@@ -69,7 +72,7 @@ class RobotArgs(CalibrateRobotArgs, frozen=True):
 
 
 class HandEyeArgs(Data, frozen=True):
-    """flanges: of the robot, in its base frame, one for each picture, in the same order. target: what is seen."""
+    """flanges: poses of the flange in the base frame of the robot, one per picture. target: the calibration target."""
 
     flanges: list[Pose]
     camera_parameters: CameraParameters
@@ -80,7 +83,7 @@ class HandEyeArgs(Data, frozen=True):
 
 
 class IntrinsicsArgs(Data, frozen=True):
-    """board: what is seen."""
+    """The board in the pictures."""
 
     board: CharucoBoard
     options: IntrinsicsOptions = IntrinsicsOptions()
@@ -105,7 +108,7 @@ class FrameByAxesArgs(Data, frozen=True):
 
 
 class FrameByPointsArgs(Data, frozen=True):
-    """Points in the frame that is looked for, and where they were touched, in the same order; m."""
+    """Points in the frame to be found, and their touched positions, in the same order; m."""
 
     known: Points
     touched: Points
@@ -128,7 +131,7 @@ class AlignmentArgs(Data, frozen=True):
 
 
 class DirectionsArgs(Data, frozen=True):
-    """The tip, then moved along the tool's +z, then from the tip to its +x side; the flange does not turn meanwhile."""
+    """Positions of the tip at one flange orientation: at the start, moved along the tool's +z, and to its +x side."""
 
     flange: Orientation
     tip: Position
@@ -139,7 +142,7 @@ class DirectionsArgs(Data, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class MeasurementCalibrationOperations:
-    """Calibrations beyond the original's, over REST (docs/protocol.md): whole results, and more kinds."""
+    """Calibrations beyond the ARCOR2 protocol, over REST (docs/protocol.md)."""
 
     _calibration_records: Calibrations
     _compute: Compute
@@ -162,27 +165,16 @@ class MeasurementCalibrationOperations:
 
     @operation("PUT", "/api/calibration/camera", CALIBRATION, Role.TECHNICIAN, **_MANY)
     async def find_camera_pose(self, uploads: Uploads, person: str) -> CameraPose:
-        """Return the pose of a camera from one or several pictures of the same markers, with all errors."""
+        """Return the pose of a camera from pictures of markers, with all errors."""
         args = read_args(uploads.fields["args"], CameraArgs)
         configuration = self._configured(args.markers)
         options = configuration.options if isinstance(args.options, Unset) else args.options
         pictures = await _pictures(uploads)
         task = t.FindCameraPose(pictures, args.camera_parameters, configuration.layout, options)
         found = await self._compute.run(task)
-        details = {"camera_parameters": args.camera_parameters, "markers": configuration, "options": options}
+        parameters = {"camera_parameters": args.camera_parameters, "markers": configuration, "options": options}
         kind = CalibrationKind.CAMERA_POSE
-        await store_record(
-            self._calibration_records,
-            person,
-            args.record,
-            kind,
-            found,
-            found.residual,
-            "px",
-            pictures,
-            details,
-            found.pose,
-        )
+        await self._store(person, args, kind, found, "px", after=found.pose, pictures=pictures, parameters=parameters)
         return found
 
     @operation(
@@ -196,7 +188,7 @@ class MeasurementCalibrationOperations:
         media_type="image/png",
     )
     async def draw_camera_pose(self, upload: Upload) -> Binary:
-        """Draw where the markers should be with a camera's pose onto its picture; PNG."""
+        """Return the picture of a camera as PNG, with the markers drawn as expected from the camera's pose."""
         args = read_args(upload.fields["args"], CameraPictureArgs)
         picture = await asyncio.to_thread(upload.file.read)
         layout = self._configured(args.markers).layout
@@ -205,7 +197,7 @@ class MeasurementCalibrationOperations:
 
     @operation("PUT", "/api/calibration/robot", CALIBRATION, Role.TECHNICIAN, **_MANY)
     async def find_robot_pose(self, uploads: Uploads, person: str) -> RobotPose:
-        """Return the pose of a robot seen by a depth camera with a known pose (16 bit, mm), with all metrics."""
+        """Return the pose of a robot from depth pictures (16 bit, mm) of a camera with a known pose, with metrics."""
         args = read_args(uploads.fields["args"], RobotArgs)
         pictures = await _pictures(uploads)
         model = replace(self._robots.model_of_uri(args.urdf_uri), base=args.robot_pose)
@@ -214,25 +206,14 @@ class MeasurementCalibrationOperations:
                 model, args.robot_joints, pictures, args.camera_parameters, args.camera_pose, args.distance, args.angle
             )
         )
-        details = {"view": replace(args, record=UNSET)}
+        parameters = {"view": replace(args, record=UNSET)}
         kind = CalibrationKind.ROBOT_POSE
-        await store_record(
-            self._calibration_records,
-            person,
-            args.record,
-            kind,
-            found,
-            found.residual,
-            "m",
-            pictures,
-            details,
-            found.pose,
-        )
+        await self._store(person, args, kind, found, after=found.pose, pictures=pictures, parameters=parameters)
         return found
 
     @operation("PUT", "/api/calibration/hand-eye", CALIBRATION, Role.TECHNICIAN, **_MANY)
     async def find_hand_eye(self, uploads: Uploads, person: str) -> HandEye:
-        """Return the pose of a camera on the flange of a robot, or next to the robot."""
+        """Return the pose of a camera mounted on the flange of a robot or next to the robot."""
         args = read_args(uploads.fields["args"], HandEyeArgs)
         pictures = await _pictures(uploads)
         if len(pictures) != len(args.flanges):
@@ -244,74 +225,99 @@ class MeasurementCalibrationOperations:
         samples = [HandEyeSample(flange, picture) for flange, picture in zip(args.flanges, pictures, strict=True)]
         task = t.FindHandEye(samples, args.camera_parameters, args.target, args.mounting, args.options)
         found = await self._compute.run(task)
-        details = {"args": replace(args, record=UNSET)}
-        kind = CalibrationKind.HAND_EYE
-        await store_record(
-            self._calibration_records,
-            person,
-            args.record,
-            kind,
-            found,
-            found.residual,
-            "px",
-            pictures,
-            details,
-            found.pose,
-        )
+        await self._store(person, args, CalibrationKind.HAND_EYE, found, "px", after=found.pose, pictures=pictures)
         return found
 
     @operation("PUT", "/api/calibration/intrinsics", CALIBRATION, Role.TECHNICIAN, **_MANY)
     async def find_intrinsics(self, uploads: Uploads, person: str) -> Intrinsics:
-        """Return the focal lengths, the centre and the distortion of a camera, from pictures of a ChArUco board."""
+        """Return focal lengths, principal point and distortion of a camera from pictures of a ChArUco board."""
         args = read_args(uploads.fields["args"], IntrinsicsArgs)
         pictures = await _pictures(uploads)
         found = await self._compute.run(t.FindIntrinsics(pictures, args.board, args.options))
-        details = {"args": replace(args, record=UNSET)}
-        kind = CalibrationKind.INTRINSICS
-        await store_record(
-            self._calibration_records, person, args.record, kind, found, found.residual, "px", pictures, details, UNSET
-        )
+        await self._store(person, args, CalibrationKind.INTRINSICS, found, "px", pictures=pictures)
         return found
 
     @operation("PUT", "/api/calibration/touch/frame-by-axes", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def frame_by_axes(self, body: FrameByAxesArgs, person: str) -> TouchedFrame:
-        """Return a frame from three touched points or more: origin, x axis, xy plane."""
+        """Return a frame from three or more touched points: origin, x axis, xy plane."""
         found = await self._compute.run(t.FrameByAxes(body.origin, body.on_x, body.in_plane))
-        await store_touch_record(self._calibration_records, person, body, CalibrationKind.USER_FRAME, found, found.pose)
+        await self._store(person, body, CalibrationKind.USER_FRAME, found, after=found.pose)
         return found
 
     @operation("PUT", "/api/calibration/touch/frame-by-points", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def frame_by_points(self, body: FrameByPointsArgs, person: str) -> TouchedFrame:
-        """Compute a frame, such as a robot base, from three or more points that are known in it and were touched."""
+        """Return a frame, such as a robot base, from three or more touched points with known positions in it."""
         found = await self._compute.run(t.FrameByPoints(body.known, body.touched))
-        await store_touch_record(self._calibration_records, person, body, CalibrationKind.BASE_FRAME, found, found.pose)
+        await self._store(person, body, CalibrationKind.BASE_FRAME, found, after=found.pose)
         return found
 
     @operation("PUT", "/api/calibration/touch/tip", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def tip_by_touches(self, body: TipArgs, person: str) -> TouchedTip:
-        """Return a tool's tip on the flange, from one point touched in four orientations or more."""
+        """Return the position of a tool's tip on the flange, from one point touched in four or more orientations."""
         found = await self._compute.run(t.TipByTouches(body.flanges))
-        await store_touch_record(
-            self._calibration_records, person, body, CalibrationKind.TOOL_TIP, found, Pose(found.position)
-        )
+        await self._store(person, body, CalibrationKind.TOOL_TIP, found, after=Pose(found.position))
         return found
 
     @operation("PUT", "/api/calibration/touch/orientation-by-alignment", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def orientation_by_alignment(self, body: AlignmentArgs, person: str) -> TouchedOrientation:
-        """Return a tool's orientation on the flange, from aligning it with a reference."""
+        """Return a tool's orientation on the flange, from aligning the tool with a reference."""
         found = await self._compute.run(t.OrientationByAlignment(body.flanges, body.reference))
-        turned = Pose(orientation=found.orientation)
-        await store_touch_record(
-            self._calibration_records, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned
-        )
+        after = Pose(orientation=found.orientation)
+        await self._store(person, body, CalibrationKind.TOOL_ORIENTATION, found, "rad", after=after)
         return found
 
     @operation("PUT", "/api/calibration/touch/orientation-by-points", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def orientation_by_points(self, body: DirectionsArgs, person: str) -> TouchedOrientation:
-        """Return a tool's orientation on the flange, from moving its tip along its +z and to its +x side."""
+        """Return a tool's orientation on the flange, from moving its tip along its +z axis and to its +x side."""
         found = await self._compute.run(t.OrientationByPoints(body.flange, body.tip, body.along_z, body.on_x))
-        turned = Pose(orientation=found.orientation)
-        await store_touch_record(
-            self._calibration_records, person, body, CalibrationKind.TOOL_ORIENTATION, found, turned
-        )
+        after = Pose(orientation=found.orientation)
+        await self._store(person, body, CalibrationKind.TOOL_ORIENTATION, found, "rad", after=after)
         return found
+
+    async def _store(
+        self,
+        person: str,
+        args: Any,
+        kind: CalibrationKind,
+        found: Any,
+        unit: str = "m",
+        *,
+        after: Pose | Unset = UNSET,
+        pictures: Sequence[bytes] = (),
+        parameters: dict[str, Any] | None = None,
+    ) -> None:
+        """Store a record of a calibration if its arguments request it.
+
+        Args:
+            person: the user.
+            args: the arguments; `record` states the object.
+            kind: the kind of calibration.
+            found: the result.
+            unit: unit of its residual.
+            after: its pose, if it has one.
+            pictures: the pictures that it is computed from.
+            parameters: its other inputs, by default the arguments.
+        """
+        record_as: RecordAs | Unset = args.record
+        if isinstance(record_as, Unset):
+            return
+        result: dict[str, Any] = msgspec.to_builtins(found)
+        result.pop("picture", None)  # it can be drawn again
+        await self._calibration_records.put(
+            CalibrationRecord(
+                kind,
+                person,
+                record_as.object_id,
+                record_as.object_name or record_as.object_id,
+                record_as.parent,
+                found.verdict,
+                residual=found.residual,
+                residual_unit=unit,
+                inputs=[CalibrationInput.of(f"picture {number}", each) for number, each in enumerate(pictures, 1)],
+                parameters=msgspec.to_builtins(parameters or {"args": replace(args, record=UNSET)}),
+                result=result,
+                before=record_as.before,
+                after=after,
+                applied=record_as.applied,
+            )
+        )

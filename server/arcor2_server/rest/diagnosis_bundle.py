@@ -26,35 +26,42 @@ from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.settings import API_VERSION, VERSION, ServerSettings
 
 LARGEST_PART: Final = 4 * 1024 * 1024
-"""Maximum size of one unpacked file, bytes; a larger one is replaced by a note."""
+"""Maximum size of an uncompressed file, bytes. A note replaces a larger file."""
 LARGEST_NOTES: Final = 256 * 1024
 """Maximum size of the notes from a client, bytes."""
 RUNS: Final = 20
+"""Number of the latest runs in the bundle."""
 
-_README: Final = """A bundle for diagnosis of ARCOR2-HW.
+_README: Final = """Diagnosis bundle of ARCOR2-HW
 
-about.json      versions of server, Python and packages, settings of the server
-types.json      object types, where they come from, what is wrong with them
-scene.json      the scene that is open, with changes that are not saved
-project.json    the project that is open, likewise
-devices.json    connection, health and alarms of devices, and what is under way
-runs.json       the last runs of packages, and how they ended
-log.jsonl       the last lines of the server's log
-client.json     what the client that asked for this saw last
+about.json      versions of the server, Python and packages; settings of the server
+types.json      object types, their origin and their problems
+scene.json      the open scene, with unsaved changes
+project.json    the open project, with unsaved changes
+devices.json    connection, health and alarms of the devices; state of the scene and the program
+runs.json       the latest runs of packages and their results
+log.jsonl       the latest lines of the server log
+client.json     notes of the client that requested this bundle, such as its last events
 
-Settings whose names say that they are secret have ***, and so have tokens and passwords in texts. Look through it all
-the same before you give it to somebody: names of people, devices and addresses are in it. Nothing was sent anywhere.
+Secret settings, tokens and passwords are replaced by ***. The bundle still contains names of users, names of devices
+and network addresses. Check it before you share it. The server has not sent it anywhere else.
 """
 
 
 class ClientNotes(Data, frozen=True):
-    """What a client adds of itself: its version, the browser, its last events and errors."""
+    """Notes of a client: its version, the browser, its last events and errors."""
 
     client: dict[str, Any]
 
 
 def packed(content: dict[str, Any], notes: Any = None, stored: Set[str] = frozenset()) -> bytes:
-    """Return the zip without secrets; `stored` are those of settings. Takes a moment: for another thread."""
+    """Return the bundle as a zip without secrets. This takes a while, so run it in a thread.
+
+    Args:
+        content: the files by name.
+        notes: notes of the client.
+        stored: the stored secrets of settings.
+    """
     plain = msgspec.to_builtins(content, enc_hook=_plain)
     plain["about.json"] |= {
         "python": platform.python_version(),
@@ -100,8 +107,7 @@ class Diagnosis:
     _runs: Runs
 
     def parts(self) -> dict[str, Any]:
-        """Return the content of the bundle by file name, not yet encoded. Call this on the event loop."""
-
+        """Return the content of the bundle by file name, before encoding. Call this in the event loop."""
         session, cell, execution = self._session, self._online, self._execution
         return {
             "about.json": {

@@ -13,17 +13,17 @@ MEDIA_TYPE = "model/gltf-binary"
 
 @dataclass(frozen=True, slots=True)
 class DisplayModelOperations:
-    """Meshes and robots made ready for clients, over REST (docs/protocol.md)."""
+    """Meshes and robot models converted for display, over REST (docs/protocol.md)."""
 
     _display_models: DisplayModels
 
     @operation("GET", "/api/assets/{asset_id}/shown", "ARCOR2-HW", Role.OPERATOR, media_type=MEDIA_TYPE)
     async def asset_shown(self, asset_id: str) -> CacheableContent:
-        """Return a mesh, or a robot's description with its meshes, as it is shown: one binary glTF."""
-        shown = await self._display_models.get(asset_id)
+        """Return a mesh, or a robot description with its meshes, as a binary glTF file."""
+        model = await self._display_models.get(asset_id)
 
         async def read(gzipped: bool) -> bytes:
-            file = shown.packed if gzipped and shown.packed is not None else shown.plain
+            file = model.packed if gzipped and model.packed is not None else model.plain
             try:
                 return await asyncio.to_thread(file.read_bytes)
             except FileNotFoundError:
@@ -31,4 +31,4 @@ class DisplayModelOperations:
                     "What was prepared of the asset {asset_id!r} was dropped just now: ask again.", asset_id=asset_id
                 ) from None
 
-        return CacheableContent(read, MEDIA_TYPE, shown.etag, gzipped=shown.packed is not None)
+        return CacheableContent(read, MEDIA_TYPE, model.etag, gzipped=model.packed is not None)

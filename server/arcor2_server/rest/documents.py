@@ -1,4 +1,4 @@
-"""The OpenAPI documents, one of all operations and one per service, generated from the declarations."""
+"""The OpenAPI documents of all operations and of each service, generated from the declared operations."""
 
 import functools
 import typing
@@ -21,7 +21,7 @@ _TIMESTAMP: Final = r"^\d{4}-"
 
 
 def document(service: str = "") -> dict[str, Any]:
-    """Return the document of one service, or of all."""
+    """Return the OpenAPI document of one service, by default of all."""
     chosen = [one for one in OPERATIONS if service in ("", one.service)]
     schemas, components = _schemas(chosen)
     paths: dict[str, dict[str, Any]] = {}
@@ -39,7 +39,7 @@ def document(service: str = "") -> dict[str, Any]:
 
 
 def _types(one: Operation) -> Iterable[tuple[Any, bool]]:
-    """Return the types of an operation, and whether their fields keep their names."""
+    """Return the types of an operation, each with whether its fields are snake_case on the wire."""
     if "body" in one.takes:
         yield one.takes["body"], False
     if one.media_type == "application/json" and one.gives not in (None, type(None)):
@@ -53,10 +53,11 @@ def _is_union(kind: Any) -> bool:
 
 
 Schemas = dict[tuple[str, bool], dict[str, Any]]
+"""Schemas by the representation of the type, and whether its fields are snake_case on the wire."""
 
 
 def _schemas(chosen: list[Operation]) -> tuple[Schemas, dict[str, Any]]:
-    """Return the schemas of all types, by their representation, and the components that they refer to."""
+    """Return the schemas of all types, and the components that they refer to."""
     schemas: Schemas = {}
     components: dict[str, Any] = {}
     wanted = [pair for one in chosen for pair in _types(one)] + [(WebApiError, False)]
@@ -65,51 +66,53 @@ def _schemas(chosen: list[Operation]) -> tuple[Schemas, dict[str, Any]]:
         kinds = list({str(kind): kind for kind, is_plain in wanted if is_plain is plain}.values())
         made, parts = msgspec.json.schema_components(kinds, ref_template=_REFERENCE)
         for kind, schema in zip(kinds, made, strict=True):
-            schemas[str(kind), plain] = _lowered(schema, plain)
+            schemas[str(kind), plain] = _to_openapi(schema, plain)
         for name, part in parts.items():
-            components[name] = _lowered(part, plain)
+            components[name] = _to_openapi(part, plain)
     for query in queries:
         made, parts = msgspec.json.schema_components([query], ref_template=_REFERENCE)
-        schemas[str(query), True] = _lowered(parts[query.__name__], True)
+        schemas[str(query), True] = _to_openapi(parts[query.__name__], True)
     return schemas, components
 
 
-def _lowered(schema: Any, plain: bool) -> Any:
-    """Return a schema of JSON Schema 2020-12 as OpenAPI 3.0 has it, with the names of fields as on the wire."""
+def _to_openapi(schema: Any, plain: bool) -> Any:
+    """Convert a schema from JSON Schema 2020-12 to OpenAPI 3.0, with the names of fields as on the wire."""
     if isinstance(schema, list):
-        return [_lowered(item, plain) for item in schema]
+        return [_to_openapi(item, plain) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    lowered: dict[str, Any] = {}
+    converted: dict[str, Any] = {}
     for key, value in schema.items():
         match key:
             case "properties":
-                lowered[key] = {name if plain else camel(name): _lowered(item, plain) for name, item in value.items()}
+                converted[key] = {
+                    name if plain else camel(name): _to_openapi(item, plain) for name, item in value.items()
+                }
             case "required":
-                lowered[key] = [name if plain else camel(name) for name in value]
+                converted[key] = [name if plain else camel(name) for name in value]
             case "const":
-                lowered["enum"] = [value]
+                converted["enum"] = [value]
             case "anyOf" if {"type": "null"} in value:
-                others = [_lowered(item, plain) for item in value if item != {"type": "null"}]
-                lowered |= {"nullable": True} | (others[0] if len(others) == 1 else {"anyOf": others})
+                others = [_to_openapi(item, plain) for item in value if item != {"type": "null"}]
+                converted |= {"nullable": True} | (others[0] if len(others) == 1 else {"anyOf": others})
             case "contentEncoding":
-                lowered["format"] = {"base64": "byte"}[value]
+                converted["format"] = {"base64": "byte"}[value]
             case "exclusiveMinimum" | "exclusiveMaximum":
-                lowered |= {f"m{key[10:]}": value, key: True}
+                converted |= {f"m{key[10:]}": value, key: True}
             case "default" | "enum":
-                lowered[key] = value
+                converted[key] = value
             case _:
-                lowered[key] = _lowered(value, plain)
-    if str(lowered.get("pattern", "")).startswith(_TIMESTAMP):
-        lowered["format"] = "date-time"
-    if "type" not in lowered and all(isinstance(value, str) for value in lowered.get("enum", [None])):
-        lowered["type"] = "string"
-    if lowered.get("required") == []:
-        del lowered["required"]
-    if "$ref" in lowered and len(lowered) > 1:
-        reference = lowered.pop("$ref")
-        lowered["allOf"] = [{"$ref": reference}]
-    return lowered
+                converted[key] = _to_openapi(value, plain)
+    if str(converted.get("pattern", "")).startswith(_TIMESTAMP):
+        converted["format"] = "date-time"
+    if "type" not in converted and all(isinstance(value, str) for value in converted.get("enum", [None])):
+        converted["type"] = "string"
+    if converted.get("required") == []:
+        del converted["required"]
+    if "$ref" in converted and len(converted) > 1:
+        reference = converted.pop("$ref")
+        converted["allOf"] = [{"$ref": reference}]
+    return converted
 
 
 def _operation(one: Operation, schemas: Schemas) -> dict[str, Any]:
@@ -152,24 +155,24 @@ def _query(one: Operation, schemas: Schemas) -> Iterable[dict[str, Any]]:
 def _responses(one: Operation, schemas: Schemas) -> dict[str, Any]:
     good: dict[str, Any] = {"description": "Done."}
     if one.media_type == "application/json":
-        good["content"] = {"application/json": {"schema": _given(one, schemas)}}
+        good["content"] = {"application/json": {"schema": _result_schema(one, schemas)}}
     elif one.media_type != "text/plain":
         good["content"] = {one.media_type: {"schema": {"type": "string", "format": "binary"}}}
     refused = {"application/json": {"schema": schemas[str(WebApiError), False]}}
-    reasons = {"default": "Refused: the body says why."}
+    reasons = {"default": "The request was refused. The body states the reason."}
     if one.takes.keys() & {"query", "body", "upload", "uploads"}:
-        reasons["400"] = "What was sent has a wrong form."
+        reasons["400"] = "The query or body is invalid."
     if not one.open:
         reasons |= {"401": "A token is needed.", "403": "The role is too low."}
     if one.path_names or one.takes.keys() & {"query", "body"}:
-        reasons["404"] = "Something that is named does not exist."
-    reasons["409"] = "It cannot be done in the present state."
+        reasons["404"] = "An item that the request names does not exist."
+    reasons["409"] = "The present state does not allow the request."
     return {"200": good} | {
         status: {"description": text, "content": refused} for status, text in sorted(reasons.items())
     }
 
 
-def _given(one: Operation, schemas: Schemas) -> dict[str, Any]:
+def _result_schema(one: Operation, schemas: Schemas) -> dict[str, Any]:
     if one.gives in (None, type(None)):
         return {"type": "string", "enum": ["ok"]}
     if _is_union(one.gives):
@@ -178,11 +181,11 @@ def _given(one: Operation, schemas: Schemas) -> dict[str, Any]:
 
 
 # ------------------------------------------------------------------------------------------------ routes
-_kept = functools.lru_cache(maxsize=16)(document)
+_cached_document = functools.lru_cache(maxsize=16)(document)
 
 
 def service_at(settings: ServerSettings, port: int) -> str:
-    """Return the service of a classic port, "" for the port of all services."""
+    """Return the service on a classic port, "" if it is not the port of a single service."""
     services = {one.service for one in OPERATIONS}
     return next((name for name, own in settings.classic_ports.items() if own == port and name in services), "")
 
@@ -199,14 +202,14 @@ class ApiDocumentOperations:
     @operation("GET", "/openapi", SERVER, Role.OPERATOR, plain=True)
     async def openapi(self) -> dict[str, Any]:
         """Return the OpenAPI document of all services."""
-        return _kept()
+        return _cached_document()
 
     @operation("GET", "/openapi/openapi.json", SERVER, Role.OPERATOR, plain=True)
     async def openapi_file(self) -> dict[str, Any]:
         """Return the OpenAPI document of all services."""
-        return _kept()
+        return _cached_document()
 
     @operation("GET", "/swagger/api/swagger.json", SERVER, Role.OPERATOR, plain=True)
     async def swagger(self, port: int) -> dict[str, Any]:
-        """Return the OpenAPI document of all services; on a classic port, of the service that has it."""
-        return _kept(service_at(self._settings, port))
+        """Return the OpenAPI document of all services, on a classic port that of its service."""
+        return _cached_document(service_at(self._settings, port))

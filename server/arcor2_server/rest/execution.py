@@ -1,4 +1,4 @@
-"""The Execution service over REST: packages, the running program, tokens and breakpoints (section 16)."""
+"""The Execution service over REST: packages, the running program, breakpoints, tokens (protocol, section 16)."""
 
 import asyncio
 import enum
@@ -38,7 +38,7 @@ class SummaryProject(Data, frozen=True):
 
 
 class SummaryPackage(Data, frozen=True):
-    """One package."""
+    """A package and its project."""
 
     id: str
     name: str | Unset = UNSET
@@ -48,7 +48,7 @@ class SummaryPackage(Data, frozen=True):
 
 
 class ExecutionState(enum.StrEnum):
-    """How the proxy of the original names the states."""
+    """States of a program as the Execution service of ARCOR2 names them."""
 
     UNDEFINED = "Undefined"
     RUNNING = "Running"
@@ -59,7 +59,7 @@ class ExecutionState(enum.StrEnum):
 
 
 class ExecutionInfo(Data, frozen=True):
-    """The state of the program, and what an action in progress, or paused before, uses of action points."""
+    """State of the program. action_point_ids: those that the running action, or the next action if paused, uses."""
 
     state: ExecutionState
     active_package_id: str | Unset = UNSET
@@ -68,13 +68,13 @@ class ExecutionInfo(Data, frozen=True):
 
 
 class BreakpointsQuery(Data, frozen=True):
-    """Ids of action points: the name may stand several times."""
+    """Ids of action points. The parameter may be repeated."""
 
     breakpoints: list[str] = field(default_factory=list)
 
 
 class DebugQuery(Data, frozen=True, rename="camel"):
-    """Whether the program is paused before its first action."""
+    """Whether the program pauses before its first action."""
 
     break_on_first_action: bool = False
 
@@ -103,7 +103,7 @@ def _summary(package: PackageSummary) -> SummaryPackage:
     )
 
 
-async def _pieces(file: IO[bytes]) -> AsyncIterator[bytes]:
+async def _chunks(file: IO[bytes]) -> AsyncIterator[bytes]:
     with file:
         while chunk := await asyncio.to_thread(file.read, MIB):
             yield chunk
@@ -135,7 +135,7 @@ class ExecutionOperations:
 
     @operation("GET", "/packages", EXECUTION, Role.OPERATOR)
     async def list_packages(self) -> list[SummaryPackage]:
-        """List the packages."""
+        """Return all packages."""
         return [_summary(package) for package in await self._execution.list()]
 
     @operation(
@@ -144,23 +144,23 @@ class ExecutionOperations:
         EXECUTION,
         Role.PROGRAMMER,
         file="executionPackage",
-        title="Taking in the package {id}",
+        title="Uploading the package {id}",
         limit=MAX_UPLOAD + MIB,
     )
     async def upload_package(self, id: str, upload: Upload) -> None:  # noqa: A002
-        """Take in a package as a zip, in place of one of that id."""
+        """Upload a package as a zip file. It replaces a package with the same id."""
         summary = await self._execution.take(id, upload.file)
         self._hub.broadcast(make_event("PackageChanged", summary, ChangeType.ADD))
 
     @operation("GET", "/packages/{id}", EXECUTION, Role.OPERATOR, media_type=ZIP)
     async def download_package(self, id: str) -> Binary:  # noqa: A002
-        """Return a package as a zip."""
+        """Return a package as a zip file."""
         file = await asyncio.to_thread(self._execution.packages.to_zip, id)
-        return Binary(_pieces(file), ZIP, f"{id}.zip", os.fstat(file.fileno()).st_size)
+        return Binary(_chunks(file), ZIP, f"{id}.zip", os.fstat(file.fileno()).st_size)
 
     @operation("DELETE", "/packages/{id}", EXECUTION, Role.ADVANCED_USER)
     async def delete_package(self, id: str) -> None:  # noqa: A002
-        """Delete a package that does not run, with its breakpoints."""
+        """Delete a package that is not running, with its breakpoints."""
         summary = await self._execution.delete(id)
         await ProjectTables(self._storage).delete_breakpoints(id)
         self._hub.broadcast(make_event("PackageChanged", summary, ChangeType.REMOVE))
@@ -168,12 +168,12 @@ class ExecutionOperations:
     # ------------------------------------------------------------------------------------------------ the program
     @operation("PUT", "/packages/{id}/start", EXECUTION, Role.OPERATOR)
     async def start_package(self, id: str, person: str) -> None:  # noqa: A002
-        """Run a package. An open document that no connected user works on does not prevent it."""
+        """Run a package. A document left open by users who disconnected does not prevent it."""
         await self._package_runs.run_package(id, How(by=person))
 
     @operation("PUT", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
     async def put_breakpoints(self, id: str, query: BreakpointsQuery) -> None:  # noqa: A002
-        """Keep the action points at which a package pauses when it is debugged."""
+        """Store the action points at which a package pauses when it is debugged."""
         await asyncio.to_thread(self._execution.packages.directory, id)
         await ProjectTables(self._storage).put_breakpoints(id, query.breakpoints)
 
@@ -201,12 +201,12 @@ class ExecutionOperations:
 
     @operation("PUT", "/packages/resume", EXECUTION, Role.OPERATOR)
     async def resume_package(self) -> None:
-        """Let the paused program go on."""
+        """Resume the paused program."""
         self._execution.resume()
 
     @operation("PUT", "/packages/step", EXECUTION, Role.OPERATOR)
     async def step_package(self) -> None:
-        """Let the paused program go on for one action."""
+        """Resume the paused program for one action."""
         self._execution.step()
 
     @operation("GET", "/packages/state", EXECUTION, Role.OPERATOR)
@@ -225,7 +225,7 @@ class ExecutionOperations:
     # ------------------------------------------------------------------------------------------------ tokens
     @operation("POST", "/tokens/create", EXECUTION, Role.PROGRAMMER)
     async def create_token(self, query: NameQuery) -> ExecutionToken:
-        """Add an entry to the token table of the protocol. It grants no access: `arcor2-hw token add` makes tokens."""
+        """Add an entry to the token table of the protocol. It grants no access: see `arcor2-hw token add`."""
         if not query.name or len(query.name) > LONGEST_NAME or not query.name.isprintable():
             raise InvalidData(
                 "A token needs a name of 1 to {longest_name} printable characters.", longest_name=LONGEST_NAME
@@ -236,21 +236,21 @@ class ExecutionOperations:
 
     @operation("GET", "/tokens", EXECUTION, Role.PROGRAMMER)
     async def list_tokens(self) -> list[ExecutionToken]:
-        """Return the table of the original."""
+        """Return the token table of the protocol."""
         return await ProjectTables(self._storage).tokens()
 
     @operation("DELETE", "/tokens/{id}", EXECUTION, Role.PROGRAMMER)
     async def delete_token(self, id: str) -> None:  # noqa: A002
-        """Delete an entry."""
+        """Delete an entry of the token table."""
         await ProjectTables(self._storage).delete_token(id)
 
     @operation("PUT", "/tokens/{id}/access", EXECUTION, Role.PROGRAMMER)
     async def put_access(self, id: str, query: AccessQuery) -> None:  # noqa: A002
-        """Set the flag of an entry."""
-        beside = ProjectTables(self._storage)
-        await beside.put_token(msgspec.structs.replace(await beside.token(id), access=query.access))
+        """Set the access flag of an entry of the token table."""
+        tables = ProjectTables(self._storage)
+        await tables.put_token(msgspec.structs.replace(await tables.token(id), access=query.access))
 
     @operation("GET", "/tokens/{id}/access", EXECUTION, Role.PROGRAMMER)
     async def get_access(self, id: str) -> bool:  # noqa: A002
-        """Return the flag of an entry."""
+        """Return the access flag of an entry of the token table."""
         return (await ProjectTables(self._storage).token(id)).access

@@ -1,4 +1,4 @@
-"""Routes that belong to no service: readiness, devices."""
+"""REST operations that belong to no ARCOR2 service: readiness, addresses, devices."""
 
 import asyncio
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ SERVER = "ARCOR2-HW"
 
 @dataclass(frozen=True, slots=True)
 class GeneralOperations:
-    """Routes of no service: readiness, devices."""
+    """REST operations that belong to no ARCOR2 service: readiness, addresses, devices."""
 
     _settings: ServerSettings
     _online: OnlineScene
@@ -24,16 +24,16 @@ class GeneralOperations:
 
     @operation("GET", "/healthz/ready", SERVER, Role.OPERATOR, open=True, media_type="text/plain")
     async def ready(self) -> str:
-        """Answer 200 as soon as requests are served."""
+        """Return 200 as soon as the server serves requests."""
         return ""
 
     @operation("GET", "/api/joining", SERVER, Role.OPERATOR, plain=True)
     async def how_to_join(self, port: int) -> ServerAddresses:
-        """Return the addresses at which others reach this server, and the fingerprint of its certificate."""
-        # Names are looked up, which may take its time.
+        """Return the addresses at which other machines reach this server, and the fingerprint of its certificate."""
+        # In a thread, since looking up names may take long.
         return await asyncio.to_thread(server_addresses, self._settings, port)
 
     @operation("GET", "/api/devices", SERVER, Role.OPERATOR, plain=True)
     async def devices(self) -> list[DeviceStatus]:
-        """Return connection, health, alarms and owner of control of each device; empty when nothing is in operation."""
+        """Return connection, health, alarms and control owner of each device of the running program or online scene."""
         return self._execution.board.statuses() or self._online.board.statuses()

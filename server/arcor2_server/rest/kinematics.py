@@ -1,4 +1,4 @@
-"""The kinematic calibration of a robot that is in use, over REST (docs/protocol.md)."""
+"""The kinematic calibration used for a robot, over REST (docs/protocol.md)."""
 
 from dataclasses import dataclass
 
@@ -12,9 +12,9 @@ from arcor2_server.workspace.robots import SceneRobots
 
 
 class RobotKinematics(Data, frozen=True):
-    """What a robot's kinematics are computed with here, offline too. read, checksum: of what its controller told.
+    """Kinematic calibration with which the server computes the kinematics of a robot, also offline.
 
-    refused: why that is not used.
+    read, checksum: time and checksum of the calibration read from the controller. refused: why it is not used.
     """
 
     object_id: str
@@ -27,7 +27,7 @@ class RobotKinematics(Data, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class KinematicsOperations:
-    """Which kinematics of a robot are in force, over REST (docs/protocol.md)."""
+    """The kinematic calibration used for a robot, over REST (docs/protocol.md)."""
 
     _online: OnlineScene
     _robot_calibrations: RobotCalibrations
@@ -35,7 +35,7 @@ class KinematicsOperations:
 
     @operation("GET", "/api/robots/{object_id}/kinematics", SERVER, Role.OPERATOR, plain=True)
     async def robot_kinematics(self, object_id: str) -> RobotKinematics:
-        """Tell with which kinematics those of a robot of the open scene are computed, and since when."""
+        """Return the kinematic calibration used for a robot of the open scene."""
         robot = self._online.robot(object_id)
         if self._robots.model_of_type(robot.type) is None:
             return RobotKinematics(robot.id, robot.name, InForce.NONE)

@@ -1,4 +1,4 @@
-"""Collision models over REST: one model per id (protocol, section 13)."""
+"""Collision models over REST (protocol, section 13). A model of any type has a unique id."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from arcor2_server.storage import Storage
 
 
 class MetaModel3d(Data, frozen=True):
-    """Names a stored model."""
+    """Id and type of a stored collision model."""
 
     id: str
     type: Model3dType
@@ -21,19 +21,19 @@ class MetaModel3d(Data, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class ModelOperations:
-    """Collision models over REST (protocol, section 13): one model per id, of whatever kind."""
+    """Collision models over REST (protocol, section 13)."""
 
     _storage: Storage
     _type_notifications: TypeNotifications
 
     @operation("GET", "/models", STORAGE, Role.OPERATOR)
     async def list_models(self) -> list[MetaModel3d]:
-        """List the collision models."""
+        """Return all collision models."""
         return [MetaModel3d(model.id, model.type()) for model in await self._storage.models()]
 
     @operation("GET", "/models/meshes", STORAGE, Role.OPERATOR)
     async def list_meshes(self) -> list[Mesh]:
-        """Return those models that are meshes."""
+        """Return all collision models that are meshes."""
         return [model for model in await self._storage.models() if isinstance(model, Mesh)]
 
     async def _put(self, model: Models) -> None:
@@ -43,22 +43,22 @@ class ModelOperations:
 
     @operation("PUT", "/models/box", STORAGE, Role.TECHNICIAN)
     async def put_box_model(self, body: Box) -> None:
-        """Save a box, in place of whatever model has its id."""
+        """Save a box. It replaces a collision model with the same id."""
         await self._put(body)
 
     @operation("PUT", "/models/cylinder", STORAGE, Role.TECHNICIAN)
     async def put_cylinder_model(self, body: Cylinder) -> None:
-        """Save a cylinder, in place of whatever model has its id."""
+        """Save a cylinder. It replaces a collision model with the same id."""
         await self._put(body)
 
     @operation("PUT", "/models/sphere", STORAGE, Role.TECHNICIAN)
     async def put_sphere_model(self, body: Sphere) -> None:
-        """Save a sphere, in place of whatever model has its id."""
+        """Save a sphere. It replaces a collision model with the same id."""
         await self._put(body)
 
     @operation("PUT", "/models/mesh", STORAGE, Role.TECHNICIAN)
     async def put_mesh_model(self, body: Mesh) -> None:
-        """Save a mesh, in place of whatever model has its id."""
+        """Save a mesh. It replaces a collision model with the same id."""
         await self._put(body)
 
     @operation("DELETE", "/models/{model_id}", STORAGE, Role.TECHNICIAN)
@@ -80,7 +80,7 @@ class ModelOperations:
 
     @operation("GET", "/models/{model_id}/{model_type}", STORAGE, Role.OPERATOR)
     async def get_model(self, model_id: str, model_type: str) -> Models:
-        """Return a collision model of the kind that is asked for: box, cylinder, sphere or mesh."""
+        """Return a collision model of a given type: box, cylinder, sphere or mesh."""
         try:
             kind = Model3dType(model_type.capitalize())
         except ValueError:

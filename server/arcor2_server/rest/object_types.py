@@ -19,11 +19,11 @@ from arcor2_server.storage import Storage
 from arcor2_server.storage.assets import TooLarge
 
 MAX_SOURCE: Final = 1024 * 1024
-"""Bytes of one module: a driver of that size is not one device any more."""
+"""Maximum size of a module, bytes."""
 
 
 class ObjectType(Data, frozen=True):
-    """An object type: the whole module that declares its class."""
+    """An object type with the source of the module that declares its class."""
 
     id: str
     name: str
@@ -41,7 +41,7 @@ def _document(stored: ObjectTypeSource) -> ObjectType:
 
 @dataclass(frozen=True, slots=True)
 class ObjectTypeOperations:
-    """Object types over REST: uploaded as source, listed, read, deleted (protocol, sections 9.1 and 13)."""
+    """Object types over REST (protocol, sections 9.1 and 13)."""
 
     _storage: Storage
     _types: ObjectTypes
@@ -49,22 +49,21 @@ class ObjectTypeOperations:
 
     @operation("GET", "/object-types", STORAGE, Role.OPERATOR)
     async def list_object_types(self) -> list[IdDesc]:
-        """List the uploaded object types."""
+        """Return all uploaded object types."""
         stored = await self._storage.object_types()
         return [IdDesc(one.id, one.id, str(one.created), str(one.modified), one.description) for one in stored]
 
     @operation("GET", "/object-types/{obj_type_id}", STORAGE, Role.OPERATOR)
     async def get_object_type(self, obj_type_id: str) -> ObjectType:
-        """Return one uploaded object type with its source."""
+        """Return an uploaded object type with its source."""
         return _document(await self._storage.object_type(obj_type_id))
 
     @operation("PUT", "/object-types", STORAGE, Role.PROGRAMMER, limit=2 * MAX_SOURCE)
     async def put_object_type(self, body: ObjectType) -> Timestamp:
-        """Upload a new or changed object type, or a module that others need; answer the time.
+        """Upload an object type, or a module that other object types import; return the time of the upload.
 
         The source is analysed, never imported. It replaces an installed type of the same name until it is deleted.
-        Clients are notified of what changed at the latest half a second after the last upload, and before a scene is
-        opened.
+        Clients are notified within 0.5 s after the last upload, and before a scene is opened.
         """
         if body.id != body.name or not is_valid_name(body.id):
             raise InvalidData(
@@ -94,9 +93,9 @@ class ObjectTypeOperations:
 
     @operation("DELETE", "/object-types/{obj_type_id}", STORAGE, Role.PROGRAMMER)
     async def delete_object_type(self, obj_type_id: str) -> None:
-        """Delete an uploaded object type; an installed type of that name is in its place again.
+        """Delete an uploaded object type. An installed type of the same name is available again.
 
-        A scene that uses a type that no longer exists has a problem from then on.
+        Scenes that use a missing type report a problem.
         """
         self._types.require_deletable(obj_type_id)
         await self._storage.delete_object_type(obj_type_id)

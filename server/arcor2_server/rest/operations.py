@@ -1,4 +1,4 @@
-"""Declaration of REST operations. Route and OpenAPI are derived from the signature of the handler."""
+"""Declaration of REST operations. Routes and OpenAPI documents are generated from the signatures of the handlers."""
 
 import asyncio
 import inspect
@@ -35,15 +35,15 @@ F = TypeVar("F", bound=Callable[..., Awaitable[Any]])
 
 MIB: Final = 1024 * 1024
 LARGEST_BODY: Final = 16 * MIB
-"""Maximum size of a JSON body, as of a websocket message, bytes."""
+"""Maximum size of a JSON body, as for a websocket message, bytes."""
 MOST_FILES: Final = 200
 """Maximum number of files in one body."""
-BESIDE: Final = 256 * 1024
+IN_THREAD_FROM: Final = 256 * 1024
 """Size of JSON above which it is decoded or encoded in a thread, bytes."""
 
 
 class Binary(msgspec.Struct, frozen=True):
-    """An answer that is no JSON: bytes, or pieces of which `size` bytes come together."""
+    """A file as the result of an operation: its content, or chunks of it with `size` bytes in total."""
 
     content: bytes | AsyncIterator[bytes]
     media_type: str
@@ -52,18 +52,18 @@ class Binary(msgspec.Struct, frozen=True):
 
 
 class CacheableContent(msgspec.Struct, frozen=True):
-    """An answer that clients keep, and ask for again by its `etag`: `read(gzipped)` gives it, also compressed where
-    `gzipped` says so.
-    """
+    """A result that clients cache by its `etag`."""
 
     read: Callable[[bool], Awaitable[bytes]]
+    """Returns the content, compressed by gzip if the argument is true."""
     media_type: str
     etag: str
     gzipped: bool = False
+    """Whether the content is also available compressed by gzip."""
 
 
 class Upload(msgspec.Struct):
-    """The file of a multipart body, on disk when it is large; `fields` are the other parts."""
+    """The file of a multipart body, on disk if it is large. `fields` are the other parts."""
 
     file: IO[bytes]
     filename: str
@@ -71,7 +71,7 @@ class Upload(msgspec.Struct):
 
 
 class Uploads(msgspec.Struct):
-    """The files of a multipart body that has several of one name, in their order; `fields` are the other parts."""
+    """The files with the same name in a multipart body, in their order. `fields` are the other parts."""
 
     files: list[IO[bytes]]
     fields: dict[str, str]
@@ -79,9 +79,11 @@ class Uploads(msgspec.Struct):
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """One operation. The handler's own parameters say what it takes: `query` (a Struct), `body` (a type
-    that msgspec reads), `upload`, `uploads`, `port` (on
-    which it was asked), `person` (whose token it is, empty where none is asked for); all others are parts of the path.
+    """A REST operation.
+
+    Parameters of the handler with these names are filled from the request: `query` (a Struct), `body` (a type that
+    msgspec decodes), `upload`, `uploads`, `port` (the local port) and `person` (the name of the token, may be empty).
+    All other parameters are parts of the path.
     """
 
     method: Literal["GET", "PUT", "POST", "DELETE"]
@@ -90,33 +92,39 @@ class Operation:
     role: Role
     handler: Callable[..., Awaitable[Any]]
     takes: Mapping[str, Any]
+    """Types of the parameters of the handler."""
     gives: Any
+    """Type of the result."""
     file: str = ""
-    """The name of the part of a multipart body that is the file."""
+    """Name of the part of a multipart body with the file."""
     parts: tuple[str, ...] = ()
-    """The names of further parts that have to be there."""
+    """Names of further required parts."""
     title: str = ""
-    """Title of the task that shows the upload (TaskState); `{name}` is replaced by a part of the path."""
+    """Title of the task that reports the upload (TaskState); `{name}` is replaced by a part of the path."""
     shown_from: int = 0
-    """Size of a body below which no task is shown, bytes."""
+    """Size of a body below which no task reports the upload, bytes."""
     limit: int = LARGEST_BODY
+    """Maximum size of the body, bytes."""
     plain: bool = False
-    """Whether the answer has snake_case names, as later operations of the protocol do."""
+    """Whether the fields of the result are snake_case on the wire, as in later operations of the protocol."""
     open: bool = False
+    """Whether the operation needs no token."""
     media_type: str = "application/json"
-    """Of the answer."""
+    """Media type of the result."""
     path_names: tuple[str, ...] = field(default=())
+    """Names of the parameters in the path."""
 
 
 SPECIAL: Final = frozenset({"query", "body", "upload", "uploads", "port", "person"})
-"""Parameters of a handler that are no parts of the path."""
+"""Parameters of handlers that are not parts of the path."""
 OPERATIONS: Final[list[Operation]] = []
+"""All declared operations; their handlers are methods that are not bound yet."""
 
 
 def operation(
     method: Literal["GET", "PUT", "POST", "DELETE"], path: str, service: str, role: Role, **more: Any
 ) -> Callable[[F], F]:
-    """Declare an operation; `more` are the further attributes of Operation."""
+    """Declare a method as the handler of an operation. `more`: further attributes of Operation."""
 
     def register(handler: F) -> F:
         hints = typing.get_type_hints(handler, include_extras=True)
@@ -133,10 +141,10 @@ def operation(
 
 
 def bound(operations: Iterable[Operation], groups: Iterable[object]) -> Iterator[Operation]:
-    """Return the operations with their handlers bound to the objects on which they are declared as methods.
+    """Return the operations with their handlers bound to the objects of their classes.
 
     Raises:
-        KeyError: a group is missing.
+        KeyError: the object of a class is missing.
     """
     by_class = {type(group).__qualname__: group for group in groups}
     for declared in operations:
@@ -145,11 +153,11 @@ def bound(operations: Iterable[Operation], groups: Iterable[object]) -> Iterator
 
 
 def route(declared: Operation, tasks: Tasks) -> HTTPRouteHandler:
-    """Return the route of an operation whose handler is bound.
+    """Return the route of an operation.
 
     Args:
-        declared: the operation.
-        tasks: where the progress of uploads is shown.
+        declared: the operation, with a bound handler.
+        tasks: the tasks, for the progress of uploads.
     """
 
     async def handle(request: Request[Any, Any, Any]) -> Response[Any]:
@@ -191,7 +199,7 @@ def route(declared: Operation, tasks: Tasks) -> HTTPRouteHandler:
 
 
 def _note(outcome: str, declared: Operation, request: Request[Any, Any, Any]) -> None:
-    """Log operations that change something."""
+    """Log an operation, unless it only reads."""
     if declared.method == "GET":
         return
     audit.note(
@@ -223,7 +231,7 @@ async def _arguments(declared: Operation, request: Request[Any, Any, Any], uploa
 
 
 def _query(kind: Any, request: Request[Any, Any, Any]) -> Any:
-    """Decode the query. Both spellings of a name are valid; unknown names are ignored."""
+    """Decode the query. Names may be camelCase or snake_case; unknown names are ignored."""
     fields = {field.name: field for field in msgspec.structs.fields(kind)}
     values: dict[str, Any] = {}
     for key, value in request.query_params.multi_items():
@@ -231,7 +239,7 @@ def _query(kind: Any, request: Request[Any, Any, Any]) -> Any:
         if name not in fields:
             continue
         if _is_list(fields[name].type):
-            # Existing clients repeat the name, or separate by commas.
+            # Existing clients repeat the name, or separate the values by commas.
             values.setdefault(fields[name].encode_name, []).extend(part for part in value.split(",") if part)
         else:
             values[fields[name].encode_name] = value
@@ -254,11 +262,11 @@ def _is_list(kind: Any) -> bool:
 
 async def _body(kind: Any, request: Request[Any, Any, Any]) -> Any:
     media_type = request.content_type[0]
-    # Without a type it is taken for what it has to be.
+    # A body without a media type is accepted as JSON.
     if media_type and media_type != "application/json" and not media_type.endswith("+json"):
         raise Unsupported("The body has to be application/json, not {media_type}.", media_type=media_type[:80])
     content = await request.body()
-    if len(content) > BESIDE:
+    if len(content) > IN_THREAD_FROM:
         return await asyncio.to_thread(_decoded, content, kind)
     return _decoded(content, kind)
 
@@ -267,7 +275,7 @@ def _decoded(content: bytes, kind: Any) -> Any:
     try:
         value = snaked(msgspec.json.decode(content))
         if b"\\u" in content:
-            msgspec.json.encode(value)  # half a surrogate pair can be read, but neither kept nor sent back
+            msgspec.json.encode(value)  # refuses lone surrogates, which can be neither stored nor sent back
         body = msgspec.convert(value, kind)
         check_texts(body)
     except (msgspec.DecodeError, RecursionError, UnicodeError) as error:
@@ -326,7 +334,7 @@ async def _multipart(
 
 def _as_file(part: Any, uploads: list[UploadFile]) -> UploadFile | None:
     if isinstance(part, str):
-        # A part without a file name, that could be read as text.
+        # A part without a file name was decoded as text.
         part = UploadFile("application/octet-stream", "", part.encode())
         uploads.append(part)
     return part if isinstance(part, UploadFile) else None
@@ -336,7 +344,7 @@ async def _response(declared: Operation, request: Request[Any, Any, Any], given:
     if isinstance(given, CacheableContent):
         return await _cacheable(request, given)
     if isinstance(given, Binary):
-        # RFC 6266: the name in UTF-8, since it may be anything.
+        # RFC 6266: the name is encoded as UTF-8, since it may have any characters.
         headers = {"Content-Disposition": f"attachment; filename*=UTF-8''{quote(given.filename, safe='')}"}
         if isinstance(given.content, bytes):
             return Response(given.content, media_type=given.media_type, headers=headers)
@@ -347,13 +355,13 @@ async def _response(declared: Operation, request: Request[Any, Any, Any], given:
         return Response(given, media_type=declared.media_type)
     content = msgspec.json.encode("ok" if given is None else given)
     if not declared.plain:
-        content = await asyncio.to_thread(_renamed, content) if len(content) > BESIDE else _renamed(content)
+        content = await asyncio.to_thread(_renamed, content) if len(content) > IN_THREAD_FROM else _renamed(content)
     return Response(content, media_type=MediaType.JSON)
 
 
 async def _cacheable(request: Request[Any, Any, Any], given: CacheableContent) -> Response[Any]:
     gzipped = given.gzipped and "gzip" in accepted_encodings(request)
-    # Each encoding is a representation of its own, with a tag of its own.
+    # Each encoding is a separate representation and needs its own tag.
     etag = f'{given.etag[:-1]}.gz"' if gzipped else given.etag
     headers = {"ETag": etag, "Cache-Control": "no-cache", "Vary": "Accept-Encoding"}
     known = [each.strip().removeprefix("W/") for each in request.headers.get("if-none-match", "").split(",")]

@@ -25,7 +25,7 @@ class ProjectSources(Data, frozen=True):
 
 
 class CloneQuery(Data, frozen=True):
-    """Which project becomes which."""
+    """The project to copy, and id, name and description of the copy."""
 
     project_id: str
     new_project_name: str
@@ -35,13 +35,13 @@ class CloneQuery(Data, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class ProjectOperations:
-    """Projects over REST: documents, sources, and what is kept beside them (protocol, section 13)."""
+    """Projects, their sources and parameters over REST (protocol, section 13)."""
 
     _storage: Storage
 
     @operation("GET", "/projects", STORAGE, Role.OPERATOR)
     async def list_projects(self) -> list[IdDesc]:
-        """List the saved projects."""
+        """Return all saved projects."""
         return [
             IdDesc(one.id, one.name, str(one.created), str(one.modified), one.description or UNSET)
             for one in await self._storage.projects()
@@ -54,7 +54,7 @@ class ProjectOperations:
 
     @operation("PUT", "/projects", STORAGE, Role.ADVANCED_USER)
     async def put_project(self, body: Project) -> Timestamp:
-        """Save a project, new or changed; answers the time. Its scene has to be saved."""
+        """Save a new or changed project; return the time. Its scene must be saved before."""
         check_id(body.id, "project")
         return str((await self._storage.put_project(body)).modified)
 
@@ -65,8 +65,8 @@ class ProjectOperations:
 
     @operation("PUT", "/projects/clone", STORAGE, Role.ADVANCED_USER)
     async def clone_project(self, query: CloneQuery) -> Project:
-        """Copy a project with its source, parameters and overrides; answer the copy."""
-        storage, beside = self._storage, ProjectTables(self._storage)
+        """Copy a project with its source, parameters and overrides; return the copy."""
+        storage, tables = self._storage, ProjectTables(self._storage)
         key = new_id("pro") if isinstance(query.new_project_id, Unset) else query.new_project_id
         check_id(key, "project")
         if not query.new_project_name:
@@ -78,10 +78,10 @@ class ProjectOperations:
         if not isinstance(query.new_description, Unset):
             copy = replace(copy, description=query.new_description)
         copy = await storage.put_project(copy)
-        with contextlib.suppress(NotFound):  # one with logic has none
+        with contextlib.suppress(NotFound):  # a project with logic has no script
             await storage.put_project_source(key, await storage.project_source(original.id))
-        await beside.put_parameters(key, await beside.parameters(original.id))
-        await beside.put_object_parameters(key, await beside.object_parameters(original.id))
+        await tables.put_parameters(key, await tables.parameters(original.id))
+        await tables.put_object_parameters(key, await tables.object_parameters(original.id))
         return copy
 
     # ------------------------------------------------------------------------------------------------ sources
@@ -95,24 +95,24 @@ class ProjectOperations:
         """Return the script of a project."""
         return ProjectSources(project_id, await self._storage.project_source(project_id))
 
-    # ------------------------------------------------------------------------------------------------ beside
+    # ------------------------------------------------------------------------------------------------ parameters
     @operation("GET", "/projects/{project_id}/parameters", STORAGE, Role.OPERATOR)
     async def get_parameters(self, project_id: str) -> list[ProjectParameter]:
-        """Return the parameters stored next to a project, not those inside it."""
+        """Return the parameters stored next to a project, not those in the project document."""
         return await ProjectTables(self._storage).parameters(project_id)
 
     @operation("PUT", "/projects/{project_id}/parameters", STORAGE, Role.ADVANCED_USER)
     async def put_parameters(self, project_id: str, body: list[ProjectParameter]) -> Timestamp:
-        """Store parameters next to a project; answer the time."""
+        """Store parameters next to a project; return the time."""
         await ProjectTables(self._storage).put_parameters(project_id, body)
         return now()
 
     @operation("GET", "/projects/{project_id}/object-parameters", STORAGE, Role.OPERATOR)
     async def get_object_parameters(self, project_id: str) -> list[SceneObjectOverride]:
-        """Return the overrides of settings stored next to a project."""
+        """Return the overrides of object settings stored next to a project."""
         return await ProjectTables(self._storage).object_parameters(project_id)
 
     @operation("PUT", "/projects/{project_id}/object-parameters", STORAGE, Role.ADVANCED_USER)
     async def put_object_parameters(self, project_id: str, body: list[SceneObjectOverride]) -> None:
-        """Store overrides of settings next to a project."""
+        """Store overrides of object settings next to a project."""
         await ProjectTables(self._storage).put_object_parameters(project_id, body)

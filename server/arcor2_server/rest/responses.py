@@ -1,4 +1,4 @@
-"""Responses of routes: JSON by msgspec, errors as the WebApiError of the protocol."""
+"""HTTP responses: JSON encoded by msgspec, and errors as the WebApiError of the protocol."""
 
 from typing import Any, Final
 
@@ -19,12 +19,12 @@ from arcor2_hw.exceptions import (
 from arcor2_server.storage.assets import TooLarge
 
 SERVICE: Final = "service"
-"""The key of a route's `opt` that names the service it belongs to."""
+"""Option of a route: the name of its service."""
 _encode = msgspec.json.Encoder().encode
 
 
 class WebApiError(Data, frozen=True):
-    """What a refused REST request is answered with (openapi/storage.json)."""
+    """Body of the response to a refused REST request (openapi/storage.json)."""
 
     service: str
     message: str
@@ -33,13 +33,13 @@ class WebApiError(Data, frozen=True):
 
 
 class InternalError(Arcor2Error):
-    """Something nobody foresaw."""
+    """An unexpected error inside the server."""
 
     code = "internal"
 
 
 class Unsupported(Arcor2Error):
-    """The body is of another media type than the route takes."""
+    """The route does not accept the media type of the body."""
 
     code = "unsupported_media_type"
 
@@ -56,40 +56,40 @@ _STATUS: Final[dict[type[Arcor2Error], tuple[int, str]]] = {
     InvalidProject: (409, "InvalidProject"),
 }
 """Status and `type` of the answer by error class, first match. Existing clients distinguish errors by the type."""
-_ABSENT: Final = frozenset({"not_installed", "compute_stopped", "compute_timeout", "compute_busy"})
+_UNAVAILABLE: Final = frozenset({"not_installed", "compute_stopped", "compute_timeout", "compute_busy"})
 """Codes of errors of an unavailable part of the system."""
 _BY_CODE: Final = {"calibration_refused": (409, "Invalid")}
+"""Status and type by error code, as in the Calibration service of ARCOR2 (protocol, section 15)."""
 _BY_REASON: Final = {"no_marker": (404, "NotFound")}
-"""As the original's Calibration service has them (protocol, section 15)."""
+"""Status and type by the reason of a refused calibration, as in the Calibration service of ARCOR2."""
 _STATES: Final = {"Execution": "PackageRunState"}
-"""The type of a state error, for services that define one."""
+"""Type of errors caused by a wrong state, for services that define one."""
 
 
-def answer(content: Any, status: int = 200) -> Response[bytes]:
-    """Answer with JSON."""
+def _json_response(content: Any, status: int) -> Response[bytes]:
     return Response(_encode(content), status_code=status, media_type=MediaType.JSON)
 
 
 def refusal(service: str, error: Arcor2Error) -> Response[bytes]:
-    """Answer an error: 404 for a missing item, 400 for an invalid request, 409 for a wrong state."""
-    otherwise = (503, "General") if error.code in _ABSENT else (409, _STATES.get(service, "General"))
+    """Return the response for an error: 404 for a missing item, 400 for an invalid request, 409 for a wrong state."""
+    otherwise = (503, "General") if error.code in _UNAVAILABLE else (409, _STATES.get(service, "General"))
     otherwise = _BY_REASON.get(getattr(error, "reason", "")) or _BY_CODE.get(error.code, otherwise)
     status, name = next((found for kind, found in _STATUS.items() if isinstance(error, kind)), otherwise)
-    return answer(WebApiError(service, _printable(str(error)), name, _printable(error.detail)), status)
+    return _json_response(WebApiError(service, _printable(str(error)), name, _printable(error.detail)), status)
 
 
 def http_refusal(request: Request[Any, Any, Any], error: HTTPException) -> Response[bytes]:
-    """Answer a request refused before it reaches a route: no such route, no token, too large."""
+    """Return the response to a request that reached no route: unknown route, missing token, too large."""
     service = "ARCOR2-HW"
     if "route_handler" in request.scope:
         service = request.route_handler.opt.get(SERVICE, service)
     name = {404: "NotFound", 400: "Argument", 413: "Argument", 405: "Argument"}.get(error.status_code, "General")
-    refused = answer(WebApiError(service, error.detail, name, ""), error.status_code)
+    refused = _json_response(WebApiError(service, error.detail, name, ""), error.status_code)
     for header, value in (error.headers or {}).items():
         refused.headers[header] = value
     return refused
 
 
 def _printable(text: str) -> str:
-    """Half a surrogate pair can be read but not sent back."""
+    """Return a text without lone surrogates, which JSON can contain but UTF-8 cannot encode."""
     return text if text.isascii() else text.encode(errors="replace").decode()

@@ -18,5 +18,5 @@ class RunOperations:
 
     @operation("GET", "/api/runs", SERVER, Role.OPERATOR, plain=True)
     async def list_runs(self, query: ListRunsArgs) -> list[Run]:
-        """Return the newest runs of packages: user, package, time and outcome."""
+        """Return the newest runs of packages: user, package, time and result."""
         return self._runs.find(query)

@@ -38,7 +38,7 @@ class SphereQuery(Data, frozen=True, rename="camel"):
 
 
 class CylinderQuery(Data, frozen=True, rename="camel"):
-    """A cylinder along its z; m."""
+    """A cylinder along its z axis; m."""
 
     cylinder_id: str
     radius: float
@@ -46,7 +46,7 @@ class CylinderQuery(Data, frozen=True, rename="camel"):
 
 
 class MeshQuery(Data, frozen=True, rename="camel"):
-    """A mesh that is kept as an asset."""
+    """A mesh asset and its scale along each axis."""
 
     mesh_id: str
     mesh_file_id: str
@@ -56,7 +56,7 @@ class MeshQuery(Data, frozen=True, rename="camel"):
 
 
 class MeshFocusAction(Data, frozen=True):
-    """Points on a mesh, in its own frame, and where a robot touched them, in the same order; m."""
+    """Points on a mesh in its own frame, and the positions where a robot touched them, in the same order; m."""
 
     mesh_focus_points: list[Position]
     robot_space_points: list[Position]
@@ -70,14 +70,14 @@ class LineCheck(Data, frozen=True):
 
 
 class LineCheckResult(Data, frozen=True):
-    """Whether the line is free, and if not, what it meets first."""
+    """Whether the line is free, and if not, the first object that it hits."""
 
     safe: bool
     object_id: str | Unset = UNSET
 
 
 class HolderQuery(Data, frozen=True, rename="camel"):
-    """A robot of the scene that is online, and the link of its model that holds."""
+    """A robot of the online scene, and the link of its model to which an object is attached."""
 
     robot_id: str
     link: str
@@ -85,7 +85,7 @@ class HolderQuery(Data, frozen=True, rename="camel"):
 
 @dataclass(frozen=True, slots=True)
 class SceneServiceOperations:
-    """The Scene service."""
+    """The Scene service: collision models, line checks, poses from focus points (protocol, section 14)."""
 
     _assets: AssetStore
     _online: OnlineScene
@@ -119,7 +119,7 @@ class SceneServiceOperations:
 
     @operation("PUT", "/collisions/mesh", SCENE, Role.TECHNICIAN)
     async def put_mesh(self, query: MeshQuery, body: Pose) -> str:
-        """Add a mesh asset to the collision models; each axis may be scaled."""
+        """Add a mesh asset to the collision models, scaled along each axis."""
         check_id(query.mesh_id, "collision model")
         scale = (query.mesh_scale_x, query.mesh_scale_y, query.mesh_scale_z)
         if 0.0 in scale:
@@ -135,13 +135,13 @@ class SceneServiceOperations:
         return sorted(self._scene_collisions.online_obstacles())
 
     @operation("DELETE", "/collisions/{id}", SCENE, Role.TECHNICIAN)
-    async def delete_collision(self, id: str) -> None:  # noqa: A002 - the protocol calls it so
+    async def delete_collision(self, id: str) -> None:  # noqa: A002 - name in the protocol
         """Remove an added collision model."""
         self._collisions.remove(id)
 
     @operation("PUT", "/system/start", SCENE, Role.TECHNICIAN)
     async def start_system(self) -> None:
-        """Note that the scene is started; no device is touched, which the websocket's StartScene does."""
+        """Mark the scene as started. No device is connected; use StartScene of the websocket for that."""
         self._collisions.started = True
 
     @operation("PUT", "/system/stop", SCENE, Role.TECHNICIAN)
@@ -151,7 +151,7 @@ class SceneServiceOperations:
 
     @operation("GET", "/system/running", SCENE, Role.OPERATOR)
     async def system_running(self) -> bool:
-        """Return whether the scene is started: over REST, or because it is online."""
+        """Return whether the scene is marked as started or is online."""
         return self._collisions.started or self._online.online
 
     @operation("PUT", "/utils/focus", SCENE, Role.OPERATOR)
@@ -161,7 +161,7 @@ class SceneServiceOperations:
 
     @operation("PUT", "/utils/line-safe", SCENE, Role.OPERATOR, plain=True)
     async def check_line(self, body: LineCheck) -> LineCheckResult:
-        """Return whether a straight line is free of slightly inflated collision models."""
+        """Return whether a straight line is free of the collision models, which are slightly inflated."""
         found = await self._scene_collisions.hit(body.pt1, body.pt2)
         return LineCheckResult(True) if found is None else LineCheckResult(False, found.id)
 
@@ -173,6 +173,6 @@ class SceneServiceOperations:
 
     @operation("PUT", "/collisions/{id}/detach", SCENE, Role.TECHNICIAN)
     async def detach_collision(self, id: str) -> Pose:  # noqa: A002 - as above
-        """Detach a collision model from a robot; answer its pose, which is unchanged."""
+        """Detach a collision model from a robot; return its pose, which is unchanged."""
         self._online.require_online()
         return await self._scene_collisions.detach(id)

@@ -15,7 +15,7 @@ LONGEST_ID = 255
 
 
 class IdDesc(Data, frozen=True):
-    """One entry of a list."""
+    """Id, name, times and description of a stored document."""
 
     id: str
     name: str
@@ -25,7 +25,7 @@ class IdDesc(Data, frozen=True):
 
 
 def check_id(key: str, what: str) -> None:
-    """Refuse an id under which nothing could be asked for later. Raise InvalidData if that is impossible."""
+    """Raise InvalidData if an id cannot be used in the path of a route."""
     if not key or len(key) > LONGEST_ID or not key.isprintable() or "/" in key or key in (".", ".."):
         raise InvalidData(
             "{key!r} cannot be the id of a {what}: 1 to {longest_id} printable characters, no slash.",
@@ -44,7 +44,7 @@ class SceneOperations:
 
     @operation("GET", "/scenes", STORAGE, Role.OPERATOR)
     async def list_scenes(self) -> list[IdDesc]:
-        """List the saved scenes."""
+        """Return all saved scenes."""
         return [
             IdDesc(one.id, one.name, str(one.created), str(one.modified), one.description or UNSET)
             for one in await self._storage.scenes()
@@ -57,7 +57,7 @@ class SceneOperations:
 
     @operation("PUT", "/scenes", STORAGE, Role.TECHNICIAN)
     async def put_scene(self, body: Scene) -> Timestamp:
-        """Save a scene, new or changed; answers the time. All object types in it have to be known."""
+        """Save a new or changed scene; return the time. All its object types must be known."""
         check_id(body.id, "scene")
         for placed in body.objects:
             if not self._types.known(placed.type):
@@ -68,5 +68,5 @@ class SceneOperations:
 
     @operation("DELETE", "/scenes/{scene_id}", STORAGE, Role.TECHNICIAN)
     async def delete_scene(self, scene_id: str) -> None:
-        """Delete a saved scene; its projects then cannot be opened."""
+        """Delete a saved scene. Its projects cannot be opened afterwards."""
         await self._storage.delete_scene(scene_id)

@@ -1,4 +1,4 @@
-"""Shows an upload over REST as a task."""
+"""Reports the progress of an upload over REST as a task."""
 
 import asyncio
 from collections.abc import Iterator
@@ -14,21 +14,24 @@ from arcor2_server.access.route_options import PERSON
 from arcor2_server.collaboration.tasks import Task, Tasks
 
 RECEIVED: Final = 0.9
-"""Progress of the task when all data has been received; then it is checked and stored."""
+"""Progress of the task when all data is received. Then the data is checked and stored."""
 
 
 @contextmanager
 def receiving(request: Request[Any, Any, Any], tasks: Tasks, title: str, shown_from: int) -> Iterator[None]:
-    """Show the enclosed upload as a task, if it has a title and at least `shown_from` bytes.
+    """Report the upload in the body of the `with` statement as a task.
 
-    title: a sentence, in which `{name}` stands for a part of the path.
+    Args:
+        request: the request.
+        tasks: the tasks.
+        title: title of the task, in which `{name}` is a part of the path; no task is reported if it is empty.
+        shown_from: size of the request below which no task is reported, bytes.
     """
     size = request.content_length
     if not title or (size is not None and size < shown_from):
         yield
         return
-    named = title.format(**request.path_params)
-    task = tasks.begin(TaskKind.UPLOAD, named, request.state.get(PERSON, ""))
+    task = tasks.begin(TaskKind.UPLOAD, title.format(**request.path_params), request.state.get(PERSON, ""))
     _count(request, task, size)
     try:
         yield
@@ -38,7 +41,7 @@ def receiving(request: Request[Any, Any, Any], tasks: Tasks, title: str, shown_f
     except Arcor2Error as error:
         task.fail(str(error))
         raise
-    except HTTPException as error:  # too much, for one; what is said after an end is dropped
+    except HTTPException as error:  # for example, the body is too large
         task.fail(error.detail)
         raise
     except BaseException:
@@ -57,13 +60,13 @@ def _count(request: Request[Any, Any, Any], task: Task, size: int | None) -> Non
         if message["type"] == "http.request":
             received += len(message.get("body", b""))
             if not message.get("more_body", False):
-                task.at(RECEIVED if size else None, "All has come: it is checked and kept.")
+                task.at(RECEIVED if size else None, "All data is received. Checking and storing it.")
             elif size:
-                task.at(RECEIVED * received / size, f"{received / 1e6:.1f} of {size / 1e6:.1f} MB have come.")
+                task.at(RECEIVED * received / size, f"{received / 1e6:.1f} of {size / 1e6:.1f} MB received.")
             else:
-                task.at(None, f"{received / 1e6:.1f} MB have come.")
+                task.at(None, f"{received / 1e6:.1f} MB received.")
         elif message["type"] == "http.disconnect":
-            task.cancel(f"Who sent it has gone after {received / 1e6:.1f} MB.")
+            task.cancel(f"The client disconnected after {received / 1e6:.1f} MB.")
         return message
 
     request.receive = counted

@@ -68,7 +68,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         self._pongs.clear()
 
     def send_text_now(self, message: bytes) -> bool:
-        """Send an encoded text message unless the connection is closed or its buffer full; return whether it was sent."""
+        """Send an encoded text message if it can be sent at once; return whether it was sent."""
         if self.disconnected or self.close_sent or not self.writable.is_set():
             return False
         try:

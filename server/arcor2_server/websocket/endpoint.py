@@ -346,10 +346,9 @@ class Endpoint:
         message: str = "",
         code: str = "",
     ) -> None:
+        messages = [message] if message else UNSET
         sent_code = code if code and request.codes else UNSET
-        response = encode(
-            Response(request.id, request.request, result, [message] if message else UNSET, data, sent_code)
-        )
+        response = encode(Response(request.id, request.request, result, messages, data, sent_code))
         if context is None:
             client.put(response)
             return
