@@ -165,7 +165,7 @@ async def test_clients_without_subscription_get_no_events(tmp_path: Path, scale:
                     names.add(event.event)
         assert "SceneState" in names
         assert "ObjectState" not in names
-        with pytest.raises(RequestFailed, match=r"Moon; there is .*ObjectState"):
+        with pytest.raises(RequestFailed, match=r"Moon\. Available events: .*ObjectState"):
             await old.call("SubscribeEvents", rpc.SubscribeEventsArgs({"Moon"}))
 
 

@@ -25,7 +25,7 @@ WRONG_TOKENS: Final = 10
 """Number of wrong tokens from one address within WRONG_TOKENS_WITHIN after which further tokens are refused."""
 WRONG_TOKENS_WITHIN: Final = 60.0
 """Period in which wrong tokens are counted, s."""
-REMEDY: Final = "Make new tokens on the server with `arcor2-hw token add`."
+REMEDY: Final = "Create new tokens on the server with `arcor2-hw token add`."
 MAX_ADDRESSES: Final = 1000
 """Maximum number of addresses whose wrong tokens are counted."""
 PARAMETER: Final = "token"
@@ -102,7 +102,7 @@ class Access:
             while len(self._wrong) > MAX_ADDRESSES:
                 self._wrong.popitem(last=False)
             log.warning("wrong token", address=address)
-            raise AccessRefused("The token is not valid: it is unknown, was revoked, or its time is over.")
+            raise AccessRefused("The token is not valid: it is unknown, revoked or expired.")
         return Admission(token.role, token)
 
     def admit(self, connection: ASGIConnection[Any, Any, Any, Any]) -> Admission:

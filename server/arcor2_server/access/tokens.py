@@ -72,7 +72,7 @@ class TokenFile:
             self._tokens, self._seen, self.damage, self.unusable = [], None, "", False
         except OSError as error:
             raise StorageError(
-                "the file of tokens {path} cannot be used: {reason}", path=self._path, reason=error
+                "the token file {path} cannot be used: {reason}", path=self._path, reason=error
             ) from error
         return self._tokens
 
@@ -81,18 +81,18 @@ class TokenFile:
         try:
             return _decode(self._path.read_bytes())
         except msgspec.DecodeError as error:
-            self.damage = f"The file of tokens {self._path} is damaged: {str(error).rstrip('.')}."
+            self.damage = f"The token file {self._path} is damaged: {str(error).rstrip('.')}."
         try:
             tokens = _decode(self._copy.read_bytes())
-            self.damage += f" The tokens are those of its copy {self._copy}."
+            self.damage += f" Its copy {self._copy} is used instead."
         except (OSError, msgspec.DecodeError):
             tokens, self.unusable = self._tokens, not self._tokens
             self.damage += (
-                " Its copy cannot be used either, so nobody can connect with a token."
+                " Its copy cannot be used either, so no client can connect with a token."
                 if self.unusable
-                else " The tokens that were read before it was damaged stay valid until the server ends."
+                else " The tokens that were read before stay valid until the server stops."
             )
-            self.damage += " Make new tokens with `arcor2-hw token add`; the damaged file is then stored aside."
+            self.damage += " Create new tokens with `arcor2-hw token add`; this also renames the damaged file."
         return tokens
 
     def repair(self) -> str:
@@ -132,7 +132,7 @@ class TokenFile:
         """
         if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
             raise InvalidData(
-                "A token needs the name of a person or a device, of {longest_name} characters at most.",
+                "A token needs the name of a user or device with at most {longest_name} characters.",
                 longest_name=LONGEST_NAME,
             )
         secret = secrets.token_urlsafe(32)
@@ -172,5 +172,5 @@ class TokenFile:
                 write_private(self._path, content)
         except OSError as error:
             raise StorageError(
-                "the file of tokens {path} cannot be written: {reason}", path=self._path, reason=error.strerror
+                "the token file {path} cannot be written: {reason}", path=self._path, reason=error.strerror
             ) from error

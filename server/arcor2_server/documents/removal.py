@@ -16,7 +16,7 @@ def require_point_unused(document: Document, point: BareActionPoint) -> None:
     """Raise RequestRefused if something outside an action point depends on it or on its children."""
     if below := document.points_of(point.id):
         raise RequestRefused(
-            "{name} hangs on {point_name}: remove it, or hang it elsewhere, first.",
+            "{point_name} is the parent of {name}. Remove {name} or change its parent first.",
             name=below[0].name,
             point_name=point.name,
         )
@@ -24,7 +24,7 @@ def require_point_unused(document: Document, point: BareActionPoint) -> None:
     for action_id in own:
         if document.outgoing(action_id) or document.incoming(action_id):
             raise RequestRefused(
-                "{name} on {point_name} is in the logic.",
+                "The action {name} on {point_name} is used in the logic.",
                 name=document.action(action_id)[1].name,
                 point_name=point.name,
             )
@@ -34,7 +34,9 @@ def require_point_unused(document: Document, point: BareActionPoint) -> None:
                 raise RequestRefused("A condition of the logic uses a result of an action on {name}.", name=point.name)
             if user.id not in own:
                 raise RequestRefused(
-                    "The action {name} uses {point_name} or what belongs to it.", name=user.name, point_name=point.name
+                    "The action {name} uses {point_name}, or one of its orientations, joints or actions.",
+                    name=user.name,
+                    point_name=point.name,
                 )
 
 
@@ -42,9 +44,9 @@ def require_results_unused(document: Document, before: Action, after: Action) ->
     """Raise RequestRefused if `after` lacks the results of `before`, and a link or a condition uses one of them."""
     if before.outputs() and not after.outputs() and (users := document.users_of(before.id)):
         user = users[0]
-        who = f"The action {user.name}" if isinstance(user, Action) else "A condition of the logic"
+        using = f"The action {user.name}" if isinstance(user, Action) else "A condition of the logic"
         raise RequestRefused(
-            "{device} uses a result of {name}: its results have to keep names.", device=who, name=before.name
+            "{user} uses a result of {name}, so its results must keep their names.", user=using, name=before.name
         )
 
 

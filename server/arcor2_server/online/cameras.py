@@ -22,7 +22,7 @@ def picture_file(image: str) -> bytes:
     try:
         data = image.encode("latin-1")
     except UnicodeEncodeError:
-        raise InvalidData("The image is no picture's bytes: it has characters beyond 255.") from None
+        raise InvalidData("The image is not a picture file: it has characters above 255.") from None
     if not data:
         raise InvalidData("The image is empty.")
     return data
@@ -51,7 +51,7 @@ class Cameras:
         try:
             return msgspec.json.decode(raw, type=CameraParameters)
         except msgspec.MsgspecError as error:
-            raise Arcor2Error("{name} gave no parameters of a camera.", str(error), name=camera.name) from error
+            raise Arcor2Error("{name} returned no camera parameters.", str(error), name=camera.name) from error
 
     async def take_picture(self, camera: SceneObject, method: str, **arguments: int) -> bytes:
         """Take a picture by a method of the camera; return its file."""
@@ -59,4 +59,4 @@ class Cameras:
         try:
             return picture_file(msgspec.json.decode(raw, type=str))
         except msgspec.MsgspecError:
-            raise Arcor2Error("{name} gave no picture.", name=camera.name) from None
+            raise Arcor2Error("{name} returned no picture.", name=camera.name) from None

@@ -170,7 +170,7 @@ class SceneCalibration:
 
         async def find(on_progress: ProgressCallback) -> tuple[Pose, CalibrationRecord]:
             if moves:
-                on_progress(0.0, f"{robot.name} moves to where it is seen well")
+                on_progress(0.0, f"{robot.name} moves to its calibration pose")
                 await self._online.call(robot.id, MOVE_METHOD, control=True, requested_at=requested_at)
             return await self._find_robot(user, robot, camera, parameters, model, on_progress)
 
@@ -187,7 +187,7 @@ class SceneCalibration:
         for obj in self._session.require_scene().objects:
             if self._types.derives_from(obj.type, "Camera"):
                 return obj
-        raise RequestRefused("The scene has no camera that could see the robot.")
+        raise RequestRefused("The scene has no camera.")
 
     async def _find_robot(
         self,
@@ -200,7 +200,9 @@ class SceneCalibration:
     ) -> tuple[Pose, CalibrationRecord]:
         if isinstance(robot.pose, Unset) or isinstance(camera.pose, Unset):
             raise RequestRefused(
-                "{name} and {camera_name} need a pose from which to search.", name=robot.name, camera_name=camera.name
+                "{name} and {camera_name} need a pose, where the search starts.",
+                name=robot.name,
+                camera_name=camera.name,
             )
         joints = await self._online.robot_joints(robot.id)
         view = RobotView(joints, robot.pose, camera.pose, parameters)

@@ -48,15 +48,15 @@ class Undo:
         if isinstance(number, Unset):
             latest = history.undoable(user) if kind is EditKind.UNDO else history.redoable(user)
             if latest is None:
-                raise RequestRefused("There is nothing that you could {value}.", value=kind.value)
+                raise RequestRefused("There is nothing to {value}.", value=kind.value)
             return latest
         edit = history.find(number)
         if edit is None:
-            raise RequestRefused("There is no edit {number}, or it is not kept any more.", number=number)
+            raise RequestRefused("There is no edit {number}, or it is no longer stored.", number=number)
         if edit.user != user:
             raise RequestRefused("Edit {number} was made by {user}.", number=number, user=edit.user)
         if not (history.can_undo(user, number) if kind is EditKind.UNDO else history.can_redo(user, number)):
-            raise RequestRefused("Edit {number} is nothing that you could {value}.", number=number, value=kind.value)
+            raise RequestRefused("You cannot {value} edit {number}.", number=number, value=kind.value)
         return edit
 
     @asynccontextmanager
@@ -66,7 +66,7 @@ class Undo:
             for item in moved_ids(self._session.document, changes):
                 if others := self._locks.holders_of(item) - {user}:
                     raise Locked(
-                        "{item!r}, which would move along, is locked by {others}.",
+                        "{item!r} would move too, but is locked by {others}.",
                         item=item,
                         others=", ".join(sorted(others)),
                     )
@@ -134,6 +134,6 @@ class Undo:
                     if item.value.name == name
                 }
                 if (found | opened) - {None, change.id}:
-                    raise RequestRefused("There is a scene or project called {name} by now.", name=name)
+                    raise RequestRefused("There is now a scene or project called {name}.", name=name)
             if change.kind is Kind.OBJECT and change.after is None and await self._dependents.uses_object(change.id):
-                raise RequestRefused("{name} is used in projects by now.", name=change.before.name)
+                raise RequestRefused("{name} is now used in projects.", name=change.before.name)

@@ -31,7 +31,9 @@ class DiagnosisOperations:
     async def diagnosis_with_notes(self, body: ClientNotes) -> Binary:
         """Return the diagnosis bundle with notes of the client, at most 256 KiB of JSON."""
         if len(msgspec.json.encode(body.client)) > LARGEST_NOTES:
-            raise InvalidData("A client may add {largest_notes} bytes of JSON, not more.", largest_notes=LARGEST_NOTES)
+            raise InvalidData(
+                "The notes of a client may have at most {largest_notes} bytes of JSON.", largest_notes=LARGEST_NOTES
+            )
         return await self._bundle(body.client)
 
     async def _bundle(self, notes: dict[str, Any] | None) -> Binary:

@@ -28,7 +28,8 @@ class DisplayModelOperations:
                 return await asyncio.to_thread(file.read_bytes)
             except FileNotFoundError:
                 raise NotFound(
-                    "What was prepared of the asset {asset_id!r} was dropped just now: ask again.", asset_id=asset_id
+                    "The display model of the asset {asset_id!r} was just deleted from the cache. Try again.",
+                    asset_id=asset_id,
                 ) from None
 
         return CacheableContent(read, MEDIA_TYPE, model.etag, gzipped=model.packed is not None)

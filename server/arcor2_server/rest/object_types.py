@@ -67,7 +67,7 @@ class ObjectTypeOperations:
         """
         if body.id != body.name or not is_valid_name(body.id):
             raise InvalidData(
-                "{id!r} cannot name an object type: id and name are the name of its class.", id=body.id[:80]
+                "{id!r} cannot be the id of an object type. Id and name must be the name of its class.", id=body.id[:80]
             )
         if len(body.source.encode()) > MAX_SOURCE:
             raise TooLarge("The source of {id} has more than {max_source} bytes.", id=body.id, max_source=MAX_SOURCE)
@@ -76,7 +76,9 @@ class ObjectTypeOperations:
         if not isinstance(body.model, Unset) and body.model.type is not Model3dType.NONE:
             if body.model.id != body.id:
                 raise InvalidData(
-                    "The model of {id} has to have its id, not {other_id!r}.", id=body.id, other_id=body.model.id[:80]
+                    "The model of {id} must have the same id, not {other_id!r}.",
+                    id=body.id,
+                    other_id=body.model.id[:80],
                 )
             model = await self._storage.model(body.id)
             if model.type() is not body.model.type:

@@ -252,7 +252,7 @@ def _query(kind: Any, request: Request[Any, Any, Any]) -> Any:
         value = getattr(read, name)
         for each in value if isinstance(value, list) else (value,):
             if isinstance(each, float) and not math.isfinite(each):
-                raise InvalidData("The query is wrong: {name} is no finite number.", name=name)
+                raise InvalidData("The query is wrong: {name} is not a finite number.", name=name)
     return read
 
 
@@ -264,7 +264,7 @@ async def _body(kind: Any, request: Request[Any, Any, Any]) -> Any:
     media_type = request.content_type[0]
     # A body without a media type is accepted as JSON.
     if media_type and media_type != "application/json" and not media_type.endswith("+json"):
-        raise Unsupported("The body has to be application/json, not {media_type}.", media_type=media_type[:80])
+        raise Unsupported("The body must be application/json, not {media_type}.", media_type=media_type[:80])
     content = await request.body()
     if len(content) > IN_THREAD_FROM:
         return await asyncio.to_thread(_decoded, content, kind)
@@ -296,7 +296,7 @@ async def _uploads(declared: Operation, request: Request[Any, Any, Any], uploads
     named = [part for name, part in parts if name == declared.file]
     if len(named) > MOST_FILES:
         raise InvalidData(
-            "The body has {count} files {file}; {most_files} are the most.",
+            "The body has {count} files {file}. At most {most_files} are allowed.",
             count=len(named),
             file=declared.file,
             most_files=MOST_FILES,
@@ -312,7 +312,7 @@ async def _multipart(
 ) -> tuple[list[tuple[str, Any]], dict[str, str]]:
     """Return all parts of a body in order, and the text parts."""
     if request.content_type[0] != "multipart/form-data":
-        raise Unsupported("The body has to be multipart/form-data with the file {file}.", file=declared.file)
+        raise Unsupported("The body must be multipart/form-data with the file {file}.", file=declared.file)
     try:
         form = await request.form()
     except UnicodeDecodeError:

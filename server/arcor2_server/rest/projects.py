@@ -73,7 +73,7 @@ class ProjectOperations:
             raise InvalidData("A project needs a name.")
         original = await storage.project(query.project_id)
         if await storage.identify(key) is not None:
-            raise Conflict("There is something with the id {key!r} already.", key=key)
+            raise Conflict("The id {key!r} is used already.", key=key)
         copy = replace(original, id=key, name=query.new_project_name)
         if not isinstance(query.new_description, Unset):
             copy = replace(copy, description=query.new_description)

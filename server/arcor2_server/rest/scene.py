@@ -123,7 +123,7 @@ class SceneServiceOperations:
         check_id(query.mesh_id, "collision model")
         scale = (query.mesh_scale_x, query.mesh_scale_y, query.mesh_scale_z)
         if 0.0 in scale:
-            raise InvalidData("A mesh cannot be scaled to nothing.")
+            raise InvalidData("The scale of a mesh must not be 0.")
         self._assets.info(query.mesh_file_id)
         await self._compute.run(ReadMesh(self._scene_collisions.mesh_file(query.mesh_file_id), scale))
         self._collisions.put(Obstacle.of(Mesh(query.mesh_id, query.mesh_file_id), body, scale))

@@ -28,7 +28,7 @@ def check_id(key: str, what: str) -> None:
     """Raise InvalidData if an id cannot be used in the path of a route."""
     if not key or len(key) > LONGEST_ID or not key.isprintable() or "/" in key or key in (".", ".."):
         raise InvalidData(
-            "{key!r} cannot be the id of a {what}: 1 to {longest_id} printable characters, no slash.",
+            "{key!r} cannot be the id of a {what}. Use 1 to {longest_id} printable characters without a slash.",
             key=key[:80],
             what=what,
             longest_id=LONGEST_ID,
@@ -61,9 +61,7 @@ class SceneOperations:
         check_id(body.id, "scene")
         for placed in body.objects:
             if not self._types.known(placed.type):
-                raise NotFound(
-                    "The object {name} is of a type {type!r}, which there is not.", name=placed.name, type=placed.type
-                )
+                raise NotFound("The object {name} has the unknown type {type!r}.", name=placed.name, type=placed.type)
         return str((await self._storage.put_scene(body)).modified)
 
     @operation("DELETE", "/scenes/{scene_id}", STORAGE, Role.TECHNICIAN)

@@ -89,7 +89,7 @@ class ActionPointRequests:
         document = self._session.require_project_open()
         point = document.action_point(args.action_point_id)
         if point.name == args.new_name:
-            raise RequestRefused("The action point is called {name} already.", name=point.name)
+            raise RequestRefused("The action point already has the name {name}.", name=point.name)
         self._check_name(args.new_name)
         self._editing.require_locked(context, point.id)
         renamed = replace(point, name=args.new_name)
@@ -105,7 +105,7 @@ class ActionPointRequests:
         if not context.dry_run:
             self._editing.require_locked(context, point.id, tree=True)
         elif not self._locks.could_lock_tree(context.user, point.id):
-            raise RequestRefused("{name}, or something that hangs on it, is locked by somebody else.", name=point.name)
+            raise RequestRefused("{name} or one of its descendants is locked by another user.", name=point.name)
         await self._move(context, document, point, args.new_position)
 
     async def _move(self, context: Context, document: Document, point: BareActionPoint, position: Position) -> None:
@@ -144,7 +144,7 @@ class ActionPointRequests:
         if args.new_parent_id == old:
             return
         if args.new_parent_id == point.id:
-            raise RequestRefused("{name} cannot hang on itself.", name=point.name)
+            raise RequestRefused("{name} cannot be its own parent.", name=point.name)
         user, locks = context.user, self._locks
         skip_held = locks.auto_skip_held(user, *([old] if old else []))
         async with skip_held, locks.auto(user, *([args.new_parent_id] if args.new_parent_id else [])):
@@ -169,7 +169,7 @@ class ActionPointRequests:
             for item in owned:
                 if self._locks.writer_of(item.id) not in (None, context.user):
                     raise RequestRefused(
-                        "{name} on {point_name} is locked by somebody else.",
+                        "{name} on {point_name} is locked by another user.",
                         name=item.value.name,
                         point_name=point.name,
                     )

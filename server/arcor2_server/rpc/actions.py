@@ -100,9 +100,9 @@ class ActionRequests:
             for user in document.users_of(action.id):
                 if isinstance(user, LogicItem) and user.id in removed:
                     continue
-                who = f"the action {user.name}" if isinstance(user, Action) else "a condition of the logic"
+                using = f"the action {user.name}" if isinstance(user, Action) else "a condition of the logic"
                 raise RequestRefused(
-                    "A result of {name} is used by {device}: change that first.", name=action.name, device=who
+                    "A result of {name} is used by {user}. Change that first.", name=action.name, user=using
                 )
             # The action comes first, since the history names an edit by its first change.
             if await self._editing.commit(context, [document.remove(Kind.ACTION, action.id), *logic_changes]):

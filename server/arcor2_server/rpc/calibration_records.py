@@ -41,7 +41,7 @@ class CalibrationRecordRequests:
         """
         if record.parent != "world":
             raise RequestRefused(
-                "The calibration is stated in the frame of {parent}: give a pose in that.", parent=record.parent
+                "The calibration is stated in the frame of {parent}. Give a pose in this frame.", parent=record.parent
             )
         self._session.require_scene_open()
         found = self._session.document.scene_object(record.object_id)

@@ -43,7 +43,7 @@ class SharedStateRequests:
         if args.scope is ViewScope.USER:
             user = context.user if isinstance(args.user, Unset) else args.user
         elif not isinstance(args.user, Unset):
-            raise RequestRefused("What is shared is nobody's: leave the user out.")
+            raise RequestRefused("A shared view state has no user. Omit the user.")
         return await self._view_states.get(args.scope, user, args.document)
 
     @rpc("SetViewState")
@@ -53,7 +53,7 @@ class SharedStateRequests:
         if args.scope is ViewScope.USER:
             user = context.user
         elif context.client.role < Role.STANDARD_USER:
-            raise RequestRefused("What all see alike needs the role standard_user or a higher one.")
+            raise RequestRefused("Changing a shared view state needs the role standard_user or a higher one.")
         views = self._view_states
         return SetViewStateData(await views.change(args.scope, user, args.document, args.values, context.client))
 
@@ -73,7 +73,7 @@ class SharedStateRequests:
     async def set_breakpoints(self, context: Context, args: SetBreakpointsArgs) -> ProjectBreakpoints:
         """Set and remove shared breakpoints of a project. BreakpointsChanged publishes them."""
         if both := args.add & args.remove:
-            raise RequestRefused("{both} is to be set and taken away at once.", both=min(both))
+            raise RequestRefused("The breakpoint {both} cannot be set and removed by one request.", both=min(both))
         project_id = self._project_id(args.project_id)
         return await self._breakpoints.change(project_id, args.add, args.remove, context.user)
 

@@ -115,7 +115,7 @@ class GeneralRequests:
         offered = {event.name for event in EVENTS.values() if event.additional}
         if unknown := args.events - offered:
             raise RequestRefused(
-                "No additional event is called {unknown}; there is {offered}.",
+                "Unknown additional events: {unknown}. Available events: {offered}.",
                 unknown=", ".join(sorted(unknown)),
                 offered=", ".join(sorted(offered)),
             )

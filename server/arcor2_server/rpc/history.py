@@ -86,12 +86,14 @@ class HistoryRequests:
                 )
             changes = inverse_changes(session.history.since(args.revision))
             if not changes:
-                raise RequestRefused("The document is as it was in revision {revision}.", revision=args.revision)
+                raise RequestRefused(
+                    "The document already has the state of revision {revision}.", revision=args.revision
+                )
             async with self._undo.locked(context.user, changes):
                 if session.document is document and session.revision == at:
                     revision = await self._apply(context, changes, args.revision, context.request, EditKind.RESTORE)
                     return RestoreRevisionData(revision)
-        raise RequestRefused("Others are editing: try again.")
+        raise RequestRefused("Other users are editing the document. Try again.")
 
     async def _revert(self, context: Context, number: int | Unset, kind: EditKind) -> UndoData:
         self._session.require_scene_open()
@@ -109,7 +111,7 @@ class HistoryRequests:
     ) -> int:
         needed = role_for(changes)
         if context.client.role < needed:
-            raise RequestRefused("What would change needs the role {name} or a higher one.", name=needed.name.lower())
+            raise RequestRefused("These changes need the role {name} or a higher one.", name=needed.name.lower())
         revision = await self._undo.apply(context.user, changes, after, request, kind, dry_run=context.dry_run)
         if not context.dry_run:
             emit_all(context, self._session, changes)

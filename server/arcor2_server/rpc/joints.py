@@ -68,7 +68,9 @@ class JointsRequests:
         point, value = self._session.require_project_open().joints(args.joints_id)
         given, known = [joint.name for joint in args.joints], {joint.name for joint in value.joints}
         if len(given) != len(set(given)) or set(given) != known:
-            raise InvalidData("{name} has exactly the joints {known}.", name=value.name, known=", ".join(sorted(known)))
+            raise InvalidData(
+                "Give each joint of {name} once: {known}.", name=value.name, known=", ".join(sorted(known))
+            )
         self._editing.require_locked(context, point.id)
         await self._update(context, replace(value, joints=list(args.joints), is_valid=True))
 

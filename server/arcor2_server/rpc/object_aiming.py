@@ -62,7 +62,7 @@ class ObjectAimingRequests:
         self._online.require_online()
         user = context.user
         if self._object_aiming.of(user, document) is not None:
-            raise RequestRefused("You are aiming already: finish that, or cancel it.")
+            raise RequestRefused("You are already aiming at an object. Finish or cancel that first.")
         points = self._focus_points(document.scene_object(args.object_id))
         self._online.robot(robot.robot_id)
         self._editing.require_locked(context, args.object_id)
@@ -70,7 +70,7 @@ class ObjectAimingRequests:
         # Check that the robot has this arm and end effector, and knows its pose.
         await self._online.end_effector_pose(robot.robot_id, robot.end_effector, optional(robot.arm_id))
         if self._object_aiming.of(user, self._session.require_scene_alone()) is not None:
-            raise RequestRefused("You are aiming already: finish that, or cancel it.")
+            raise RequestRefused("You are already aiming at an object. Finish or cancel that first.")
         if not context.dry_run:
             self._object_aiming.begin(user, ObjectAiming(args.object_id, robot, points, document))
 
@@ -110,7 +110,7 @@ class ObjectAimingRequests:
         log.info("pose found by touched points", object=obj.name, largest_deviation_m=found.worst)
         if found.worst > WORST_MISS:
             raise RequestRefused(
-                "The points do not fit {name}: one misses by {worst:.0f} mm. Was another one touched?",
+                "The touched points do not fit {name}: one is off by {worst:.0f} mm. Touch the focus points again.",
                 name=obj.name,
                 worst=found.worst * 1000,
             )

@@ -26,7 +26,7 @@ def require_mesh(assets: AssetStore, model: Models) -> None:
     """Raise RequestRefused if the mesh of a collision model is not an asset."""
     if isinstance(model, Mesh) and not assets.exists(model.asset_id):
         raise RequestRefused(
-            "There is no asset {asset_id!r} that could be the mesh of {id}.", asset_id=model.asset_id, id=model.id
+            "The mesh of {id} does not exist: there is no asset {asset_id!r}.", asset_id=model.asset_id, id=model.id
         )
 
 
@@ -37,7 +37,10 @@ def _parent_value(parent: IdValue, kind: str) -> Raw:
     except msgspec.DecodeError as error:
         if kind not in ("string", "string_enum"):
             raise InvalidData(
-                "The parameter {id}: {value} is no {type}.", id=parent.id, value=parent.value[:80], type=kind
+                "The parameter {id}: {value} is not of the type {type}.",
+                id=parent.id,
+                value=parent.value[:80],
+                type=kind,
             ) from error
         value = parent.value
     if kind in ("string", "string_enum") and not isinstance(value, str):
@@ -111,14 +114,17 @@ class ObjectTypeRequests:
             raise RequestRefused("There is an object type called {type} already: choose another name.", type=new.type)
         if not is_valid_name(new.type):
             raise RequestRefused(
-                "{type!r} is no valid name: letters, digits and _, no keyword, no name of Python's.", type=new.type
+                "{type!r} is not a valid name. Use letters, digits and _, and no keyword or built-in name of Python.",
+                type=new.type,
             )
         base = types.meta(new.base)
         if base.disabled:
             problem = "" if isinstance(base.problem, Unset) else f" ({base.problem})"
             raise RequestRefused("The object type {type} cannot be used{problem}.", type=base.type, problem=problem)
         if types.derives_from(base.type, "Robot"):
-            raise RequestRefused("A robot's object type has to be written, not only derived.")
+            raise RequestRefused(
+                "The object type of a robot cannot be derived without changes. Upload its source instead."
+            )
         if isinstance(new.object_model, Unset):
             if types.derives_from(base.type, "CollisionObject"):
                 raise RequestRefused("An object type derived from {type} needs a collision model.", type=base.type)
@@ -128,7 +134,7 @@ class ObjectTypeRequests:
         try:
             model = new.object_model.model()
         except ValueError as error:
-            raise RequestRefused("A collision model is needed: {reason}.", reason=error) from None
+            raise RequestRefused("The collision model is missing or invalid: {reason}.", reason=error) from None
         if model.id != new.type:
             raise RequestRefused("The model of {type} needs the id {type}, not {id}.", type=new.type, id=model.id)
         require_mesh(self._assets, model)
@@ -195,7 +201,7 @@ class ObjectTypeRequests:
             if sorted(given) != sorted(parents):
                 needed = ", ".join(sorted(parents)) or "no other one"
                 raise RequestRefused(
-                    "The values of {param_id} depend on {needed}: give exactly that.",
+                    "The values of {param_id} depend on {needed}. Give exactly these parameters.",
                     param_id=args.param_id,
                     needed=needed,
                 )

@@ -40,17 +40,17 @@ ACKNOWLEDGED_WITHIN: Final = 30.0
 """Time limit for acknowledging a stop, s. Restarting the safety system of a controller takes 20 s."""
 _FRAMES: Final = {JogFrame.WORLD: "world", JogFrame.ROBOT: "base", JogFrame.TOOL: "tool", JogFrame.USER: "world"}
 _RELEASED_ON_SITE: Final = {
-    Safety.EMERGENCY_STOP: "an emergency stop is released where it was pressed",
-    Safety.SAFEGUARD_STOP: "a safeguard stop is released by its guard, which has to be closed",
-    Safety.ENABLING_STOP: "it moves again when the enabling device is held",
-    Safety.RECOVERY: "it is in recovery and has to be moved out by hand",
+    Safety.EMERGENCY_STOP: "release the emergency stop where it was pressed",
+    Safety.SAFEGUARD_STOP: "close the guard",
+    Safety.ENABLING_STOP: "hold the enabling device",
+    Safety.RECOVERY: "move the robot back into its limits by hand",
 }
 
 
 def _acknowledging_method(name: str, safety: Safety, role: Role) -> str:
     """Return the method that ends a safety state. Raise RequestRefused if there is none, or the role is too low."""
-    if (where := _RELEASED_ON_SITE.get(safety)) is not None:
-        raise RequestRefused("{name} cannot be acknowledged: {place}.", name=name, place=where)
+    if (remedy := _RELEASED_ON_SITE.get(safety)) is not None:
+        raise RequestRefused("{name} cannot be acknowledged here: {remedy}.", name=name, remedy=remedy)
     if safety is Safety.PROTECTIVE_STOP:
         return "acknowledge_protective_stop"
     if safety not in (Safety.FAULT, Safety.VIOLATION):
@@ -107,10 +107,10 @@ class OperationRequests:
         motion: dict[str, Any] = {"end_effector_id": optional(args.end_effector_id)}
         in_space = not (isinstance(args.linear, Unset) and isinstance(args.angular, Unset))
         if isinstance(args.joints, Unset) != in_space:
-            raise RequestRefused("Give either linear and angular velocity, or one or both of them, or joints.")
+            raise RequestRefused("Give either joint velocities, or a linear or angular velocity, or both of these.")
         if not isinstance(args.joints, Unset):
             if len({joint.name for joint in args.joints}) != len(args.joints):
-                raise RequestRefused("A joint is named twice.")
+                raise RequestRefused("A joint is given twice.")
             return motion | {"joints": args.joints}
         linear = Position() if isinstance(args.linear, Unset) else args.linear
         angular = Position() if isinstance(args.angular, Unset) else args.angular
@@ -118,7 +118,7 @@ class OperationRequests:
             axes = self._axes(args)
             linear, angular = linear.rotated(axes), angular.rotated(axes)
         elif not (isinstance(args.object_id, Unset) and isinstance(args.pose, Unset)):
-            raise RequestRefused("An object or a pose belongs to the frame user.")
+            raise RequestRefused("An object or a pose is only allowed with the frame user.")
         return motion | {"twist": (*linear, *angular), "frame": _FRAMES[args.frame]}
 
     def _axes(self, args: JogRobotArgs) -> Orientation:

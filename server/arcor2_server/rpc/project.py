@@ -96,7 +96,7 @@ class ProjectRequests:
             self._editing.require_no_program()
             await self._editing.require_document_name_free(args.name, "project")
             if self._locks.write_locked_roots(excluding=(PROJECT,)):
-                raise RequestRefused("Something is locked: all locks have to be given back first.")
+                raise RequestRefused("An item is locked. All locks must be released first.")
             scene = await self._scene_for(context, args.scene_id)
             if problems := session.scene_problems(scene):
                 raise RequestRefused(
@@ -159,7 +159,7 @@ class ProjectRequests:
             self._online.require_offline()
             if session.has_changes and not args.force:
                 raise RequestRefused(
-                    "{name} has changes that are not saved: save it, or close it by force.", name=project.name
+                    "{name} has unsaved changes. Save them, or close it with force.", name=project.name
                 )
             if context.dry_run:
                 return

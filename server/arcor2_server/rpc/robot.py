@@ -95,7 +95,7 @@ class RobotRequests:
         async with self._reading(context, args.robot_id) as cell:
             robot = cell.robot(args.robot_id)
             if not self._types.robot_meta(robot.type).multi_arm:
-                raise RequestRefused("{name} has one arm.", name=robot.name)
+                raise RequestRefused("{name} has only one arm.", name=robot.name)
             return sorted(await cell.ask(set[str], args.robot_id, "get_arm_ids"))
 
     @rpc("RegisterForRobotEvent")

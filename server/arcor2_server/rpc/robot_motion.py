@@ -53,7 +53,7 @@ def _step_frame(cell: OnlineScene, args: StepRobotEefArgs) -> Orientation:
             if isinstance(args.pose, Unset):
                 raise RequestRefused("Give the pose that the step is relative to.")
             return args.pose.orientation
-    raise RequestRefused("Steps in a frame of the user's own are not available.")
+    raise RequestRefused("Steps in a user frame are not available.")
 
 
 def _stepped(args: StepRobotEefArgs, present: Pose, frame: Orientation) -> Pose:
@@ -216,7 +216,7 @@ class RobotMotionRequests:
     async def _move_to_orientation(self, context: Context, args: MoveToActionPointArgs, orientation_id: str) -> None:
         arm_id, end_effector = optional(args.arm_id), args.end_effector_id
         if isinstance(end_effector, Unset):
-            raise RequestRefused("Name the end effector that shall move there.")
+            raise RequestRefused("Give the end effector that moves to the orientation.")
         point, named = self._session.document.orientation(orientation_id)
         await self._motion.require_ready(args.robot_id, "move_to_pose", arm_id)
         arguments: dict[str, Any] = {

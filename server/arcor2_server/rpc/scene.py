@@ -85,12 +85,10 @@ class SceneRequests:
             self._session.require_scene_alone()
             scene = self._session.require_scene()
             if self._session.scene_changed and not args.force:
-                raise RequestRefused(
-                    "{name} has changes that are not saved: save it, or close it by force.", name=scene.name
-                )
+                raise RequestRefused("{name} has unsaved changes. Save them, or close it with force.", name=scene.name)
             self._online.require_offline()
             if self._locks.locked_roots(excluding=(SCENE,)):
-                raise RequestRefused("Something in the scene is locked: all locks have to be given back first.")
+                raise RequestRefused("An item of the scene is locked. All locks must be released first.")
             if context.dry_run:
                 return
             await self._session.discard()

@@ -42,7 +42,7 @@ def _model_of(model: ObjectModel) -> Models:
     try:
         return model.model()
     except ValueError as error:
-        raise InvalidData("A collision model is needed: {reason}.", reason=error) from None
+        raise InvalidData("The collision model is missing or invalid: {reason}.", reason=error) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,7 @@ class SceneObjectRequests:
                     sorted([project.name for project in await self._storage.projects() if project.id in users])
                 )
                 raise RequestRefused(
-                    "{name} is used in {names}: change these projects, or remove it by force.",
+                    "{name} is used in {names}. Change these projects, or remove it with force.",
                     name=obj.name,
                     names=names,
                 )
@@ -180,7 +180,7 @@ class SceneObjectRequests:
         document = self._session.require_scene_alone()
         obj = document.scene_object(args.id)
         if args.new_name == obj.name:
-            raise RequestRefused("The object is called {name} already.", name=obj.name)
+            raise RequestRefused("The object already has the name {name}.", name=obj.name)
         self._editing.require_name_free(Kind.OBJECT, args.new_name, "an object")
         check_name(args.new_name, "object")
         self._editing.require_locked(context, args.id)

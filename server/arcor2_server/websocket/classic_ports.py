@@ -38,7 +38,7 @@ def ports_from_environment(environment: Mapping[str, str] = os.environ) -> dict[
 def _port_of_number(environment: Mapping[str, str], variable: str, default: int) -> int:
     text = environment.get(variable) or str(default)
     if not text.isdecimal() or int(text) > 0xFFFF:
-        raise InvalidData("{variable}={text!r} is no port.", variable=variable, text=text)
+        raise InvalidData("{variable}={text!r} is not a port number.", variable=variable, text=text)
     return int(text)
 
 
@@ -51,5 +51,5 @@ def _port_of_url(environment: Mapping[str, str], variable: str, default: int) ->
     except ValueError:
         port = None
     if port is None:
-        raise InvalidData("{variable}={text!r} has no port.", variable=variable, text=text)
+        raise InvalidData("{variable}={text!r} contains no port.", variable=variable, text=text)
     return port

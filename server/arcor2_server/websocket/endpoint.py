@@ -235,7 +235,7 @@ class Endpoint:
             try:
                 request = _decode_request(text)
             except (msgspec.DecodeError, RecursionError) as error:
-                self._refuse(client, _read_head(text), f"This is no request: {error}.")
+                self._refuse(client, _read_head(text), f"This is not a valid request: {error}.")
                 continue
             route = self.service.routes.get(request.request)
             if route is None:
