@@ -242,7 +242,7 @@ async def test_packages_are_listed_live_downloaded_uploaded_and_run(
         await screen.page.locator("input[type=file]").set_input_files(
             {"name": "brought.zip", "mimeType": "application/zip", "buffer": content}
         )
-        await tray.locator(".task").filter(has_text="Taking in the package brought").wait_for()
+        await tray.locator(".task").filter(has_text="Uploading the package brought").wait_for()
         await screen.sees("Uploaded brought.zip.")
         await until(lambda: _packages(client, 2), "the package is there twice")
         await expect(screen.page.locator(".card")).to_have_count(2)

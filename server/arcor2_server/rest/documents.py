@@ -22,11 +22,11 @@ _TIMESTAMP: Final = r"^\d{4}-"
 
 def document(service: str = "") -> dict[str, Any]:
     """Return the OpenAPI document of one service, by default of all."""
-    chosen = [one for one in OPERATIONS if service in ("", one.service)]
+    chosen = [declared for declared in OPERATIONS if service in ("", declared.service)]
     schemas, components = _schemas(chosen)
     paths: dict[str, dict[str, Any]] = {}
-    for one in chosen:
-        paths.setdefault(one.path, {})[one.method.lower()] = _operation(one, schemas)
+    for declared in chosen:
+        paths.setdefault(declared.path, {})[declared.method.lower()] = _operation(declared, schemas)
     return {
         "openapi": OPENAPI,
         "info": {"title": f"ARCOR2-HW {service}".strip(), "version": version("arcor2-hw")},
@@ -38,14 +38,14 @@ def document(service: str = "") -> dict[str, Any]:
     }
 
 
-def _types(one: Operation) -> Iterable[tuple[Any, bool]]:
+def _types(declared: Operation) -> Iterable[tuple[Any, bool]]:
     """Return the types of an operation, each with whether its fields are snake_case on the wire."""
-    if "body" in one.takes:
-        yield one.takes["body"], False
-    if one.media_type == "application/json" and one.gives not in (None, type(None)):
+    if "body" in declared.parameters:
+        yield declared.parameters["body"], False
+    if declared.media_type == "application/json" and declared.result not in (None, type(None)):
         # A union of Structs without tags has no schema of its own.
-        for part in typing.get_args(one.gives) if _is_union(one.gives) else (one.gives,):
-            yield part, one.plain
+        for part in typing.get_args(declared.result) if _is_union(declared.result) else (declared.result,):
+            yield part, declared.plain
 
 
 def _is_union(kind: Any) -> bool:
@@ -60,8 +60,8 @@ def _schemas(chosen: list[Operation]) -> tuple[Schemas, dict[str, Any]]:
     """Return the schemas of all types, and the components that they refer to."""
     schemas: Schemas = {}
     components: dict[str, Any] = {}
-    wanted = [pair for one in chosen for pair in _types(one)] + [(WebApiError, False)]
-    queries = [one.takes["query"] for one in chosen if "query" in one.takes]
+    wanted = [pair for declared in chosen for pair in _types(declared)] + [(WebApiError, False)]
+    queries = [declared.parameters["query"] for declared in chosen if "query" in declared.parameters]
     for plain in (False, True):
         kinds = list({str(kind): kind for kind, is_plain in wanted if is_plain is plain}.values())
         made, parts = msgspec.json.schema_components(kinds, ref_template=_REFERENCE)
@@ -115,56 +115,56 @@ def _to_openapi(schema: Any, plain: bool) -> Any:
     return converted
 
 
-def _operation(one: Operation, schemas: Schemas) -> dict[str, Any]:
-    text = (one.handler.__doc__ or "").strip()
+def _operation(declared: Operation, schemas: Schemas) -> dict[str, Any]:
+    text = (declared.handler.__doc__ or "").strip()
     made: dict[str, Any] = {
-        "tags": [one.service],
-        "operationId": one.handler.__name__,
+        "tags": [declared.service],
+        "operationId": declared.handler.__name__,
         "summary": text.splitlines()[0],
-        "description": f"{' '.join(text.split())} Least role: {Role(one.role).name.lower()}.",
+        "description": f"{' '.join(text.split())} Required role: {Role(declared.role).name.lower()}.",
         "parameters": [
-            {"name": name, "in": "path", "required": True, "schema": {"type": "string"}} for name in one.path_names
+            {"name": name, "in": "path", "required": True, "schema": {"type": "string"}} for name in declared.path_names
         ]
-        + list(_query(one, schemas)),
-        "responses": _responses(one, schemas),
+        + list(_query(declared, schemas)),
+        "responses": _responses(declared, schemas),
     }
-    if not one.open:
+    if not declared.open:
         made["security"] = [{"token": []}, {}]
-    if "body" in one.takes:
-        schema = schemas[str(one.takes["body"]), False]
+    if "body" in declared.parameters:
+        schema = schemas[str(declared.parameters["body"]), False]
         made["requestBody"] = {"required": True, "content": {"application/json": {"schema": schema}}}
-    elif one.file:
+    elif declared.file:
         file: dict[str, Any] = {"type": "string", "format": "binary"}
         several = {"type": "array", "minItems": 1, "items": file}
-        properties: dict[str, Any] = {one.file: several if "uploads" in one.takes else file}
-        properties |= {name: {"type": "string", "description": "JSON"} for name in one.parts}
-        schema = {"type": "object", "required": [one.file, *one.parts], "properties": properties}
+        properties: dict[str, Any] = {declared.file: several if "uploads" in declared.parameters else file}
+        properties |= {name: {"type": "string", "description": "JSON"} for name in declared.parts}
+        schema = {"type": "object", "required": [declared.file, *declared.parts], "properties": properties}
         made["requestBody"] = {"required": True, "content": {"multipart/form-data": {"schema": schema}}}
     return made
 
 
-def _query(one: Operation, schemas: Schemas) -> Iterable[dict[str, Any]]:
-    if "query" not in one.takes:
+def _query(declared: Operation, schemas: Schemas) -> Iterable[dict[str, Any]]:
+    if "query" not in declared.parameters:
         return
-    schema = schemas[str(one.takes["query"]), True]
+    schema = schemas[str(declared.parameters["query"]), True]
     required = schema.get("required", [])
     for name, part in schema["properties"].items():
         yield {"name": name, "in": "query", "required": name in required, "schema": part}
 
 
-def _responses(one: Operation, schemas: Schemas) -> dict[str, Any]:
+def _responses(declared: Operation, schemas: Schemas) -> dict[str, Any]:
     good: dict[str, Any] = {"description": "Done."}
-    if one.media_type == "application/json":
-        good["content"] = {"application/json": {"schema": _result_schema(one, schemas)}}
-    elif one.media_type != "text/plain":
-        good["content"] = {one.media_type: {"schema": {"type": "string", "format": "binary"}}}
+    if declared.media_type == "application/json":
+        good["content"] = {"application/json": {"schema": _result_schema(declared, schemas)}}
+    elif declared.media_type != "text/plain":
+        good["content"] = {declared.media_type: {"schema": {"type": "string", "format": "binary"}}}
     refused = {"application/json": {"schema": schemas[str(WebApiError), False]}}
     reasons = {"default": "The request was refused. The body states the reason."}
-    if one.takes.keys() & {"query", "body", "upload", "uploads"}:
+    if declared.parameters.keys() & {"query", "body", "upload", "uploads"}:
         reasons["400"] = "The query or body is invalid."
-    if not one.open:
+    if not declared.open:
         reasons |= {"401": "A token is needed.", "403": "The role is too low."}
-    if one.path_names or one.takes.keys() & {"query", "body"}:
+    if declared.path_names or declared.parameters.keys() & {"query", "body"}:
         reasons["404"] = "An item that the request names does not exist."
     reasons["409"] = "The present state does not allow the request."
     return {"200": good} | {
@@ -172,12 +172,12 @@ def _responses(one: Operation, schemas: Schemas) -> dict[str, Any]:
     }
 
 
-def _result_schema(one: Operation, schemas: Schemas) -> dict[str, Any]:
-    if one.gives in (None, type(None)):
+def _result_schema(declared: Operation, schemas: Schemas) -> dict[str, Any]:
+    if declared.result in (None, type(None)):
         return {"type": "string", "enum": ["ok"]}
-    if _is_union(one.gives):
-        return {"oneOf": [schemas[str(part), one.plain] for part in typing.get_args(one.gives)]}
-    return schemas[str(one.gives), one.plain]
+    if _is_union(declared.result):
+        return {"oneOf": [schemas[str(part), declared.plain] for part in typing.get_args(declared.result)]}
+    return schemas[str(declared.result), declared.plain]
 
 
 # ------------------------------------------------------------------------------------------------ routes
@@ -186,7 +186,7 @@ _cached_document = functools.lru_cache(maxsize=16)(document)
 
 def service_at(settings: ServerSettings, port: int) -> str:
     """Return the service on a classic port, "" if it is not the port of a single service."""
-    services = {one.service for one in OPERATIONS}
+    services = {declared.service for declared in OPERATIONS}
     return next((name for name, own in settings.classic_ports.items() if own == port and name in services), "")
 
 

@@ -39,9 +39,9 @@ class KinematicsOperations:
         robot = self._online.robot(object_id)
         if self._robots.model_of_type(robot.type) is None:
             return RobotKinematics(robot.id, robot.name, InForce.NONE)
-        kept = self._robot_calibrations.stored(robot)
-        if kept is None:
+        stored = self._robot_calibrations.stored(robot)
+        if stored is None:
             return RobotKinematics(robot.id, robot.name, InForce.NOMINAL)
-        state = InForce.NOMINAL if kept.refused else InForce.MEASURED
-        checksum, refused = kept.calibration.checksum, kept.refused or UNSET
-        return RobotKinematics(robot.id, robot.name, state, kept.read, checksum, refused)
+        state = InForce.NOMINAL if stored.refused else InForce.MEASURED
+        checksum, refused = stored.calibration.checksum, stored.refused or UNSET
+        return RobotKinematics(robot.id, robot.name, state, stored.read, checksum, refused)

@@ -91,9 +91,9 @@ class Operation:
     service: str
     role: Role
     handler: Callable[..., Awaitable[Any]]
-    takes: Mapping[str, Any]
+    parameters: Mapping[str, Any]
     """Types of the parameters of the handler."""
-    gives: Any
+    result: Any
     """Type of the result."""
     file: str = ""
     """Name of the part of a multipart body with the file."""
@@ -128,12 +128,12 @@ def operation(
 
     def register(handler: F) -> F:
         hints = typing.get_type_hints(handler, include_extras=True)
-        gives = hints.pop("return")
+        result = hints.pop("return")
         names = tuple(name for name in hints if name not in SPECIAL)
         if set(names) != {part[1:-1] for part in path.split("/") if part.startswith("{")}:
             raise TypeError(f"{method} {path}: the path and the parameters of {handler} differ")
         OPERATIONS.append(
-            Operation(method, path, service, role, handler, hints, gives, path_names=names, **more),
+            Operation(method, path, service, role, handler, hints, result, path_names=names, **more),
         )
         return handler
 
@@ -177,10 +177,10 @@ def route(declared: Operation, tasks: Tasks) -> HTTPRouteHandler:
         except Exception:
             reference = secrets.token_hex(4)
             log.exception("request failed", method=declared.method, path=declared.path, reference=reference)
-            trouble = InternalError(
+            error_inside = InternalError(
                 "An error inside the server: see its log, reference {reference}.", reference=reference
             )
-            return refusal(declared.service, trouble)
+            return refusal(declared.service, error_inside)
         finally:
             for upload in uploads:
                 await upload.close()
@@ -214,7 +214,7 @@ def _note(outcome: str, declared: Operation, request: Request[Any, Any, Any]) ->
 
 async def _arguments(declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]) -> dict[str, Any]:
     given: dict[str, Any] = {name: request.path_params[name] for name in declared.path_names}
-    for name, kind in declared.takes.items():
+    for name, kind in declared.parameters.items():
         if name == "port":
             given[name] = (request.scope.get("server") or ("", 0))[1]
         elif name == "query":

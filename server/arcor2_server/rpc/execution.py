@@ -118,7 +118,7 @@ class ExecutionRequests:
     @rpc("UploadPackage")
     async def upload_package(self, context: Context, args: UploadPackageArgs) -> None:
         """Store a package that was sent as a zip file."""
-        with self._tasks.running(TaskKind.UPLOAD, f"Taking in the package {args.id}", context.client.name):
+        with self._tasks.running(TaskKind.UPLOAD, f"Uploading the package {args.id}", context.client.name):
             summary = await self._execution.upload(args.id, args.data)
         context.emit("PackageChanged", summary, ChangeType.ADD)
 

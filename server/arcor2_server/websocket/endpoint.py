@@ -275,8 +275,8 @@ class Endpoint:
         except Exception:
             reference = secrets.token_hex(4)
             log.exception("request failed", request=request.request, reference=reference, user=client.user)
-            trouble = f"An error inside the server: see its log, reference {reference}."
-            self._refuse(client, request, trouble, "internal")
+            message = f"An error inside the server: see its log, reference {reference}."
+            self._refuse(client, request, message, "internal")
 
     async def _run(self, client: Client, request: Request, route: Route) -> None:
         rpc = route.rpc

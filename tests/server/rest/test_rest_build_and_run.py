@@ -293,7 +293,7 @@ async def test_an_upload_of_a_hundred_megabytes_does_not_block_others(server: Se
         assert slowest < 2.0
         assert most - before < 40_000_000, "it goes to the disk as it comes"
         told = await _told_of_uploads(follower)
-        assert {one.title for one in told} == {"Taking in the package pkg_big"}
+        assert {one.title for one in told} == {"Uploading the package pkg_big"}
         shares = [one.progress for one in told if not isinstance(one.progress, Unset)]
         assert shares == sorted(shares)
         assert len([share for share in shares if 0.05 < share < 0.9]) >= 2, "as it comes"
