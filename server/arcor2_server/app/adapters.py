@@ -4,9 +4,9 @@ from arcor2_server.app.parts import Server
 from arcor2_server.rest.api_page import ApiPageOperations
 from arcor2_server.rest.assets import AssetOperations
 from arcor2_server.rest.build import BuildOperations
-from arcor2_server.rest.calibration import CalibrationOperations
+from arcor2_server.rest.calibration_methods import CalibrationMethodOperations
 from arcor2_server.rest.calibration_records import CalibrationRecordOperations
-from arcor2_server.rest.calibrations import MeasurementCalibrationOperations
+from arcor2_server.rest.calibration_service import CalibrationServiceOperations
 from arcor2_server.rest.diagnosis import DiagnosisOperations
 from arcor2_server.rest.diagnosis_bundle import Diagnosis
 from arcor2_server.rest.display_models import DisplayModelOperations
@@ -18,7 +18,7 @@ from arcor2_server.rest.models import ModelOperations
 from arcor2_server.rest.object_types import ObjectTypeOperations
 from arcor2_server.rest.projects import ProjectOperations
 from arcor2_server.rest.runs import RunOperations
-from arcor2_server.rest.scene import SceneServiceOperations
+from arcor2_server.rest.scene_service import SceneServiceOperations
 from arcor2_server.rest.scenes import SceneOperations
 from arcor2_server.rpc.action_points import ActionPointRequests
 from arcor2_server.rpc.actions import ActionRequests
@@ -111,9 +111,9 @@ def rest_groups(s: Server) -> list[object]:
         ApiPageOperations(),
         AssetOperations(s.assets, s.type_notifications),
         BuildOperations(s.storage, s.build, s.package_import),
-        CalibrationOperations(s.calibration, s.robots),
+        CalibrationServiceOperations(s.calibration, s.robots),
         CalibrationRecordOperations(s.calibration_records),
-        MeasurementCalibrationOperations(s.calibration_records, s.compute, s.markers, s.robots),
+        CalibrationMethodOperations(s.calibration_records, s.compute, s.markers, s.robots),
         DiagnosisOperations(s.secrets, diagnosis),
         DisplayModelOperations(s.display_models),
         ApiDocumentOperations(s.settings),

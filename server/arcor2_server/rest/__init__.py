@@ -12,9 +12,9 @@ from arcor2_server.rest import (  # noqa: F401
     api_page,
     assets,
     build,
-    calibration,
+    calibration_methods,
     calibration_records,
-    calibrations,
+    calibration_service,
     diagnosis,
     display_models,
     documents,
@@ -25,7 +25,7 @@ from arcor2_server.rest import (  # noqa: F401
     object_types,
     projects,
     runs,
-    scene,
+    scene_service,
     scenes,
 )
 from arcor2_server.rest.operations import OPERATIONS, bound, route

@@ -15,7 +15,7 @@ from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import ListCalibrationsArgs
-from arcor2_server.rest.calibration import CALIBRATION
+from arcor2_server.rest.calibration_service import CALIBRATION
 from arcor2_server.rest.operations import operation
 from arcor2_server.storage.calibrations import Calibrations
 

@@ -23,15 +23,15 @@ from arcor2_hw.calibration.configuration import CalibrationConfiguration
 from arcor2_hw.calibration.layout import CharucoBoard, Layout
 from arcor2_hw.calibration.records import CalibrationInput, CalibrationKind, CalibrationRecord
 from arcor2_hw.calibration.results import RobotPose, TouchedFrame, TouchedOrientation, TouchedTip
-from arcor2_hw.compute import calibration_tasks as t
+from arcor2_hw.compute import calibration_tasks
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.compute.workers import Compute
-from arcor2_server.rest.calibration import CALIBRATION, CalibrateRobotArgs, read_args
 from arcor2_server.rest.calibration_records import RecordAs
+from arcor2_server.rest.calibration_service import CALIBRATION, CalibrateRobotArgs, read_args
 from arcor2_server.rest.operations import MIB, Binary, Upload, Uploads, operation
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.workspace.markers import Markers
@@ -94,7 +94,7 @@ async def _pictures(uploads: Uploads) -> list[bytes]:
     return [await asyncio.to_thread(file.read) for file in uploads.files]
 
 
-_MANY: Final[dict[str, Any]] = {"file": "image", "parts": ("args",), "limit": MAX_PICTURES, "plain": True}
+_PICTURE_UPLOAD: Final[dict[str, Any]] = {"file": "image", "parts": ("args",), "limit": MAX_PICTURES, "plain": True}
 
 
 # ------------------------------------------------------------------------------------------------ by touch
@@ -141,7 +141,7 @@ class DirectionsArgs(Data, frozen=True):
 
 
 @dataclass(frozen=True, slots=True)
-class MeasurementCalibrationOperations:
+class CalibrationMethodOperations:
     """Calibrations beyond the ARCOR2 protocol, over REST (docs/protocol.md)."""
 
     _calibration_records: Calibrations
@@ -163,14 +163,14 @@ class MeasurementCalibrationOperations:
     def _configured(self, given: CalibrationConfiguration | Unset) -> CalibrationConfiguration:
         return self._markers.configuration if isinstance(given, Unset) else given
 
-    @operation("PUT", "/api/calibration/camera", CALIBRATION, Role.TECHNICIAN, **_MANY)
+    @operation("PUT", "/api/calibration/camera", CALIBRATION, Role.TECHNICIAN, **_PICTURE_UPLOAD)
     async def find_camera_pose(self, uploads: Uploads, person: str) -> CameraPose:
         """Return the pose of a camera from pictures of markers, with all errors."""
         args = read_args(uploads.fields["args"], CameraArgs)
         configuration = self._configured(args.markers)
         options = configuration.options if isinstance(args.options, Unset) else args.options
         pictures = await _pictures(uploads)
-        task = t.FindCameraPose(pictures, args.camera_parameters, configuration.layout, options)
+        task = calibration_tasks.FindCameraPose(pictures, args.camera_parameters, configuration.layout, options)
         found = await self._compute.run(task)
         parameters = {"camera_parameters": args.camera_parameters, "markers": configuration, "options": options}
         kind = CalibrationKind.CAMERA_POSE
@@ -192,17 +192,19 @@ class MeasurementCalibrationOperations:
         args = read_args(upload.fields["args"], CameraPictureArgs)
         picture = await asyncio.to_thread(upload.file.read)
         layout = self._configured(args.markers).layout
-        drawn = await self._compute.run(t.DrawCameraPose(picture, args.camera_parameters, layout, args.result))
+        drawn = await self._compute.run(
+            calibration_tasks.DrawCameraPose(picture, args.camera_parameters, layout, args.result)
+        )
         return Binary(drawn, "image/png", "camera-pose.png")
 
-    @operation("PUT", "/api/calibration/robot", CALIBRATION, Role.TECHNICIAN, **_MANY)
+    @operation("PUT", "/api/calibration/robot", CALIBRATION, Role.TECHNICIAN, **_PICTURE_UPLOAD)
     async def find_robot_pose(self, uploads: Uploads, person: str) -> RobotPose:
         """Return the pose of a robot from depth pictures (16 bit, mm) of a camera with a known pose, with metrics."""
         args = read_args(uploads.fields["args"], RobotArgs)
         pictures = await _pictures(uploads)
         model = replace(self._robots.model_of_uri(args.urdf_uri), base=args.robot_pose)
         found = await self._compute.run(
-            t.FindRobotPose(
+            calibration_tasks.FindRobotPose(
                 model, args.robot_joints, pictures, args.camera_parameters, args.camera_pose, args.distance, args.angle
             )
         )
@@ -211,7 +213,7 @@ class MeasurementCalibrationOperations:
         await self._store(person, args, kind, found, after=found.pose, pictures=pictures, parameters=parameters)
         return found
 
-    @operation("PUT", "/api/calibration/hand-eye", CALIBRATION, Role.TECHNICIAN, **_MANY)
+    @operation("PUT", "/api/calibration/hand-eye", CALIBRATION, Role.TECHNICIAN, **_PICTURE_UPLOAD)
     async def find_hand_eye(self, uploads: Uploads, person: str) -> HandEye:
         """Return the pose of a camera mounted on the flange of a robot or next to the robot."""
         args = read_args(uploads.fields["args"], HandEyeArgs)
@@ -223,45 +225,45 @@ class MeasurementCalibrationOperations:
                 other_count=len(args.flanges),
             )
         samples = [HandEyeSample(flange, picture) for flange, picture in zip(args.flanges, pictures, strict=True)]
-        task = t.FindHandEye(samples, args.camera_parameters, args.target, args.mounting, args.options)
+        task = calibration_tasks.FindHandEye(samples, args.camera_parameters, args.target, args.mounting, args.options)
         found = await self._compute.run(task)
         await self._store(person, args, CalibrationKind.HAND_EYE, found, "px", after=found.pose, pictures=pictures)
         return found
 
-    @operation("PUT", "/api/calibration/intrinsics", CALIBRATION, Role.TECHNICIAN, **_MANY)
+    @operation("PUT", "/api/calibration/intrinsics", CALIBRATION, Role.TECHNICIAN, **_PICTURE_UPLOAD)
     async def find_intrinsics(self, uploads: Uploads, person: str) -> Intrinsics:
         """Return focal lengths, principal point and distortion of a camera from pictures of a ChArUco board."""
         args = read_args(uploads.fields["args"], IntrinsicsArgs)
         pictures = await _pictures(uploads)
-        found = await self._compute.run(t.FindIntrinsics(pictures, args.board, args.options))
+        found = await self._compute.run(calibration_tasks.FindIntrinsics(pictures, args.board, args.options))
         await self._store(person, args, CalibrationKind.INTRINSICS, found, "px", pictures=pictures)
         return found
 
     @operation("PUT", "/api/calibration/touch/frame-by-axes", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def frame_by_axes(self, body: FrameByAxesArgs, person: str) -> TouchedFrame:
         """Return a frame from three or more touched points: origin, x axis, xy plane."""
-        found = await self._compute.run(t.FrameByAxes(body.origin, body.on_x, body.in_plane))
+        found = await self._compute.run(calibration_tasks.FrameByAxes(body.origin, body.on_x, body.in_plane))
         await self._store(person, body, CalibrationKind.USER_FRAME, found, after=found.pose)
         return found
 
     @operation("PUT", "/api/calibration/touch/frame-by-points", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def frame_by_points(self, body: FrameByPointsArgs, person: str) -> TouchedFrame:
         """Return a frame, such as a robot base, from three or more touched points with known positions in it."""
-        found = await self._compute.run(t.FrameByPoints(body.known, body.touched))
+        found = await self._compute.run(calibration_tasks.FrameByPoints(body.known, body.touched))
         await self._store(person, body, CalibrationKind.BASE_FRAME, found, after=found.pose)
         return found
 
     @operation("PUT", "/api/calibration/touch/tip", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def tip_by_touches(self, body: TipArgs, person: str) -> TouchedTip:
         """Return the position of a tool's tip on the flange, from one point touched in four or more orientations."""
-        found = await self._compute.run(t.TipByTouches(body.flanges))
+        found = await self._compute.run(calibration_tasks.TipByTouches(body.flanges))
         await self._store(person, body, CalibrationKind.TOOL_TIP, found, after=Pose(found.position))
         return found
 
     @operation("PUT", "/api/calibration/touch/orientation-by-alignment", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def orientation_by_alignment(self, body: AlignmentArgs, person: str) -> TouchedOrientation:
         """Return a tool's orientation on the flange, from aligning the tool with a reference."""
-        found = await self._compute.run(t.OrientationByAlignment(body.flanges, body.reference))
+        found = await self._compute.run(calibration_tasks.OrientationByAlignment(body.flanges, body.reference))
         after = Pose(orientation=found.orientation)
         await self._store(person, body, CalibrationKind.TOOL_ORIENTATION, found, "rad", after=after)
         return found
@@ -269,7 +271,9 @@ class MeasurementCalibrationOperations:
     @operation("PUT", "/api/calibration/touch/orientation-by-points", CALIBRATION, Role.TECHNICIAN, plain=True)
     async def orientation_by_points(self, body: DirectionsArgs, person: str) -> TouchedOrientation:
         """Return a tool's orientation on the flange, from moving its tip along its +z axis and to its +x side."""
-        found = await self._compute.run(t.OrientationByPoints(body.flange, body.tip, body.along_z, body.on_x))
+        found = await self._compute.run(
+            calibration_tasks.OrientationByPoints(body.flange, body.tip, body.along_z, body.on_x)
+        )
         after = Pose(orientation=found.orientation)
         await self._store(person, body, CalibrationKind.TOOL_ORIENTATION, found, "rad", after=after)
         return found

@@ -73,7 +73,7 @@ def read_args(text: str, kind: type[T]) -> T:
 
 
 @dataclass(frozen=True, slots=True)
-class CalibrationOperations:
+class CalibrationServiceOperations:
     """The Calibration service of ARCOR2 over REST (protocol, section 15)."""
 
     _calibration: Calibration
