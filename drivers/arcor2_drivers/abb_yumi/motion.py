@@ -1,4 +1,4 @@
-"""Motion: moves of one arm, or of both in step, kept clear of each other, and stopping."""
+"""Motion: moves of one arm or of both coupled, with clearance between the arms, and stopping."""
 
 import contextlib
 import math

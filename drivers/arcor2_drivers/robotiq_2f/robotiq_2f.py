@@ -226,11 +226,11 @@ class Robotiq2F(PolledControl[Status], Gripper):
     def _await_standstill(self) -> None:
         before: list[int] = []
 
-        def stands(status: Status) -> bool:
+        def at_standstill(status: Status) -> bool:
             before.append(status.position)
             return not status.go_to and len(before) > 1 and before[-2] == status.position
 
-        self.wait(stands, STANDS_WITHIN, "coming to a standstill")
+        self.wait(at_standstill, STANDS_WITHIN, "coming to a standstill")
 
     def _write(self, command: Command, what: str, go_on: GoOn) -> None:
         def write() -> None:
@@ -263,7 +263,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
             self._require_ready(what)
             self._write(command, what, go_on)
 
-            def stands(status: Status) -> bool:
+            def at_standstill(status: Status) -> bool:
                 self.require_control(what)
                 if status.fault >= FIRST_MAJOR:
                     raise self._fault(status, what)
@@ -277,7 +277,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
                 return accepted and status.object is not Object.MOVING
 
             try:
-                return self.wait(stands, self._s.stroke / speed + ACCEPTED_WITHIN + MARGIN, what, go_on)
+                return self.wait(at_standstill, self._s.stroke / speed + ACCEPTED_WITHIN + MARGIN, what, go_on)
             except DeviceTimeout:
                 with contextlib.suppress(DeviceError):  # without it the gripper finishes the motion, then holds
                     self._write(Command(go_to=False), what, go_on)  # no caller waits for the motion any more

@@ -12,7 +12,7 @@ from . import dashboard
 from .dashboard import Dashboard
 
 MAX_AGE: Final = 0.5
-"""Time for which an answer is used again, s: nobody turns a key faster."""
+"""Time for which an answer is reused, s; an operator does not turn the key faster."""
 TIMEOUT: Final = 0.3
 """Time for the answers that are requested periodically, s."""
 POLYSCOPE_X: Final = 10

@@ -112,7 +112,7 @@ class ControlSession:
         self._guard.start()
 
     def _refusal(self, text: str) -> DeviceError:
-        """Return the error that a text of ur_rtde's constructor stands for."""
+        """Return the error for a text of ur_rtde's constructor."""
         lower = text.lower()
         if "in use" in lower or "in_use" in lower:
             return NotInControl(

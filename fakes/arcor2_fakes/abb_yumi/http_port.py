@@ -43,7 +43,7 @@ class Session:
     key: str
     user: str
     address: str
-    heard: float = field(default_factory=time.monotonic)
+    last_request: float = field(default_factory=time.monotonic)
 
 
 @dataclass
@@ -107,7 +107,7 @@ class HttpPort:
     def expire(self) -> None:
         """End sessions without recent requests."""
         for session in list(self._sessions.values()):
-            if time.monotonic() - session.heard > SESSION_LASTS:
+            if time.monotonic() - session.last_request > SESSION_LASTS:
                 self._end(session)
 
     def end_all(self) -> None:
@@ -140,7 +140,7 @@ class HttpPort:
         else:
             if fresh:
                 extra = [("Set-Cookie", f"{COOKIE}={session.key}; path=/; httponly")]
-            session.heard = time.monotonic()
+            session.last_request = time.monotonic()
             fields = dict(parse_qsl(body.decode("latin-1"), keep_blank_values=True))
             if url.path == "/logout":
                 self._end(session)

@@ -1,8 +1,8 @@
-"""A fake Robotiq 2F gripper: the URCap's ASCII port, or Modbus RTU on a pty.
+"""Fake Robotiq 2F gripper: the ASCII port of the URCap, and Modbus RTU on a pty.
 
-Fingers that move in time, parts between them, activation, object detection and faults. Not modelled: automatic release
-(ATR), the dynamics of fingers and parts (a part is rigid and a force is only remembered), encompassing grips, several
-grippers behind one port, motor current that follows from a force.
+Modelled: fingers that move in time, parts between them, activation, object detection and faults. Not modelled:
+automatic release (ATR), the dynamics of fingers and parts (a part is rigid, a force is only stored), encompassing
+grips, several grippers behind one port, and a motor current that depends on the force.
 """
 
 WIRE = "ASCII on TCP, and Modbus RTU on a pty"

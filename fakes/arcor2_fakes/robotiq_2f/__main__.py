@@ -1,4 +1,4 @@
-"""Starts the fake gripper: `python -m arcor2_fakes.robotiq_2f`."""
+"""Start the fake gripper: `python -m arcor2_fakes.robotiq_2f`."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ def main(
     latency: Annotated[float, Parameter(validator=validators.Number(gte=0))] = 0.015,
     time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 1.0,
 ) -> int:
-    """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
+    """Start the fake; it prints one line `ready {json}` with its addresses, and exits on SIGTERM.
 
     Args:
         ascii_port: HOST:PORT of the URCap's ASCII port; port 0 takes a free one.
-        link: symbolic link to keep on the pty of Modbus RTU, whose own path changes when it is unplugged and plugged.
+        link: Symbolic link to the pty of Modbus RTU, whose path changes when it is unplugged and plugged.
         control: HOST:PORT of the control channel; port 0 takes a free one.
-        stroke: width between the fingers when open, m.
-        latency: seconds of the gripper's own between a request and its effect.
-        time_scale: how much faster than real the gripper is.
+        stroke: Width between the open fingers, m.
+        latency: Time between a request and its effect, s.
+        time_scale: Speed of the simulation; 1 is real time.
     """
 
     async def body(fake: Fake) -> None:

@@ -1,4 +1,4 @@
-"""The URCap's port: `GET <variable>` and `SET <variable> <value> ...`, a line each."""
+"""ASCII port of the URCap: lines `GET <variable>` and `SET <variable> <value> ...`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _UNIT: Final = 9
 
 
 class AsciiPort:
-    """Serves any number of clients on one TCP port, each line answered in turn."""
+    """Serves any number of clients on a TCP port."""
 
     def __init__(self, host: str, port: int, gripper: Gripper) -> None:
         self._gripper = gripper
@@ -48,10 +48,10 @@ class AsciiPort:
 
 
 class _Lines:
-    """Cuts lines out of what one client sends."""
+    """Splits the bytes of a client into lines."""
 
-    def __init__(self, line: Callable[[str], object], give_up: Callable[[], None]) -> None:
-        self._line, self._give_up = line, give_up
+    def __init__(self, line: Callable[[str], object], close: Callable[[], None]) -> None:
+        self._line, self._close = line, close
         self._rest = b""
 
     def feed(self, data: bytes) -> None:
@@ -59,4 +59,4 @@ class _Lines:
         for raw in complete:
             self._line(raw.decode("ascii", "replace").strip())
         if len(self._rest) > _LONGEST:
-            self._give_up()
+            self._close()

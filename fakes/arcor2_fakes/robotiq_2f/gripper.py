@@ -1,4 +1,4 @@
-"""The gripper itself: registers, fingers that move in time, the part between them. Knows nothing of a wire."""
+"""The gripper, independent of wires: registers, fingers that move in time, and the part between them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ MOVING, CONTACT_OPENING, CONTACT_CLOSING, ARRIVED = range(4)
 RESET, ACTIVATING, ACTIVE = 0, 1, 3
 """gSTA."""
 TOO_EARLY, NOT_ACTIVATED, INTERFERENCE, FIRST_MAJOR = 5, 7, 13, 10
-"""gFLT: action before activation is completed; before it is asked for; activation fault; faults that stop it."""
+"""gFLT: action before the activation has ended; without activation; activation fault; first fault that stops it."""
 FAULTS: Final = frozenset({0, 5, 7, 8, 9, 10, 11, 12, 13, 14, 15})
 REQUESTS: Final = ("ACT", "GTO", "ATR", "ARD", "POS", "SPE", "FOR")
 
 
 @dataclasses.dataclass(frozen=True)
 class Mechanics:
-    """What the model is built like; positions in counts, the rest in SI units."""
+    """Mechanical properties of the model; positions in counts, the rest in SI units."""
 
     stroke: float = 0.085
     open_count: int = 3
@@ -38,35 +38,35 @@ class Mechanics:
         return (self.closed_count - count) * self.stroke / (self.closed_count - self.open_count)
 
     def rate(self, speed: float) -> float:
-        """Return counts per second for m/s."""
+        """Return the speed in counts/s for a speed in m/s."""
         return speed * (self.closed_count - self.open_count) / self.stroke
 
 
 class Pace:
-    """A clock that may run faster than the real one, and change its pace."""
+    """A clock of the simulation, whose speed can change."""
 
     def __init__(self, clock: Callable[[], float], factor: float) -> None:
         self._clock, self._factor = clock, factor
         self._since, self._now = clock(), 0.0
 
     def __call__(self) -> float:
-        """Return the seconds passed at this clock."""
+        """Return the time of the simulation, s."""
         return self._now + (self._clock() - self._since) * self._factor
 
     def set(self, factor: float) -> None:
-        """Let it run `factor` times as fast as the real one. Raises `ValueError`."""
+        """Set the speed; 1 is real time. Raise `ValueError`."""
         if not 0.01 <= factor <= 1000.0:
             raise ValueError("factor is 0.01 to 1000")
         self._now, self._since, self._factor = self(), self._clock(), factor
 
 
 class Gripper:
-    """Fingers and registers. `clock` gives seconds; all is brought up to date whenever somebody looks."""
+    """Fingers and registers. `clock` returns seconds; each access first advances the simulation to the present."""
 
     def __init__(self, clock: Callable[[], float], mechanics: Mechanics | None = None) -> None:
         self.mechanics = mechanics or Mechanics()
         self._clock = clock
-        self._then = clock()
+        self._advanced_to = clock()
         self._pending: deque[tuple[float, dict[str, int]]] = deque()
         self.requested = dict.fromkeys(REQUESTS, 0)
         self._position = float(self.mechanics.open_count)
@@ -78,13 +78,13 @@ class Gripper:
         self._blocked = False
         self.commands: deque[dict[str, int]] = deque(maxlen=50)
         self.stops: deque[float] = deque(maxlen=200)
-        """When requests came that end a motion (GTO 0), by the machine's monotonic clock, s."""
+        """Times of requests that end a motion (GTO 0), on the monotonic clock, s."""
         self.count = 0
-        """Commands since the start."""
+        """Number of commands since the start."""
 
     # ------------------------------------------------------------------------------------------- from the wire
     def request(self, changes: dict[str, int]) -> None:
-        """Take requests; they are obeyed after the gripper's latency."""
+        """Receive requests; they take effect after the latency."""
         self.commands.append(dict(changes))
         self.count += 1
         if changes.get("GTO") == 0:
@@ -92,7 +92,7 @@ class Gripper:
         self._pending.append((self._clock() + self.mechanics.latency, dict(changes)))
 
     def registers(self) -> dict[str, int]:
-        """Return what the gripper tells now."""
+        """Return the present registers."""
         self.advance()
         moving = self._object == MOVING and (self._status == ACTIVATING or self.requested["GTO"] == 1)
         return {
@@ -107,28 +107,28 @@ class Gripper:
 
     # ------------------------------------------------------------------------------------------- from the world
     def put_part(self, width: float) -> None:
-        """Put a part between the fingers. Raises `ValueError` when it does not fit."""
+        """Put a part between the fingers. Raise `ValueError` if it does not fit."""
         self.advance()
         if not 0.0 < width <= self.mechanics.width(self._position) + 1e-9:
             raise ValueError(f"width is above 0 and up to {self.mechanics.width(self._position):.4f} m, the opening")
         self._part = width
 
     def remove_part(self) -> None:
-        """Take the part away; the fingers go on to where they were sent."""
+        """Remove the part; the fingers continue to the requested position."""
         self.advance()
         self._part = None
         if self.requested["GTO"] and self._object == CONTACT_CLOSING and not self._blocked:
             self._object = MOVING
 
     def block(self, on: bool = True) -> None:
-        """Jam the fingers where they are, or free them."""
+        """Block the fingers at their position, or release them."""
         self.advance()
         self._blocked = on
         if not on and self.requested["GTO"] and self._object in (CONTACT_OPENING, CONTACT_CLOSING):
             self._object = MOVING
 
     def fault(self, code: int) -> None:
-        """Raise a fault; 0 ends one whose cause has gone. From 10 on only a reset (ACT 0) ends it."""
+        """Raise a fault; 0 clears a minor one. Faults from 10 on are cleared only by a reset (ACT 0)."""
         self.advance()
         if code not in FAULTS:
             raise ValueError(f"code is one of {', '.join(map(str, sorted(FAULTS)))}")
@@ -137,14 +137,14 @@ class Gripper:
             self._legs = []
 
     def power_cycle(self) -> None:
-        """Switch off and on: all registers are 0, the fingers stay where they are."""
+        """Switch off and on: all registers are 0, the fingers keep their position."""
         self.advance()
         self._pending.clear()
         self._reset()
         self.requested = dict.fromkeys(REQUESTS, 0)
 
     def truth(self) -> dict[str, object]:
-        """Return what is really so."""
+        """Return the true state."""
         registers = self.registers()
         width = self.mechanics.width(self._position)
         gripped = self._part is not None and abs(width - self._part) < 1e-6
@@ -161,20 +161,20 @@ class Gripper:
 
     # ------------------------------------------------------------------------------------------- in time
     def advance(self) -> None:
-        """Bring all up to date."""
+        """Advance the simulation to the present."""
         now = self._clock()
         while self._pending and self._pending[0][0] <= now:
             due, changes = self._pending.popleft()
-            self._move(max(due - self._then, 0.0))
-            self._then = max(due, self._then)
-            self._obey(changes)
-        self._move(now - self._then)
-        self._then = now
+            self._move(max(due - self._advanced_to, 0.0))
+            self._advanced_to = max(due, self._advanced_to)
+            self._apply(changes)
+        self._move(now - self._advanced_to)
+        self._advanced_to = now
 
     def _reset(self) -> None:
         self._status, self._object, self._fault, self._legs = RESET, MOVING, 0, []
 
-    def _obey(self, changes: dict[str, int]) -> None:
+    def _apply(self, changes: dict[str, int]) -> None:
         was = dict(self.requested)
         self.requested.update(changes)
         if not self.requested["ACT"]:
@@ -196,7 +196,7 @@ class Gripper:
             self._object = MOVING
 
     def _move(self, seconds: float) -> None:
-        """Let `seconds` pass under the present requests."""
+        """Advance by `seconds` under the present requests."""
         if self._fault >= FIRST_MAJOR:
             return
         if self._status == ACTIVATING:
@@ -226,10 +226,10 @@ class Gripper:
             self._object = ARRIVED if stop == target else CONTACT_CLOSING if closing else CONTACT_OPENING
 
     def _approach(self, target: float, rate: float, seconds: float) -> float:
-        """Move towards `target`; give the seconds left over."""
-        way = target - self._position
-        if abs(way) <= rate * seconds:
+        """Move towards `target` and return the remaining seconds."""
+        distance = target - self._position
+        if abs(distance) <= rate * seconds:
             self._position = target
-            return seconds - abs(way) / rate
-        self._position += rate * seconds if way > 0.0 else -rate * seconds
+            return seconds - abs(distance) / rate
+        self._position += rate * seconds if distance > 0.0 else -rate * seconds
         return 0.0

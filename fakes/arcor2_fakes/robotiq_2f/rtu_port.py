@@ -1,4 +1,4 @@
-"""The Modbus RTU port of the gripper."""
+"""Modbus RTU port of the gripper."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _REQUESTS, _STATUS, _COUNT = 0x03E8, 0x07D0, 3
 
 
 class RtuPort:
-    """The gripper's serial port. Must be made inside the event loop."""
+    """Serial port of the gripper. Create it in the event loop."""
 
     def __init__(self, gripper: Gripper, link: Path | None = None) -> None:
         self._gripper = gripper

@@ -38,7 +38,7 @@ class Motion(Protocol):
 
 
 class JointSpeed:
-    """speedj: a joint velocity reached under an acceleration and kept until the next command."""
+    """speedj: a joint velocity reached under an acceleration and held until the next command."""
 
     along_path = False
     done = False
@@ -52,7 +52,7 @@ class JointSpeed:
 
 
 class LinearSpeed:
-    """speedl: a TCP velocity reached under an acceleration and kept until the next command."""
+    """speedl: a TCP velocity reached under an acceleration and held until the next command."""
 
     along_path = False
     done = False
