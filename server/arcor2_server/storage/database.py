@@ -1,6 +1,7 @@
 """The database of saved documents: connections, transactions and errors."""
 
 import asyncio
+import functools
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from contextvars import ContextVar
@@ -130,11 +131,8 @@ class Database:
             wanted = select(table.id, table.document).where(table.id.in_(keys[begin : begin + _PER_QUERY]))
             async with self.reading() as session:
                 rows = list(await session.execute(wanted))
-            found += await asyncio.to_thread(self._decode_all, decode, rows)
+            found += await asyncio.to_thread(list, map(functools.partial(self.decoded, decode), rows))
         return found
-
-    def _decode_all(self, decode: Any, rows: Sequence[Any]) -> list[Any]:
-        return [self.decoded(decode, row) for row in rows]
 
     def decoded(self, decode: Any, row: Any) -> Any:
         """Return the document of a row. Raise StorageError that names the row if the document is damaged."""

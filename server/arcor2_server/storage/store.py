@@ -143,12 +143,6 @@ class Storage(Database):
             await session.merge(ProjectSourceRow(id=key, script=script))
 
     # ------------------------------------------------------------------------------------------------ object types
-    async def object_type_stamps(self) -> dict[str, str]:
-        """Return the times at which uploaded object types were modified, by id."""
-        async with self.reading() as session:
-            rows = await session.execute(select(ObjectTypeRow.id, ObjectTypeRow.modified))
-            return {key: modified for key, modified in rows}  # noqa: C416 - rows are no tuples to mypy
-
     async def object_types(self) -> list[ObjectTypeSource]:
         """Return all uploaded object types with their models."""
         async with self.reading() as session:
