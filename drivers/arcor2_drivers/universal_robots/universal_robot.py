@@ -14,7 +14,6 @@ from arcor2_hw.objects.single_arm import SingleArm
 from .arm import Arm
 from .control import Control
 from .geometry import JOINT_LIMITS, JOINTS, UR5E, ArmModel, Vector3, flange, from_vector, tcp_speed, to_vector
-from .geometry import world_from_base as base_in_world
 from .gripping import DigitalGripper
 from .jog import Jog
 from .motion import Motion
@@ -173,11 +172,6 @@ class UniversalRobot(MoveActions, DigitalGripper, SingleArm):
             return read_calibration(self._ur.host)
         except DeviceError as e:
             raise type(e)(f"{self.name}: {e}", e.detail) from e
-
-    @property
-    def base_from_controller(self) -> Pose:
-        """Return the controller's base in base_link."""
-        return base_in_world(Pose())
 
     @property
     def samples_received(self) -> int:
