@@ -1,4 +1,4 @@
-"""No setting of any driver makes the cell host open a file, or a URL, of the user's choice."""
+"""No setting of any driver makes the cell host open a file or URL that a user chose."""
 
 import dataclasses
 import importlib.metadata
@@ -72,7 +72,7 @@ def cases() -> list[tuple[str, str, str]]:
 
 
 @pytest.mark.parametrize(("type_name", "setting", "wrong"), cases())
-def test_what_a_setting_names_is_checked(
+def test_files_and_urls_in_settings_are_checked(
     monkeypatch: pytest.MonkeyPatch, type_name: str, setting: str, wrong: str
 ) -> None:
     monkeypatch.setenv(DEVICE_FILES, "/data/device-files")
@@ -83,7 +83,7 @@ def test_what_a_setting_names_is_checked(
         settings(**VALID[type_name] | {setting: wrong})
 
 
-def test_a_scale_empties_no_file(tmp_path: Path) -> None:
+def test_a_port_setting_cannot_name_a_file(tmp_path: Path) -> None:
     (entry,) = importlib.metadata.entry_points(group=ENTRY_POINTS, name="MtSicsScale")
     settings: Any = settings_type(entry.load())
     tokens = tmp_path / "tokens.json"

@@ -1,4 +1,4 @@
-"""Common features of all installed fakes: faults of the wire, a power cycle, and a simulation speed."""
+"""What every installed fake offers: wire faults, a power cycle, and a faster pace."""
 
 import subprocess
 import sys

@@ -155,7 +155,7 @@ def test_the_identification_is_read(peer: Peer, link: ModbusLink) -> None:
     assert peer.requests == [adu("2B 0E 01 00")]
 
 
-# ------------------------------------------------------------------------------------------------ bad days on TCP
+# ------------------------------------------------------------------------------------------------ faults on TCP
 def test_answers_with_another_transaction_id_are_ignored(peer: Peer, link: ModbusLink) -> None:
     """Send the answer of another transaction, that of another unit, and the right one in one segment."""
     peer.script = lambda _: adu("04 02 0001", number=7) + adu("04 02 0002", unit=9) + adu("04 02 0003")

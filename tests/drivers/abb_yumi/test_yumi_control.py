@@ -19,7 +19,7 @@ HOME = Position(-0.0096, 0.1826, 0.1986)
 """m: where RobotStudio shows the left flange in the calibration position, from general knowledge of the robot."""
 
 
-def test_connecting_observes(fake: FakeYumi) -> None:
+def test_connecting_only_observes(fake: FakeYumi) -> None:
     fake.do("control_state", state="motoroff")
     before = fake.truth()
     robot = make(fake.host)

@@ -213,7 +213,7 @@ def test_after_an_emergency_stop_nothing_moves_until_a_new_command(fake: FakeYum
     ready.move_to_joints(turned(ready, "left", 1, 0.1), 0.8, arm_id="left")
 
 
-def test_motors_off_in_mid_move(fake: FakeYumi, ready: YuMi) -> None:
+def test_motors_switched_off_during_a_move(fake: FakeYumi, ready: YuMi) -> None:
     doing = moving_far(fake, ready)
     fake.do("control_state", state="motoroff")
     with pytest.raises(NotInControl) as error:
@@ -281,7 +281,7 @@ def test_a_collision_is_acknowledged_by_a_person(fake: FakeYumi, ready: YuMi) ->
     wait(lambda: ready.state().safety is Safety.PROTECTIVE_STOP)  # the next one is not acknowledged by the last
 
 
-def test_a_motion_server_that_is_silent_is_named(fake: FakeYumi, robot: YuMi) -> None:
+def test_a_silent_motion_server_is_named(fake: FakeYumi, robot: YuMi) -> None:
     fake.do("silence", wire="right")
     with pytest.raises(DeviceTimeout) as error:
         robot.take_control()

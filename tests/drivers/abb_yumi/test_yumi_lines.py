@@ -37,7 +37,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("name", "value"), WRONG)
-def test_a_bad_setting_is_named(name: str, value: Any) -> None:
+def test_an_invalid_setting_is_named(name: str, value: Any) -> None:
     with pytest.raises(OutOfRange) as error:
         YumiSettings(**{"host": "10.0.0.1", name: value})
     assert name in str(error.value)

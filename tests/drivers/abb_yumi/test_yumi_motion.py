@@ -66,7 +66,7 @@ def test_a_line_is_straight(fake: FakeYumi, ready: YuMi) -> None:
     assert at.orientation.angle_to(target.orientation) < 1e-4
 
 
-def test_a_pose_with_all_axes_together(ready: YuMi) -> None:
+def test_a_pose_is_reached_with_all_axes_together(ready: YuMi) -> None:
     start = ready.get_end_effector_pose("tcp", "right")
     spin = Pose(orientation=Orientation.from_rotation_vector(0.0, 0.0, 0.6))
     target = shifted(start, Position(0.1, -0.05, 0.05)) * spin
@@ -174,7 +174,7 @@ def test_a_low_speed_override_slows_a_move_without_a_timeout(fake: FakeYumi, rea
     assert ready.state().speed_override == 0.25
 
 
-def test_the_arms_keep_clear_of_each_other(fake: FakeYumi, ready: YuMi) -> None:
+def test_the_arms_keep_their_clearance(fake: FakeYumi, ready: YuMi) -> None:
     home = ready.get_end_effector_pose("tcp", "left")
     begun = fake.arm("left")["moves_begun"]
     for linear in (True, False):

@@ -1,4 +1,4 @@
-"""The reader's lines: whatever comes and however it is cut, nothing but whole, clean lines comes out."""
+"""Lines of the reader: with any fragmentation or noise, only complete, clean lines come out."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -23,15 +23,13 @@ def feed(data: bytes, places: list[int]) -> list[str]:
 
 
 @given(st.lists(st.tuples(codes, framings)), st.lists(st.integers(min_value=0)))
-def test_lines_come_out_as_they_went_in_however_they_are_framed_and_cut(
-    sent: list[tuple[str, str]], places: list[int]
-) -> None:
+def test_lines_are_read_with_any_framing_and_fragmentation(sent: list[tuple[str, str]], places: list[int]) -> None:
     data = "".join(framing.format(code) for code, framing in sent).encode()
     assert feed(data, places) == [code for code, _ in sent]
 
 
 @given(st.binary(max_size=3000), st.lists(st.integers(min_value=0)))
-def test_foreign_bytes_give_clean_lines_only_and_cutting_changes_nothing(data: bytes, places: list[int]) -> None:
+def test_random_bytes_give_only_printable_lines(data: bytes, places: list[int]) -> None:
     found = feed(data, places)
     assert found == feed(data, [])
     for line in found:
@@ -45,7 +43,7 @@ def test_a_line_after_noise_is_read(noise: bytes, code: str) -> None:
     assert feed(noise + b"\r" + code.encode() + b"\r", [])[-1:] == [code]
 
 
-def test_an_endless_line_costs_no_memory_and_gives_nothing() -> None:
+def test_an_endless_line_is_dropped() -> None:
     buffer = LineBuffer()
     for _ in range(1000):
         assert buffer.feed(b"x" * 1000) == []
@@ -54,12 +52,12 @@ def test_an_endless_line_costs_no_memory_and_gives_nothing() -> None:
     assert buffer.garbage == 1
 
 
-def test_framing_that_is_torn_is_dropped() -> None:
+def test_incomplete_framing_is_dropped() -> None:
     assert feed(b"\x02HALF\rA\x03\r\x02\x02B\x03\r\x02C\x03\r", []) == ["C"]
 
 
 @given(st.text(max_size=300))
-def test_words_of_the_reader_are_no_codes(text: str) -> None:
+def test_status_words_are_not_codes(text: str) -> None:
     for word in (
         "ERROR",
         "LON",
@@ -80,7 +78,7 @@ def test_words_of_the_reader_are_no_codes(text: str) -> None:
 
 
 @given(st.text(max_size=100))
-def test_answers_are_read_or_none(text: str) -> None:
+def test_answers_are_parsed_or_ignored(text: str) -> None:
     for line in (text, f"STAT,{text}", f"VER,{text}"):
         assert isinstance(lines.status(line), lines.Status | None)
         assert isinstance(lines.identity(line), Identity | None)

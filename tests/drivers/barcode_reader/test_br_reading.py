@@ -90,7 +90,7 @@ def test_a_code_is_consumed_once(fake: FakeProcess, reader: BarcodeReader) -> No
         reader.last_code()
 
 
-def test_nothing_to_read_fails_by_name_and_in_time(fake: FakeProcess, reader: BarcodeReader) -> None:
+def test_nothing_to_read_fails_with_the_name_within_the_timeout(fake: FakeProcess, reader: BarcodeReader) -> None:
     began = own_time()
     with pytest.raises(DeviceFault, match=f"^reader at {fake.ready['port']}: no code was read within 0.8 s$") as raised:
         reader.scan(0.8)
@@ -102,7 +102,7 @@ def test_nothing_to_read_fails_by_name_and_in_time(fake: FakeProcess, reader: Ba
     assert fake.truth()["reading"] is False
 
 
-def test_a_code_that_comes_into_view_late_is_read(fake: FakeProcess, reader: BarcodeReader) -> None:
+def test_a_code_that_appears_late_is_read(fake: FakeProcess, reader: BarcodeReader) -> None:
     thread, outcome = in_background(lambda: reader.scan(5.0))
     time.sleep(0.7)  # past the reader's own time-out
     fake.control.do("present", code="AT LAST")
@@ -110,7 +110,7 @@ def test_a_code_that_comes_into_view_late_is_read(fake: FakeProcess, reader: Bar
     assert outcome == ["AT LAST"]
 
 
-def test_a_code_decoded_too_late_belongs_to_no_later_trigger(fake: FakeProcess, reader: BarcodeReader) -> None:
+def test_a_code_decoded_too_late_is_not_matched_to_a_later_trigger(fake: FakeProcess, reader: BarcodeReader) -> None:
     fake.control.do("late", seconds=0.4)
     fake.control.do("present", code="OLD")
     assert reader.trigger(0.3) == NoRead("timeout")
@@ -170,7 +170,7 @@ class UntidyReader:
                         late = b"LATE %d\r" % triggers
 
 
-def test_codes_that_lag_behind_are_thrown_away(make: Callable[..., BarcodeReader]) -> None:
+def test_delayed_codes_are_discarded(make: Callable[..., BarcodeReader]) -> None:
     untidy = UntidyReader()
     try:
         reader = make(untidy.port)
@@ -228,7 +228,7 @@ def test_disconnecting_ends_a_reading(fake: FakeProcess, reader: BarcodeReader, 
 
 
 # ------------------------------------------------------------------------------------------------ condition
-def test_health_is_followed(fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]) -> None:
+def test_health_follows_the_reader(fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]) -> None:
     assert reader.alarms() == []
     for word, health in (
         ("DIRTY", Health.MAINTENANCE_REQUIRED),
@@ -245,9 +245,9 @@ def test_health_is_followed(fake: FakeProcess, reader: BarcodeReader, wait_for: 
     assert reader.alarms() == []
 
 
-# ------------------------------------------------------------------------------------------------ bad days
+# ------------------------------------------------------------------------------------------------ faults
 @on_both
-def test_unplugged_and_plugged_again(fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]) -> None:
+def test_unplugging_and_reconnecting(fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]) -> None:
     thread, outcome = in_background(lambda: reader.scan(30.0))
     wait_for(lambda: fake.truth()["reading"])
     began = own_time()
@@ -268,7 +268,7 @@ def test_unplugged_and_plugged_again(fake: FakeProcess, reader: BarcodeReader, w
 
 
 @on_both
-def test_unplugged_while_idle_is_noticed(
+def test_unplugging_while_idle_is_detected(
     fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]
 ) -> None:
     fake.control.do("unplug")
@@ -279,7 +279,7 @@ def test_unplugged_while_idle_is_noticed(
 
 @on_both
 @pytest.mark.parametrize("fault", ["silence", "half_frame", "garbage"])
-def test_reader_that_does_not_answer_sensibly(
+def test_invalid_answers_of_the_reader_are_typed_errors(
     fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any], fault: str
 ) -> None:
     fake.control.do("present", code="HERE")
@@ -297,7 +297,9 @@ def test_reader_that_does_not_answer_sensibly(
     assert reader.scan() == "HERE"
 
 
-def test_silence_in_mid_reading(fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]) -> None:
+def test_a_reader_that_goes_silent_during_reading(
+    fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]
+) -> None:
     thread, outcome = in_background(lambda: reader.scan(1.0))
     wait_for(lambda: fake.truth()["reading"])
     fake.control.do("silence")
@@ -307,7 +309,7 @@ def test_silence_in_mid_reading(fake: FakeProcess, reader: BarcodeReader, wait_f
     assert isinstance(outcome[0], DeviceTimeout)
 
 
-def test_a_silent_reader_is_noticed_while_idle(
+def test_a_silent_reader_is_detected_while_idle(
     fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]
 ) -> None:
     fake.control.do("silence")
@@ -317,7 +319,7 @@ def test_a_silent_reader_is_noticed_while_idle(
 
 
 @pytest.mark.parametrize("port", ["/dev/does-not-exist", "socket://127.0.0.1:1"])
-def test_no_such_port(make: Callable[..., BarcodeReader], port: str) -> None:
+def test_a_missing_port_is_named(make: Callable[..., BarcodeReader], port: str) -> None:
     reader = make(port)
     began = own_time()
     with pytest.raises(NotConnected, match=f"^reader at {port}: the port cannot be opened"):
@@ -350,7 +352,7 @@ def test_port_that_is_in_use(start_fake: Callable[..., FakeProcess], make: Calla
     assert first.identify().model == "BR-20"
 
 
-def test_half_a_command_of_somebody_else_in_the_reader(
+def test_a_partial_command_of_another_host_is_flushed(
     start_fake: Callable[..., FakeProcess], make: Callable[..., BarcodeReader]
 ) -> None:
     fake = start_fake("barcode_reader")
@@ -381,7 +383,7 @@ reader.scan(60.0)
 """
 
 
-def test_a_killed_owner_leaves_no_reading(
+def test_a_killed_process_leaves_no_reading_active(
     fake: FakeProcess, make: Callable[..., BarcodeReader], wait_for: Callable[..., Any]
 ) -> None:
     process = subprocess.Popen([sys.executable, "-c", HOST, fake.ready["port"]])

@@ -1,4 +1,4 @@
-"""The next part of a crate, on rendered pictures with noise: where it is known exactly, and what is refused."""
+"""The next part of a crate, in rendered pictures with noise and known ground truth, and refusals."""
 
 from collections.abc import Callable
 from typing import Any
@@ -51,7 +51,7 @@ POSES = {
 
 
 @pytest.mark.parametrize("truth", POSES.values(), ids=POSES)
-def test_a_part_alone(picture: Photographer, make: Callable[..., Bin], truth: Pose) -> None:
+def test_a_single_part_is_found(picture: Photographer, make: Callable[..., Bin], truth: Pose) -> None:
     pose, quality = make().next_part(picture(part("a", truth)))
     distance, turn = errors(pose, truth)
     print(f"off by {distance:.2f} mm, {turn:.2f} degrees; quality {quality:.3f}")  # noqa: T201
@@ -60,7 +60,7 @@ def test_a_part_alone(picture: Photographer, make: Callable[..., Bin], truth: Po
     assert quality > 0.95
 
 
-def test_many_poses(picture: Photographer, make: Callable[..., Bin]) -> None:
+def test_parts_are_found_in_many_poses(picture: Photographer, make: Callable[..., Bin]) -> None:
     rng, crate, found = np.random.default_rng(3), make(), []
     for _ in range(6):
         truth = at(rng.uniform(-0.08, 0.08), rng.uniform(-0.04, 0.04), FLAT, turned(z=rng.uniform(-180, 180)))
@@ -73,9 +73,7 @@ def test_many_poses(picture: Photographer, make: Callable[..., Bin]) -> None:
     assert turn.max() < 1.0
 
 
-def test_an_oblique_camera_and_a_picture_that_came_over_the_wire(
-    picture: Photographer, make: Callable[..., Bin]
-) -> None:
+def test_an_oblique_camera_and_a_streamed_picture(picture: Photographer, make: Callable[..., Bin]) -> None:
     truth = at(0.05, 0.02, FLAT, turned(z=37))
     photo = picture(part("a", truth), camera=looking(CRATE.position, 0.3, -0.3, 0.6))
     pose, quality = make().next_part(decode_picture(encode(photo)))
@@ -83,7 +81,7 @@ def test_an_oblique_camera_and_a_picture_that_came_over_the_wire(
     assert (distance < CLOSE, turn < 0.6, quality > 0.97) == (True, True, True)
 
 
-def test_the_highest_of_several_is_next(picture: Photographer, make: Callable[..., Bin]) -> None:
+def test_the_highest_part_is_next(picture: Photographer, make: Callable[..., Bin]) -> None:
     low, high = at(0.09, 0.05, FLAT, turned(z=5)), at(-0.06, -0.03, PART[1] / 2, turned(x=90, z=70))
     pose, _ = make().next_part(picture(part("low", low), part("high", high)))
     assert errors(pose, high)[0] < CLOSE
@@ -92,7 +90,7 @@ def test_the_highest_of_several_is_next(picture: Photographer, make: Callable[..
     assert errors(pose, upon)[0] < CLOSE
 
 
-def test_what_is_refused(picture: Photographer, make: Callable[..., Bin]) -> None:
+def test_unreachable_and_missing_parts_are_refused(picture: Photographer, make: Callable[..., Bin]) -> None:
     crate = make()
     with pytest.raises(Empty, match=r"^crate is empty$") as empty:
         crate.next_part(picture())
@@ -114,7 +112,7 @@ def test_what_is_refused(picture: Photographer, make: Callable[..., Bin]) -> Non
     assert errors(pose, free)[0] < CLOSE
 
 
-def test_a_crate_that_was_not_put_down_exactly(picture: Photographer, make: Callable[..., Bin]) -> None:
+def test_a_displaced_crate_is_tolerated(picture: Photographer, make: Callable[..., Bin]) -> None:
     """The floor is 6 mm higher than the crate's pose says; it is not taken for parts."""
     crate = make()
     crate.set_pose(CRATE * Pose(Position(0.0, 0.0, -0.006)))
@@ -123,7 +121,7 @@ def test_a_crate_that_was_not_put_down_exactly(picture: Photographer, make: Call
     assert errors(crate.next_part(picture(part("a", truth)))[0], truth)[0] < CLOSE
 
 
-def test_a_mesh(picture: Photographer, make: Callable[..., Bin], tmp_path: Any) -> None:
+def test_parts_are_found_by_mesh(picture: Photographer, make: Callable[..., Bin], tmp_path: Any) -> None:
     """An angle whose origin is at its corner, so that its pose is not that of its middle."""
     import open3d as o3d
 
@@ -158,7 +156,7 @@ def test_grip_pose(make: Callable[..., Bin]) -> None:
     assert np.abs(upright.orientation.matrix()[:, 2] @ CRATE.orientation.matrix()[:, 2]) == pytest.approx(1.0)
 
 
-def test_pictures_that_are_none(picture: Photographer, make: Callable[..., Bin]) -> None:
+def test_invalid_pictures_are_refused(picture: Photographer, make: Callable[..., Bin]) -> None:
     from PIL import Image
 
     crate, photo = make(), picture()

@@ -1,4 +1,4 @@
-"""Models of parts and settings of a crate: what is none is refused when it is given, by name."""
+"""Models of parts and settings of a crate: invalid ones are refused by name."""
 
 from pathlib import Path
 from typing import Any
@@ -40,14 +40,14 @@ def connect(mesh: str) -> Bin:
         ("part.obj", "v 0 0 0\nv nan 0 0\nv 0 0.1 0\nf 1 2 3\n", "vertices that are not finite|has no triangles"),
     ],
 )
-def test_what_is_no_mesh(tmp_path: Path, name: str, text: str, said: str) -> None:
+def test_invalid_meshes_are_refused(tmp_path: Path, name: str, text: str, said: str) -> None:
     file = tmp_path / name
     file.write_text(text)
     with pytest.raises(NotConnected, match=f"^crate: part_mesh .*({said})"):
         connect(str(file))
 
 
-def test_a_file_that_is_not_there_or_too_large(tmp_path: Path) -> None:
+def test_missing_and_oversized_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(NotConnected, match=r"^crate: part_mesh .*missing\.stl cannot be read: No such file"):
         connect(str(tmp_path / "missing.stl"))
     with (tmp_path / "large.stl").open("wb") as file:
@@ -70,7 +70,7 @@ def test_a_mesh_with_too_many_triangles(tmp_path: Path, monkeypatch: pytest.Monk
         connect(str(tmp_path / "fine.stl"))
 
 
-def test_life() -> None:
+def test_a_bin_connects_and_disconnects() -> None:
     crate = Bin("id", "crate", Pose(), BinSettings(0.3, 0.2, 0.1, 0.05, 0.04, 0.03))
     assert crate.connection is Connection.OFFLINE
     crate.connect()

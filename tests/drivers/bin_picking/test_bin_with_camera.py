@@ -1,4 +1,4 @@
-"""A bin on the pictures of a camera: fake, stream, driver, and the way of a program's links from action to action."""
+"""A bin with a camera: fake, stream, driver, and the links of a program from picture to robot."""
 
 from collections.abc import Iterator
 
@@ -27,7 +27,7 @@ def fake() -> Iterator[FakeProcess]:
     running.end()
 
 
-def test_from_the_picture_to_the_tool(fake: FakeProcess) -> None:
+def test_a_program_links_picture_part_and_robot(fake: FakeProcess) -> None:
     camera = OakD(
         "camera_id", "camera", HANGING, None, OakDSettings(fake.ready["stream"], max_age=5.0, frame_timeout=10.0)
     )

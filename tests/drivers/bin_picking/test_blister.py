@@ -1,4 +1,4 @@
-"""A blister counts: parts and places in their order, in its own frame, kept over a restart if told to."""
+"""A blister: parts and places in order, in its own frame, stored over a restart on request."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -38,7 +38,7 @@ def local(pose: Pose) -> tuple[float, ...]:
     return tuple(round(each, 9) for each in (TRAY.inverted() * pose).position)
 
 
-def test_parts_are_given_in_order_and_stay_until_taken(make: Callable[..., Blister]) -> None:
+def test_parts_are_returned_in_order_until_taken(make: Callable[..., Blister]) -> None:
     tray = make()
     places = []
     while not tray.is_empty():
@@ -56,7 +56,7 @@ def test_parts_are_given_in_order_and_stay_until_taken(make: Callable[..., Blist
     assert tray.next_part().position.distance_to((TRAY * Pose(Position(0.01, 0.02, 0.005))).position) < 1e-12
 
 
-def test_places_are_filled_backwards_in_every_second_row(make: Callable[..., Blister]) -> None:
+def test_places_are_filled_in_serpentine_order(make: Callable[..., Blister]) -> None:
     tray = make(snake=True, starts_full=False, turn=90.0)
     columns = []
     while not tray.is_full():
@@ -93,7 +93,7 @@ def test_single_places_and_the_tool(make: Callable[..., Blister]) -> None:
     assert local(tray.place(0, 0)) == (0.51, 0.02, 0.005)
 
 
-def test_the_state_survives_only_in_a_file(make: Callable[..., Blister], tmp_path: Path) -> None:
+def test_the_state_is_restored_only_from_a_file(make: Callable[..., Blister], tmp_path: Path) -> None:
     tray = make()
     tray.next_part()
     tray.part_taken()
@@ -111,7 +111,7 @@ def test_the_state_survives_only_in_a_file(make: Callable[..., Blister], tmp_pat
     assert [each.name for each in tmp_path.iterdir()] == ["tray.json"]
 
 
-def test_a_state_that_cannot_be_kept(make: Callable[..., Blister], tmp_path: Path) -> None:
+def test_a_state_that_cannot_be_stored_is_reported(make: Callable[..., Blister], tmp_path: Path) -> None:
     folder = tmp_path / "there"
     folder.mkdir()
     tray = make(state_file=str(folder / "tray.json"))

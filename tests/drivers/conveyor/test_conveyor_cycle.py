@@ -1,4 +1,4 @@
-"""The conveyor's driver against the fake: connecting, homing, moving, running, stopping, faults and refusals."""
+"""The conveyor's driver against the fake: connecting, homing, moving, running, stopping and faults."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -52,7 +52,7 @@ def test_connecting_observes_and_writes_nothing(fake: FakeProcess, observed: Con
         observed.run(0.1)
 
 
-def test_the_guard_is_armed_before_anything_is_enabled(fake: FakeProcess, belt: Conveyor) -> None:
+def test_the_heartbeat_monitor_is_armed_before_enabling(fake: FakeProcess, belt: Conveyor) -> None:
     truth = fake.truth()
     assert truth["consumer"] == 127 << 16 | 1000
     assert truth["abort_option"] == 3
@@ -64,7 +64,7 @@ def test_the_guard_is_armed_before_anything_is_enabled(fake: FakeProcess, belt: 
     assert belt.control_owner() is None
 
 
-def test_home_move_run_halt(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
+def test_a_belt_homes_moves_runs_and_halts(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
     belt = make(fake.ready["can"], homing_method=19, homing_speed=1.0, max_speed=2.0, acceleration=10.0)
     belt.connect()
     belt.take_control()
@@ -95,7 +95,7 @@ def test_home_move_run_halt(fake: FakeProcess, make: Callable[..., Conveyor]) ->
     assert fake.truth()["position"] == 0
 
 
-def test_unit_scaling_and_direction(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
+def test_units_and_direction_are_scaled(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
     belt = make(fake.ready["can"], counts_per_metre=-20000.0)
     belt.connect()
     belt.take_control()
@@ -107,7 +107,7 @@ def test_unit_scaling_and_direction(fake: FakeProcess, make: Callable[..., Conve
 
 
 @pytest.mark.parametrize("how", ["stop", "quick_stop"])
-def test_stop_cancels_a_move_and_nothing_goes_on(fake: FakeProcess, belt: Conveyor, how: str) -> None:
+def test_stop_cancels_a_move_for_good(fake: FakeProcess, belt: Conveyor, how: str) -> None:
     with under_way(fake, lambda: belt.move_by(5.0, 0.3)) as outcome:
         getattr(belt, how)()
         stood = fake.truth()
@@ -142,7 +142,7 @@ def test_a_fault_ends_the_move_with_its_text_and_is_reset(fake: FakeProcess, bel
     belt.fault_reset()  # harmless
 
 
-def test_emergency_in_mid_move(fake: FakeProcess, belt: Conveyor) -> None:
+def test_an_emergency_message_ends_a_move(fake: FakeProcess, belt: Conveyor) -> None:
     with under_way(fake, lambda: belt.move_by(5.0, 0.3)) as outcome:
         fake.control.do("emergency", code=0x2310)
     assert isinstance(outcome[0], DeviceFault)
@@ -150,7 +150,7 @@ def test_emergency_in_mid_move(fake: FakeProcess, belt: Conveyor) -> None:
     assert "move_by 5 m ended: fault 2310h, continuous overcurrent" in str(outcome[0])
 
 
-def test_homing_that_fails(fake: FakeProcess, belt: Conveyor) -> None:
+def test_failed_homing_is_reported(fake: FakeProcess, belt: Conveyor) -> None:
     belt.home()
     fake.control.do("homing_fails")
     with pytest.raises(DeviceFault, match="homing error \\(method 37\\)"):
@@ -158,7 +158,7 @@ def test_homing_that_fails(fake: FakeProcess, belt: Conveyor) -> None:
     assert not belt.homed
 
 
-def test_a_set_point_that_is_not_taken(fake: FakeProcess, belt: Conveyor) -> None:
+def test_a_rejected_set_point_is_reported(fake: FakeProcess, belt: Conveyor) -> None:
     fake.control.do("handshake_stuck")
     with pytest.raises(DeviceTimeout, match=r"node 5: move_by 0.1 m: taking the set-point took longer than 1 s"):
         belt.move_by(0.1)
@@ -212,7 +212,7 @@ def test_settings_are_checked_by_name(name: str, value: Any) -> None:
         ConveyorSettings(**({"channel": "/dev/ttyACM0"} | {name: value}))
 
 
-def test_status_words_and_codes() -> None:
+def test_status_words_and_error_codes_are_decoded() -> None:
     assert cia402.power(0x0637) is cia402.Power.ENABLED
     assert cia402.power(0x0250) is cia402.Power.SWITCH_ON_DISABLED
     assert cia402.power(0x0218) is cia402.Power.FAULT

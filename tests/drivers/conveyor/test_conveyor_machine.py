@@ -1,4 +1,4 @@
-"""The belt as a PackML machine, its state by PDO, the bus by socketcand, and a foreign master that commands it."""
+"""The belt as a PackML machine, its state by PDO, the bus over socketcand, and a foreign NMT master."""
 
 import socket
 import threading
@@ -31,7 +31,7 @@ S = MachineState
 
 
 # ------------------------------------------------------------------------------------------------ PackML
-def test_a_shift_of_the_belt(fake: FakeProcess, belt: Conveyor) -> None:
+def test_a_belt_runs_as_a_packml_machine(fake: FakeProcess, belt: Conveyor) -> None:
     seen = [belt.machine_state()]
     for act in (belt.reset, belt.start, belt.hold, belt.unhold, belt.stop, belt.reset, belt.abort, belt.clear):
         act()
@@ -52,7 +52,7 @@ def test_a_shift_of_the_belt(fake: FakeProcess, belt: Conveyor) -> None:
     assert set(seen) <= belt.states
 
 
-def test_the_states_in_between_are_told(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
+def test_transitional_states_are_reported(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
     belt = make(fake.ready["can"], acceleration=0.5)
     belt.connect()
     belt.take_control()
@@ -82,7 +82,7 @@ def test_the_states_in_between_are_told(fake: FakeProcess, make: Callable[..., C
     assert belt.machine_state() is S.STOPPED
 
 
-def test_commands_that_the_state_refuses_name_both(fake: FakeProcess, belt: Conveyor) -> None:
+def test_refused_commands_name_command_and_state(fake: FakeProcess, belt: Conveyor) -> None:
     with pytest.raises(Refused, match=r"^belt at \S+ node 5: start is refused in state Stopped: this state"):
         belt.start()
     with pytest.raises(Refused, match="suspend is refused in state Stopped: a belt has no such command"):
@@ -98,7 +98,7 @@ def test_commands_that_the_state_refuses_name_both(fake: FakeProcess, belt: Conv
     assert isinstance(outcome[0], Cancelled)
 
 
-def test_an_aborted_belt_runs_only_after_it_was_cleared(fake: FakeProcess, belt: Conveyor) -> None:
+def test_an_aborted_belt_runs_only_after_clear(fake: FakeProcess, belt: Conveyor) -> None:
     belt.run(0.2)
     belt.abort()
     assert belt.stop_reason().endswith("aborted by command")
@@ -112,7 +112,7 @@ def test_an_aborted_belt_runs_only_after_it_was_cleared(fake: FakeProcess, belt:
     belt.run(0.1)
 
 
-def test_a_fault_is_aborted_and_cleared(fake: FakeProcess, belt: Conveyor) -> None:
+def test_a_fault_aborts_and_is_cleared(fake: FakeProcess, belt: Conveyor) -> None:
     belt.reset()
     belt.start()
     thread_errors: list[Any] = []
@@ -136,7 +136,7 @@ def test_a_fault_is_aborted_and_cleared(fake: FakeProcess, belt: Conveyor) -> No
         belt.wait_for(S.EXECUTE, 0.2)
 
 
-def test_without_control_a_machine_is_only_watched(fake: FakeProcess, observed: Conveyor) -> None:
+def test_without_control_a_machine_is_only_observed(fake: FakeProcess, observed: Conveyor) -> None:
     assert observed.machine_state() is S.STOPPED
     with pytest.raises(NotInControl):
         observed.reset()
@@ -147,7 +147,7 @@ def test_without_control_a_machine_is_only_watched(fake: FakeProcess, observed: 
 
 
 # ------------------------------------------------------------------------------------------------ PDO
-def test_the_state_comes_by_pdo_while_control_is_ours(fake: FakeProcess, belt: Conveyor) -> None:
+def test_the_state_arrives_by_pdo_during_control(fake: FakeProcess, belt: Conveyor) -> None:
     """Mapping is written when control is taken (CiA 301, 7.5.2.37: invalid, count 0, entries, count, valid)."""
     writes = [
         (w["index"], w["subindex"], w["data"])
@@ -175,7 +175,7 @@ def test_the_state_comes_by_pdo_while_control_is_ours(fake: FakeProcess, belt: C
     assert belt.position().age < 0.2
 
 
-def test_a_drive_that_sends_no_pdos_any_more_is_asked(fake: FakeProcess, belt: Conveyor) -> None:
+def test_a_drive_without_pdos_is_polled(fake: FakeProcess, belt: Conveyor) -> None:
     belt.reset()
     for number in (0, 1):
         belt._observer.link.write(_entry(0x1800 + number, 5, "<H"), 0)  # the event timer
@@ -186,7 +186,7 @@ def test_a_drive_that_sends_no_pdos_any_more_is_asked(fake: FakeProcess, belt: C
     assert belt.connection is Connection.ONLINE
 
 
-def test_without_pdos(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
+def test_the_driver_works_without_pdos(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
     belt = make(fake.ready["can"], pdo_period_ms=0)
     belt.connect()
     belt.take_control()
@@ -195,9 +195,7 @@ def test_without_pdos(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
     assert belt._observer.pdos.received == 0
 
 
-def test_another_that_commands_the_node_ends_control(
-    fake: FakeProcess, belt: Conveyor, wait_for: Callable[..., Any]
-) -> None:
+def test_a_foreign_nmt_command_ends_control(fake: FakeProcess, belt: Conveyor, wait_for: Callable[..., Any]) -> None:
     """NMT has no owner. The drive does what 6007h says; we notice by its heartbeat and do not take it back."""
     belt.run(0.2)
     foreign = can.Bus(channel=f"socket://{fake.ready['can']}", interface="slcan", bitrate=500000, sleep_after_open=0.0)
@@ -218,7 +216,7 @@ def _entry(at: int, subindex: int, form: str) -> Any:
 
 
 # ------------------------------------------------------------------------------------------------ socketcand
-def test_the_whole_way_by_socketcand(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
+def test_a_belt_runs_over_socketcand(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
     belt = make(f"{fake.ready['socketcand']}/can0", interface=CanInterface.SOCKETCAND)
     belt.connect()
     assert belt.identify().serial == "1005"
@@ -230,7 +228,7 @@ def test_the_whole_way_by_socketcand(fake: FakeProcess, make: Callable[..., Conv
     belt.disconnect()
 
 
-def test_socketcand_loses_and_comes_back(
+def test_socketcand_disconnects_and_reconnects(
     fake: FakeProcess, make: Callable[..., Conveyor], wait_for: Callable[..., Any]
 ) -> None:
     belt = make(f"{fake.ready['socketcand']}/can0", interface=CanInterface.SOCKETCAND)
@@ -240,14 +238,14 @@ def test_socketcand_loses_and_comes_back(
     assert belt.belt_position() == 0.0
 
 
-def test_socketcand_that_refuses_the_bus(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
+def test_a_bus_refused_by_socketcand_is_reported(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
     belt = make(f"{fake.ready['socketcand']}/can7", interface=CanInterface.SOCKETCAND)
     with pytest.raises(NotConnected, match="the CAN adapter cannot be reached") as refused:
         belt.connect(1.0)
     assert "could not open bus" in refused.value.detail
 
 
-def test_socketcand_that_says_nothing_is_given_up_in_time(make: Callable[..., Conveyor]) -> None:
+def test_a_silent_socketcand_server_times_out(make: Callable[..., Conveyor]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         belt = make("{}:{}/can0".format(*server.getsockname()), interface=CanInterface.SOCKETCAND)
         began = own_time()
@@ -295,6 +293,6 @@ def test_socketcand_frames_byte_for_byte() -> None:
 
 
 @pytest.mark.parametrize("channel", ["can0", "socket://127.0.0.1:29536", "socket://127.0.0.1/can0"])
-def test_a_socketcand_channel_names_server_and_bus(channel: str) -> None:
+def test_socketcand_channels_are_parsed(channel: str) -> None:
     with pytest.raises(OutOfRange, match=r"^channel must be socket://host:port"):
         ConveyorSettings(channel, interface=CanInterface.SOCKETCAND)

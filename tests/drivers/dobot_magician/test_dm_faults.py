@@ -260,7 +260,7 @@ def test_disconnecting_stops_the_arm(fake: FakeProcess, arm: DobotMagician) -> N
     assert truth["joints"][0] < 60.0
 
 
-def test_a_stop_between_two_motions_of_a_pick_drops_the_rest(fake: FakeProcess, arm: DobotMagician) -> None:
+def test_a_stop_during_a_pick_drops_its_other_motions(fake: FakeProcess, arm: DobotMagician) -> None:
     for _ in range(3):
         arm.stop()
     arm.move_to_joints(joints(0, 45, 45, 0), 1.0)

@@ -63,7 +63,7 @@ def test_garbage_yields_only_complete_frames() -> None:
         encode(1, 1, bytes(254))
 
 
-def test_alarm_bits() -> None:
+def test_alarm_bits_are_decoded() -> None:
     assert alarms.codes(bytes(16)) == frozenset()
     bits = bytearray(16)
     bits[0], bits[2], bits[8], bits[10] = 0x01, 0x02, 0x80, 0x02

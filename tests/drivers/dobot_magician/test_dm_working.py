@@ -154,7 +154,7 @@ def test_stop_overtakes_a_motion_and_drops_the_queue(
     assert fake.truth()["motions"] == 2
 
 
-def test_pick_and_place_switch_at_the_part(fake: FakeProcess, arm: DobotMagician) -> None:
+def test_pick_and_place_switch_the_suction_at_the_part(fake: FakeProcess, arm: DobotMagician) -> None:
     arm.set_part(0.03, 0.03, 0.02)
     arm.pick(at(0.22, 0.05, -0.02), approach=0.04, speed=1.0, slow_speed=0.5)
     truth = fake.truth()
@@ -232,7 +232,7 @@ def test_an_alarm_ends_a_motion_and_is_acknowledged(fake: FakeProcess, arm: Dobo
     assert fake.truth()["motions"] == 2
 
 
-def test_settings_name_the_parameter() -> None:
+def test_an_invalid_setting_names_the_parameter() -> None:
     for settings, words in (
         ({"port": " "}, "^port must be"),
         ({"port": "/dev/ttyUSB0", "answer_timeout": math.nan}, "^answer_timeout must be 0.05 to 5, not nan$"),
@@ -244,5 +244,5 @@ def test_settings_name_the_parameter() -> None:
             DobotMagicianSettings(**settings)  # type: ignore[arg-type]
 
 
-def test_the_declared_loss_reaction_is_that_the_arm_continues() -> None:
+def test_the_arm_continues_after_a_loss_as_declared() -> None:
     assert DobotMagician.loss_reaction.kind is LossKind.CONTINUES

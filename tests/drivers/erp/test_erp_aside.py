@@ -1,4 +1,4 @@
-"""What waits, what was refused, and whose the outbox is: told, kept and not lost."""
+"""Waiting and refused results, and the owner of an outbox."""
 
 import time
 from collections.abc import Callable
@@ -23,7 +23,7 @@ def results_asked(fake: FakeProcess) -> int:
     return sum(each["path"] == "/results" for each in fake.control.do("received"))
 
 
-def test_what_the_service_refuses_is_kept_aside_and_named(fake: FakeProcess, erp: ErpService, order: str) -> None:
+def test_refused_results_are_stored_separately_and_named(fake: FakeProcess, erp: ErpService, order: str) -> None:
     fake.control.do("forbid", order=order)
     fake.control.do("add_order", order="B-1", product="PCB", quantity=1)
     erp.report_result(order, "S-1", True)
@@ -56,7 +56,7 @@ def test_what_the_service_refuses_is_kept_aside_and_named(fake: FakeProcess, erp
         erp.acknowledge("results_refused")
 
 
-def test_results_that_wait_too_long_are_an_alarm(
+def test_results_that_wait_too_long_raise_an_alarm(
     fake: FakeProcess, make: Callable[..., ErpService], order: str
 ) -> None:
     erp = make(fake.ready["url"], waiting_alarm=0.4)
@@ -74,7 +74,7 @@ def test_results_that_wait_too_long_are_an_alarm(
     assert erp.alarms() == []
 
 
-def test_one_outbox_is_open_in_one_place(fake: FakeProcess, erp: ErpService, make: Callable[..., ErpService]) -> None:
+def test_an_outbox_has_one_owner(fake: FakeProcess, erp: ErpService, make: Callable[..., ErpService]) -> None:
     second = make(fake.ready["url"])
     with pytest.raises(Refused, match="another program has opened the outbox"):
         second.connect(0.5)
@@ -84,7 +84,7 @@ def test_one_outbox_is_open_in_one_place(fake: FakeProcess, erp: ErpService, mak
     assert second.results_waiting() == 0
 
 
-def test_results_of_one_service_go_to_no_other(fake: FakeProcess, make: Callable[..., ErpService], order: str) -> None:
+def test_results_go_only_to_their_service(fake: FakeProcess, make: Callable[..., ErpService], order: str) -> None:
     elsewhere = make(fake.ready["url"] + "/other")
     with pytest.raises(Refused, match="404"):
         elsewhere.connect()
@@ -100,7 +100,7 @@ def test_results_of_one_service_go_to_no_other(fake: FakeProcess, make: Callable
     assert serials(fake) == []
 
 
-def test_disconnecting_from_a_silent_service_is_quick_and_keeps_all(
+def test_disconnecting_from_a_silent_service_keeps_all_results(
     fake: FakeProcess, make: Callable[..., ErpService], order: str
 ) -> None:
     erp = make(fake.ready["url"], request_timeout=1.5)
@@ -117,7 +117,7 @@ def test_disconnecting_from_a_silent_service_is_quick_and_keeps_all(
     assert serials(fake) == ["S-1"]
 
 
-def test_waiting_for_the_outbox_is_stopped(fake: FakeProcess, erp: ErpService, order: str) -> None:
+def test_stop_ends_waiting_for_the_outbox(fake: FakeProcess, erp: ErpService, order: str) -> None:
     fake.control.do("fail", status=503, count=-1, path="/results")
     erp.report_result(order, "S-1", True)
     waiting = Waiting(lambda: erp.wait_until_sent(60.0))

@@ -1,4 +1,4 @@
-"""The process is killed, or the service: every result that was stored arrives, once and in order."""
+"""The process or the service is killed: every stored result arrives, once and in order."""
 
 import random
 import select
@@ -51,7 +51,7 @@ def reporting(tmp_path: Path) -> Any:
         process.communicate()
 
 
-def test_killed_between_sending_and_answer(
+def test_a_kill_between_sending_and_answer_duplicates_nothing(
     fake: FakeProcess, make: Callable[..., ErpService], order: str, reporting: Any
 ) -> None:
     process = reporting(fake.ready["url"], 1, 1)
@@ -73,7 +73,7 @@ def test_killed_between_sending_and_answer(
     assert fake.truth()["repeated"] == repeated + 1, "the result was not sent again, so it was not killed in between"
 
 
-def test_many_deaths_lose_nothing_and_double_nothing(
+def test_many_kills_lose_and_duplicate_nothing(
     fake: FakeProcess, make: Callable[..., ErpService], order: str, reporting: Any
 ) -> None:
     drawn = random.Random(7)
@@ -101,7 +101,7 @@ def test_many_deaths_lose_nothing_and_double_nothing(
     assert len(set(came) - set(stored)) <= 4, "at most the one result per life that was stored and not yet told of"
 
 
-def test_the_service_dies_and_starts_again_with_its_store(
+def test_a_restarted_service_loses_and_duplicates_nothing(
     start_fake: Callable[..., FakeProcess], make: Callable[..., ErpService], tmp_path: Path
 ) -> None:
     store = str(tmp_path / "plan.jsonl")

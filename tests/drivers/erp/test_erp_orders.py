@@ -1,4 +1,4 @@
-"""Orders: taken once, given until they are done, not lost with an answer, not needing the service while at hand."""
+"""Orders: accepted once, returned until done, not lost with an answer, available without the service."""
 
 import time
 from collections.abc import Callable
@@ -20,7 +20,7 @@ def posts(fake: FakeProcess) -> list[str]:
     return [each["path"] for each in fake.control.do("received")[-50:] if each["method"] == "POST"]
 
 
-def test_connecting_only_asks_for_the_status(fake: FakeProcess, make: Callable[..., ErpService]) -> None:
+def test_connecting_only_reads_the_status(fake: FakeProcess, make: Callable[..., ErpService]) -> None:
     fake.control.do("add_order", order="A-1", product="PCB", quantity=1)
     before = len(posts(fake))
     erp = make(fake.ready["url"])
@@ -32,7 +32,7 @@ def test_connecting_only_asks_for_the_status(fake: FakeProcess, make: Callable[.
     assert fake.truth()["orders"][0]["station"] == ""
 
 
-def test_an_order_is_given_until_each_piece_is_reported(fake: FakeProcess, erp: ErpService) -> None:
+def test_an_order_is_returned_until_each_piece_is_reported(fake: FakeProcess, erp: ErpService) -> None:
     fake.control.do("add_order", order="A-1", product="PCB", quantity=2)
     fake.control.do("add_order", order="A-2", product="Cover", quantity=1)
     assert erp.next_order() == (True, "A-1", "PCB", 2, 2)
@@ -47,7 +47,7 @@ def test_an_order_is_given_until_each_piece_is_reported(fake: FakeProcess, erp: 
     assert [order["station"] for order in fake.truth()["orders"]] == ["cell", "cell"]
 
 
-def test_the_order_at_hand_needs_no_service_and_outlives_the_driver(
+def test_the_current_order_needs_no_service_and_survives_a_restart(
     fake: FakeProcess, erp: ErpService, make: Callable[..., ErpService]
 ) -> None:
     fake.control.do("add_order", order="A-1", product="PCB", quantity=3)
@@ -66,9 +66,7 @@ def test_the_order_at_hand_needs_no_service_and_outlives_the_driver(
     assert [result["serial"] for result in fake.truth()["results"]] == ["S-1", "S-2"]
 
 
-def test_an_order_whose_answer_was_lost_is_not_lost(
-    fake: FakeProcess, erp: ErpService, make: Callable[..., ErpService]
-) -> None:
+def test_an_order_survives_a_lost_answer(fake: FakeProcess, erp: ErpService, make: Callable[..., ErpService]) -> None:
     for number in (1, 2):
         fake.control.do("add_order", order=f"A-{number}", product="PCB", quantity=1)
     fake.control.do("lose_answers", count=1)
@@ -83,7 +81,7 @@ def test_an_order_whose_answer_was_lost_is_not_lost(
     assert fake.truth()["repeated"] == 1
 
 
-def test_an_order_may_be_waited_for_over_a_loss(fake: FakeProcess, erp: ErpService) -> None:
+def test_waiting_for_an_order_survives_a_connection_loss(fake: FakeProcess, erp: ErpService) -> None:
     assert erp.next_order(0.3) == NONE
     waiting = Waiting(lambda: erp.next_order(20.0))
     time.sleep(0.2)
@@ -93,7 +91,7 @@ def test_an_order_may_be_waited_for_over_a_loss(fake: FakeProcess, erp: ErpServi
     assert waiting.outcome(15.0) == (True, "A-9", "PCB", 4, 4)
 
 
-def test_waiting_for_an_order_is_stopped(fake: FakeProcess, erp: ErpService) -> None:
+def test_stop_ends_waiting_for_an_order(fake: FakeProcess, erp: ErpService) -> None:
     waiting = Waiting(lambda: erp.next_order(60.0))
     time.sleep(0.3)
     with pytest.raises(Refused, match="busy with another call of next_order"):
@@ -108,7 +106,7 @@ def test_waiting_for_an_order_is_stopped(fake: FakeProcess, erp: ErpService) -> 
     assert erp.next_order() == NONE
 
 
-def test_disconnecting_ends_the_waiting(fake: FakeProcess, erp: ErpService) -> None:
+def test_disconnecting_ends_waiting(fake: FakeProcess, erp: ErpService) -> None:
     waiting = Waiting(lambda: erp.next_order(60.0))
     time.sleep(0.2)
     erp.disconnect()
@@ -118,7 +116,7 @@ def test_disconnecting_ends_the_waiting(fake: FakeProcess, erp: ErpService) -> N
         erp.report_result("A-1", "S-1", True)
 
 
-def test_a_closed_order_is_told_after_its_results(fake: FakeProcess, erp: ErpService) -> None:
+def test_an_order_is_closed_after_its_results_are_sent(fake: FakeProcess, erp: ErpService) -> None:
     fake.control.do("add_order", order="A-1", product="PCB", quantity=5)
     fake.control.do("add_order", order="A-2", product="PCB", quantity=1)
     erp.next_order()
@@ -132,7 +130,7 @@ def test_a_closed_order_is_told_after_its_results(fake: FakeProcess, erp: ErpSer
     assert erp.next_order()[1] == "A-2"
 
 
-def test_an_answer_for_another_question_is_no_order(fake: FakeProcess, erp: ErpService) -> None:
+def test_an_answer_to_another_request_is_ignored(fake: FakeProcess, erp: ErpService) -> None:
     fake.control.do("add_order", order="A-1", product="PCB", quantity=1)
     fake.control.do("mistake", count=1)
     with pytest.raises(DeviceError, match="key of another request"):
@@ -144,7 +142,7 @@ def test_an_answer_for_another_question_is_no_order(fake: FakeProcess, erp: ErpS
     ("order", "serial", "note", "named"),
     [("", "S", "", "order_id"), ("A", " ", "", "serial"), ("A", "S", "x" * 201, "note"), ("A\n", "S", "", "order_id")],
 )
-def test_texts_that_are_none(erp: ErpService, order: str, serial: str, note: str, named: str) -> None:
+def test_invalid_texts_are_refused(erp: ErpService, order: str, serial: str, note: str, named: str) -> None:
     with pytest.raises(OutOfRange, match=f"planning at .*{named} must be"):
         erp.report_result(order, serial, True, note)
     assert erp.results_waiting() == 0

@@ -1,4 +1,4 @@
-"""Results: on disk before the action returns, at the service exactly once and in order, whatever happens in between."""
+"""Results: on disk before the action returns, at the service exactly once and in order, with any fault in between."""
 
 import time
 
@@ -18,7 +18,7 @@ def order(fake: FakeProcess) -> str:
     return "A-1"
 
 
-def test_results_arrive_in_order_with_what_was_said(fake: FakeProcess, erp: ErpService, order: str) -> None:
+def test_results_arrive_in_order_with_their_values(fake: FakeProcess, erp: ErpService, order: str) -> None:
     for number in range(20):
         erp.report_result(order, f"S-{number}", number % 3 > 0, f"{number} V")
     erp.wait_until_sent(10.0)
@@ -33,7 +33,7 @@ def test_results_arrive_in_order_with_what_was_said(fake: FakeProcess, erp: ErpS
     assert (state.waiting, state.refused, state.since, state.last_error) == (0, 0, None, "")
 
 
-def test_production_goes_on_with_the_service_down(fake: FakeProcess, erp: ErpService, order: str) -> None:
+def test_production_continues_while_the_service_is_down(fake: FakeProcess, erp: ErpService, order: str) -> None:
     fake.control.do("refuse")
     fake.control.do("reset")
     began = own_time()
@@ -59,7 +59,7 @@ def test_production_goes_on_with_the_service_down(fake: FakeProcess, erp: ErpSer
 
 
 @pytest.mark.parametrize("fault", ["lose_answers", "half_frame", "garbage", "silence", "reset"])
-def test_each_result_once_whatever_becomes_of_the_answer(
+def test_each_result_arrives_once_with_any_fault_of_the_answer(
     fake: FakeProcess, erp: ErpService, order: str, fault: str
 ) -> None:
     erp.report_result(order, "S-0", True)
@@ -79,7 +79,7 @@ def test_each_result_once_whatever_becomes_of_the_answer(
     assert serials(fake) == ["S-0", "S-1", "S-2"]
 
 
-def test_a_result_that_was_done_though_the_status_says_otherwise(
+def test_an_error_status_after_storing_does_not_duplicate_a_result(
     fake: FakeProcess, erp: ErpService, order: str
 ) -> None:
     fake.control.do("fail", status=500, count=2, path="/results", done=True)
@@ -89,14 +89,14 @@ def test_a_result_that_was_done_though_the_status_says_otherwise(
     assert fake.truth()["repeated"] == 2
 
 
-def test_an_answer_for_another_message_counts_for_nothing(fake: FakeProcess, erp: ErpService, order: str) -> None:
+def test_an_answer_to_another_message_is_ignored(fake: FakeProcess, erp: ErpService, order: str) -> None:
     fake.control.do("mistake", count=1)
     erp.report_result(order, "S-1", True)
     erp.wait_until_sent(10.0)
     assert serials(fake) == ["S-1"]
 
 
-def test_a_pause_the_service_asks_for_is_kept(fake: FakeProcess, erp: ErpService, order: str) -> None:
+def test_retry_after_is_respected(fake: FakeProcess, erp: ErpService, order: str) -> None:
     fake.control.do("fail", status=503, count=1, retry_after=2, path="/results")
     erp.report_result(order, "S-1", True)
     erp.wait_until_sent(10.0)
@@ -104,7 +104,7 @@ def test_a_pause_the_service_asks_for_is_kept(fake: FakeProcess, erp: ErpService
     assert 2.0 <= asked[1] - asked[0] < 6.0
 
 
-def test_attempts_become_rarer_while_the_service_fails(fake: FakeProcess, erp: ErpService, order: str) -> None:
+def test_retries_back_off_while_the_service_fails(fake: FakeProcess, erp: ErpService, order: str) -> None:
     fake.control.do("fail", status=503, count=-1, path="/results")
     before = len([each for each in fake.control.do("received") if each["path"] == "/results"])
     erp.report_result(order, "S-1", True)
@@ -116,9 +116,7 @@ def test_attempts_become_rarer_while_the_service_fails(fake: FakeProcess, erp: E
     assert serials(fake) == ["S-1"]
 
 
-def test_a_message_the_service_cannot_do_holds_up_its_order_only(
-    fake: FakeProcess, erp: ErpService, order: str
-) -> None:
+def test_a_rejected_message_blocks_only_its_order(fake: FakeProcess, erp: ErpService, order: str) -> None:
     fake.control.do("add_order", order="B-1", product="PCB", quantity=1)
     fake.control.do("fail", status=500, count=1, path="/results")
     erp.report_result(order, "S-1", True)

@@ -1,4 +1,4 @@
-"""Settings that are wrong are named; token and certificates are those of the files, and the token stays hidden."""
+"""Invalid settings are named; token and certificates come from files, and the token is never shown."""
 
 import datetime
 import ipaddress
@@ -44,13 +44,13 @@ URL = "https://erp.example/api"
         ({"poll": 0.0}, "poll"),
     ],
 )
-def test_a_wrong_setting_is_named(settings: dict[str, Any], named: str) -> None:
+def test_an_invalid_setting_is_named(settings: dict[str, Any], named: str) -> None:
     with pytest.raises(OutOfRange, match=named) as raised:
         ErpSettings(**{"url": URL, **settings})
     assert "secret" not in str(raised.value)
 
 
-def test_where_the_outbox_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_outbox_has_a_default_path(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     assert file_of("", "cell", URL).parent == tmp_path / "arcor2-hw" / "outbox"
     files = {file_of("/o", "cell", URL), file_of("/o", "cell", URL + "2"), file_of("/o", "other", URL)}
@@ -61,7 +61,7 @@ def test_where_the_outbox_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     ("text", "seconds"),
     [("", 0.0), ("7", 7.0), ("-3", 0.0), ("soon", 0.0), ("99999", 600.0), ("Wed, 21 Oct 2015 07:28:00 GMT", 0.0)],
 )
-def test_retry_after(text: str, seconds: float) -> None:
+def test_retry_after_is_parsed(text: str, seconds: float) -> None:
     assert parse_retry_after(text) == seconds
 
 
@@ -105,7 +105,7 @@ class Authority:
         return files
 
 
-def test_token_and_certificate(
+def test_token_and_certificates_are_read_from_files(
     start_fake: Callable[..., FakeProcess], make: Callable[..., ErpService], tmp_path: Path
 ) -> None:
     good, other = Authority(tmp_path, "good"), Authority(tmp_path, "other")
@@ -140,7 +140,7 @@ def test_token_and_certificate(
     assert [result["serial"] for result in service.truth()["results"]] == ["S-1"]
 
 
-def test_a_token_that_is_withdrawn_holds_all_and_is_an_alarm(
+def test_a_revoked_token_holds_all_results_and_raises_an_alarm(
     fake: FakeProcess, make: Callable[..., ErpService]
 ) -> None:
     fake.control.do("add_order", order="A-1", product="PCB", quantity=9)

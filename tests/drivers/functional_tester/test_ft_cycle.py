@@ -1,4 +1,4 @@
-"""The functional tester's driver on a fake that behaves: what it observes, what it commands, what is refused."""
+"""The functional tester's driver on a working fake: observing, commands and refusals."""
 
 import threading
 from collections.abc import Callable
@@ -54,7 +54,7 @@ def test_connecting_observes_and_writes_nothing(fake: FakeProcess, observed: Fun
     assert (truth["watchdog_ms"], truth["last_command"], truth["door"]) == (0, None, "closed")
 
 
-def test_whole_cycle(fake: FakeProcess, tester: FunctionalTester) -> None:
+def test_a_complete_cycle(fake: FakeProcess, tester: FunctionalTester) -> None:
     assert tester.control_owner() == "us"
     assert fake.truth()["watchdog_ms"] == 2000
     for number, (code, defect, passes) in enumerate(
@@ -86,7 +86,7 @@ def test_the_same_board_twice_gives_two_results(fake: FakeProcess, loaded: Funct
     assert fake.truth()["tested"] == 2
 
 
-def test_measured_values_before_any_test(tester: FunctionalTester) -> None:
+def test_measured_values_need_a_test(tester: FunctionalTester) -> None:
     with pytest.raises(Refused, match="supply_voltage is refused in state Stopped: nothing was tested"):
         tester.supply_voltage()
 
@@ -100,7 +100,7 @@ def test_program_out_of_range_sends_nothing(fake: FakeProcess, loaded: Functiona
 
 
 # ------------------------------------------------------------------------------------------------ refusals
-def test_start_without_board_or_with_the_door_open(fake: FakeProcess, tester: FunctionalTester) -> None:
+def test_start_is_refused_without_board_or_with_the_door_open(fake: FakeProcess, tester: FunctionalTester) -> None:
     with pytest.raises(Refused, match="start is refused in state Idle: there is no board in the fixture"):
         tester.test()
     tester.open_door()
@@ -110,7 +110,7 @@ def test_start_without_board_or_with_the_door_open(fake: FakeProcess, tester: Fu
     assert fake.truth()["tested"] == 0
 
 
-def test_commands_that_the_state_refuses_name_both(tester: FunctionalTester) -> None:
+def test_refused_commands_name_command_and_state(tester: FunctionalTester) -> None:
     address = "tester at 127.0.0.1:"
     with pytest.raises(Refused, match=f"^{address}.*hold is refused in state Stopped: this state does not allow it"):
         tester.command(MachineCommand.HOLD)
@@ -120,9 +120,7 @@ def test_commands_that_the_state_refuses_name_both(tester: FunctionalTester) -> 
         tester.command(MachineCommand.SUSPEND)
 
 
-def test_hold_door_and_release_while_testing(
-    fake: FakeProcess, loaded: FunctionalTester, wait_for: Callable[..., Any]
-) -> None:
+def test_hold_and_door_during_a_test(fake: FakeProcess, loaded: FunctionalTester, wait_for: Callable[..., Any]) -> None:
     thread, outcome = in_background(loaded.test)
     wait_for(lambda: fake.truth()["state"], lambda state: state == "Execute")
     loaded.command(MachineCommand.HOLD)
@@ -141,9 +139,7 @@ def test_hold_door_and_release_while_testing(
     assert fake.truth()["door"] == "closed"
 
 
-def test_key_switch_takes_control_away(
-    fake: FakeProcess, tester: FunctionalTester, wait_for: Callable[..., Any]
-) -> None:
+def test_the_key_switch_ends_control(fake: FakeProcess, tester: FunctionalTester, wait_for: Callable[..., Any]) -> None:
     fake.control.do("mode", mode="manual")
     with pytest.raises(NotInControl, match=r"open_door is refused in state Stopped: the key switch .*\(manual\)"):
         tester.open_door()
@@ -154,7 +150,7 @@ def test_key_switch_takes_control_away(
     tester.open_door()
 
 
-def test_control_is_refused_while_somebody_elses_test_runs(
+def test_control_is_refused_during_another_hosts_test(
     start_fake: Callable[..., FakeProcess], make: Callable[..., FunctionalTester], wait_for: Callable[..., Any]
 ) -> None:
     fake = start_fake("functional_tester", "--test-time", "1.0")
@@ -190,7 +186,9 @@ def test_stop_ends_a_test_without_result(
     assert loaded.test() is True
 
 
-def test_stop_at_the_station_cancels(fake: FakeProcess, loaded: FunctionalTester, wait_for: Callable[..., Any]) -> None:
+def test_a_stop_at_the_station_cancels_the_test(
+    fake: FakeProcess, loaded: FunctionalTester, wait_for: Callable[..., Any]
+) -> None:
     thread, outcome = in_background(loaded.test)
     wait_for(lambda: fake.truth()["state"], lambda state: state == "Execute")
     fake.control.do("command", name="stop")

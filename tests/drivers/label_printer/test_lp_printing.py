@@ -1,4 +1,4 @@
-"""The label printer's driver on a fake: each label once and counted, faults by name, nothing sent again."""
+"""The label printer's driver: each label is printed once and counted, faults are named, nothing is sent again."""
 
 import time
 from collections.abc import Callable
@@ -50,7 +50,7 @@ def test_connecting_only_asks_and_labels_are_printed_once(fake: FakeProcess, pri
         printer.print(LABEL)
 
 
-def test_data_is_no_command(fake: FakeProcess, printer: ZplPrinter) -> None:
+def test_data_cannot_contain_commands(fake: FakeProcess, printer: ZplPrinter) -> None:
     nasty = ["^XZ^XA^FDx^FS^XZ", "~JA~HS_5E\\&{code} \u0159\u00b5\u20ac", "A>;B>0^PQ9~"]
     assert printer.print_label(*nasty) == "printer-1"
     assert texts(fake) == [nasty]
@@ -65,7 +65,7 @@ def test_data_is_no_command(fake: FakeProcess, printer: ZplPrinter) -> None:
 
 
 @pytest.mark.parametrize("fake", ["flags"], indirect=True)
-def test_what_keeps_it_from_printing_is_named_and_nothing_is_sent(
+def test_faults_that_prevent_printing_are_named_and_nothing_is_sent(
     fake: FakeProcess, printer: ZplPrinter, wait_for: Callable[..., Any]
 ) -> None:
     for command, on, off, code in (
@@ -108,7 +108,7 @@ def test_no_reply_means_media_out_or_head_open(
 
 
 @pytest.mark.parametrize("fake", ["flags"], indirect=True)
-def test_a_fault_in_between_leaves_the_label_unconfirmed(
+def test_a_fault_during_printing_leaves_the_label_unconfirmed(
     fake: FakeProcess, make: Callable[..., ZplPrinter], wait_for: Callable[..., Any]
 ) -> None:
     printer = make(fake.ready["port"], print_timeout=0.3)
@@ -147,7 +147,7 @@ def test_a_fault_in_between_leaves_the_label_unconfirmed(
         printer.last_came_out()
 
 
-def test_a_label_that_never_comes_is_not_sent_again(fake: FakeProcess, printer: ZplPrinter) -> None:
+def test_a_missing_label_is_not_sent_again(fake: FakeProcess, printer: ZplPrinter) -> None:
     fake.control.do("forgetful", on=True)
     with pytest.raises(DeviceTimeout, match="has not counted the label within 1 s; it is not sent again"):
         printer.print(LABEL)
@@ -164,7 +164,7 @@ def test_a_label_that_never_comes_is_not_sent_again(fake: FakeProcess, printer: 
 
 
 @on_both
-def test_lost_after_sending_nothing_is_sent_again(
+def test_nothing_is_sent_again_after_a_loss(
     fake: FakeProcess, printer: ZplPrinter, wait_for: Callable[..., Any]
 ) -> None:
     send = printer.line.send
@@ -192,7 +192,7 @@ def test_lost_after_sending_nothing_is_sent_again(
 
 
 @pytest.mark.parametrize("fake", ["pty"], indirect=True)
-def test_labels_of_somebody_else(fake: FakeProcess, printer: ZplPrinter) -> None:
+def test_labels_of_another_host(fake: FakeProcess, printer: ZplPrinter) -> None:
     with printer.line.held():
         fake.control.do("pause")
         printer.line.send(b"^XA^FDtheirs^FS^PQ2^XZ")
@@ -206,7 +206,9 @@ def test_labels_of_somebody_else(fake: FakeProcess, printer: ZplPrinter) -> None
 
 @on_both
 @pytest.mark.parametrize("fault", ["silence", "half_frame", "garbage"])
-def test_no_sensible_answer(fake: FakeProcess, printer: ZplPrinter, wait_for: Callable[..., Any], fault: str) -> None:
+def test_invalid_answers_of_the_device_are_typed_errors(
+    fake: FakeProcess, printer: ZplPrinter, wait_for: Callable[..., Any], fault: str
+) -> None:
     began = own_time()
     with printer.line.held():
         fake.control.do(fault)
@@ -232,14 +234,14 @@ def test_no_sensible_answer(fake: FakeProcess, printer: ZplPrinter, wait_for: Ca
         ("^XA" + "x" * 40000 + "^XZ", "longer"),
     ],
 )
-def test_what_is_no_single_label_is_not_sent(fake: FakeProcess, printer: ZplPrinter, label: str, why: str) -> None:
+def test_only_a_single_label_is_sent(fake: FakeProcess, printer: ZplPrinter, label: str, why: str) -> None:
     with pytest.raises(OutOfRange, match=f"^printer at .*: the label .*{why}"):
         printer.print(label)
     assert "format" not in fake.truth()["received"]
 
 
 @pytest.mark.parametrize("port", ["/dev/does-not-exist", "socket://127.0.0.1:1"])
-def test_no_such_port(make: Callable[..., ZplPrinter], port: str) -> None:
+def test_a_missing_port_is_named(make: Callable[..., ZplPrinter], port: str) -> None:
     printer = make(port)
     with pytest.raises(NotConnected, match=f"^printer at {port}: the port cannot be opened"):
         printer.connect(1.0)
@@ -266,7 +268,7 @@ def test_settings_out_of_range_name_the_parameter(name: str, value: Any) -> None
 
 
 @pytest.mark.parametrize("fake", ["flags"], indirect=True)
-def test_stop_ends_the_wait_and_the_label_comes_out_once(fake: FakeProcess, printer: ZplPrinter) -> None:
+def test_stop_ends_the_wait_and_the_label_is_printed_once(fake: FakeProcess, printer: ZplPrinter) -> None:
     printing = BackgroundCall(lambda: printer.print(LABEL))
     while "format" not in fake.truth()["received"]:
         assert not printing.over

@@ -1,4 +1,4 @@
-"""ZPL answers, byte for byte, and fields that hold no commands whatever is in them."""
+"""ZPL answers byte for byte, and fields that cannot contain commands."""
 
 import pytest
 from hypothesis import given
@@ -32,7 +32,7 @@ def test_host_status_is_read() -> None:
 @pytest.mark.parametrize(
     "data", [b"", ONE, ONE + TWO, TWO + ONE + THREE, ONE + TWO + THREE[:-1], ONE.replace(b",0,0,1245", b",x,0,1245")]
 )
-def test_what_is_not_whole_is_no_status(data: bytes) -> None:
+def test_incomplete_answers_are_no_status(data: bytes) -> None:
     assert status(data) is None
 
 
@@ -43,7 +43,7 @@ def test_other_answers() -> None:
 
 
 @given(st.text(st.characters(exclude_categories=["C"]), max_size=100), st.booleans())
-def test_a_field_holds_no_command(text: str, barcode: bool) -> None:
+def test_fields_escape_commands(text: str, barcode: bool) -> None:
     try:
         data = field(text, barcode)
     except BadLabel:
@@ -55,7 +55,7 @@ def test_a_field_holds_no_command(text: str, barcode: bool) -> None:
 
 
 @given(st.binary(max_size=200))
-def test_foreign_bytes_raise_nothing(data: bytes) -> None:
+def test_random_bytes_raise_nothing(data: bytes) -> None:
     for read in (status, identity, number, variable):
         read(data)
     assert status(data + ONE + TWO + THREE) is not None or data.endswith(b"\x02")

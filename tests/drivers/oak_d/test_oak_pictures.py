@@ -1,4 +1,4 @@
-"""The OAK-D's driver on a fake that renders: pictures that fit the scene, of one instant, and fresh."""
+"""Pictures of the OAK-D from a rendering fake: they match the scene, are synchronous and current."""
 
 import subprocess
 import sys
@@ -53,7 +53,7 @@ def test_connecting_sets_nothing_and_imports_late(fake: FakeProcess, camera: Oak
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
-def test_points_lie_where_things_stand(camera: OakD) -> None:
+def test_points_match_the_scene(camera: OakD) -> None:
     frame = camera.trigger()
     assert frame.depth is not None
     assert frame.color.shape == (360, 640, 3)
@@ -74,7 +74,7 @@ def test_points_lie_where_things_stand(camera: OakD) -> None:
     assert abs(rays(camera.color_camera_params, 640, 360)[10, 10, 0] - straight) > 0.003
 
 
-def test_colour_and_depth_are_of_one_instant(fake: FakeProcess, camera: OakD) -> None:
+def test_colour_and_depth_are_synchronous(fake: FakeProcess, camera: OakD) -> None:
     """The board's red and its height are at the same place in every frame, while it wanders."""
     stop = threading.Event()
 
@@ -102,7 +102,7 @@ def test_colour_and_depth_are_of_one_instant(fake: FakeProcess, camera: OakD) ->
     assert np.ptp(places) > 0.02
 
 
-def test_pictures_show_what_was_there_after_the_call(fake: FakeProcess, camera: OakD) -> None:
+def test_pictures_are_taken_after_the_call(fake: FakeProcess, camera: OakD) -> None:
     for x in (-0.1, 0.0, 0.1):
         fake.control.do("move", name="board", pose={"position": [x, 0.0, 0.03]})
         began = time.monotonic()
@@ -116,7 +116,7 @@ def test_pictures_show_what_was_there_after_the_call(fake: FakeProcess, camera: 
         assert (columns.mean() - 321.15) / 456.25 * 0.75 == pytest.approx(x, abs=0.008)
 
 
-def test_depth_picture_says_how_it_was_taken(camera: OakD) -> None:
+def test_depth_pictures_carry_their_parameters(camera: OakD) -> None:
     one, many = camera.depth_image(), camera.depth_image(12)
     assert one.mode == "I;16"
     assert one.size == (640, 360)
@@ -134,7 +134,7 @@ def test_depth_picture_says_how_it_was_taken(camera: OakD) -> None:
         camera.depth_image(0)
 
 
-def test_exposure(fake: FakeProcess, camera: OakD) -> None:
+def test_exposure_is_set(fake: FakeProcess, camera: OakD) -> None:
     bright = np.asarray(camera.color_image()).mean()
     camera.fix_exposure(0.004)
     assert fake.truth()["exposure"] == pytest.approx(0.004)
@@ -150,7 +150,7 @@ def test_exposure(fake: FakeProcess, camera: OakD) -> None:
     assert len(fake.truth()["received"]) == 2
 
 
-def test_jpeg_and_several_hosts(fake: FakeProcess, camera: OakD, make: Callable[..., OakD]) -> None:
+def test_several_hosts_receive_jpeg(fake: FakeProcess, camera: OakD, make: Callable[..., OakD]) -> None:
     second = make(fake.ready["stream"], color_coding=ColorCoding.JPEG)
     second.connect(PATIENCE)
     raw, packed = camera.trigger(), second.trigger()
@@ -177,7 +177,7 @@ def test_settings_are_checked(wrong: dict[str, object], named: str) -> None:
         OakDSettings(**wrong)  # type: ignore[arg-type]
 
 
-def test_kinds_of_address() -> None:
+def test_every_form_of_address_is_parsed() -> None:
     assert OakDSettings(" 10.0.0.7:5005 ").network == ("10.0.0.7", 5005)
     assert OakDSettings("[::1]:5005").network == ("::1", 5005)
     for camera in ("", "14442C10D13EABCE00", "192.168.1.20"):

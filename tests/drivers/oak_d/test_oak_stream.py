@@ -1,4 +1,4 @@
-"""The stream's codec: messages byte for byte as docs/devices/oak-d.md says, and bytes that are none."""
+"""The stream's codec: messages byte for byte as in docs/devices/oak-d.md, and invalid bytes."""
 
 import zlib
 from typing import Any
@@ -51,7 +51,7 @@ REFUSED = bytes.fromhex("4f414b53 01 07 000f 00000000 a9cc30ef") + b'{"reason":"
         (REFUSED, Kind.REFUSED, Refusal("no"), b""),
     ],
 )
-def test_what_the_source_sends(data: bytes, kind: Kind, header: Any, payload: bytes) -> None:
+def test_messages_of_the_camera(data: bytes, kind: Kind, header: Any, payload: bytes) -> None:
     head = stream.read_prefix(data[:16])
     assert (head.kind, head.payload) == (kind, len(payload))
     text = data[16 : 16 + head.header]
@@ -70,7 +70,7 @@ def test_what_the_source_sends(data: bytes, kind: Kind, header: Any, payload: by
         (AUTO, Kind.CONTROL, {"exposure": None}),
     ],
 )
-def test_what_the_driver_sends(data: bytes, kind: Kind, header: dict[str, object]) -> None:
+def test_messages_of_the_driver(data: bytes, kind: Kind, header: dict[str, object]) -> None:
     assert stream.encode(kind, header) == data
 
 
@@ -84,12 +84,12 @@ def test_what_the_driver_sends(data: bytes, kind: Kind, header: dict[str, object
         (FRAME[:8] + b"\x04\x00\x00\x01" + FRAME[12:], "a message of 86 and 67108865 bytes is too long"),
     ],
 )
-def test_what_is_no_message(data: bytes, said: str) -> None:
+def test_invalid_messages_are_refused(data: bytes, said: str) -> None:
     with pytest.raises(BadStream, match=f"^{said}"):
         stream.read_prefix(data[:16])
 
 
-def test_every_wrong_bit_of_the_framing_is_noticed() -> None:
+def test_every_bit_error_of_the_framing_is_detected() -> None:
     framing = FRAME[: 16 + stream.read_prefix(FRAME[:16]).header]
     for bit in range(8 * len(framing)):
         wrong = bytearray(framing)
@@ -110,12 +110,12 @@ def test_every_wrong_bit_of_the_framing_is_noticed() -> None:
         b'{"number":' + b"9" * 40 + b"}",
     ],
 )
-def test_headers_that_are_none(text: bytes) -> None:
+def test_invalid_headers_are_refused(text: bytes) -> None:
     with pytest.raises(BadStream, match=r"^an invalid header"):
         stream.read_header(text, FrameHeader)
 
 
-def test_a_hello_that_makes_no_sense() -> None:
+def test_an_invalid_hello_is_refused() -> None:
     for wrong in ({"width": 0}, {"height": 10**6}, {"fps": 0.0}):
         text = msgspec.json.encode({**msgspec.json.decode(HELLO[16:-13]), **wrong})
         with pytest.raises(BadStream, match="is not a valid mode"):
@@ -123,7 +123,7 @@ def test_a_hello_that_makes_no_sense() -> None:
 
 
 @given(st.binary(min_size=16, max_size=16))
-def test_foreign_bytes_raise_nothing_else(data: bytes) -> None:
+def test_random_bytes_raise_only_protocol_errors(data: bytes) -> None:
     for each in (data, b"OAKS" + data[4:], b"OAKS\x01" + data[5:]):
         try:
             head = stream.read_prefix(each)

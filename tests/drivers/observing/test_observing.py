@@ -1,4 +1,4 @@
-"""The life of an observed connection: opened once, lost, back, stopped at any moment."""
+"""The life of an observed connection: opened once, lost, restored, stopped at any moment."""
 
 import logging
 import threading
@@ -71,7 +71,7 @@ def test_start_and_stop_are_idempotent() -> None:
     line.life.stop()
 
 
-def test_a_first_opening_that_fails_is_the_callers_and_is_not_repeated() -> None:
+def test_a_failed_first_connection_is_raised_and_not_repeated() -> None:
     line = Line()
     line.refuses = True
     with pytest.raises(NotConnected, match="refuses"):
@@ -84,7 +84,7 @@ def test_a_first_opening_that_fails_is_the_callers_and_is_not_repeated() -> None
     line.life.stop()
 
 
-def test_it_comes_back_by_itself_told_once_each_way(caplog: pytest.LogCaptureFixture) -> None:
+def test_loss_and_return_are_announced_once(caplog: pytest.LogCaptureFixture) -> None:
     line = Line()
     caplog.set_level(logging.INFO)
     line.life.start(1.0)
@@ -107,7 +107,7 @@ def test_it_comes_back_by_itself_told_once_each_way(caplog: pytest.LogCaptureFix
     line.life.stop()
 
 
-def test_stopping_while_lost_ends_the_attempts() -> None:
+def test_stopping_while_lost_ends_reconnecting() -> None:
     line = Line()
     line.life.start(1.0)
     line.refuses = True
@@ -119,7 +119,7 @@ def test_stopping_while_lost_ends_the_attempts() -> None:
     assert (line.opened, line.open, line.life.state) == (1, False, Connection.OFFLINE)
 
 
-def test_a_thread_that_does_not_end_holds_up_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hung_thread_does_not_block_stopping(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(observing, "STOP_WITHIN", 0.05)
     line = Line()
     hold = threading.Event()

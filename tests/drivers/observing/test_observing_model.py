@@ -1,4 +1,4 @@
-"""The connection's state machine against random days: what may follow what, told once each way, no haste, no leak."""
+"""The connection's state machine under random events: valid transitions, each announced once."""
 
 import itertools
 import logging
@@ -82,7 +82,7 @@ DAY = st.lists(st.sampled_from(["start", "stop", "break", "unplug", "plug", "set
 
 @given(day=DAY)
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_any_day(day: list[str], quick: None) -> None:
+def test_random_events_keep_the_state_machine_valid(day: list[str], quick: None) -> None:
     device = Device()
     life = device.life
     told = Told()
@@ -174,7 +174,7 @@ class Told(logging.Handler):
             self.count[word] += f" {word} after" in record.getMessage() or f" {word}:" in record.getMessage()
 
 
-def test_attempts_come_ever_more_slowly_up_to_a_cap(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reconnection_attempts_back_off_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(observing, "FIRST_PAUSE", 0.02)
     monkeypatch.setattr(observing, "LONGEST_PAUSE", 0.16)
     device = Device()
@@ -188,7 +188,7 @@ def test_attempts_come_ever_more_slowly_up_to_a_cap(monkeypatch: pytest.MonkeyPa
         assert gap >= pause - 1e-3, gaps
 
 
-def test_a_connection_that_breaks_as_soon_as_it_is_back_is_not_hurried(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_connection_that_breaks_at_once_keeps_the_back_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(observing, "FIRST_PAUSE", 0.01)
     monkeypatch.setattr(observing, "LONGEST_PAUSE", 0.1)
     device = Device()
@@ -205,7 +205,7 @@ def _break() -> None:
     raise ConnectionLost("line 7 broke")
 
 
-def test_a_watch_that_returns_takes_no_processor() -> None:
+def test_a_watch_that_returns_does_not_spin() -> None:
     calls: list[float] = []
     life = Observing("line 7", lambda _: None, lambda _: calls.append(0.0), lambda: None)
     life.start(1.0)
@@ -214,7 +214,7 @@ def test_a_watch_that_returns_takes_no_processor() -> None:
     assert 1 <= len(calls) <= 1 + 0.2 / observing.BREATH + 10
 
 
-def test_a_mistake_in_the_drivers_watch_is_a_loss(quick: None, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_error_in_the_drivers_watch_is_a_loss(quick: None, caplog: pytest.LogCaptureFixture) -> None:
     device = Device()
     mistakes = [ZeroDivisionError("a mistake")]
 

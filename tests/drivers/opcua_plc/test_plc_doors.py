@@ -1,4 +1,4 @@
-"""A server that wants to know who we are, and one that has lost a node."""
+"""Authentication, and a server that has lost a node."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +12,7 @@ from arcor2_hw.exceptions import DeviceError, DeviceFault, NotConnected, Refused
 from tests.fakes.conftest import FakeProcess
 
 
-def test_a_node_that_goes_while_we_are_connected(
+def test_a_node_removed_during_a_connection_is_named(
     start_fake: Callable[..., FakeProcess], make: Callable[..., OpcUaPlc]
 ) -> None:
     fake = start_fake("opcua_plc")

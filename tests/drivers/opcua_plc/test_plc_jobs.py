@@ -18,7 +18,7 @@ def handshake(fake: FakeProcess) -> list[tuple[str, Any]]:
     return [(name.removeprefix("Handshake."), value) for name, value in written if "HostLife" not in name]
 
 
-def test_a_job_is_done_in_the_order_of_the_handshake(fake: FakeProcess, plc: OpcUaPlc) -> None:
+def test_a_job_follows_the_handshake(fake: FakeProcess, plc: OpcUaPlc) -> None:
     before, done = len(handshake(fake)), len(fake.truth()["done"])
     began = time.monotonic()
     plc.run_job(2)
@@ -31,7 +31,7 @@ def test_a_job_is_done_in_the_order_of_the_handshake(fake: FakeProcess, plc: Opc
     assert fake.truth()["done"][done:] == [2, 1]
 
 
-def test_a_jobs_error_has_the_plcs_code(fake: FakeProcess, plc: OpcUaPlc) -> None:
+def test_a_job_error_carries_the_plc_code(fake: FakeProcess, plc: OpcUaPlc) -> None:
     fake.control.do("job_error", code=417)
     with pytest.raises(DeviceFault, match=r"plc at opc.tcp.*job 1 ended with error 417") as fault:
         plc.run_job(1)
@@ -51,7 +51,7 @@ def test_a_job_that_takes_too_long_is_stopped(fake: FakeProcess, plc: OpcUaPlc) 
     assert not fake.truth()["moving"]
 
 
-def test_a_request_that_is_not_answered_is_taken_back(fake: FakeProcess, plc: OpcUaPlc) -> None:
+def test_an_unanswered_request_is_withdrawn(fake: FakeProcess, plc: OpcUaPlc) -> None:
     fake.control.do("deaf")
     with pytest.raises(DeviceTimeout, match=r"the start of job 1 took longer than 2 s; the PLC is idle"):
         plc.run_job(1)
@@ -99,7 +99,7 @@ def test_control_is_refused_while_another_host_has_it(fake: FakeProcess, observe
     assert observed.control_owner() == "us"
 
 
-def test_control_that_somebody_takes_away_is_noticed(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
+def test_control_taken_by_another_host_is_detected(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
     running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
     fake.control.do("stranger", number=77)
@@ -109,7 +109,7 @@ def test_control_that_somebody_takes_away_is_noticed(fake: FakeProcess, plc: Opc
         plc.write_digital("lamp", True)
 
 
-def test_control_given_back(fake: FakeProcess, plc: OpcUaPlc) -> None:
+def test_control_is_released(fake: FakeProcess, plc: OpcUaPlc) -> None:
     plc.write_digital("lamp", True)
     assert fake.truth()["owner"] == 1
     plc.release_control()
@@ -123,7 +123,7 @@ def test_control_given_back(fake: FakeProcess, plc: OpcUaPlc) -> None:
     assert fake.truth()["owner"] == 0
 
 
-def test_numbers_the_plc_cannot_hold(fake: FakeProcess, plc: OpcUaPlc) -> None:
+def test_numbers_out_of_the_plc_type_are_refused(fake: FakeProcess, plc: OpcUaPlc) -> None:
     with pytest.raises(OutOfRange, match="number of a job must be -32768 to 32767, not 40000"):
         plc.run_job(40000)
     with pytest.raises(AssertionError):

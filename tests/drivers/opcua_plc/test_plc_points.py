@@ -1,4 +1,4 @@
-"""Points: types, units, time stamps and quality; edges in order; what cannot be written or is not there is named."""
+"""Points: types, units, time stamps and quality; edges in order; missing and read-only points."""
 
 import time
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from tests.fakes.conftest import FakeProcess
 URL = "opc.tcp://127.0.0.1:4840"
 
 
-def test_connecting_writes_nothing_and_says_who_it_is(fake: FakeProcess, make: Callable[..., OpcUaPlc]) -> None:
+def test_connecting_writes_nothing_and_reads_the_identity(fake: FakeProcess, make: Callable[..., OpcUaPlc]) -> None:
     before = fake.truth()["writes"]
     plc = make(fake.ready["url"])
     plc.connect()
@@ -46,7 +46,7 @@ def test_each_kind_is_read_and_written_in_its_unit_and_type(fake: FakeProcess, p
     assert {point.name: point.unit for point in plc.points()}["speed"] == "m/s"
 
 
-def test_a_reading_has_the_sources_time(fake: FakeProcess, observed: OpcUaPlc) -> None:
+def test_values_carry_the_source_time(fake: FakeProcess, observed: OpcUaPlc) -> None:
     before = datetime.now(UTC)
     fake.control.do("set", name="Level", value=123)
     after = datetime.now(UTC)
@@ -86,7 +86,7 @@ def test_quality_comes_from_the_status(
     wait_for(observed.alarms, lambda alarms: alarms == [])
 
 
-def test_edges_come_each_once_and_in_order(fake: FakeProcess, observed: OpcUaPlc, wait_for: Any) -> None:
+def test_edges_are_reported_once_and_in_order(fake: FakeProcess, observed: OpcUaPlc, wait_for: Any) -> None:
     edges: list[Edge] = []
     end = observed.subscribe("part", edges.append)
     other: list[Edge] = []
@@ -104,7 +104,7 @@ def test_edges_come_each_once_and_in_order(fake: FakeProcess, observed: OpcUaPlc
     assert len(edges) == 5
 
 
-def test_wait_for(fake: FakeProcess, observed: OpcUaPlc) -> None:
+def test_wait_for_returns_at_the_condition(fake: FakeProcess, observed: OpcUaPlc) -> None:
     observed.wait_for("door", True, 0.0)
     with pytest.raises(DeviceTimeout, match=r"plc at opc.tcp.*part becoming on took longer"):
         observed.wait_for("part", True, 0.1)
@@ -120,7 +120,7 @@ def test_wait_for(fake: FakeProcess, observed: OpcUaPlc) -> None:
     assert isinstance(waiting.outcome(), Cancelled)
 
 
-def test_what_cannot_be_written(fake: FakeProcess, plc: OpcUaPlc) -> None:
+def test_unwritable_points_are_refused(fake: FakeProcess, plc: OpcUaPlc) -> None:
     before = [each for each in fake.truth()["written"] if each[0].startswith("Cell.")]
     with pytest.raises(Refused, match="part is an input"):
         plc.write_digital("part", True)
@@ -137,7 +137,7 @@ def test_what_cannot_be_written(fake: FakeProcess, plc: OpcUaPlc) -> None:
     assert [each for each in fake.truth()["written"] if each[0].startswith("Cell.")] == before
 
 
-def test_a_variable_the_server_does_not_let_us_write(fake: FakeProcess, make: Callable[..., OpcUaPlc]) -> None:
+def test_a_read_only_variable_is_named(fake: FakeProcess, make: Callable[..., OpcUaPlc]) -> None:
     plc = make(fake.ready["url"], points="part=DO ns=2;s=Cell.PartPresent")
     plc.connect()
     plc.take_control()
@@ -189,7 +189,7 @@ def test_without_a_handshake_there_is_no_control(fake: FakeProcess, make: Callab
         "lamp=DO ns=2;s=A on_loss=maybe",
     ],
 )
-def test_points_that_are_none(text: str) -> None:
+def test_invalid_points_are_refused(text: str) -> None:
     with pytest.raises(OutOfRange, match="points must"):
         parse_points(text)
 
@@ -207,7 +207,7 @@ def test_node_ids_of_each_kind() -> None:
 
 
 @pytest.mark.parametrize("without", ["owner", "code", "plc_life"])
-def test_a_handshake_is_whole_or_empty(without: str) -> None:
+def test_a_handshake_is_complete_or_empty(without: str) -> None:
     assert parse_handshake("") == {}
     parts = [part for part in HANDSHAKE.split(" | ") if not part.startswith(f"{without}=")]
     with pytest.raises(OutOfRange, match=f"handshake must give {without} too"):
@@ -228,6 +228,6 @@ def test_a_handshake_is_whole_or_empty(without: str) -> None:
         ({"server_certificate": "x"}, "server_certificate"),
     ],
 )
-def test_a_wrong_setting_is_named(settings: dict[str, Any], named: str) -> None:
+def test_an_invalid_setting_is_named(settings: dict[str, Any], named: str) -> None:
     with pytest.raises(OutOfRange, match=named):
         OpcUaPlcSettings(**{"url": URL, "points": "p=DI i=1", **settings})

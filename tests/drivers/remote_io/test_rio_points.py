@@ -1,4 +1,4 @@
-"""The remote I/O block's driver on a sound wire: points, edges, pulses, control; TCP and RTU."""
+"""The remote I/O block on a working wire: points, edges, pulses, control; TCP and RTU."""
 
 import threading
 import time
@@ -44,7 +44,7 @@ def in_thread(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
 
 
 # ------------------------------------------------------------------------------------------------ settings
-def test_point_list() -> None:
+def test_the_point_list_is_parsed() -> None:
     points = parse_points(POINTS)
     door, lamp, speed = points["door"].io, points["lamp"].io, points["speed"].io
     assert (door.direction, door.kind, door.debounce) == (PointDirection.INPUT, PointKind.DIGITAL, 0.1)
@@ -74,7 +74,7 @@ def test_point_list() -> None:
         ("a=DI1 debounce=0.1 debounce=0.2", "each once"),
     ],
 )
-def test_point_list_with_a_mistake_names_it(points: str, told: str) -> None:
+def test_an_invalid_point_list_names_the_mistake(points: str, told: str) -> None:
     with pytest.raises(OutOfRange, match=f"^points must .*{told}"):
         RemoteIOSettings(host="127.0.0.1", points=points)
 
@@ -98,7 +98,7 @@ def test_settings_out_of_range_name_the_parameter(name: str, value: Any) -> None
         RemoteIOSettings(**{"host": "127.0.0.1", "points": POINTS, name: value})
 
 
-def test_one_way_to_the_block() -> None:
+def test_tcp_and_rtu_exclude_each_other() -> None:
     with pytest.raises(OutOfRange, match=r"^host must be .* or serial_port"):
         RemoteIOSettings(host="127.0.0.1", serial_port="/dev/ttyS0", points=POINTS)
 
@@ -116,7 +116,7 @@ def test_connecting_observes_and_writes_nothing(fake: FakeProcess, observed: Rem
     assert (identity.vendor, identity.model, identity.firmware) == ("Fake Field Devices", "RIO-16", "2.0")
 
 
-def test_reading_each_kind(fake: FakeProcess, observed: RemoteIO) -> None:
+def test_every_kind_of_point_is_read(fake: FakeProcess, observed: RemoteIO) -> None:
     fake.control.do("set_input", number=0, on=True)
     fake.control.do("set_analog", number=0, raw=-250)
     assert observed.read_digital("part") is True
@@ -134,7 +134,7 @@ def test_reading_each_kind(fake: FakeProcess, observed: RemoteIO) -> None:
         observed.read_digital("level")
 
 
-def test_alarms(fake: FakeProcess, observed: RemoteIO) -> None:
+def test_alarms_are_reported(fake: FakeProcess, observed: RemoteIO) -> None:
     assert observed.alarms() == []
     fake.control.do("diagnosis", supply_missing=True)
     assert [alarm.code for alarm in observed.alarms()] == ["supply_missing"]
@@ -144,7 +144,7 @@ def test_alarms(fake: FakeProcess, observed: RemoteIO) -> None:
     assert observed.health is Health.NORMAL
 
 
-def test_debouncing() -> None:
+def test_inputs_are_debounced() -> None:
     point = Debounced("door", 0.1)
     samples = [(0.0, 0), (0.02, 1), (0.04, 0), (0.06, 1), (0.1, 1), (0.14, 1), (0.17, 1), (0.2, 0), (0.25, 1)]
     edges = [edge for at, raw in samples if (edge := point.take(bool(raw), at)) is not None]
@@ -152,7 +152,7 @@ def test_debouncing() -> None:
     assert point.value is True
 
 
-def test_edges_are_told_once_debounced_and_in_order(
+def test_edges_are_debounced_and_reported_in_order(
     fake: FakeProcess, observed: RemoteIO, wait_for: Callable[..., Any]
 ) -> None:
     edges: list[Edge] = []
@@ -173,7 +173,7 @@ def test_edges_are_told_once_debounced_and_in_order(
     assert [(edge.name, edge.value) for edge in edges] == [("door", True), ("part", True)]
 
 
-def test_wait_for(fake: FakeProcess, observed: RemoteIO) -> None:
+def test_wait_for_returns_at_the_condition(fake: FakeProcess, observed: RemoteIO) -> None:
     observed.wait_for("part", False, 0.0)
     thread, outcome = in_thread(lambda: observed.wait_for("part", True, 5.0))
     fake.control.do("set_input", number=0, on=True)
@@ -191,7 +191,7 @@ def test_wait_for(fake: FakeProcess, observed: RemoteIO) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ outputs
-def test_writing(fake: FakeProcess, block: RemoteIO) -> None:
+def test_outputs_are_written(fake: FakeProcess, block: RemoteIO) -> None:
     assert not any(fake.truth()["outputs"])  # taking control switches nothing
     assert block.control_owner() == "us"
     block.write_digital("lamp", True)
@@ -217,7 +217,7 @@ def test_pulse_is_timed_by_the_block(fake: FakeProcess, block: RemoteIO) -> None
         block.pulse_output("lamp", 100.0)
 
 
-def test_a_pulse_that_is_stopped_is_off(fake: FakeProcess, block: RemoteIO, wait_for: Callable[..., Any]) -> None:
+def test_a_stopped_pulse_switches_off(fake: FakeProcess, block: RemoteIO, wait_for: Callable[..., Any]) -> None:
     block.write_digital("valve", True)
     thread, outcome = in_thread(lambda: block.pulse("lamp", 20.0))
     wait_for(lambda: fake.truth()["outputs"][4])
@@ -250,7 +250,7 @@ def test_control_is_refused_while_another_host_has_it(
     assert (outputs[0], outputs[4]) == (False, True)
 
 
-def test_leaving_puts_the_outputs_into_their_safe_state(fake: FakeProcess, block: RemoteIO) -> None:
+def test_disconnecting_sets_safe_outputs(fake: FakeProcess, block: RemoteIO) -> None:
     block.write_digital("lamp", True)
     block.write_digital("valve", True)
     block.write_analog("speed", 1.0)
@@ -268,7 +268,7 @@ def test_leaving_puts_the_outputs_into_their_safe_state(fake: FakeProcess, block
 
 
 # ------------------------------------------------------------------------------------------------ RTU
-def test_rtu(start_fake: Callable[..., FakeProcess], make: Callable[..., RemoteIO]) -> None:
+def test_the_block_works_over_rtu(start_fake: Callable[..., FakeProcess], make: Callable[..., RemoteIO]) -> None:
     fake = start_fake("remote_io", "--serial")
     block = make(fake.ready["modbus"], baudrate=115200)
     block.connect()

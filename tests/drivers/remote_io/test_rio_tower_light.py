@@ -1,4 +1,4 @@
-"""The tower light on the fake block: colours, blinking, patterns, and what it shows when we are gone."""
+"""The tower light on the fake block: colours, blinking, patterns, and the state after a connection loss."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -34,7 +34,7 @@ def lamps(fake: FakeProcess) -> list[bool]:
     return outputs[:3]
 
 
-def test_colours(fake: FakeProcess, tower: TowerLight) -> None:
+def test_colours_are_switched(fake: FakeProcess, tower: TowerLight) -> None:
     with pytest.raises(NotInControl, match="showing red is refused: nobody has control"):
         tower.show(LampColor.RED)
     assert fake.truth()["writes"] == 0
@@ -50,7 +50,7 @@ def test_colours(fake: FakeProcess, tower: TowerLight) -> None:
     assert lamps(fake) == [False, False, False]
 
 
-def test_blinking(fake: FakeProcess, tower: TowerLight, wait_for: Callable[..., Any]) -> None:
+def test_colours_blink(fake: FakeProcess, tower: TowerLight, wait_for: Callable[..., Any]) -> None:
     tower.take_control()
     tower.show(LampColor.AMBER, blinking=True)
     history = wait_for(lambda: fake.truth()["history"], lambda history: len(history) >= 8)
@@ -64,7 +64,7 @@ def test_blinking(fake: FakeProcess, tower: TowerLight, wait_for: Callable[..., 
     assert [(change["output"], change["on"]) for change in after] == [(3, True), (3, False)]  # nothing blinks any more
 
 
-def test_patterns_of_states(fake: FakeProcess, tower: TowerLight, wait_for: Callable[..., Any]) -> None:
+def test_patterns_follow_states(fake: FakeProcess, tower: TowerLight, wait_for: Callable[..., Any]) -> None:
     tower.take_control()
     tower.show_state(ShownState.EXECUTE)
     assert lamps(fake) == [False, False, True]
@@ -76,7 +76,9 @@ def test_patterns_of_states(fake: FakeProcess, tower: TowerLight, wait_for: Call
     assert {state.value for state in ShownState} == {state.name.lower() for state in MachineState}
 
 
-def test_what_it_shows_when_we_are_gone(fake: FakeProcess, tower: TowerLight, wait_for: Callable[..., Any]) -> None:
+def test_the_safe_pattern_is_shown_after_a_loss(
+    fake: FakeProcess, tower: TowerLight, wait_for: Callable[..., Any]
+) -> None:
     tower.take_control()
     tower.show(LampColor.GREEN, blinking=True)
     fake.control.do("silence")
@@ -90,7 +92,7 @@ def test_what_it_shows_when_we_are_gone(fake: FakeProcess, tower: TowerLight, wa
     assert lamps(fake) == [True, False, False]
 
 
-def test_beside_a_block_on_the_same_device(
+def test_a_tower_light_and_a_block_share_a_device(
     fake: FakeProcess, tower: TowerLight, make: Callable[..., RemoteIO], wait_for: Callable[..., Any]
 ) -> None:
     block = make(fake.ready["modbus"])

@@ -279,7 +279,7 @@ def test_a_grip_that_takes_too_long_is_stopped(
 
 
 @given(st.floats(0.0, 0.085))
-def test_width_survives_scaling(width: float) -> None:
+def test_widths_round_trip_through_scaling(width: float) -> None:
     settings = Robotiq2FSettings(host="h")
     position = scaling.position(settings, width)
     assert settings.open_position <= position <= settings.closed_position
@@ -322,7 +322,7 @@ def test_tool_and_limits_default_to_those_of_the_model() -> None:
         ({"max_speed": 0.01}, "max_speed"),
     ],
 )
-def test_settings_name_the_parameter(wrong: dict[str, Any], named: str) -> None:
+def test_an_invalid_setting_names_the_parameter(wrong: dict[str, Any], named: str) -> None:
     with pytest.raises(OutOfRange, match=f"^{named} must be") as caught:
         Robotiq2FSettings(**{"host": "gripper.local", **wrong})
     assert isinstance(caught.value, Arcor2Error)

@@ -97,7 +97,9 @@ def test_stop(fake: FakeProcess, rtu: Robotiq2F, wait_for: Callable[..., Any]) -
     assert 3 < fake.truth()["position"] < 230
 
 
-def test_absent_port_and_foreign_unit(fake: FakeProcess, make_rtu: Callable[..., Robotiq2F], tmp_path: Path) -> None:
+def test_a_missing_port_and_a_wrong_unit_are_named(
+    fake: FakeProcess, make_rtu: Callable[..., Robotiq2F], tmp_path: Path
+) -> None:
     with pytest.raises(NotConnected, match=r"gripper at .*ttyNONE unit 9 cannot be reached: the port cannot be opened"):
         make_rtu(str(tmp_path / "ttyNONE")).connect(1.0)
     with pytest.raises(DeviceTimeout, match=r"unit 8: no answer within 0\.2 s"):

@@ -1,4 +1,4 @@
-"""MT-SICS lines, quoted, and what foreign bytes come to."""
+"""MT-SICS lines from the manual, and random bytes."""
 
 import pytest
 from hypothesis import given
@@ -35,12 +35,12 @@ def test_a_line_is_read(line: bytes, meaning: Answer) -> None:
 @pytest.mark.parametrize(
     "line", [b"S S nan g", b"S S 1e5 g", b"S S 100,00 g", b"S S 1 0 g", b"S S 10.00", b"S S g", b"X S 1.0 g", b""]
 )
-def test_what_is_no_answer_is_none(line: bytes) -> None:
+def test_invalid_lines_are_no_answer(line: bytes) -> None:
     assert answers(line + b"\r\n") == []
 
 
 @given(st.binary(max_size=300))
-def test_foreign_bytes_raise_nothing(data: bytes) -> None:
+def test_random_bytes_raise_nothing(data: bytes) -> None:
     for answer in answers(data + b"\r\n"):
         assert answer.value is None or abs(answer.value) < 1e10
     assert len(answers(b"S S " + b" " * LONGEST_LINE + b"1.0 g\r\n")) == 0

@@ -1,4 +1,4 @@
-"""The scale's driver on a fake: weighing at rest, refusing by name, never an old value, coming back."""
+"""The scale's driver on a fake: weighing at standstill, refusals by name, never a stale value, recovery."""
 
 import threading
 import time
@@ -30,7 +30,7 @@ on_both = pytest.mark.parametrize("fake", ["pty", "tcp"], indirect=True)
 
 
 @on_both
-def test_connecting_only_asks_and_a_cycle_weighs(
+def test_connecting_only_reads_and_a_cycle_weighs(
     fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any]
 ) -> None:
     scale.connect()  # harmless when connected
@@ -61,7 +61,7 @@ def test_connecting_only_asks_and_a_cycle_weighs(
         scale.weigh()
 
 
-def test_units_come_out_in_kilograms(fake: FakeProcess, scale: MtSicsScale) -> None:
+def test_units_are_converted_to_kilograms(fake: FakeProcess, scale: MtSicsScale) -> None:
     fake.control.do("put", kg=1.25)
     for unit in ("g", "kg", "mg"):
         fake.control.do("unit", value=unit)
@@ -72,7 +72,7 @@ def test_units_come_out_in_kilograms(fake: FakeProcess, scale: MtSicsScale) -> N
     assert raised.value.fault_code == "unit"
 
 
-def test_a_moving_load_is_waited_for_and_not_tared(fake: FakeProcess, scale: MtSicsScale) -> None:
+def test_an_unstable_load_is_waited_for_and_not_tared(fake: FakeProcess, scale: MtSicsScale) -> None:
     fake.control.do("vibrate", on=True)
     for call, name in ((scale.tare, "tare"), (scale.zero, "zero")):
         with pytest.raises(Refused, match=f"{name} is refused while the load is in motion"):
@@ -110,7 +110,7 @@ def test_stop_ends_a_weighing(fake: FakeProcess, make: Callable[..., MtSicsScale
     assert isinstance(outcome[0], Cancelled)
 
 
-def test_outside_the_range(fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any]) -> None:
+def test_weights_out_of_range_are_errors(fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any]) -> None:
     for kg, code in ((4.0, "overload"), (-1.0, "underload")):
         fake.control.do("put", kg=kg)
         wait_for(lambda: [alarm.code for alarm in scale.alarms()], lambda codes, code=code: codes == [code])
@@ -129,7 +129,7 @@ def test_outside_the_range(fake: FakeProcess, scale: MtSicsScale, wait_for: Call
 
 
 @pytest.mark.parametrize(("code", "words"), [("ES", "does not know"), ("ET", "damaged"), ("EL", "parameter")])
-def test_the_errors_of_the_scale_are_told(fake: FakeProcess, scale: MtSicsScale, code: str, words: str) -> None:
+def test_errors_of_the_scale_are_reported(fake: FakeProcess, scale: MtSicsScale, code: str, words: str) -> None:
     with scale.line.held():  # else the look every 0.5 s could get the error
         fake.control.do("error", code=code)
         with pytest.raises(DeviceFault, match=words) as raised:
@@ -148,7 +148,7 @@ def test_a_busy_scale(fake: FakeProcess, scale: MtSicsScale) -> None:
     assert scale.weight() == 0.0
 
 
-def test_a_restart_loses_the_tare_and_nobody_weighs_with_it(fake: FakeProcess, scale: MtSicsScale) -> None:
+def test_weighing_is_refused_after_a_restart_lost_the_tare(fake: FakeProcess, scale: MtSicsScale) -> None:
     fake.control.do("put", kg=0.25)
     scale.weigh()
     scale.tare()
@@ -174,7 +174,7 @@ def test_stale_is_an_error(fake: FakeProcess, scale: MtSicsScale, wait_for: Call
 
 
 @on_both
-def test_unplugged_and_plugged_again(fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any]) -> None:
+def test_unplugging_and_reconnecting(fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any]) -> None:
     fake.control.do("put", kg=0.1)
     scale.weigh()
     scale.tare()
@@ -193,7 +193,9 @@ def test_unplugged_and_plugged_again(fake: FakeProcess, scale: MtSicsScale, wait
 
 @on_both
 @pytest.mark.parametrize("fault", ["silence", "half_frame", "garbage"])
-def test_no_sensible_answer(fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any], fault: str) -> None:
+def test_invalid_answers_of_the_device_are_typed_errors(
+    fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any], fault: str
+) -> None:
     began = own_time()
     with scale.line.held():
         fake.control.do(fault)
@@ -208,7 +210,7 @@ def test_no_sensible_answer(fake: FakeProcess, scale: MtSicsScale, wait_for: Cal
     assert scale.weight() == 0.0
 
 
-def test_a_late_answer_is_thrown_away(fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any]) -> None:
+def test_a_late_answer_is_discarded(fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any]) -> None:
     with scale.line.held():
         fake.control.do("slow", seconds=0.6)
         with pytest.raises(DeviceTimeout):
@@ -220,7 +222,7 @@ def test_a_late_answer_is_thrown_away(fake: FakeProcess, scale: MtSicsScale, wai
 
 
 @pytest.mark.parametrize("port", ["/dev/does-not-exist", "socket://127.0.0.1:1"])
-def test_no_such_port(make: Callable[..., MtSicsScale], port: str) -> None:
+def test_a_missing_port_is_named(make: Callable[..., MtSicsScale], port: str) -> None:
     scale = make(port)
     with pytest.raises(NotConnected, match=f"^scale at {port}: the port cannot be opened"):
         scale.connect(1.0)
@@ -229,7 +231,7 @@ def test_no_such_port(make: Callable[..., MtSicsScale], port: str) -> None:
         scale.weigh()
 
 
-def test_a_port_in_use_and_half_a_command_in_the_scale(fake: FakeProcess, make: Callable[..., MtSicsScale]) -> None:
+def test_a_used_port_and_a_partial_command(fake: FakeProcess, make: Callable[..., MtSicsScale]) -> None:
     with Path(fake.ready["port"]).open("wb", buffering=0) as line:
         line.write(b"S")
     first, second = make(fake.ready["port"]), make(fake.ready["port"])

@@ -62,14 +62,14 @@ def test_a_frozen_owner_stops_the_servos_within_the_declared_time(
     assert trips(fake) == 2
 
 
-def test_a_killed_owner_stops_the_servos_at_once(fake: FakeProcess, owner: "subprocess.Popen[bytes]") -> None:
+def test_a_killed_process_stops_the_servos_at_once(fake: FakeProcess, owner: "subprocess.Popen[bytes]") -> None:
     owner.kill()
     began = own_time()
     fake.control.wait_until(standing)
     assert own_time() - began < 0.4 + 0.3  # the watchdog of its settings, and what a busy machine adds
 
 
-def test_a_watchdog_that_tripped_is_named(fake: FakeProcess, ready: TwoAxisRobot) -> None:
+def test_a_tripped_watchdog_is_named(fake: FakeProcess, ready: TwoAxisRobot) -> None:
     keep_alive = ready._observer._keep_alive
     assert keep_alive is not None
     os.kill(keep_alive.pid, signal.SIGKILL)  # as if this computer had not run it

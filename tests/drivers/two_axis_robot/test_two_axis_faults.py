@@ -112,7 +112,7 @@ robot.move_to_joints([Joint("joint_1", 2.0), Joint("joint_2", -2.0)], 0.3)
 """
 
 
-def test_the_servos_stop_when_the_drivers_process_is_killed(fake: FakeProcess, make: Make) -> None:
+def test_the_servos_stop_when_the_process_is_killed(fake: FakeProcess, make: Make) -> None:
     process = subprocess.Popen([sys.executable, "-c", KILLED, fake.ready["port"]], cwd=Path(__file__).parents[3])
     try:
         fake.control.wait_until(lambda t: t["servos"]["1"]["speed"] > 0.5, within=15.0)

@@ -41,7 +41,7 @@ def joints(a: float, b: float) -> list[Joint]:
 
 
 @pytest.mark.parametrize(("name", "value"), WRONG, ids=[name for name, _ in WRONG])
-def test_a_wrong_setting_is_named(name: str, value: Any) -> None:
+def test_an_invalid_setting_is_named(name: str, value: Any) -> None:
     settings: dict[str, Any] = {"port": "/dev/ttyUSB0", name: value}
     with pytest.raises(OutOfRange, match=name if name != "upper_1" else "lower_1"):
         TwoAxisRobotSettings(**settings)

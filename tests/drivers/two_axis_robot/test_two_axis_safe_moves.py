@@ -52,7 +52,7 @@ def touches(around: BoxSurroundings, *seen: list[float]) -> set[str]:
     return around.touches(RobotModel.load(URDF, LINKS), BASE, seen)
 
 
-def test_a_move_folds_to_get_past_a_pin(arm: TwoAxisRobot, around: BoxSurroundings) -> None:
+def test_a_move_folds_the_arm_around_a_pin(arm: TwoAxisRobot, around: BoxSurroundings) -> None:
     seen: list[list[float]] = []
     doing = BackgroundCall(arm.move_to_joints, joints(RIGHT), 1.0)
     while not doing.ended_at:

@@ -55,7 +55,7 @@ def test_a_stall_of_half_a_second_does_not_stop_a_move(ready: UR5e, fake: FakeUr
     assert ready.control_owner() == "us"
 
 
-def test_a_jog_ends_on_time_while_the_host_is_stalled(ready: UR5e, fake: FakeUr) -> None:
+def test_a_jog_expires_while_the_host_is_stalled(ready: UR5e, fake: FakeUr) -> None:
     trips, start = fake.truth()["watchdog_trips"], fake.truth()["q"][0]
     ready.jog(joint_velocities=[0.3, 0.0, 0.0, 0.0, 0.0, 0.0], valid_for=0.2)
     stall(0.7)
@@ -96,7 +96,7 @@ def test_a_frozen_owner_stops_the_arm_within_the_declared_time(owner: Owner, fak
     stopped_within(fake, UR5e.loss_reaction.within - (own_time() - began))
 
 
-def test_a_killed_owner_stops_the_arm_at_once(owner: Owner, fake: FakeUr) -> None:
+def test_a_killed_process_stops_the_arm_at_once(owner: Owner, fake: FakeUr) -> None:
     process = owner()
     time.sleep(0.3)
     child = control_process(process.pid)

@@ -42,7 +42,7 @@ def test_garbage_is_frames_or_a_value_error_within_bounded_memory(data: bytes) -
     assert len(rest) < MAX_FRAME
 
 
-def test_a_recipe_gives_the_layout_and_names_what_is_missing() -> None:
+def test_a_recipe_defines_the_layout_and_names_missing_fields() -> None:
     number, layout = recipe(["timestamp", "actual_q", "robot_mode"], b"\x07DOUBLE,VECTOR6D,INT32,")
     assert (number, layout.size) == (7, 8 + 48 + 4)
     with pytest.raises(DeviceFault, match="no_such_thing"):
@@ -65,7 +65,7 @@ def test_dashboard_answers_are_decoded_or_a_device_fault(answer: str) -> None:
     assert version == "" or version in answer
 
 
-def test_dashboard_answers_of_the_manual() -> None:
+def test_dashboard_answers_match_the_manual() -> None:
     assert dashboard.is_remote("true")
     assert not dashboard.is_remote("false\n")
     assert dashboard.program_name("PLAYING a b.urp") == "a b.urp"
@@ -89,7 +89,7 @@ def test_a_pose_survives_conversion_for_the_controller(
     assert back.orientation.angle_to(pose.orientation) < 1e-6
 
 
-def test_the_controllers_base_is_base_link_turned_half_round() -> None:
+def test_the_controller_base_is_base_link_rotated_by_pi() -> None:
     at = world_from_base(Pose(Position(1.0, 2.0, 3.0))) * Pose(Position(0.1, 0.2, 0.3))
     assert at.position.distance_to(Position(0.9, 1.8, 3.3)) < 1e-12
 
@@ -126,6 +126,6 @@ def test_the_computed_time_is_the_minimum_for_speed_and_acceleration(d: float, v
         ("stop_deceleration", math.inf),
     ],
 )
-def test_a_bad_setting_is_named(name: str, value: float | str) -> None:
+def test_an_invalid_setting_is_named(name: str, value: float | str) -> None:
     with pytest.raises(OutOfRange, match=name):
         UrSettings(**{"host": "127.0.0.1", name: value})  # type: ignore[arg-type]

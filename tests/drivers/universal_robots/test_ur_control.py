@@ -252,7 +252,9 @@ def test_manual_mode_limits_the_tcp_speed(ready: UR5e, fake: FakeUr) -> None:
         ready.jog((0.3, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def test_a_slow_slider_gives_a_move_more_time(ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_low_speed_slider_extends_the_move_timeout(
+    ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(timing, "GRACE", 0.2)
     fake.do("speed_slider", fraction=0.2)
     ready.move_to_joints(
@@ -369,7 +371,7 @@ def test_without_a_dashboard_the_watchdog_ends_the_program_after_a_safeguard_sto
         robot.disconnect()
 
 
-def test_a_protective_stop_is_acknowledged_by_a_person_only(ready: UR5e, fake: FakeUr) -> None:
+def test_a_protective_stop_is_acknowledged_only_on_request(ready: UR5e, fake: FakeUr) -> None:
     doing = far_move(ready, fake)
     fake.do("protective_stop")
     with pytest.raises(SafetyStop) as stop:

@@ -235,7 +235,7 @@ def test_no_sample_is_missed_and_little_cpu_time_is_needed(fake: FakeUr, robot: 
     assert core < 0.10
 
 
-def test_a_bad_setting_of_the_model_is_refused() -> None:
+def test_an_invalid_setting_of_the_model_is_refused() -> None:
     with pytest.raises(OutOfRange, match="payload_mass"):
         make("127.0.0.1", payload_mass=7.0)
 

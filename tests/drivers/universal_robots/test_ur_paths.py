@@ -126,7 +126,7 @@ def test_a_path_stops_although_the_control_process_hangs(ready: UR5e, fake: Fake
     fake.control.wait_until(lambda t: t["program"] is None)
 
 
-def test_a_path_stops_when_its_owner_is_killed(fake: FakeUr) -> None:
+def test_a_path_stops_when_its_process_is_killed(fake: FakeUr) -> None:
     code = textwrap.dedent(
         f"""
         from arcor2_drivers.universal_robots.settings import UrSettings
@@ -171,7 +171,7 @@ def test_a_path_does_not_resume_after_a_safeguard_stop(ready: UR5e, fake: FakeUr
     assert fake.truth()["q"] == q
 
 
-def test_a_path_that_takes_too_long_is_stopped(ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_path_that_times_out_is_stopped(ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(paths, "linear_budget", lambda *_: 0.2)
     start = ready.get_end_effector_pose("tcp")
     with pytest.raises(DeviceTimeout, match="computed time"):
@@ -208,7 +208,7 @@ def test_a_move_ends_at_contact_and_the_wrench_is_reported(fake: FakeUr) -> None
         robot.disconnect()
 
 
-def test_a_careful_move_stops_at_a_force_from_the_side(ready: UR5e, fake: FakeUr) -> None:
+def test_a_careful_move_stops_at_a_lateral_force(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp")
     try:
         x, y, z = fake.truth()["tcp_pose"][:3]
@@ -259,7 +259,7 @@ def test_invalid_arguments_of_a_contact_are_refused(
         ready.move_until_contact(direction, force, distance)
 
 
-def test_an_inertia_reaches_the_controller(ready: UR5e, fake: FakeUr) -> None:
+def test_the_inertia_is_sent_to_the_controller(ready: UR5e, fake: FakeUr) -> None:
     inertia = (0.01, 0.02, 0.03, 0.0, 0.0, 0.001)
     ready.set_tool(Pose(Position(0.0, 0.0, 0.1)), 2.0, (0.0, 0.0, 0.05), inertia)
     assert fake.truth()["payload_inertia"] == pytest.approx(inertia)
@@ -274,6 +274,6 @@ def test_an_inertia_reaches_the_controller(ready: UR5e, fake: FakeUr) -> None:
         ready.set_tool(Pose(), 1.0, (0.0, 0.0, 0.0), (1.0,))
 
 
-def test_states_of_a_run_fit_their_register() -> None:
+def test_run_states_fit_their_register() -> None:
     assert max(RunState) < 8
     assert ((1 << 20) - 1) * 8 + 7 < 1 << 31

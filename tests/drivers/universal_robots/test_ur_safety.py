@@ -81,7 +81,7 @@ def test_an_emergency_stop_switches_power_off_until_a_person_restores_it(
 
 
 @pytest.mark.parametrize(("command", "safety"), [("violation", Safety.VIOLATION), ("fault", Safety.FAULT)])
-def test_a_violation_or_fault_needs_a_restart_of_the_safety_system_by_a_person(
+def test_a_violation_or_fault_needs_a_safety_restart_on_request(
     ready: UR5e, whole: FakeUr, command: str, safety: Safety
 ) -> None:
     doing = far_move(ready, whole)
@@ -237,7 +237,7 @@ def test_single_joints_are_jogged(ready: UR5e, fake: FakeUr) -> None:
     ("version", "rate", "upper"),
     [("3.15", 125.0, True), ("5.4", 500.0, True), ("5.12", 500.0, True), ("10.12", 500.0, False)],
 )
-def test_each_generation_is_observed_controlled_and_moved(
+def test_every_generation_is_observed_controlled_and_moved(
     start_fake: Callable[..., FakeUr], version: str, rate: float, upper: bool
 ) -> None:
     fake = start_fake("--controller-version", version, "--frequency", str(rate), "--time-scale", "0.1")

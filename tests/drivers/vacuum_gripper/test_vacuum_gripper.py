@@ -96,7 +96,7 @@ def test_a_part_is_gripped_and_released(gripper: SuctionGripper, fake: FakeProce
     assert gripper.alarms() == []
 
 
-def test_nothing_held_is_an_error_and_the_vacuum_is_off(make: Make, fake: FakeProcess) -> None:
+def test_a_missed_part_is_an_error_and_switches_the_vacuum_off(make: Make, fake: FakeProcess) -> None:
     gripper = make(grip_time=0.2)
     gripper.connect()
     gripper.take_control()
@@ -108,7 +108,7 @@ def test_nothing_held_is_an_error_and_the_vacuum_is_off(make: Make, fake: FakePr
         gripper.check_part()
 
 
-def test_the_part_is_attached_to_the_robot_until_it_is_released_or_lost(make: Make, fake: FakeProcess) -> None:
+def test_the_part_is_attached_to_the_robot_until_released_or_lost(make: Make, fake: FakeProcess) -> None:
     robot = Carrier()
     gripper = make(part_size_x=0.1, part_size_y=0.08, part_size_z=0.02, release_time=0.2)
     gripper.mount(lambda name: robot, lambda name: robot)
@@ -130,7 +130,7 @@ def test_the_part_is_attached_to_the_robot_until_it_is_released_or_lost(make: Ma
     assert [alarm.code for alarm in gripper.alarms()] == ["part_lost"]
 
 
-def test_a_part_that_sticks_is_an_error(make: Make, fake: FakeProcess) -> None:
+def test_a_stuck_part_is_an_error(make: Make, fake: FakeProcess) -> None:
     gripper = make(release_time=0.2)
     gripper.connect()
     gripper.take_control()

@@ -313,7 +313,7 @@ def test_inverse_kinematics_reach_pose_and_arm_angle(arm: str) -> None:
     assert found >= 25
 
 
-def test_a_motion_keeps_to_the_limits_of_the_axes() -> None:
+def test_a_motion_stays_within_axis_limits() -> None:
     start = HOME["left"]
     goal = start.copy()
     goal[0] += 2.0
@@ -332,7 +332,7 @@ def test_invalid_lines_are_rejected(line: str) -> None:
         parsed(line)
 
 
-def test_bad_control_commands_are_refused(fake: FakeProcess) -> None:
+def test_invalid_control_commands_are_refused(fake: FakeProcess) -> None:
     from arcor2_fakes.control import ControlError
 
     wrong: list[tuple[str, dict[str, Any]]] = [

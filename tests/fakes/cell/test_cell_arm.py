@@ -1,4 +1,4 @@
-"""The arm and the markers as the camera is told of them: links meet, and end at the controller's flange."""
+"""The arm and the markers as sent to the camera: links touch, and end at the controller's flange."""
 
 import itertools
 import math
@@ -61,7 +61,7 @@ def test_neighbouring_links_touch(q: tuple[float, ...]) -> None:
         assert gaps.min() < radii + 0.006, (one, other)
 
 
-def test_the_camera_takes_links_and_markers_as_they_are_told() -> None:
+def test_the_camera_receives_links_and_markers() -> None:
     camera = Camera(BASE, (0.08, 0.06, 0.002), markers=[Marker(7, Pose((0.1, 0.2, 0.05)), 0.06)])
     told = [*arm.things("ur5e", BASE.matrix(), JOINTS[0], TIP.matrix()).values(), *sight.fixed(camera)]
     things = [msgspec.convert(msgspec.to_builtins(each), Thing) for each in told]
@@ -73,7 +73,7 @@ def test_the_camera_takes_links_and_markers_as_they_are_told() -> None:
     assert marker.pose.position[2] + marker.size[2] / 2.0 == pytest.approx(0.05)
 
 
-def test_a_link_that_moved_is_told_and_one_that_did_not_is_not() -> None:
+def test_only_moved_links_are_sent() -> None:
     before = arm.things("ur5e", BASE.matrix(), JOINTS[0], TIP.matrix())
     q = (*JOINTS[0][:2], JOINTS[0][2] + 0.1, *JOINTS[0][3:])
     others, moved = sight.changes(before, arm.things("ur5e", BASE.matrix(), q, TIP.matrix()))

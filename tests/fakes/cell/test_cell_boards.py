@@ -1,4 +1,4 @@
-"""The boards of a run follow from its seed, and nothing else tells good from bad."""
+"""The boards of a run depend only on its seed."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,7 +17,7 @@ def test_a_seed_gives_the_same_boards_with_good_and_bad_ones(count: int, seed: i
 
 
 @given(count=st.integers(0, 20), seed=SEEDS)
-def test_codes_do_not_depend_on_what_is_drawn_for_the_defects(count: int, seed: int) -> None:
+def test_codes_do_not_depend_on_the_random_defects(count: int, seed: int) -> None:
     codes = [board.code for board in draw_boards(count, seed)]
     assert codes == [board.code for board in draw_boards(20, seed)][:count]
 

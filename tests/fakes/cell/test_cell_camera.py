@@ -1,4 +1,4 @@
-"""The world with the fake controller and the fake camera: the camera sees the arm where its joints are, and markers."""
+"""The world with the fake controller and camera: the camera sees the arm at its joint values, and the markers."""
 
 import json
 import socket

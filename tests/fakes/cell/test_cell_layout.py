@@ -1,4 +1,4 @@
-"""The layout: what it says, and what is wrong with a bad one."""
+"""The cell layout: its content, and errors of invalid ones."""
 
 import copy
 import math
@@ -36,7 +36,7 @@ def test_the_example_can_be_read() -> None:
         (lambda layout: layout["reader"]["pose"].update(orientation=[0, 0, 0, 2]), "unit quaternion"),
     ],
 )
-def test_a_bad_layout_is_refused_with_the_field_named(change: Any, names: str, tmp_path: Path) -> None:
+def test_an_invalid_layout_names_the_field(change: Any, names: str, tmp_path: Path) -> None:
     layout = copy.deepcopy(msgspec.json.decode(EXAMPLE.read_bytes()))
     change(layout)
     path = tmp_path / "layout.json"
@@ -46,7 +46,7 @@ def test_a_bad_layout_is_refused_with_the_field_named(change: Any, names: str, t
     assert str(path) in str(caught.value)
 
 
-def test_no_file_and_no_json(tmp_path: Path) -> None:
+def test_missing_files_and_invalid_json_are_refused(tmp_path: Path) -> None:
     with pytest.raises(LayoutError, match="No such file"):
         read_layout(tmp_path / "none.json")
     (tmp_path / "bad.json").write_text('{"robot": ')
@@ -74,7 +74,7 @@ QUARTER = math.sqrt(0.5)
         ((0.0, 0.0, 0.0), 0.0, 0.31, False),
     ],
 )
-def test_tolerances_are_those_of_the_places_own_axes(
+def test_tolerances_are_along_the_axes_of_the_place(
     offset: tuple[float, float, float], roll: float, yaw: float, there: bool
 ) -> None:
     # A place on a wall: its z is the world's x.

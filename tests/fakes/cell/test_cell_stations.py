@@ -1,4 +1,4 @@
-"""The belt with its light barriers, and the place where labels come down on boards and are pressed on."""
+"""The belt with its light barriers, and the place where labels are put on boards and pressed."""
 
 import copy
 import itertools
@@ -166,7 +166,7 @@ async def test_boards_ride_interrupt_barriers_and_wait_at_the_stop() -> None:
     assert cell.world.truth()["at_pick_place"] == "B"
 
 
-async def test_a_board_is_gripped_where_it_lies_and_nowhere_else() -> None:
+async def test_a_board_is_gripped_only_where_it_is() -> None:
     cell = Cell()
     await cell.world.begin()
     await cell.run(0.5)
@@ -178,7 +178,7 @@ async def test_a_board_is_gripped_where_it_lies_and_nowhere_else() -> None:
     assert cell.board("A")["place"] == "good"
 
 
-async def test_a_board_laid_onto_another_is_lost_and_one_on_the_bare_belt_rides_on() -> None:
+async def test_a_board_placed_on_another_is_lost() -> None:
     cell = Cell()
     await cell.world.begin()
     await cell.run(0.7)
@@ -204,7 +204,7 @@ async def test_a_belt_that_runs_backwards_loses_its_boards() -> None:
     assert "backwards" in cell.board("A")["history"][-1]["why"]
 
 
-async def test_a_stuck_barrier_shows_what_is_not_so() -> None:
+async def test_a_stuck_light_barrier_reports_a_wrong_state() -> None:
     cell = Cell()
     await cell.world.begin()
     await cell.world.stick_barrier(0, True)
@@ -218,7 +218,7 @@ async def test_a_stuck_barrier_shows_what_is_not_so() -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(pushes=st.lists(st.floats(-0.05, 0.3), max_size=40), takes=st.lists(st.booleans(), min_size=40, max_size=40))
-def test_boards_on_a_belt_never_overlap_nor_pass_the_stop(pushes: list[float], takes: list[bool]) -> None:
+def test_boards_on_a_belt_neither_overlap_nor_pass_the_stop(pushes: list[float], takes: list[bool]) -> None:
     things = [Thing(Board(str(number))) for number in range(8)]
     assert LAYOUT.belt is not None
     belt, counts = BoardBelt(LAYOUT.belt, things), 0.0
@@ -234,7 +234,7 @@ def test_boards_on_a_belt_never_overlap_nor_pass_the_stop(pushes: list[float], t
 
 
 # ---------------------------------------------------------------------------------------------------- labels
-async def test_a_label_comes_down_on_the_board_below_and_stays_once_it_is_pressed_on() -> None:
+async def test_a_label_stays_on_the_board_once_pressed() -> None:
     cell = Cell()
     await in_nest(cell)
     await cell.print("A")
@@ -246,7 +246,7 @@ async def test_a_label_comes_down_on_the_board_below_and_stays_once_it_is_presse
     assert cell.world.truth()["spilled_labels"] == []
 
 
-async def test_a_label_that_only_lies_there_falls_off() -> None:
+async def test_a_label_that_was_not_pressed_falls_off() -> None:
     cell = Cell()
     await in_nest(cell)
     await cell.print("A")
@@ -265,7 +265,7 @@ async def test_a_label_that_only_lies_there_falls_off() -> None:
     ],
     ids=["the wrong way round", "half", "off the label in between", "beside it"],
 )
-async def test_a_label_is_not_pressed_on_by(way: list[tuple[float, ...]]) -> None:
+async def test_a_label_is_not_pressed_by_wrong_motions(way: list[tuple[float, ...]]) -> None:
     cell = Cell()
     await in_nest(cell)
     await cell.print("A")
@@ -273,7 +273,7 @@ async def test_a_label_is_not_pressed_on_by(way: list[tuple[float, ...]]) -> Non
     assert not cell.board("A")["label"]["pressed"]
 
 
-async def test_rolling_before_the_label_is_there_presses_nothing() -> None:
+async def test_rolling_without_a_label_presses_nothing() -> None:
     cell = Cell()
     await in_nest(cell)
     await cell.roll(BEGIN, END)
@@ -282,7 +282,7 @@ async def test_rolling_before_the_label_is_there_presses_nothing() -> None:
     assert not cell.board("A")["label"]["pressed"]
 
 
-async def test_labels_that_no_bare_board_is_below_are_spilled() -> None:
+async def test_labels_without_a_free_board_are_wasted() -> None:
     cell = Cell()
     cell.inputs.printed = [Printed(1, [{"barcode": True, "text": "of yesterday"}])]
     await cell.world.begin()
@@ -296,7 +296,7 @@ async def test_labels_that_no_bare_board_is_below_are_spilled() -> None:
     assert cell.board("A")["label"]["code"] == "A"
 
 
-async def test_lamps_are_what_the_outputs_say() -> None:
+async def test_lamps_follow_the_outputs() -> None:
     cell = Cell()
     cell.inputs.outputs = [False, True, True]
     await cell.wait()
@@ -314,14 +314,14 @@ async def test_lamps_are_what_the_outputs_say() -> None:
         (lambda whole: whole["labelling"]["arm"].update(links=[0.1]), "links"),
     ],
 )
-def test_a_layout_that_makes_no_sense_is_refused(change: Any, names: str) -> None:
+def test_an_invalid_layout_is_refused(change: Any, names: str) -> None:
     whole = copy.deepcopy(WHOLE)
     change(whole)
     with pytest.raises(msgspec.ValidationError, match=names):
         msgspec.convert(whole, Layout)
 
 
-def test_a_layout_says_which_devices_it_needs() -> None:
+def test_a_layout_lists_its_devices() -> None:
     assert LAYOUT.needs() == ["conveyor", "io", "printer", "arm"]
     assert msgspec.convert(PLAIN, Layout).needs() == []
 
@@ -334,7 +334,7 @@ CAMERA = {
 }
 
 
-async def test_the_camera_sees_boards_where_they_are_and_those_in_a_box_piled_up() -> None:
+async def test_the_camera_sees_boards_and_piles_in_boxes() -> None:
     cell = Cell()
     cell.world = World(msgspec.convert({**WHOLE, "camera": CAMERA}, Layout), BOARDS, cell.devices)
     await cell.world.begin()
@@ -351,7 +351,7 @@ async def test_the_camera_sees_boards_where_they_are_and_those_in_a_box_piled_up
     assert "A" not in cell.world.seen()
 
 
-async def test_only_what_is_different_is_told_to_the_camera() -> None:
+async def test_only_changes_are_sent_to_the_camera() -> None:
     cell = Cell()
     cell.world = World(msgspec.convert({**WHOLE, "camera": CAMERA}, Layout), BOARDS, cell.devices)
     await cell.world.begin()

@@ -1,4 +1,4 @@
-"""The world with the real fakes all round: the fake UR controller plays a program, the boards go where its arm goes."""
+"""The world with the fake UR controller: boards move with the arm of a running program."""
 
 import socket
 from collections.abc import Callable
@@ -62,7 +62,7 @@ def test_the_arm_carries_a_board_into_the_tester(cell: tuple[Any, Any, Any]) -> 
     assert ur.truth()["digital_inputs"] == 0
 
 
-def test_half_a_centimetre_beside_the_fixture_is_lost(cell: tuple[Any, Any, Any]) -> None:
+def test_a_board_placed_5_mm_off_the_fixture_is_lost(cell: tuple[Any, Any, Any]) -> None:
     ur, tester, world = cell
     world.control.do("sensor", stuck=True)
     assert ur.truth()["digital_inputs"] == 1

@@ -1,4 +1,4 @@
-"""The world as a process between the fakes: the real tester and reader, and a robot controller of the test's own."""
+"""The world as a process between the fakes: real tester and reader, and a test robot controller."""
 
 import asyncio
 import math
@@ -155,7 +155,7 @@ async def test_a_broken_gripper_moves_nothing(cell: Cell) -> None:
     assert (await cell.tester.do("truth"))["board"] is None
 
 
-async def test_other_sabotage(cell: Cell) -> None:
+async def test_other_faults_can_be_injected(cell: Cell) -> None:
     await cell.move(*FEEDER)
     await cell.grip(True)
     await cell.world.do("sensor", stuck=False)
@@ -172,7 +172,7 @@ async def test_other_sabotage(cell: Cell) -> None:
     assert (counts["removed"], counts["feeder"]) == (1, 2 if counts["lost"] else 3)
 
 
-async def test_the_world_waits_for_fakes_that_are_still_starting(start_fake: Callable[..., Any]) -> None:
+async def test_the_world_waits_for_starting_fakes(start_fake: Callable[..., Any]) -> None:
     robot = StandInRobot()
     address = await robot.control.start()
     await robot.control.close()
@@ -197,7 +197,7 @@ async def test_the_world_waits_for_fakes_that_are_still_starting(start_fake: Cal
     await late.control.close()
 
 
-async def test_a_robot_that_is_none(start_fake: Callable[..., Any]) -> None:
+async def test_an_unknown_robot_is_refused(start_fake: Callable[..., Any]) -> None:
     tester = await asyncio.to_thread(start_fake, "functional_tester")
     reader = await asyncio.to_thread(start_fake, "barcode_reader")
     at = reader.ready["control"]
@@ -221,7 +221,7 @@ async def test_a_robot_that_is_none(start_fake: Callable[..., Any]) -> None:
         (["--layout", EXAMPLE, "--patience", "0"], "can't be reached"),
     ],
 )
-def test_wrong_arguments_give_one_line(arguments: list[str], says: str) -> None:
+def test_invalid_arguments_are_reported_in_one_line(arguments: list[str], says: str) -> None:
     options = {"--robot": "127.0.0.1:1", "--tester": "127.0.0.1:1", "--reader": "127.0.0.1:1"}
     options |= dict(zip(arguments[::2], arguments[1::2], strict=True))
     line = [part for option in options.items() for part in option]

@@ -1,4 +1,4 @@
-"""The physics of the cell, with devices of the test's own and a clock that it moves."""
+"""The physics of the cell, with test devices and a simulated clock."""
 
 import math
 from pathlib import Path
@@ -98,7 +98,7 @@ class Cell:
         return " ".join(board["place"] for board in self.world.truth()["boards"])
 
 
-async def test_a_board_goes_where_it_is_carried() -> None:
+async def test_a_board_moves_with_the_gripper() -> None:
     cell = Cell()
     await cell.world.begin()
     assert (cell.devices.sensor, cell.devices.shown) == (False, None)
@@ -122,7 +122,7 @@ async def test_a_board_goes_where_it_is_carried() -> None:
     assert [event["place"] for event in truth["boards"][0]["history"]] == ["gripper", "tester", "gripper", "good"]
 
 
-async def test_a_turned_base_and_a_set_tcp_change_nothing_of_the_physics() -> None:
+async def test_base_rotation_and_tcp_do_not_change_the_physics() -> None:
     yaw = 0.7
     layout = msgspec.structs.replace(
         LAYOUT,
@@ -154,7 +154,7 @@ async def test_a_turned_base_and_a_set_tcp_change_nothing_of_the_physics() -> No
         {"tilt": 0.15},
     ],
 )
-async def test_jaws_that_close_beside_the_board_hold_nothing(miss: dict[str, float]) -> None:
+async def test_jaws_that_miss_the_board_grip_nothing(miss: dict[str, float]) -> None:
     cell = Cell()
     await cell.at(**({"x": FEEDER[0], "y": FEEDER[1], "z": FEEDER[2]} | miss))
     await cell.grip(True)
@@ -173,7 +173,7 @@ async def test_jaws_that_close_beside_the_board_hold_nothing(miss: dict[str, flo
         ((GOOD[0], GOOD[1], GOOD[2] + 0.2), True, "let go"),
     ],
 )
-async def test_a_board_let_go_elsewhere_is_lost(target: Any, door: bool, why: str) -> None:
+async def test_a_board_released_elsewhere_is_lost(target: Any, door: bool, why: str) -> None:
     cell = Cell()
     cell.devices.door_open = door
     await cell.carry(FEEDER, target)
@@ -194,7 +194,7 @@ async def test_a_second_board_does_not_fit_into_the_tester() -> None:
     assert cell.places == "tester lost feeder"
 
 
-async def test_a_board_held_askew_is_let_go_askew() -> None:
+async def test_a_board_gripped_askew_is_released_askew() -> None:
     cell = Cell()
     await cell.at(*FEEDER, tilt=0.09)
     await cell.grip(True)
@@ -219,7 +219,7 @@ async def test_the_door_keeps_the_board_in() -> None:
     assert cell.places == "good feeder feeder"
 
 
-async def test_the_next_board_takes_its_time_and_a_board_can_be_put_back() -> None:
+async def test_the_next_board_needs_time_and_a_board_can_be_put_back() -> None:
     cell = Cell()
     await cell.at(*FEEDER)
     await cell.grip(True)
@@ -236,7 +236,7 @@ async def test_the_next_board_takes_its_time_and_a_board_can_be_put_back() -> No
     assert cell.world.truth()["at_pick_place"] == "B"
 
 
-async def test_a_reader_that_looks_at_the_feeder() -> None:
+async def test_a_reader_can_see_the_feeder() -> None:
     reader = msgspec.structs.replace(LAYOUT.reader, pose=LAYOUT.feeder.pose)
     cell = Cell(layout=msgspec.structs.replace(LAYOUT, reader=reader))
     await cell.at(*NOWHERE)
@@ -250,7 +250,7 @@ async def test_a_reader_that_looks_at_the_feeder() -> None:
     assert cell.devices.shown == "B"
 
 
-async def test_jaws_take_their_time() -> None:
+async def test_jaws_need_time() -> None:
     cell = Cell()
     await cell.at(*FEEDER)
     cell.bits = 1
@@ -260,7 +260,7 @@ async def test_jaws_take_their_time() -> None:
     assert cell.world.truth()["gripper"]["closed"]
 
 
-async def test_sabotage() -> None:
+async def test_faults_can_be_injected() -> None:
     cell = Cell()
     cell.world.gripper_works = False
     await cell.carry(FEEDER, TESTER)
@@ -295,7 +295,7 @@ DO = st.one_of(
 
 @settings(max_examples=60, deadline=None)
 @given(steps=st.lists(DO, max_size=25))
-async def test_no_board_is_made_or_vanishes(steps: list[tuple[str, Any]]) -> None:
+async def test_the_number_of_boards_is_constant(steps: list[tuple[str, Any]]) -> None:
     cell = Cell()
     for what, value in steps:
         match what:

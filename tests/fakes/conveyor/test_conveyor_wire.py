@@ -79,7 +79,7 @@ def adapter(fake: FakeProcess) -> Iterator[Adapter]:
     adapter.socket.close()
 
 
-def test_lawicel_commands(fake: FakeProcess) -> None:
+def test_lawicel_commands_are_answered(fake: FakeProcess) -> None:
     adapter = Adapter(fake.ready["can"])
     try:
         for command, answer in [
@@ -101,7 +101,7 @@ def test_lawicel_commands(fake: FakeProcess) -> None:
         adapter.socket.close()
 
 
-def test_adapters_hear_each_other_in_order_and_not_themselves(fake: FakeProcess, adapter: Adapter) -> None:
+def test_adapters_receive_the_frames_of_others_in_order(fake: FakeProcess, adapter: Adapter) -> None:
     other = Adapter(fake.ready["can"])
     try:
         other.send("O")
@@ -239,7 +239,7 @@ def test_tpdo_mapping_and_timer(fake: FakeProcess, adapter: Adapter) -> None:
     assert fake.truth()["pdos_sent"][1] == sent
 
 
-def test_socketcand_beside_slcan_on_one_bus(fake: FakeProcess, adapter: Adapter) -> None:
+def test_socketcand_and_slcan_share_a_bus(fake: FakeProcess, adapter: Adapter) -> None:
     host, _, port = fake.ready["socketcand"].rpartition(":")
     with socket.create_connection((host, int(port)), 2.0) as client:
 
@@ -280,7 +280,7 @@ def test_python_can_reads_and_writes(fake: FakeProcess, adapter: Adapter) -> Non
     pytest.fail("no answer")
 
 
-def test_wrong_arguments_and_unknown_commands(fake: FakeProcess, start_fake: Callable[..., Any]) -> None:
+def test_invalid_arguments_and_unknown_commands_are_refused(fake: FakeProcess, start_fake: Callable[..., Any]) -> None:
     for command, arguments in (("emergency", {"code": 0}), ("nothing", {})):
         with pytest.raises(Exception, match=command if command == "nothing" else "1 to 65535"):
             fake.control.do(command, **arguments)

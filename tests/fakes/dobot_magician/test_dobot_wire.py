@@ -114,7 +114,7 @@ def test_a_line_is_straight_and_a_jump_rises(fake: FakeProcess, line: Line) -> N
     ("mode", "target", "alarm"),
     [(1, (500, 0, 0, 0), 0x10), (1, (60, 0, 100, 0), 0x11), (4, (95, 45, 45, 0), 0x40), (4, (0, 45, -20, 0), 0x45)],
 )
-def test_limits_are_alarms(
+def test_exceeded_limits_are_alarms(
     start_fake: Callable[..., FakeProcess], mode: int, target: tuple[float, ...], alarm: int
 ) -> None:
     fake = start_fake("dobot_magician")

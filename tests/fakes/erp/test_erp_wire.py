@@ -1,4 +1,4 @@
-"""The fake planning service by itself, byte by byte: HTTP, keys, what it keeps, what it does wrong when told to."""
+"""The fake planning service, byte by byte: HTTP, idempotency keys, storage, injected faults."""
 
 import socket
 from collections.abc import Callable
@@ -40,7 +40,7 @@ def fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
     return start_fake("erp", "--order", "A-1=PCB:2", "--order", "A-2=PCB:1")
 
 
-def test_each_key_once(fake: FakeProcess) -> None:
+def test_each_key_is_accepted_once(fake: FakeProcess) -> None:
     assert ask(fake, "GET", "/status")[:2] == (200, {"service": "Fake planning", "version": "1.4.0"})
     first = ask(fake, "POST", "/orders/next", "k1", {"station": "c"})
     assert first[:2] == (201, {"key": "k1", "order": {"id": "A-1", "product": "PCB", "quantity": 2}})
@@ -66,12 +66,14 @@ def test_each_key_once(fake: FakeProcess) -> None:
         ("POST", "/orders/next", "k", [], 422),
     ],
 )
-def test_what_it_refuses(fake: FakeProcess, method: str, path: str, key: str, body: Any, status: int) -> None:
+def test_invalid_messages_are_refused(
+    fake: FakeProcess, method: str, path: str, key: str, body: Any, status: int
+) -> None:
     assert ask(fake, method, path, key, body)[0] == status
     assert fake.truth()["taken"] == 0
 
 
-def test_it_fails_when_told_to(fake: FakeProcess) -> None:
+def test_injected_faults_take_effect(fake: FakeProcess) -> None:
     fake.control.do("lose_answers", count=1)
     with pytest.raises(ConnectionError):
         ask(fake, "POST", "/results", "k1", RESULT)
@@ -90,7 +92,7 @@ def test_it_fails_when_told_to(fake: FakeProcess) -> None:
         fake.control.do("add_order", order="A-1", product="PCB")
 
 
-def test_a_power_cycle_keeps_what_was_taken(fake: FakeProcess) -> None:
+def test_a_power_cycle_keeps_accepted_messages(fake: FakeProcess) -> None:
     ask(fake, "POST", "/results", "k1", RESULT)
     fake.control.do("power_cycle", seconds=0.2)
     with pytest.raises(OSError):
@@ -100,7 +102,7 @@ def test_a_power_cycle_keeps_what_was_taken(fake: FakeProcess) -> None:
     assert len(fake.truth()["results"]) == 1
 
 
-def test_the_store_outlives_the_process(start_fake: Callable[..., FakeProcess], tmp_path: Path) -> None:
+def test_the_store_survives_the_process(start_fake: Callable[..., FakeProcess], tmp_path: Path) -> None:
     arguments = ("erp", "--store", str(tmp_path / "plan"), "--order", "A-1=PCB:2", "--order", "A-2=PCB:1")
     first = start_fake(*arguments)
     ask(first, "POST", "/orders/next", "k1", {"station": "c"})
@@ -115,11 +117,11 @@ def test_the_store_outlives_the_process(start_fake: Callable[..., FakeProcess], 
     assert ask(second, "POST", "/results", "k2", RESULT)[0] == 200
 
 
-def test_a_token_is_asked_for(start_fake: Callable[..., FakeProcess]) -> None:
+def test_a_token_is_required(start_fake: Callable[..., FakeProcess]) -> None:
     assert ask(start_fake("erp", "--token", "t"), "GET", "/status")[0] == 401
 
 
-def test_requests_in_pieces_and_in_one_go() -> None:
+def test_fragmented_and_pipelined_requests_are_served() -> None:
     raw = b"POST /a HTTP/1.1\r\nContent-Length: 3\r\nX-Y: z\r\n\r\nabcGET /b HTTP/1.1\r\n\r\n"
     whole = [(each.method, each.path, each.body) for each in Requests().feed(raw)]
     assert whole == [("POST", "/a", b"abc"), ("GET", "/b", b"")]
@@ -140,6 +142,6 @@ def test_requests_in_pieces_and_in_one_go() -> None:
         b"x" * 20000,
     ],
 )
-def test_what_is_no_request(raw: bytes) -> None:
+def test_invalid_requests_are_refused(raw: bytes) -> None:
     with pytest.raises(BadRequest):
         list(Requests().feed(raw))

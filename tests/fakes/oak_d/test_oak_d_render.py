@@ -1,4 +1,4 @@
-"""What the fake camera renders, against rays met with round bodies in closed form, and what it keeps between views."""
+"""Pictures of the fake camera against closed-form ray casting, and its caching between frames."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def capsule(x: float, radius: float = 0.05) -> Thing:
     return Thing(f"capsule {x}", Pose((x, 0.02, 0.2), TILTED), capsule=(radius, 0.2))
 
 
-def test_depth_of_a_capsule_is_that_of_the_closed_form() -> None:
+def test_depth_of_a_capsule_matches_the_closed_form() -> None:
     view = Renderer(LENS).view(DOWN, 0.0, (capsule(0.05),))
     pose = capsule(0.05).pose.matrix()
     begin, end = ((pose @ [0, 0, z, 1.0])[:3] for z in (-0.1, 0.1))
@@ -31,7 +31,7 @@ def test_depth_of_a_capsule_is_that_of_the_closed_form() -> None:
     np.testing.assert_allclose(view.depth[~on & (exact < 1.0)], exact[~on & (exact < 1.0)], atol=0.31)
 
 
-def test_a_cylinder_is_flat_where_a_capsule_is_round() -> None:
+def test_a_cylinder_has_flat_ends() -> None:
     upright = Pose((0.0, 0.0, 0.2))
     seen = [
         Renderer(LENS).view(DOWN, 0.0, (thing,)).depth.min()
@@ -40,7 +40,7 @@ def test_a_cylinder_is_flat_where_a_capsule_is_round() -> None:
     assert seen == pytest.approx([0.5, 0.45], abs=1e-3)
 
 
-def test_what_stands_still_is_kept_and_what_moved_is_not() -> None:
+def test_only_moved_bodies_are_rendered_again() -> None:
     """A view after many others is the one that a new renderer gives: nothing old remains, nothing is missing."""
     renderer = Renderer(LENS)
     still = Thing("box", Pose((-0.2, 0.1, 0.05)), size=(0.1, 0.1, 0.1), color=(200, 30, 30))
@@ -62,7 +62,7 @@ def test_what_stands_still_is_kept_and_what_moved_is_not() -> None:
     ],
     ids=["two forms", "no length", "marker on round"],
 )
-def test_a_round_thing_that_is_none_is_refused(thing: dict[str, object]) -> None:
+def test_an_invalid_round_body_is_refused(thing: dict[str, object]) -> None:
     import msgspec
 
     with pytest.raises(msgspec.ValidationError):

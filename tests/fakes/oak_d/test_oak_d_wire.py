@@ -1,4 +1,4 @@
-"""The fake camera as a client sees it: bytes of the stream, what stands in the scene, faults."""
+"""The fake camera as a client sees it: bytes of the stream, the scene, faults."""
 
 import contextlib
 import json
@@ -88,7 +88,7 @@ def box(name: str, x: float, **more: Any) -> dict[str, Any]:
     return {"name": name, "pose": {"position": [x, 0.0, 0.05]}, "size": [0.1, 0.1, 0.1], **more}
 
 
-def test_hello_and_frames(fake: FakeProcess, client: Client) -> None:
+def test_a_stream_starts_with_hello_and_frames(fake: FakeProcess, client: Client) -> None:
     kind, hello, eeprom = client.message()
     assert kind == 1
     assert (hello["width"], hello["height"], hello["fps"]) == (WIDTH, HEIGHT, 30.0)
@@ -118,7 +118,7 @@ def test_hello_and_frames(fake: FakeProcess, client: Client) -> None:
     assert answer[1]["at"] >= stamps[-1]
 
 
-def test_the_scene_is_what_the_world_says(fake: FakeProcess, client: Client) -> None:
+def test_the_scene_follows_the_world(fake: FakeProcess, client: Client) -> None:
     client.message()
     client.socket.sendall(START_BGR)
     fake.control.do("scene", things=[box("a", 0.15, color=[250, 0, 0]), box("b", -0.15, color=[0, 0, 250])])
@@ -159,7 +159,7 @@ def test_the_scene_is_what_the_world_says(fake: FakeProcess, client: Client) -> 
     assert fake.truth()["things"] == []
 
 
-def test_a_marker_is_found_where_it_lies() -> None:
+def test_a_marker_is_detected_at_its_pose() -> None:
     import cv2
 
     from arcor2_fakes.oak_d.render import Renderer
@@ -178,7 +178,7 @@ def test_a_marker_is_found_where_it_lies() -> None:
     assert np.abs(np.asarray(corners[0]).reshape(4, 2) - seen[:, 0]).max() < 1.0  # pixels
 
 
-def test_what_is_no_question_is_refused(fake: FakeProcess) -> None:
+def test_invalid_requests_are_refused(fake: FakeProcess) -> None:
     for wrong in (b"GET / HTTP/1.1\r\n\r\n", START_BGR[:12] + b"\0\0\0\0" + START_BGR[16:], b"OAKS\x02" + bytes(11)):
         with contextlib.closing(Client(fake.ready["stream"])) as client:
             client.message()
@@ -194,7 +194,7 @@ def exhaust(client: Client) -> None:
         client.frame()
 
 
-def test_faults_of_the_wire(fake: FakeProcess, client: Client) -> None:
+def test_faults_of_the_wire_can_be_injected(fake: FakeProcess, client: Client) -> None:
     client.message()
     client.socket.sendall(START_BGR)
     client.frame()

@@ -1,4 +1,4 @@
-"""The fake PLC's program scan by scan, and its variables as a client of another hand sees them."""
+"""The fake PLC's program scan by scan, and its variables as another client sees them."""
 
 from collections.abc import Callable
 
@@ -36,7 +36,7 @@ def plc() -> Bench:
     return bench
 
 
-def test_a_job_takes_its_time_and_waits_for_its_request_to_fall(plc: Bench) -> None:
+def test_a_job_needs_time_and_waits_for_its_request_to_end(plc: Bench) -> None:
     plc.host.number, plc.host.request = 1, True
     plc.run(0.9)
     assert plc.program.step is Step.BUSY
@@ -49,7 +49,7 @@ def test_a_job_takes_its_time_and_waits_for_its_request_to_fall(plc: Bench) -> N
     assert plc.program.step is Step.IDLE
 
 
-def test_a_request_that_falls_stops_the_job(plc: Bench) -> None:
+def test_a_withdrawn_request_stops_the_job(plc: Bench) -> None:
     plc.host.number, plc.host.request = 1, True
     plc.run(0.3)
     plc.host.request = False
@@ -59,7 +59,7 @@ def test_a_request_that_falls_stops_the_job(plc: Bench) -> None:
     assert (plc.program.moving, plc.program.done) == (False, [])
 
 
-def test_a_host_whose_life_stands_still_is_gone(plc: Bench) -> None:
+def test_a_stopped_life_counter_means_a_lost_host(plc: Bench) -> None:
     plc.host.number, plc.host.request = 1, True
     plc.run(0.3)
     assert not any(plc.run(0.45, alive=False))
@@ -69,7 +69,7 @@ def test_a_host_whose_life_stands_still_is_gone(plc: Bench) -> None:
     assert plc.program.done == []
 
 
-def test_what_is_not_obeyed(plc: Bench) -> None:
+def test_invalid_commands_are_ignored(plc: Bench) -> None:
     plc.host.number, plc.host.request = 9, True
     plc.run(0.05)
     assert (plc.program.step, plc.program.code) == (Step.ERROR, UNKNOWN_JOB)
@@ -82,7 +82,7 @@ def test_what_is_not_obeyed(plc: Bench) -> None:
     assert plc.program.step is Step.IDLE, "nobody has control, and a job began"
 
 
-def test_the_plcs_own_life_counts_ten_times_a_second(plc: Bench) -> None:
+def test_the_plc_life_counter_runs_at_10_hz(plc: Bench) -> None:
     before = plc.program.life
     plc.run(1.0)
     assert 9 <= plc.program.life - before <= 11
@@ -92,7 +92,7 @@ def test_the_plcs_own_life_counts_ten_times_a_second(plc: Bench) -> None:
     assert plc.program.life == before
 
 
-async def test_its_variables_on_the_wire(start_fake: Callable[..., FakeProcess]) -> None:
+async def test_variables_are_readable_by_another_client(start_fake: Callable[..., FakeProcess]) -> None:
     fake = start_fake("opcua_plc")
     async with Client(fake.ready["url"], timeout=2) as client:
         level = client.get_node("ns=2;s=Cell.Level")

@@ -76,7 +76,7 @@ def host(reader: Any) -> Iterator[Host]:
     host.close()
 
 
-def test_it_reads_what_lies_in_front(any_reader: Any) -> None:
+def test_the_code_in_front_is_read(any_reader: Any) -> None:
     host = Host(any_reader.ready["port"])
     any_reader.control.do("present", code="PCB-0001")
     for _ in range(3):
@@ -90,7 +90,7 @@ def test_it_reads_what_lies_in_front(any_reader: Any) -> None:
     host.close()
 
 
-def test_a_board_that_comes_into_view_while_reading(reader: Any, host: Host) -> None:
+def test_a_board_that_appears_during_reading_is_read(reader: Any, host: Host) -> None:
     host.say("LON")
     reader.control.wait_until(lambda truth: truth["reading"])
     reader.control.do("present", code="LATE-1")
@@ -102,7 +102,7 @@ def test_a_board_that_comes_into_view_while_reading(reader: Any, host: Host) -> 
     assert host.hear() == b"NEXT-2\r"
 
 
-def test_no_read_is_told_after_the_readers_own_time(start_fake: Callable[..., Any]) -> None:
+def test_no_read_is_reported_after_the_readers_timeout(start_fake: Callable[..., Any]) -> None:
     reader = start_fake("barcode_reader", "--timeout", "0.4")
     host = Host(reader.ready["port"])
     began = own_time()
@@ -172,7 +172,7 @@ def test_identification_status_and_unknown_commands(reader: Any, host: Host) -> 
     assert host.hear() == b"STAT,0,FAIL\r"
 
 
-def test_a_code_that_no_reader_could_send_is_refused(reader: Any) -> None:
+def test_an_unreadable_code_is_refused(reader: Any) -> None:
     for code in ("", "x" * 129, "ř", "A\rB", "ERROR", 7):
         with pytest.raises(ControlError):
             reader.control.do("present", code=code)
@@ -181,7 +181,7 @@ def test_a_code_that_no_reader_could_send_is_refused(reader: Any) -> None:
         reader.control.do("health", value="TIRED")
 
 
-def test_pulling_the_cable(start_fake: Callable[..., Any], tmp_path: Path) -> None:
+def test_a_cable_can_be_pulled(start_fake: Callable[..., Any], tmp_path: Path) -> None:
     reader = start_fake("barcode_reader", "--link", str(tmp_path / "reader"))
     link = Path(reader.ready["port"])
     host = Host(str(link))
@@ -201,7 +201,7 @@ def test_pulling_the_cable(start_fake: Callable[..., Any], tmp_path: Path) -> No
     assert not link.is_symlink()
 
 
-def test_unplugging_tcp(start_fake: Callable[..., Any]) -> None:
+def test_tcp_can_be_unplugged(start_fake: Callable[..., Any]) -> None:
     reader = start_fake("barcode_reader", "--tcp", "127.0.0.1:0")
     host = Host(reader.ready["port"])
     assert host.ask("STAT") == b"STAT,1,OK\r"
@@ -223,7 +223,7 @@ def test_unplugging_tcp(start_fake: Callable[..., Any]) -> None:
 @pytest.mark.parametrize(
     ("fault", "answer"), [("silence", b""), ("half_frame", b"STAT,"), ("garbage", None), ("slow", b"")]
 )
-def test_a_bad_line(any_reader: Any, fault: str, answer: bytes | None) -> None:
+def test_a_faulty_line_garbles_bytes(any_reader: Any, fault: str, answer: bytes | None) -> None:
     host = Host(any_reader.ready["port"], timeout=0.3)
     any_reader.control.do(fault, seconds=0.5)
     heard = host.ask("STAT")
@@ -236,7 +236,7 @@ def test_a_bad_line(any_reader: Any, fault: str, answer: bytes | None) -> None:
 
 
 @pytest.mark.parametrize("fault", ["reset", "refuse"])
-def test_a_line_that_goes_away(any_reader: Any, fault: str) -> None:
+def test_a_line_can_disappear(any_reader: Any, fault: str) -> None:
     host = Host(any_reader.ready["port"], timeout=0.3)
     assert host.ask("STAT") == b"STAT,1,OK\r"
     any_reader.control.do(fault)
@@ -255,7 +255,7 @@ def test_a_line_that_goes_away(any_reader: Any, fault: str) -> None:
     again.close()
 
 
-def test_a_line_nobody_reads_does_not_stall_the_reader(reader: Any) -> None:
+def test_an_unread_line_does_not_stall_the_reader(reader: Any) -> None:
     host = Host(reader.ready["port"])
     for _ in range(20):
         host.serial.write(b"VER\r" * 100)
@@ -265,7 +265,7 @@ def test_a_line_nobody_reads_does_not_stall_the_reader(reader: Any) -> None:
     host.close()
 
 
-def test_what_is_in_the_way_of_the_link_is_kept(tmp_path: Path) -> None:
+def test_an_existing_file_at_the_link_path_is_kept(tmp_path: Path) -> None:
     import subprocess
     import sys
 

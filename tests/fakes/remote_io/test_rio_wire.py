@@ -76,7 +76,7 @@ def test_watchdog_over_the_wire(fake: Any, host: Any, wait_for: Callable[..., An
     assert host.read_holding_registers(80, count=10, device_id=1).registers == [150, 0, 0, 3, 3, 2, 0, 0, 0, 0]
 
 
-def test_a_write_with_a_bad_part_changes_nothing(fake: Any, host: Any) -> None:
+def test_a_partly_invalid_write_changes_nothing(fake: Any, host: Any) -> None:
     assert host.write_registers(0, [1, 2, 3], device_id=1).exception_code == 2
     assert fake.truth()["analog_outputs"] == [0, 0]
 
@@ -92,7 +92,7 @@ def test_power_cycle_and_faults(fake: Any, host: Any, wait_for: Callable[..., An
         fake.control.do("set_input", number=16, on=True)
 
 
-def test_a_world_switches_inputs_and_reads_outputs(fake: Any, host: Any) -> None:
+def test_the_world_switches_inputs_and_reads_outputs(fake: Any, host: Any) -> None:
     fake.control.do("set_inputs", inputs={"0": True, "7": True})
     assert image(host)[0] == 0b1000_0001
     fake.control.do("set_inputs", inputs={"0": False})

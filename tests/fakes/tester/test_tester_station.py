@@ -1,4 +1,4 @@
-"""The fake tester's behaviour in time, on a clock of the test's own."""
+"""The fake tester's behaviour over time, with a simulated clock."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -39,7 +39,7 @@ def after(station: Station, clock: Clock, seconds: float) -> State:
     return station.state
 
 
-def test_a_long_sleep_gives_what_many_short_ones_give() -> None:
+def test_the_result_does_not_depend_on_the_time_step() -> None:
     histories = []
     for step in (0.01, 5.0):
         clock = Clock()
@@ -55,7 +55,7 @@ def test_a_long_sleep_gives_what_many_short_ones_give() -> None:
     assert histories[0][0] is State.COMPLETE
 
 
-def test_hold_keeps_the_rest_of_the_test() -> None:
+def test_hold_pauses_the_test() -> None:
     clock = Clock()
     station = station_with(clock, Board("A1"))
     station.command(Command.RESET)
@@ -71,7 +71,7 @@ def test_hold_keeps_the_rest_of_the_test() -> None:
     assert len(station.results) == 1
 
 
-def test_door_takes_its_time_and_turns_back_from_where_it_is() -> None:
+def test_the_door_needs_time_and_reverses_at_its_position() -> None:
     clock = Clock()
     station = station_with(clock)
     station.move_door(opening=True)
@@ -108,7 +108,7 @@ DO = st.one_of(
 
 @settings(max_examples=300, deadline=None)
 @given(steps=st.lists(st.tuples(DO, st.floats(0.0, 2.0)), max_size=40))
-def test_invariants_hold_whatever_happens(steps: list[tuple[tuple[str, int], float]]) -> None:
+def test_invariants_hold_for_random_events(steps: list[tuple[tuple[str, int], float]]) -> None:
     clock = Clock()
     station = station_with(clock, Board("A1", "short"))
     for (what, value), pause in steps:
@@ -151,7 +151,7 @@ def test_invariants_hold_whatever_happens(steps: list[tuple[tuple[str, int], flo
         assert [result.number for result in station.results] == list(range(1, len(station.results) + 1))
 
 
-def test_a_power_cycle_forgets_what_was_set_and_leaves_board_and_door_as_they_are() -> None:
+def test_a_power_cycle_resets_settings_but_not_board_and_door() -> None:
     clock = Clock()
     station = station_with(clock, Board("A1"))
     station.watchdog_ms, station.test_program = 5000, 3

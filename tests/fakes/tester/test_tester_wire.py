@@ -99,7 +99,7 @@ def ready_to_start(tester: Any, host: Host, wait_for: Callable[..., Any], defect
     wait_for(lambda: host.state, lambda state: state == IDLE)
 
 
-def test_the_result_follows_from_the_board(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
+def test_the_result_depends_on_the_board(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
     assert host.state == STOPPED
     assert host.switches == [False, True, False, False, False]
     values = {}
@@ -131,7 +131,7 @@ def test_the_result_follows_from_the_board(tester: Any, host: Host, wait_for: Ca
     assert results[0]["measured"]["supply_current"] == pytest.approx(values["G1"][1], rel=1e-6)
 
 
-def test_results_come_together_before_complete(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
+def test_results_are_available_before_complete(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
     ready_to_start(tester, host, wait_for)
     host.command(START)
     seen = []
@@ -145,7 +145,7 @@ def test_results_come_together_before_complete(tester: Any, host: Host, wait_for
         assert state != COMPLETE or results[0]
 
 
-def test_a_seed_gives_the_same_values_again(start_fake: Callable[..., Any], wait_for: Callable[..., Any]) -> None:
+def test_a_seed_makes_values_repeatable(start_fake: Callable[..., Any], wait_for: Callable[..., Any]) -> None:
     measured = []
     for seed in ("3", "3", "4"):
         fake = start_fake("functional_tester", "--time-scale", "50", "--seed", seed)
@@ -182,7 +182,7 @@ def test_refusals_name_their_reason(tester: Any, host: Host, wait_for: Callable[
     assert tester.truth()["results"][0]["program"] == 9
 
 
-def test_a_command_is_taken_only_when_the_sequence_changes(host: Host) -> None:
+def test_a_command_needs_a_new_sequence_number(host: Host) -> None:
     host.command(RESET)
     before = host.inputs()[1]
     host.client.write_register(0, ABORT, device_id=1)
@@ -208,7 +208,7 @@ def test_hold_stop_and_abort_give_no_result(tester: Any, host: Host, wait_for: C
     assert not host.switches[3]
 
 
-def test_the_door_stays_shut_during_a_test(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
+def test_the_door_stays_closed_during_a_test(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
     ready_to_start(tester, host, wait_for)
     host.command(START)
     wait_for(lambda: host.state, lambda state: state == EXECUTE)
@@ -267,9 +267,7 @@ def test_emergency_stop_cannot_be_cleared_while_pressed(tester: Any, host: Host,
     wait_for(lambda: host.state, lambda state: state == STOPPED)
 
 
-def test_the_watchdog_notices_a_host_that_fell_silent(
-    start_fake: Callable[..., Any], wait_for: Callable[..., Any]
-) -> None:
+def test_the_watchdog_detects_a_silent_host(start_fake: Callable[..., Any], wait_for: Callable[..., Any]) -> None:
     tester = start_fake("functional_tester", "--time-scale", "20", "--test-time", "100")
     host = Host(tester.ready["modbus"])
     host.client.write_register(5, 300, device_id=1)
@@ -287,7 +285,7 @@ def test_the_watchdog_notices_a_host_that_fell_silent(
     host.client.close()
 
 
-def test_life_counts_ten_times_a_second_in_real_time(host: Host) -> None:
+def test_the_life_counter_runs_at_10_hz(host: Host) -> None:
     first, began = host.inputs()[15], own_time()
     time.sleep(0.6)
     counted, ended = host.inputs()[15] - first, own_time()
@@ -317,7 +315,7 @@ def test_illegal_requests_get_exceptions(host: Host) -> None:
 
 
 @pytest.mark.parametrize("fault", ["silence", "reset", "half_frame", "garbage"])
-def test_a_bad_wire_gives_no_answer_and_heals(tester: Any, fault: str) -> None:
+def test_a_faulty_wire_gives_no_answer_and_recovers(tester: Any, fault: str) -> None:
     host = Host(tester.ready["modbus"], timeout=0.3)
     assert host.state == STOPPED
     tester.control.do(fault)
@@ -345,7 +343,7 @@ def test_refuse_closes_the_port_and_slow_delays(tester: Any) -> None:
     host.client.close()
 
 
-def test_commands_under_silence_do_not_arrive(tester: Any) -> None:
+def test_commands_during_silence_do_not_arrive(tester: Any) -> None:
     host = Host(tester.ready["modbus"], timeout=0.2)
     tester.control.do("silence")
     with pytest.raises(ModbusException):
@@ -354,7 +352,7 @@ def test_commands_under_silence_do_not_arrive(tester: Any) -> None:
     host.client.close()
 
 
-def test_it_ends_on_sigterm_and_says_what_is_wrong(start_fake: Callable[..., Any]) -> None:
+def test_the_fake_ends_on_sigterm_and_reports_errors(start_fake: Callable[..., Any]) -> None:
     import subprocess
     import sys
 

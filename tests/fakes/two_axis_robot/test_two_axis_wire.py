@@ -174,7 +174,7 @@ def test_the_vendors_library_works_with_the_fake(fake: FakeProcess, port: Any) -
     assert speak.read1ByteTxRx(port, 2, 70) == (0, COMM_SUCCESS, 0)
 
 
-def test_half_a_frame_and_silence_on_the_raw_wire(fake: FakeProcess) -> None:
+def test_half_a_frame_and_silence_on_the_line(fake: FakeProcess) -> None:
     line = os.open(fake.ready["port"], os.O_RDWR | os.O_NOCTTY)
     try:
 

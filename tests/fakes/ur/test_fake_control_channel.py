@@ -37,7 +37,7 @@ async def close(writer):
         await writer.wait_closed()
 
 
-async def test_bad_requests_are_answered(server):
+async def test_invalid_requests_are_answered(server):
     answers = await raw(
         server,
         b"{nonsense",
@@ -55,7 +55,7 @@ async def test_bad_requests_are_answered(server):
     assert "'by'" in answers[5]["error"]
 
 
-async def test_endless_line_is_cut_off(server):
+async def test_an_endless_line_is_closed(server):
     reader, writer = await asyncio.open_connection(*parse_address(server.address))
     writer.write(b"x" * (MAX_LINE + 100_000))
     assert not json.loads(await reader.readline())["ok"]

@@ -39,7 +39,7 @@ def start_move(c, v=1.0):
 
 
 # ----------------------------------------------------------------------------------------------------- protective stop
-def test_protective_stop_pauses_and_play_continues_the_old_motion(c):
+def test_play_resumes_the_motion_after_a_protective_stop(c):
     start_move(c)
     c.protective_stop("test")
     assert c.safety_bits >> 2 & 1
@@ -304,7 +304,7 @@ def test_a_synchronous_move_blocks_the_command_loop(c):
     assert c.arm.q == pytest.approx(GOAL)
 
 
-def test_path_is_run_from_the_uploaded_text(c):
+def test_a_path_runs_from_the_uploaded_script(c):
     moves = [f"movej({list(q)},a=3,v=2,r=0)" for q in (GOAL, HOME)]
     path = f"signal_async_progress(0)\n{moves[0]}\nsignal_async_progress(1)\n{moves[1]}"
     control_script(c, path=path)

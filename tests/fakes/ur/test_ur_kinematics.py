@@ -53,7 +53,7 @@ def test_every_solution_reaches_the_pose(q, tcp, model):
 
 
 @given(q=joints)
-def test_inverse_stays_with_its_seed(q):
+def test_inverse_kinematics_follows_the_seed(q):
     chain = Chain()
     if abs(math.sin(q[4])) < 0.01 or abs(math.sin(q[2])) < 0.01:
         return  # at a singularity the neighbour is not unique
@@ -64,7 +64,7 @@ def test_inverse_stays_with_its_seed(q):
     assert chain.inverse(chain.forward(q), q) == pytest.approx(q, abs=1e-5)
 
 
-def test_out_of_reach():
+def test_unreachable_poses_have_no_solution():
     with pytest.raises(NoSolution):
         Chain().inverse(from_pose((2.0, 0.0, 0.0, 0.0, 0.0, 0.0)), (0.0,) * 6)
 
@@ -76,7 +76,7 @@ def test_pose_round_trip(pose):
 
 @pytest.mark.parametrize("axis", [(1, 0, 0), (0, -1, 0), (0, 0, 1), (1, 1, 0), (-1, 2, 3)])
 @pytest.mark.parametrize("angle", [math.pi, math.pi - 1e-9, math.pi - 1e-4, 1e-9, 0.0])
-def test_rotation_vector_at_its_ends(axis, angle):
+def test_rotation_vectors_at_zero_and_pi(axis, angle):
     k = np.array(axis) / np.linalg.norm(axis)
     frame = from_pose((0.0, 0.0, 0.0, *(k * angle)))
     assert far(from_pose(to_pose(frame)), frame) < 1e-7

@@ -276,7 +276,7 @@ while True:
         assert ur.do("truth")["q"] == resting["q"]
 
 
-def test_protective_stop_seen_and_unlocked(ur):
+def test_a_protective_stop_is_reported_and_unlocked(ur):
     seen = ur.library("""
 receive = Receive(host, 500.0, ["timestamp", "safety_status_bits", "actual_q", "runtime_state"])
 control, dashboard = Control(host, 500.0), Dashboard(host)

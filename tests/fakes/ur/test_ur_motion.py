@@ -31,7 +31,7 @@ def run(arm, seconds=30.0, each=lambda: None):
 
 
 @given(st.floats(1e-6, 10), st.floats(0.01, 4), st.floats(0.01, 40))
-def test_profile_keeps_its_limits(length, velocity, acceleration):
+def test_a_profile_stays_within_its_limits(length, velocity, acceleration):
     profile = Trapezoid(length, velocity, acceleration)
     assert profile.duration >= length / velocity
     steps = [profile.position(profile.duration * i / 200) for i in range(201)]
@@ -44,7 +44,7 @@ def test_profile_keeps_its_limits(length, velocity, acceleration):
     assert max(abs(b - a) / dt for a, b in pairwise(speeds)) <= acceleration * (1 + 1e-3)
 
 
-def test_joint_move_keeps_velocity_and_acceleration():
+def test_a_joint_move_stays_within_velocity_and_acceleration():
     a, goal = arm(), (1.0, -1.0, 1.2, -2.0, -1.0, 0.5)
     peak, jump, last = 0.0, 0.0, a.qd
 
@@ -62,7 +62,7 @@ def test_joint_move_keeps_velocity_and_acceleration():
     assert took == pytest.approx(1.0 / 0.8 + 0.8 / 1.6, abs=2 * DT)  # the longest way is 1 rad
 
 
-def test_linear_move_is_straight_and_even():
+def test_a_linear_move_is_straight_at_constant_speed():
     a = arm()
     start = a.pose
     goal = (start[0] + 0.1, start[1] - 0.2, start[2] + 0.1, *start[3:])
@@ -85,7 +85,7 @@ def test_linear_move_is_straight_and_even():
     assert took == pytest.approx(math.sqrt(0.06) / 0.25 + 0.25 / 1.2, abs=0.01)
 
 
-def test_line_out_of_reach_is_refused_not_jumped():
+def test_an_unreachable_line_is_refused():
     a = arm()
     a.move_linear(from_pose((-2.0, *a.pose[1:])), 0.5, 1.2)
     with pytest.raises(MotionRefused):

@@ -148,7 +148,7 @@ def test_dashboard_and_script_ports_accept_pieces_and_survive_garbage(ur):
         ur.control.wait_until(lambda t: t["digital_outputs"] == 4)
 
 
-def test_truth_is_pushed_at_a_rate(ur):
+def test_truth_is_published_at_a_rate(ur):
     with socket.create_connection(parse_address(ur.ready["control"]), 2.0) as client:
         client.sendall(b'{"id":1,"do":"subscribe","to":"pose","rate":100}\n')
         lines = client.makefile()
@@ -159,7 +159,7 @@ def test_truth_is_pushed_at_a_rate(ur):
     assert stamps[-1] - stamps[0] == pytest.approx(0.01 * (len(stamps) - 1), rel=0.3)
 
 
-def test_bad_control_commands_are_refused(ur):
+def test_invalid_control_commands_are_refused(ur):
     for command, arguments in [
         ("set_input", {"bit": 40}),
         ("guide", {"q": [0, 0, 0, 0, 0, 0]}),
@@ -177,7 +177,7 @@ def test_bad_control_commands_are_refused(ur):
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_ends_at_once_and_cleanly(start_ur, number):
+def test_the_fake_ends_at_once_and_cleanly(start_ur, number):
     fake = start_ur()
     with RtdeSocket(fake) as rtde:
         rtde.outputs(b"timestamp")
@@ -188,7 +188,7 @@ def test_ends_at_once_and_cleanly(start_ur, number):
         assert own_time() - begin < 1.0
 
 
-def test_port_taken_is_one_clear_line(ur):
+def test_a_used_port_is_reported_in_one_line(ur):
     second = subprocess.run(
         [sys.executable, "-m", "arcor2_fakes.ur", "--host", ur.host], capture_output=True, text=True, timeout=60
     )
@@ -201,7 +201,7 @@ def test_port_taken_is_one_clear_line(ur):
 @pytest.mark.parametrize(
     "options", [["--model", "ur99"], ["--controller-version", "x"], ["--control", "nowhere"], ["--frequency", "0"]]
 )
-def test_bad_options_are_named(options):
+def test_invalid_options_are_named(options):
     run = subprocess.run(
         [sys.executable, "-m", "arcor2_fakes.ur", *options], capture_output=True, text=True, timeout=60
     )
@@ -209,7 +209,7 @@ def test_bad_options_are_named(options):
     assert options[1] in run.stderr
 
 
-def test_does_not_outlive_its_parent():
+def test_the_fake_ends_with_its_parent():
     parent = subprocess.Popen(
         [
             sys.executable,

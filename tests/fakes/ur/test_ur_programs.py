@@ -28,7 +28,7 @@ def play(c, text, within=20.0):
     raise AssertionError("it plays on")
 
 
-def test_variables_conditions_loops_and_threads(c):
+def test_programs_have_variables_conditions_loops_and_threads(c):
     play(
         c,
         """
@@ -84,7 +84,7 @@ def test_an_invalid_call_ends_the_program(c, text):
     assert c.programs_killed == killed + 1
 
 
-def test_a_watchdog_set_by_a_program_stops_it(c):
+def test_a_watchdog_started_by_a_program_stops_it(c):
     with pytest.raises(AssertionError, match="plays on"):
         play(c, "sleep(9)", within=1.0)
     c.stop_program("test")

@@ -28,7 +28,7 @@ def test_bytes_on_the_wire():
 
 
 @pytest.mark.parametrize("size", [0, 1, 2])
-def test_impossible_size(size):
+def test_invalid_sizes_are_refused(size):
     with pytest.raises(FramingError):
         list(Deframer().feed(struct.pack(">HB", size, Kind.DATA)))
 

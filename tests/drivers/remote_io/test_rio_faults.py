@@ -1,4 +1,4 @@
-"""The remote I/O block's driver when the wire fails, answers come late, or the driver's own process is killed."""
+"""Faults of the remote I/O block: a failing wire, late answers, a killed process."""
 
 import itertools
 import socket
@@ -53,7 +53,7 @@ def expired(truth: dict[str, Any]) -> bool:
 
 
 # ------------------------------------------------------------------------------------------------ connecting
-def test_nobody_there(make: Callable[..., RemoteIO]) -> None:
+def test_an_unreachable_device_is_named(make: Callable[..., RemoteIO]) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))  # not listening: refuses
         address = "{}:{}".format(*taken.getsockname())
@@ -67,7 +67,7 @@ def test_nobody_there(make: Callable[..., RemoteIO]) -> None:
 
 
 @pytest.mark.parametrize("fault", ["silence", "half_frame", "garbage"])
-def test_connecting_to_one_that_does_not_answer_sensibly(
+def test_connecting_to_a_device_with_invalid_answers(
     fake: FakeProcess, make: Callable[..., RemoteIO], fault: str
 ) -> None:
     fake.control.do(fault)
@@ -88,7 +88,7 @@ def test_wrong_unit_is_refused_by_name(fake: FakeProcess, make: Callable[..., Re
 
 # ------------------------------------------------------------------------------------------------ losses
 @pytest.mark.parametrize("fault", ["reset", "silence", "half_frame", "garbage"])
-def test_loss_and_coming_back(fake: FakeProcess, quick: RemoteIO, wait_for: Callable[..., Any], fault: str) -> None:
+def test_a_loss_and_its_recovery(fake: FakeProcess, quick: RemoteIO, wait_for: Callable[..., Any], fault: str) -> None:
     edges: list[Any] = []
     quick.subscribe("part", edges.append)
     thread, outcome = in_thread(lambda: quick.wait_for("part", True, 20.0))
@@ -129,7 +129,7 @@ def test_control_does_not_come_back_after_a_short_loss(
     quick.write_digital("lamp", False)
 
 
-def test_a_block_that_was_switched_off_and_on_ends_control(
+def test_a_power_cycle_of_the_block_ends_control(
     start_fake: Callable[..., FakeProcess], make: Callable[..., RemoteIO], wait_for: Callable[..., Any]
 ) -> None:
     """On a serial line nothing breaks; the watchdog that is off tells it."""
@@ -146,7 +146,7 @@ def test_a_block_that_was_switched_off_and_on_ends_control(
     assert fake.truth()["outputs"][4] is False
 
 
-def test_a_pulse_ends_though_the_connection_is_lost(
+def test_a_pulse_ends_during_a_connection_loss(
     fake: FakeProcess, make: Callable[..., RemoteIO], wait_for: Callable[..., Any]
 ) -> None:
     block = make(fake.ready["modbus"], watchdog_ms=5000)  # the pulse is over long before
@@ -189,7 +189,7 @@ def test_a_late_answer_to_a_write(relay: Relay, make: Callable[..., RemoteIO], f
     assert block.control_owner() == "us"
 
 
-def test_another_host_that_takes_the_watchdog_ends_control(
+def test_another_host_taking_the_watchdog_ends_control(
     fake: FakeProcess, quick: RemoteIO, wait_for: Callable[..., Any]
 ) -> None:
     host, _, port = fake.ready["modbus"].rpartition(":")
@@ -206,7 +206,7 @@ def test_another_host_that_takes_the_watchdog_ends_control(
         quick.write_digital("lamp", False)
 
 
-def test_disconnect_is_quick_whatever_the_wire_does(fake: FakeProcess, quick: RemoteIO) -> None:
+def test_disconnect_is_quick_with_any_fault_of_the_wire(fake: FakeProcess, quick: RemoteIO) -> None:
     fake.control.do("silence")
     began = own_time()
     quick.disconnect()
@@ -234,7 +234,7 @@ time.sleep(60)
 """
 
 
-def test_outputs_go_to_their_safe_state_when_the_drivers_process_is_killed(
+def test_outputs_become_safe_when_the_process_is_killed(
     fake: FakeProcess, make: Callable[..., RemoteIO], wait_for: Callable[..., Any]
 ) -> None:
     watcher = make(fake.ready["modbus"])  # somebody else's reading must not keep the watchdog quiet

@@ -1,4 +1,4 @@
-"""The conveyor's driver when the bus fails, answers come late, the drive is reset, or its process is killed."""
+"""Faults of the conveyor: a failing bus, late answers, a reset drive, a killed process."""
 
 import os
 import socket
@@ -24,7 +24,7 @@ from tests.fakes.conftest import FakeProcess
 QUICK: dict[str, Any] = {"sdo_timeout": 0.15, "heartbeat_ms": 600}
 
 
-def test_nobody_there(make: Callable[..., Conveyor]) -> None:
+def test_an_unreachable_device_is_named(make: Callable[..., Conveyor]) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))  # not listening: refuses
         address = "{}:{}".format(*taken.getsockname())
@@ -38,7 +38,7 @@ def test_nobody_there(make: Callable[..., Conveyor]) -> None:
             belt.home()
 
 
-def test_no_drive_at_the_address(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
+def test_a_missing_drive_is_named(fake: FakeProcess, make: Callable[..., Conveyor]) -> None:
     belt = make(fake.ready["can"], node_id=6, **QUICK)
     began = own_time()
     with pytest.raises(DeviceTimeout, match=r"node 6 does not answer within 0.5 s"):
@@ -47,7 +47,7 @@ def test_no_drive_at_the_address(fake: FakeProcess, make: Callable[..., Conveyor
 
 
 @pytest.mark.parametrize("fault", ["silence", "half_frame", "garbage"])
-def test_connecting_to_one_that_does_not_answer_sensibly(
+def test_connecting_to_a_device_with_invalid_answers(
     fake: FakeProcess, make: Callable[..., Conveyor], fault: str
 ) -> None:
     fake.control.do(fault)
@@ -64,7 +64,7 @@ def test_connecting_to_one_that_does_not_answer_sensibly(
 
 
 @pytest.mark.parametrize("fault", ["mute", "reset", "garbage"])
-def test_loss_in_mid_run_stops_the_belt_and_only_observation_comes_back(
+def test_a_loss_during_a_run_stops_the_belt_and_only_observation_returns(
     fake: FakeProcess, make: Callable[..., Conveyor], wait_for: Callable[..., Any], fault: str
 ) -> None:
     belt = make(fake.ready["can"], **QUICK)
@@ -100,9 +100,7 @@ def test_loss_in_mid_run_stops_the_belt_and_only_observation_comes_back(
     belt.move_by(0.01)
 
 
-def test_a_drive_that_was_off_and_on_is_not_homed(
-    fake: FakeProcess, belt: Conveyor, wait_for: Callable[..., Any]
-) -> None:
+def test_a_power_cycle_loses_the_homing(fake: FakeProcess, belt: Conveyor, wait_for: Callable[..., Any]) -> None:
     belt.home()
     fake.control.do("power_cycle")
     wait_for(lambda: belt.connection, lambda state: state is Connection.BACK)
@@ -113,7 +111,7 @@ def test_a_drive_that_was_off_and_on_is_not_homed(
     assert fake.truth()["consumer"] == 127 << 16 | 1000  # armed again
 
 
-def test_late_answers_answer_nothing(
+def test_late_answers_are_ignored(
     fake: FakeProcess, make: Callable[..., Conveyor], wait_for: Callable[..., Any]
 ) -> None:
     belt = make(fake.ready["can"], **QUICK)
@@ -151,7 +149,7 @@ time.sleep(60)
 """
 
 
-def test_the_drive_stops_when_the_drivers_process_is_killed(fake: FakeProcess) -> None:
+def test_the_drive_stops_when_the_process_is_killed(fake: FakeProcess) -> None:
     owner = subprocess.Popen(
         [sys.executable, "-c", OWNER, f"socket://{fake.ready['can']}"], stdout=subprocess.PIPE, text=True
     )
@@ -213,7 +211,7 @@ def test_an_adapter_is_read_in_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
         os.close(line)
 
 
-def test_the_heartbeat_ceases_when_the_drive_is_not_heard(fake: FakeProcess, belt: Conveyor) -> None:
+def test_the_heartbeat_ends_when_the_drive_is_silent(fake: FakeProcess, belt: Conveyor) -> None:
     belt.run(0.1)
     fake.control.do("mute")
     fake.control.wait_until(lambda t: t["velocity"] == 0.0)
@@ -222,7 +220,7 @@ def test_the_heartbeat_ceases_when_the_drive_is_not_heard(fake: FakeProcess, bel
     assert silent_since - max(beats) > 0.5
 
 
-def test_disconnecting_stops_a_belt_that_runs(fake: FakeProcess, belt: Conveyor) -> None:
+def test_disconnecting_stops_a_running_belt(fake: FakeProcess, belt: Conveyor) -> None:
     belt.run(0.2)
     began = own_time()
     belt.disconnect()

@@ -1,4 +1,4 @@
-"""Losses of every kind, and a program that stands."""
+"""Connection losses of every kind, and a stopped PLC program."""
 
 import subprocess
 import sys
@@ -29,7 +29,7 @@ UP = (Connection.ONLINE, Connection.BACK)
 
 
 @pytest.mark.parametrize("fault", ["silence", "reset", "half_frame", "garbage", "power_cycle"])
-def test_lost_in_a_job_and_back(
+def test_a_loss_during_a_job(
     fake: FakeProcess, plc: OpcUaPlc, wait_for: Any, fault: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     edges: list[Edge] = []
@@ -56,7 +56,7 @@ def test_lost_in_a_job_and_back(
     assert sum(" back after " in record.message for record in caplog.records) == 1
 
 
-def test_outputs_and_job_when_our_life_sign_ends(fake: FakeProcess) -> None:
+def test_outputs_and_job_end_with_the_life_sign(fake: FakeProcess) -> None:
     process = subprocess.Popen([sys.executable, "-c", ORPHAN, fake.ready["url"], POINTS, HANDSHAKE])
     try:
         fake.control.wait_until(lambda t: t["moving"], 20.0)
@@ -73,7 +73,7 @@ def test_outputs_and_job_when_our_life_sign_ends(fake: FakeProcess) -> None:
     assert truth["code"] == 91
 
 
-def test_our_life_sign_outlives_a_long_job(fake: FakeProcess, plc: OpcUaPlc) -> None:
+def test_the_life_sign_continues_during_a_long_job(fake: FakeProcess, plc: OpcUaPlc) -> None:
     running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
     time.sleep(2.2)  # twice the PLC's patience
@@ -83,7 +83,7 @@ def test_our_life_sign_outlives_a_long_job(fake: FakeProcess, plc: OpcUaPlc) -> 
     assert isinstance(running.outcome(), Cancelled)
 
 
-def test_a_program_that_stands_makes_values_old(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
+def test_a_stopped_plc_program_makes_values_stale(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
     running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
     fake.control.do("live", on=False)
@@ -105,14 +105,14 @@ def test_a_program_that_stands_makes_values_old(fake: FakeProcess, plc: OpcUaPlc
     plc.write_digital("lamp", True)
 
 
-def test_a_plc_that_was_switched_off_and_on_ends_control(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
+def test_a_power_cycle_ends_control(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
     fake.control.do("restart")  # quicker than the connection notices
     wait_for(plc.control_owner, lambda owner: owner is None)
     with pytest.raises(NotInControl, match="taken control away"):
         plc.write_digital("lamp", True)
 
 
-def test_a_slow_server(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
+def test_a_slow_server_times_out(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
     fake.control.do("slow", seconds=1.0)
     began = own_time()
     with pytest.raises((DeviceTimeout, ConnectionLost), match=r"plc at opc.tcp"):
@@ -131,7 +131,7 @@ def _level(plc: OpcUaPlc) -> float:
         return -1.0
 
 
-def test_nobody_there(make: Callable[..., OpcUaPlc]) -> None:
+def test_an_unreachable_device_is_named(make: Callable[..., OpcUaPlc]) -> None:
     plc = make("opc.tcp://127.0.0.1:1")
     with pytest.raises(NotConnected, match=r"plc at opc.tcp://127.0.0.1:1"):
         plc.connect(1.0)

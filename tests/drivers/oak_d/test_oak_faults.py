@@ -1,4 +1,4 @@
-"""The OAK-D's driver on bad days: each fault is a typed error that names the camera, and afterwards it works again."""
+"""Faults of the OAK-D: each is a typed error that names the camera, and the driver recovers."""
 
 import subprocess
 import sys
@@ -65,7 +65,7 @@ def test_a_frozen_picture_is_stale(fake: FakeProcess, camera: OakD) -> None:
     wait(lambda: fresh(camera))
 
 
-def test_what_is_no_picture_is_an_error(fake: FakeProcess, camera: OakD) -> None:
+def test_invalid_pictures_are_errors(fake: FakeProcess, camera: OakD) -> None:
     fake.control.do("lens_covered")
     time.sleep(0.1)
     with pytest.raises(DeviceFault, match=r"^camera at .*: the image is black") as covered:
@@ -91,7 +91,7 @@ def test_what_is_no_picture_is_an_error(fake: FakeProcess, camera: OakD) -> None
         camera.depth_image()
 
 
-def test_overheating_is_told_before_it_switches_itself_off(fake: FakeProcess, camera: OakD) -> None:
+def test_overheating_is_reported_before_shutdown(fake: FakeProcess, camera: OakD) -> None:
     fake.control.do("overheat", temperature=95)
     wait(lambda: camera.alarms())
     [alarm] = camera.alarms()
@@ -104,7 +104,7 @@ def test_overheating_is_told_before_it_switches_itself_off(fake: FakeProcess, ca
     wait(lambda: not camera.alarms())
 
 
-def test_a_power_cycle_is_a_loss_and_the_exposure_is_set_again(fake: FakeProcess, camera: OakD) -> None:
+def test_the_exposure_is_restored_after_a_power_cycle(fake: FakeProcess, camera: OakD) -> None:
     camera.set_exposure(0.005)
     fake.control.do("power_cycle")
     wait(lambda: camera.connection is Connection.BACK)
@@ -114,7 +114,7 @@ def test_a_power_cycle_is_a_loss_and_the_exposure_is_set_again(fake: FakeProcess
 
 
 @pytest.mark.parametrize("fault", ["half_frame", "garbage", "wrong_checksum", "reset"])
-def test_a_broken_stream_is_a_loss_and_comes_back(fake: FakeProcess, camera: OakD, fault: str) -> None:
+def test_a_broken_stream_is_a_loss_and_recovers(fake: FakeProcess, camera: OakD, fault: str) -> None:
     fake.control.do(fault)
     wait(lambda: camera.connection is not Connection.ONLINE)
     if fault != "reset":
@@ -124,7 +124,7 @@ def test_a_broken_stream_is_a_loss_and_comes_back(fake: FakeProcess, camera: Oak
     back(camera)
 
 
-def test_a_slow_stream_is_an_old_picture(fake: FakeProcess, camera: OakD) -> None:
+def test_a_slow_stream_gives_stale_pictures(fake: FakeProcess, camera: OakD) -> None:
     fake.control.do("slow", seconds=0.7)
     time.sleep(0.2)
     wait(lambda: not fresh(camera))
@@ -133,7 +133,7 @@ def test_a_slow_stream_is_an_old_picture(fake: FakeProcess, camera: OakD) -> Non
     wait(lambda: fresh(camera))
 
 
-def test_a_stream_of_something_else(fake: FakeProcess, make: Callable[..., OakD]) -> None:
+def test_another_protocol_is_refused(fake: FakeProcess, make: Callable[..., OakD]) -> None:
     control = make(fake.ready["control"])  # says nothing until it is asked
     with pytest.raises(DeviceTimeout, match=f"^camera at {fake.ready['control']} sends nothing"):
         control.connect(0.5)
@@ -154,7 +154,7 @@ kept = camera.trigger(), camera.newest(1.0)
 """
 
 
-def test_a_program_that_forgets_to_disconnect_ends_well(fake: FakeProcess) -> None:
+def test_a_program_that_does_not_disconnect_ends_cleanly(fake: FakeProcess) -> None:
     """depthai takes the process down when a pipeline is still there at the interpreter's end."""
     ended = subprocess.run(
         [sys.executable, "-c", FORGETFUL, fake.ready["stream"]], capture_output=True, text=True, timeout=60
@@ -162,7 +162,7 @@ def test_a_program_that_forgets_to_disconnect_ends_well(fake: FakeProcess) -> No
     assert (ended.returncode, ended.stderr) == (0, "")
 
 
-def test_connecting_often_leaves_nothing(fake: FakeProcess, camera: OakD) -> None:
+def test_repeated_connections_leak_nothing(fake: FakeProcess, camera: OakD) -> None:
     process = psutil.Process()
     counts = []
     for _ in range(6):
@@ -173,7 +173,7 @@ def test_connecting_often_leaves_nothing(fake: FakeProcess, camera: OakD) -> Non
         assert max(held[3:]) <= max(held[:3]) + 1
 
 
-def test_no_camera_is_found_at_once(make: Callable[..., OakD], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_camera_is_reported_at_once(make: Callable[..., OakD], monkeypatch: pytest.MonkeyPatch) -> None:
     import depthai as dai
 
     monkeypatch.setattr(dai.Device, "getAllAvailableDevices", staticmethod(lambda: []))
@@ -196,7 +196,7 @@ def test_a_missing_library_names_the_extra(make: Callable[..., OakD], monkeypatc
         make("127.0.0.1:1").connect(1.0)
 
 
-def test_a_camera_that_starts_too_late_is_given_up_and_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_camera_that_starts_too_late_times_out(monkeypatch: pytest.MonkeyPatch) -> None:
     import depthai as dai
 
     from arcor2_drivers.oak_d import device_feed
@@ -216,7 +216,7 @@ def test_a_camera_that_starts_too_late_is_given_up_and_closed(monkeypatch: pytes
     assert Slow.closed.wait(5.0)  # not kept from the next that wants it
 
 
-def test_several_cameras_have_to_be_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_several_cameras_need_an_identifier(monkeypatch: pytest.MonkeyPatch) -> None:
     import depthai as dai
 
     from arcor2_drivers.oak_d import device_feed

@@ -1,4 +1,4 @@
-"""The functional tester's driver when the wire fails, answers come late, or the driver's own process is killed."""
+"""Faults of the functional tester: a failing wire, late answers, a killed process."""
 
 import socket
 import subprocess
@@ -73,7 +73,7 @@ def running_test(fake: FakeProcess, tester: FunctionalTester) -> Iterator[list[A
 
 
 # ------------------------------------------------------------------------------------------------ connecting
-def test_nobody_there(make: Callable[..., FunctionalTester]) -> None:
+def test_an_unreachable_device_is_named(make: Callable[..., FunctionalTester]) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))  # not listening: refuses
         address = "{}:{}".format(*taken.getsockname())
@@ -90,7 +90,7 @@ def test_nobody_there(make: Callable[..., FunctionalTester]) -> None:
 
 
 @pytest.mark.parametrize("fault", ["silence", "half_frame", "garbage"])
-def test_connecting_to_one_that_does_not_answer_sensibly(
+def test_connecting_to_a_device_with_invalid_answers(
     fake: FakeProcess, make: Callable[..., FunctionalTester], fault: str
 ) -> None:
     fake.control.do(fault)
@@ -104,7 +104,7 @@ def test_connecting_to_one_that_does_not_answer_sensibly(
     assert tester.machine_state() is MachineState.STOPPED
 
 
-def test_silent_peer_that_is_no_tester(make: Callable[..., FunctionalTester]) -> None:
+def test_a_silent_peer_is_named(make: Callable[..., FunctionalTester]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = "{}:{}".format(*server.getsockname())
         asked = "\\(reading input registers 0 to 16\\) twice"
@@ -116,7 +116,7 @@ def test_silent_peer_that_is_no_tester(make: Callable[..., FunctionalTester]) ->
 @pytest.mark.parametrize(
     ("fault", "within"), [("reset", 0.3), ("silence", 1.0), ("half_frame", 1.0), ("garbage", 1.0), ("refuse", None)]
 )
-def test_loss_in_mid_test(
+def test_a_loss_during_a_test(
     slow_fake: FakeProcess, quick: FunctionalTester, wait_for: Callable[..., Any], fault: str, within: float | None
 ) -> None:
     with running_test(slow_fake, quick) as outcome:
@@ -142,7 +142,7 @@ def test_loss_in_mid_test(
     assert (truth["state"], truth["tested"], truth["watchdog_ms"]) == ("Stopped", 0, 600)
 
 
-def test_loss_while_the_door_moves(
+def test_a_loss_during_a_door_motion(
     slow_fake: FakeProcess, quick: FunctionalTester, wait_for: Callable[..., Any]
 ) -> None:
     slow_fake.control.do("silence")
@@ -186,9 +186,7 @@ def test_a_late_answer_to_a_write(
     assert fake.truth()["door"] == "closed"
 
 
-def test_an_answer_with_another_transactions_number_is_none(
-    relay: Relay, make: Callable[..., FunctionalTester]
-) -> None:
+def test_an_answer_with_another_transaction_id_is_ignored(relay: Relay, make: Callable[..., FunctionalTester]) -> None:
     tester = make(relay.address, request_timeout=0.2)
     tester.connect()
     relay.renumber_next(READ_INPUT_REGISTERS)
@@ -196,7 +194,7 @@ def test_an_answer_with_another_transactions_number_is_none(
     assert relay.connections == 2
 
 
-def test_state_gets_stale_before_it_is_called_lost(
+def test_state_is_stale_before_the_connection_is_lost(
     fake: FakeProcess, observed: FunctionalTester, wait_for: Callable[..., Any]
 ) -> None:
     assert observed.machine_state() is MachineState.STOPPED
@@ -208,7 +206,7 @@ def test_state_gets_stale_before_it_is_called_lost(
         observed.machine_state()
 
 
-def test_a_life_counter_that_stands_is_stale(relay: Relay, make: Callable[..., FunctionalTester]) -> None:
+def test_a_stopped_life_counter_makes_the_state_stale(relay: Relay, make: Callable[..., FunctionalTester]) -> None:
     """A gateway that goes on answering for a tester that hangs behind it."""
     tester = make(relay.address)
     tester.connect()
@@ -222,7 +220,7 @@ def test_a_life_counter_that_stands_is_stale(relay: Relay, make: Callable[..., F
     assert tester.connection is Connection.ONLINE
 
 
-def test_observation_comes_back_by_itself_and_control_does_not(
+def test_only_observation_returns_by_itself(
     fake: FakeProcess, tester: FunctionalTester, wait_for: Callable[..., Any]
 ) -> None:
     fake.control.do("reset")
@@ -236,7 +234,7 @@ def test_observation_comes_back_by_itself_and_control_does_not(
     tester.open_door()
 
 
-def test_disconnect_is_quick_whatever_the_wire_does(fake: FakeProcess, tester: FunctionalTester) -> None:
+def test_disconnect_is_quick_with_any_fault_of_the_wire(fake: FakeProcess, tester: FunctionalTester) -> None:
     fake.control.do("silence")
     began = own_time()
     tester.disconnect()
@@ -262,9 +260,7 @@ tester.test()
 """
 
 
-def test_host_watchdog_trips_when_the_drivers_process_is_killed(
-    slow_fake: FakeProcess, wait_for: Callable[..., Any]
-) -> None:
+def test_the_watchdog_trips_when_the_process_is_killed(slow_fake: FakeProcess, wait_for: Callable[..., Any]) -> None:
     slow_fake.control.do("push_door", opening=True)
     slow_fake.control.do("put_board", code="B-1")
     slow_fake.control.do("push_door", opening=False)
@@ -284,7 +280,7 @@ def test_host_watchdog_trips_when_the_drivers_process_is_killed(
 
 
 # ------------------------------------------------------------------------------------------------ odd peers
-def test_sequence_numbers_go_on_where_another_host_left_them(fake: FakeProcess, tester: FunctionalTester) -> None:
+def test_sequence_numbers_continue_those_of_another_host(fake: FakeProcess, tester: FunctionalTester) -> None:
     host, _, port = fake.ready["modbus"].rpartition(":")
     other = ModbusTcpClient(host, port=int(port))
     try:
