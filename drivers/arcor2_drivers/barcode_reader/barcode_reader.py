@@ -31,7 +31,7 @@ class BarcodeReader(LineDevice, Reader):
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"scan": "stop", "code_present": "stop"}
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {
         "dirty": AlarmText("the window is dirty", "clean the window", Severity.WARNING),
-        "hot": AlarmText("the reader is too hot", "make sure that air reaches the reader", Severity.WARNING),
+        "hot": AlarmText("the reader is too hot", "improve its ventilation", Severity.WARNING),
         "fail": AlarmText("the reader has failed", "replace the reader"),
     }
 
@@ -154,9 +154,7 @@ class BarcodeReader(LineDevice, Reader):
         def found(came: bytes) -> str | None:
             for line in lines.LineBuffer().feed(came):
                 if lines.refused(line, command):
-                    raise DeviceFault(
-                        "{device} does not know the command {command}", line, device=self.who, command=command
-                    )
+                    raise DeviceFault("{device} rejected the command {command}", line, device=self.who, command=command)
                 if answers(line):
                     return line
             return None

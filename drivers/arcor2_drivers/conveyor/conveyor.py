@@ -57,7 +57,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
     def leave(self) -> None:
         """Release control because we disconnect."""
         newest = self.newest()
-        if newest is not None and self._motion.stands(newest):
+        if newest is not None and self._motion.is_stopped(newest):
             self.disarm()
         else:
             self._observer.link.write(cia402.CONTROLWORD, cia402.CW_QUICK_STOP)
@@ -127,7 +127,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
     def release_control(self) -> None:
         """Switch off the torque and the monitoring of our heartbeat. Raises Refused while the belt moves."""
-        if self.in_control and not self._motion.stands(self.fresh()):
+        if self.in_control and not self._motion.is_stopped(self.fresh()):
             raise Refused("{device}: release_control is refused while the belt moves: halt it", device=self.who)
         super().release_control()
 
@@ -136,9 +136,9 @@ class Conveyor(PolledControl[State], Machine, Axis):
         if self.in_control:
             return US
         master, limit = self._observer.consumer >> 16 & 0x7F, self._observer.consumer & 0xFFFF
-        if limit and self._observer.heard(master, limit / 1000.0):
+        if limit and self._observer.received_heartbeat(master, limit / 1000.0):
             return f"node {master}, whose heartbeat the drive monitors,"
-        if self._observer.heard(self._units.master_id, LONGEST_HEARTBEAT / 1000.0):
+        if self._observer.received_heartbeat(self._units.master_id, LONGEST_HEARTBEAT / 1000.0):
             return f"another host, which sends heartbeats as node {self._units.master_id} too,"
         return "another client, which enabled the drive," if state.power is Power.ENABLED else None
 
@@ -159,7 +159,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
                 refused=refused,
                 control_owner=self.control_owner() or "nobody",
             )
-        if resting and not self._motion.stands(now):
+        if resting and not self._motion.is_stopped(now):
             raise Refused("{device}: {what} is refused while the belt moves: halt it first", device=self.who, what=what)
         return now, go_on
 
@@ -282,7 +282,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
             ("control is taken", self.in_control),
             ("there is no fault", now.power not in FAULTY and not self._unit.aborted),
             ("the drive is enabled", now.power is Power.ENABLED),
-            ("the belt is stopped", self._motion.stands(now)),
+            ("the belt is stopped", self._motion.is_stopped(now)),
         ]
 
     # -------------------------------------------------------------------------------- actions

@@ -18,7 +18,7 @@ STEP: Final = 1.0
 """Time limit for a step of the state machine, s."""
 MARGIN: Final = 2.0
 """Time a motion may take beyond the time computed from its speed and ramps, s."""
-STANDS: Final = 0.001
+STANDSTILL: Final = 0.001
 """Velocity below which the belt counts as stopped, m/s: a measured velocity is never exactly 0."""
 
 
@@ -29,7 +29,7 @@ class Motion:
         self._observer, self._link, self._settings = observer, observer.link, settings
         self._who = observer.who
         self._one_step = threading.Lock()
-        self._stands = max(settings.rate(STANDS), 1)
+        self._standstill = max(settings.rate(STANDSTILL), 1)
 
     def control(self, word: int, go_on: GoOn) -> None:
         """Write the control word, unless the work was cancelled. Steps do not overtake each other."""
@@ -37,9 +37,9 @@ class Motion:
             go_on()
             self._link.write(cia402.CONTROLWORD, word)
 
-    def stands(self, now: State) -> bool:
+    def is_stopped(self, now: State) -> bool:
         """Return whether the belt is stopped."""
-        return abs(now.velocity) <= self._stands
+        return abs(now.velocity) <= self._standstill
 
     def fault(self, now: State, what: str) -> DeviceFault:
         """Return the error for a drive in fault."""
@@ -144,7 +144,7 @@ class Motion:
                     homing_method=s.homing_method,
                 )
             wanted = cia402.HOMING_ATTAINED | cia402.TARGET_REACHED
-            return now.statusword & wanted == wanted and self.stands(now)
+            return now.statusword & wanted == wanted and self.is_stopped(now)
 
         self._reach(homed, s.homing_timeout, what, go_on)
         self.control(cia402.CW_ENABLE, go_on)
@@ -166,15 +166,18 @@ class Motion:
         self._reach(lambda now: not now.statusword & acknowledged, STEP, f"{what}: ending the handshake", go_on)
         takes = abs(expected - before.position) / speed + 2.0 * speed / s.rate(s.acceleration)
         after = self._reach(
-            lambda now: bool(now.statusword & cia402.TARGET_REACHED) and self.stands(now), takes + MARGIN, what, go_on
+            lambda now: bool(now.statusword & cia402.TARGET_REACHED) and self.is_stopped(now),
+            takes + MARGIN,
+            what,
+            go_on,
         )
         if abs(after.position - expected) > s.rate(s.tolerance):
-            told, wanted = s.metres(after.position), s.metres(expected)
+            reached, wanted = s.metres(after.position), s.metres(expected)
             raise DeviceFault(
-                "{device}: {what} ended at {told:.4f} m instead of {wanted:.4f} m",
+                "{device}: {what} ended at {reached:.4f} m instead of {wanted:.4f} m",
                 device=self._who,
                 what=what,
-                told=told,
+                reached=reached,
                 wanted=wanted,
             )
 
@@ -186,7 +189,7 @@ class Motion:
         with self._one_step:
             go_on()
             self._link.write(cia402.TARGET_VELOCITY, speed)
-        near = max(self._stands, abs(speed) // 20)
+        near = max(self._standstill, abs(speed) // 20)
         ramp = 2.0 * s.max_speed / s.acceleration
         self._reach(
             lambda now: bool(now.statusword & cia402.TARGET_REACHED) and abs(now.velocity - speed) <= near,
@@ -204,7 +207,7 @@ class Motion:
             if power is Power.ENABLED:
                 self._link.write(cia402.CONTROLWORD, cia402.CW_ENABLE | cia402.CW_HALT)
                 self._link.write(cia402.TARGET_VELOCITY, 0)
-        self._observer.wait(self.stands, s.max_speed / s.acceleration + MARGIN, "halting")
+        self._observer.wait(self.is_stopped, s.max_speed / s.acceleration + MARGIN, "halting")
         if power is not Power.ENABLED:
             return
         with self._one_step:
@@ -219,7 +222,9 @@ class Motion:
             if cia402.power(self._link.read(cia402.STATUSWORD)) is Power.ENABLED:
                 self._link.write(cia402.CONTROLWORD, cia402.CW_QUICK_STOP)
         self._observer.wait(
-            lambda now: now.power not in (Power.ENABLED, Power.QUICK_STOP) and self.stands(now), MARGIN, "quick stop"
+            lambda now: now.power not in (Power.ENABLED, Power.QUICK_STOP) and self.is_stopped(now),
+            MARGIN,
+            "quick stop",
         )
 
     def fault_reset(self, go_on: GoOn) -> None:
@@ -234,6 +239,6 @@ class Motion:
         try:
             self._observer.wait(lambda s: s.power is not Power.FAULT, STEP, "resetting the fault")
         except DeviceTimeout as error:
-            text = str(self.fault(now, "its cause stands"))
+            text = str(self.fault(now, "its cause is still present"))
             raise Refused("{device}: fault_reset is refused in state Fault", text, device=self._who) from error
         self.control(cia402.CW_DISABLE_VOLTAGE, go_on)

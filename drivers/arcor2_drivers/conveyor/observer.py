@@ -55,7 +55,7 @@ class Observer(StateObserver[State]):
         self.guarded = False
         super().disconnect()
 
-    def heard(self, master: int, within: float) -> bool:
+    def received_heartbeat(self, master: int, within: float) -> bool:
         """Return whether a heartbeat of node `master` came within the last `within` s; we do not receive our own."""
         return time.monotonic() - self._masters.get(master, -1e9) <= within
 

@@ -54,15 +54,15 @@ class Unit:
         """Return the state that the drive is in."""
         if now.power in FAULTY:
             return S.ABORTED if now.power is Power.FAULT else S.ABORTING
-        standing = self._motion.stands(now)
+        stopped = self._motion.is_stopped(now)
         passing = self._passing
         if passing is not None:
             return passing
         if self.aborted:
-            return S.ABORTED if standing else S.ABORTING
+            return S.ABORTED if stopped else S.ABORTING
         if now.power is not Power.ENABLED:
-            return S.STOPPED if standing else S.STOPPING
-        if not standing or self._one_act.locked():
+            return S.STOPPED if stopped else S.STOPPING
+        if not stopped or self._one_act.locked():
             return S.EXECUTE
         return S.HELD if self.held else S.IDLE
 

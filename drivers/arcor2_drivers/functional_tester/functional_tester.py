@@ -115,7 +115,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         name = command.name.lower()
         go_on = self.begin(name)
         self.require_command(name)
-        self.give(command, go_on)
+        self.send_command(command, go_on)
         if then is not None:
             self.reach({then}, TRANSITION, name, go_on)
 
@@ -130,7 +130,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         go_on = self.begin("stop")
         if self.fresh().state in FALLEN | {S.STOPPED, S.CLEARING}:
             return
-        self.give(MachineCommand.STOP, go_on)
+        self.send_command(MachineCommand.STOP, go_on)
         self.reach({S.STOPPED, *FALLEN}, TRANSITION, "stop", go_on)
 
     # -------------------------------------------------------------------------------- actions
@@ -158,11 +158,11 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         go_on = self.begin(what)
         before = self.require_command("test")
         if before.state in PASSING:
-            before = self.wait(lambda now: now.state not in PASSING, TRANSITION, "coming to rest", go_on)
+            before = self.wait(lambda now: now.state not in PASSING, TRANSITION, "leaving the short state", go_on)
         if before.state in FALLEN:
             raise self.fault(before, f"test is refused in state {title(before.state)}: what ran before")
         if before.state in (S.COMPLETE, S.STOPPED):
-            self.give(MachineCommand.RESET, go_on)
+            self.send_command(MachineCommand.RESET, go_on)
             before = self.reach({S.IDLE}, TRANSITION, "the reset before the test", go_on)
         expected = (before.result_number + 1) & 0xFFFF
         go_on()
@@ -176,7 +176,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
             return inputs.state in (S.COMPLETE, S.RESETTING, S.IDLE) and inputs.result_number == expected
 
         try:
-            self.give(MachineCommand.START, go_on)
+            self.send_command(MachineCommand.START, go_on)
             after = self.wait(finished, self._s.test_timeout, what, go_on)
         except DeviceTimeout:
             with contextlib.suppress(DeviceError):  # the watchdog of the tester ends it

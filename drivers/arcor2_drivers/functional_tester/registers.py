@@ -67,23 +67,23 @@ class Fault(NamedTuple):
 
 
 FAULTS: Final = {
-    101: Fault("board lost during the test", "put the board in and clear"),
-    102: Fault("door opened during the test", "close the door and clear"),
+    101: Fault("board lost during the test", "put the board in, then clear"),
+    102: Fault("door opened during the test", "close the door, then clear"),
     103: Fault(
         "no contact to the board",
-        "clean the pins, check the board's seat, clear",
+        "clean the pins, check the position of the board, then clear",
         health=Health.MAINTENANCE_REQUIRED,
     ),
-    104: Fault("supply overload", "take the board out, clear", health=Health.OFF_SPEC),
-    105: Fault("host lost", "check the network, clear"),
-    106: Fault("emergency stop", "release the button, clear", Severity.CRITICAL),
+    104: Fault("supply overload", "take the board out, then clear", health=Health.OFF_SPEC),
+    105: Fault("host lost", "check the network, then clear"),
+    106: Fault("emergency stop", "release the button, then clear", Severity.CRITICAL),
 }
 EMERGENCY_STOP: Final = 106
 
 
 def fault_of(code: int) -> Fault:
     """Return the meaning of a fault code; an unknown one counts as a failure."""
-    unknown = Fault(f"unknown fault {code}", "read the tester's manual, clear", health=Health.FAILURE)
+    unknown = Fault(f"unknown fault {code}", "see the manual of the tester, then clear", health=Health.FAILURE)
     return FAULTS.get(code, unknown)
 
 

@@ -30,7 +30,7 @@ from .settings import FunctionalTesterSettings
 
 TRANSITION: Final = 3.0
 """Time for a short state, s: Resetting, Clearing, Stopping, Aborting take about 0.2 s."""
-LIFE_STANDS: Final = 1.0
+LIFE_TIMEOUT: Final = 1.0
 """Time without a change of the life counter after which the values are old, s."""
 NOTICED: Final = 0.2
 """Time beyond the watchdog after which the tester has certainly detected our absence, s."""
@@ -97,12 +97,12 @@ class Tester(ModbusDevice[Inputs]):
         """Return the newest state. Raises NotConnected, ConnectionLost, or Stale when it is too old."""
         newest = super().current()
         value, since = self._life
-        if (stands := time.monotonic() - since) > LIFE_STANDS:
+        if (age := time.monotonic() - since) > LIFE_TIMEOUT:
             raise Stale(
-                "{device} answers, but its life counter has been {value} for {stands:.1f} s",
+                "{device} answers, but its life counter has been {value} for {age:.1f} s",
                 device=self.who,
                 value=value,
-                stands=stands,
+                age=age,
             )
         return newest
 
@@ -165,7 +165,7 @@ class Tester(ModbusDevice[Inputs]):
         return inputs
 
     # -------------------------------------------------------------------------------- commands
-    def give(self, command: MachineCommand, go_on: GoOn) -> None:
+    def send_command(self, command: MachineCommand, go_on: GoOn) -> None:
         """Send a command and wait until command_acknowledged contains its number. Raises Refused with the reason."""
         name = command.name.lower()
         if command not in registers.COMMANDS:

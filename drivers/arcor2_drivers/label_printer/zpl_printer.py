@@ -30,10 +30,10 @@ _ALARMS: Final = {
     "paused": AlarmText("it is paused", "press PAUSE on the printer"),
     "too_hot": AlarmText("its head is too hot", "let it cool down"),
     "too_cold": AlarmText("its head is too cold", "let it warm up"),
-    "partial_format": AlarmText("it has received half a label", "switch it off and on"),
-    NO_REPLY: AlarmText("it does not answer", "load labels, close the head, check its power and its cable"),
+    "partial_format": AlarmText("it has received a partial label", "switch it off and on"),
+    NO_REPLY: AlarmText("it does not answer", "load labels, close the head, check its power and cable"),
     UNCONFIRMED: AlarmText(
-        "it is unknown whether the last label was printed", "look for it; then ask last_came_out or acknowledge"
+        "it is unknown whether the last label was printed", "look for it, then run last_came_out or acknowledge"
     ),
 }
 _BLOCKING: Final = tuple(field.name for field in dataclasses.fields(Status) if field.name in _ALARMS)

@@ -295,7 +295,7 @@ class Plc:
                     if not self._value_changed.wait(max(deadline - time.monotonic(), 0.0)):
                         break
                 count = min(self._notified - seen, len(self._notifications))
-                news = [
+                changes = [
                     each
                     for changed, each in list(self._notifications)[len(self._notifications) - count :]
                     if changed == name
@@ -307,7 +307,7 @@ class Plc:
             self.observing.check()
             self.check_program()
             # Ignore late notifications of values from before our reading.
-            if any(_is(each, value) and not _before(each.SourceTimestamp, began) for each in news):
+            if any(_is(each, value) and not _before(each.SourceTimestamp, began) for each in changes):
                 return
             if late or time.monotonic() >= deadline:
                 raise DeviceTimeout(

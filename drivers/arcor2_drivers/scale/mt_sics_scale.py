@@ -49,13 +49,13 @@ class MtSicsScale(LineDevice, Scale):
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"weight": "stop", "weight_within": "stop"}
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {
-        OVERLOAD: AlarmText("the load is above the weighing range", "take the load off", Severity.WARNING),
+        OVERLOAD: AlarmText("the load is above the weighing range", "remove the load", Severity.WARNING),
         UNDERLOAD: AlarmText(
             "the load is below the weighing range", "put the pan in its place and zero the scale", Severity.WARNING
         ),
         TARE_LOST: AlarmText(
-            "the scale has lost its tare, by a restart or at its keys",
-            "tare it again, or acknowledge this",
+            "the tare of the scale was lost by a restart or changed at its keys",
+            "tare again, or acknowledge the alarm",
             Severity.WARNING,
         ),
     }

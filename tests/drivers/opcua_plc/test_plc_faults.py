@@ -53,7 +53,7 @@ def test_a_loss_during_a_job(
     plc.take_control()
     plc.run_job(1)
     assert sum(" lost: " in record.message for record in caplog.records) == 1
-    assert sum(" back after " in record.message for record in caplog.records) == 1
+    assert sum(" restored after " in record.message for record in caplog.records) == 1
 
 
 def test_outputs_and_job_end_with_the_life_sign(fake: FakeProcess) -> None:

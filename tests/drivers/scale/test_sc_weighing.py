@@ -153,7 +153,7 @@ def test_weighing_is_refused_after_a_restart_lost_the_tare(fake: FakeProcess, sc
     scale.weigh()
     scale.tare()
     fake.control.do("power_cycle")
-    with pytest.raises(Refused, match="has lost its tare"):
+    with pytest.raises(Refused, match="tare of the scale was lost"):
         scale.weigh()
     assert (scale.health, [alarm.code for alarm in scale.alarms()]) == (Health.CHECK_FUNCTION, ["tare_lost"])
     with pytest.raises(NotFound):

@@ -219,7 +219,7 @@ def test_a_loss_and_the_recovery_are_logged_once(robot: UR5e, fake: FakeUr, capl
     wait(lambda: robot.connection is Connection.BACK)
     told = [record.message for record in caplog.records if record.name.endswith("observing")]
     assert len([text for text in told if " lost: " in text]) == 1
-    assert len([text for text in told if " back after " in text]) == 1
+    assert len([text for text in told if " restored after " in text]) == 1
 
 
 def test_no_sample_is_missed_and_little_cpu_time_is_needed(fake: FakeUr, robot: UR5e) -> None:
