@@ -217,7 +217,11 @@ def test_a_test_that_takes_too_long_is_stopped(
     [
         (101, "board lost during the test; put the board in, then clear", Health.CHECK_FUNCTION),
         (102, "door opened during the test; close the door, then clear", Health.CHECK_FUNCTION),
-        (103, "no contact to the board; clean the pins, check the position of the board, then clear", Health.MAINTENANCE_REQUIRED),
+        (
+            103,
+            "no contact to the board; clean the pins, check the position of the board, then clear",
+            Health.MAINTENANCE_REQUIRED,
+        ),
         (104, "supply overload; take the board out, then clear", Health.OFF_SPEC),
         (105, "host lost; check the network, then clear", Health.CHECK_FUNCTION),
         (106, "emergency stop; release the button, then clear", Health.CHECK_FUNCTION),
