@@ -287,16 +287,16 @@ async def test_frames_and_joints(arm: Server) -> None:
 WRONG: list[tuple[dict[str, Any], str]] = [
     ({"valid_ms": 301}, "valid_ms must be 0 to 300"),
     ({"valid_ms": -1}, "valid_ms must be 0 to 300"),
-    ({"linear": None}, "either linear and angular velocity"),
-    ({"joints": [{"name": "j0", "value": 1.0}]}, "either linear and angular velocity"),
+    ({"linear": None}, "either joint velocities"),
+    ({"joints": [{"name": "j0", "value": 1.0}]}, "either joint velocities"),
     ({"frame": "user"}, "either an object or a pose"),
     ({"frame": "user", "object_id": "obj_nobody"}, "obj_nobody"),
-    ({"object_id": TABLE}, "belongs to the frame user"),
+    ({"object_id": TABLE}, "only allowed with the frame user"),
     ({"arm_id": "left"}, "has one arm"),
     ({"robot_id": TABLE}, "table is not a robot"),
     ({"end_effector_id": "claw"}, "no end effector 'claw'"),
     ({"linear": None, "joints": [{"name": "j9", "value": 1.0}]}, "no joint j9"),
-    ({"linear": None, "joints": [{"name": "j0", "value": 1.0}] * 2}, "named twice"),
+    ({"linear": None, "joints": [{"name": "j0", "value": 1.0}] * 2}, "given twice"),
 ]
 
 

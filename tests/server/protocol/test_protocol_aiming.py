@@ -118,7 +118,7 @@ async def test_an_object_is_aimed_by_its_focus_points(tmp_path: Path) -> None:
         assert "not aiming" in await refused(alice, "ObjectAimingAddPoint", point_idx=0)
         bob.take()
         await alice.ask("ObjectAimingStart", **start)
-        assert "aiming already" in await refused(alice, "ObjectAimingStart", **start)
+        assert "already aiming" in await refused(alice, "ObjectAimingStart", **start)
         assert "not aiming" in await refused(bob, "ObjectAimingAddPoint", point_idx=0)
         for wrong in (-1, 4):
             assert "does not exist" in await refused(alice, "ObjectAimingAddPoint", point_idx=wrong)

@@ -178,7 +178,7 @@ async def test_client_pictures_are_calibrated_by_the_service(tmp_path: Path, req
         assert parameters.fy == 610
         assert image == b"\xff\xd8\x00picture"
         # What the original never answered: a picture that is none.
-        assert "no picture" in await refused(stranger, request_name, **args | {"image": "€"})
+        assert "not a picture" in await refused(stranger, request_name, **args | {"image": "€"})
         assert "empty" in await refused(stranger, request_name, **args | {"image": ""})
         assert len(service.asked) == 1
         service.refusal = NotFound("No marker is seen.")

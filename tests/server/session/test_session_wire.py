@@ -61,7 +61,7 @@ async def test_acknowledged_edits_survive_a_kill_of_the_server(tmp_path: Path) -
         state = await owner.next_event()
         assert (state.event, state.data.state) == ("SceneState", "stopped")
         # Locks are not restored, unsaved changes are.
-        with pytest.raises(RequestFailed, match="not saved"):
+        with pytest.raises(RequestFailed, match="unsaved changes"):
             await owner.call("CloseProject", CloseProjectArgs())
         await owner.call("SaveProject")
         await owner.call("CloseProject", CloseProjectArgs())

@@ -37,7 +37,7 @@ async def test_breakpoints_are_shared_and_announced(alice: Person, bob: Person, 
     assert work.session.revision == revision
     with pytest.raises(Refused, match="act_none"):
         await alice.ask("SetBreakpoints", add=["act_none"])
-    with pytest.raises(Refused, match="at once"):
+    with pytest.raises(Refused, match="by one request"):
         await alice.ask("SetBreakpoints", add=[action], remove=[action])
     with pytest.raises(Refused, match="RegisterUser"):
         await stranger.ask("SetBreakpoints", remove=[action])

@@ -60,7 +60,7 @@ async def test_invalid_view_states_are_refused(
         await stranger.ask("SetViewState", scope="user", values={"a": 1})
     with pytest.raises(Refused, match="RegisterUser"):
         await view(stranger)
-    with pytest.raises(Refused, match="nobody's"):
+    with pytest.raises(Refused, match="shared view state"):
         await view(alice, "shared", user="alice")
     with pytest.raises(Refused, match="scope"):
         await view(alice, "everybody")
