@@ -12,8 +12,8 @@ from arcor2_server.settings import ServerSettings
 @pytest.fixture(autouse=True)
 def machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine with two addresses on networks, whose own name leads to itself, too."""
-    monkeypatch.setattr(module, "_way_out", lambda: "192.0.2.7")
-    monkeypatch.setattr(module, "_of_name", lambda: ["127.0.1.1", "192.0.2.7", "198.51.100.4"])
+    monkeypatch.setattr(module, "_outgoing_address", lambda: "192.0.2.7")
+    monkeypatch.setattr(module, "_addresses_of_host_name", lambda: ["127.0.1.1", "192.0.2.7", "198.51.100.4"])
 
 
 @pytest.mark.parametrize(
@@ -40,6 +40,6 @@ def test_invitations_use_the_port_of_the_request(tmp_path: Path) -> None:
 
 
 def test_without_a_network_there_is_no_invitation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_way_out", str)
-    monkeypatch.setattr(module, "_of_name", list)
+    monkeypatch.setattr(module, "_outgoing_address", str)
+    monkeypatch.setattr(module, "_addresses_of_host_name", list)
     assert server_addresses(ServerSettings(data_dir=tmp_path, host="0.0.0.0"), 1).addresses == []

@@ -30,11 +30,12 @@ def tree() -> Tree:
     return Tree()
 
 
+async def is_stored(item: str) -> bool:
+    return item == "scn_stored"
+
+
 @pytest.fixture
 def locks(tree: Tree) -> Locks:
-    async def is_stored(item: str) -> bool:
-        return item == "scn_stored"
-
     return Locks(tree, is_stored, retries=3, retry_wait=0.05)
 
 
@@ -514,8 +515,10 @@ async def test_a_tree_lock_that_a_request_holds_is_announced_when_its_client_ask
 
 
 async def test_without_a_document_only_fixed_and_stored_ids_can_be_locked() -> None:
-    locks = Locks(retries=1, retry_wait=0.01)
-    with pytest.raises(NotFound, match="'box' is not known"):
+    empty = Tree()
+    empty.parents.clear()
+    locks = Locks(empty, is_stored, retries=1, retry_wait=0.01)
+    with pytest.raises(NotFound, match="box unknown"):
         await locks.write_lock("ann", "box")
     assert await locks.write_lock("ann", "SCENE", tree=True) == ["SCENE"]
     assert not locks.holds("ann", "box")
