@@ -23,10 +23,10 @@ from arcor2_hw.data.project import (
     ProjectLogicIf,
 )
 from arcor2_hw.data.scene import Scene, SceneObject
-from arcor2_server.build.candidates import Candidates
+from arcor2_server.build.combined_types import CombinedTypes
 from arcor2_server.build.reading import from_script
 from arcor2_server.build.script import from_logic
-from arcor2_server.build.service import BuildService, Ingredients
+from arcor2_server.build.service import BuildInput, BuildService
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
@@ -101,7 +101,7 @@ async def build(report: Report) -> None:
             for size in SIZES:
                 await storage.put_project(project(size))
             await service.build(f"pro_{SIZES[0]}", "warm")
-            reading = [_read_back(await service.gather("pro_1000"), types) for _ in range(ROUNDS)]
+            reading = [_read_back(await service.collect("pro_1000"), types) for _ in range(ROUNDS)]
             for _ in range(ROUNDS):
                 for size in SIZES:
                     begin = time.perf_counter()
@@ -116,9 +116,9 @@ async def build(report: Report) -> None:
     report.add(Metric("read_script_1000_ms", median(reading), ROUNDS))
 
 
-def _read_back(source_of: Ingredients, types: ObjectTypes) -> float:
+def _read_back(source_of: BuildInput, types: ObjectTypes) -> float:
     """Return the time to convert a generated script back to its project, ms."""
-    facts = Candidates(types.files(), {}).facts(source_of.scene)
+    facts = CombinedTypes(types.files(), {}).facts(source_of.scene)
     source = from_logic(source_of.scene, source_of.project, facts)
     begin = time.perf_counter()
     back = from_script(source, source_of.scene, source_of.project, facts)

@@ -1,1 +1,1 @@
-"""The Build service: turns a project into a Python program, and the program into a package."""
+"""Builds projects into execution packages with a Python script, and imports packages."""

@@ -1,4 +1,4 @@
-"""The logic of a project as statements of a script's loop."""
+"""Converts the logic of a project to the statements of the script's loop."""
 
 import ast
 
@@ -8,7 +8,7 @@ from arcor2_hw.data.object_type import ParameterMeta
 from arcor2_hw.data.project import ActionParameter, ActionParameterType, parse_link
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, InvalidProject
 from arcor2_server.build import expressions
-from arcor2_server.build.frame import NOTE, REFERENCES, Frame, References
+from arcor2_server.build.frame import NEXT_ACTION, REFERENCES, Frame, References
 from arcor2_server.build.layout import arrange
 from arcor2_server.documents.logic_graph import BRANCHABLE, END_NODE, Condition, Flow
 
@@ -17,7 +17,7 @@ Stack = list[tuple[int, Block]]
 
 
 class Cycle:
-    """The statements of the logic."""
+    """One cycle of the logic, which the script repeats. Actions are numbered in the order of `flow`."""
 
     def __init__(self, frame: Frame, flow: Flow) -> None:
         self.frame, self.flow = frame, flow
@@ -30,14 +30,15 @@ class Cycle:
                     "two actions are named {name!r}: a program could not tell them apart", name=action.name
                 )
             names.add(action.name)
-        self.declared = [frame.declared(action) for action in flow.actions]
+        self.calls = [frame.resolve(action) for action in flow.actions]
         self.results = [self._name_results(number) for number in range(len(flow.actions))]
+        """The variables for the results of each action."""
 
     def _name_results(self, number: int) -> list[str]:
-        action, returns = self.flow.actions[number], self.declared[number][3].returns
+        action, returns = self.flow.actions[number], self.calls[number].meta.returns
         outputs = action.outputs()
         if outputs and len(outputs) != len(returns):
-            method = self.declared[number][2]
+            method = self.calls[number].method
             raise InvalidProject(
                 "action {name!r} names {count} results, but {method} gives {other_count}",
                 name=action.name,
@@ -56,7 +57,7 @@ class Cycle:
             node, block = stack.pop()
             placed = self.layout.placed[node]
             if placed.guarded:
-                guard = ast.If(expressions.equals(NOTE, self.flow.actions[node].name), [], [])
+                guard = ast.If(expressions.equals(NEXT_ACTION, self.flow.actions[node].name), [], [])
                 block.append(guard)
                 block = guard.body
             block.append(self._call(node))
@@ -65,26 +66,27 @@ class Cycle:
                 stack.append((placed.last, block))
             edges = self.flow.edges[node]
             if len(edges) == 1:
-                self._go(node, edges[0].target, block, stack, placed.follow)
+                self._continue_at(node, edges[0].target, block, stack, placed.follow)
             else:
                 self._branch(node, block, stack)
         return body
 
-    def _go(self, node: int, target: int, block: Block, stack: Stack, follow: int) -> None:
-        """Write how the program gets from the end of a block to `target`, when the text goes on with `follow`."""
+    def _continue_at(self, node: int, target: int, block: Block, stack: Stack, follow: int) -> None:
+        """Let the program continue at `target` after a block, if `follow` is the next action in the text."""
         if target == END_NODE:
             if follow != END_NODE:
                 block.append(ast.Continue())
         elif not self.layout.is_join[target]:
             stack.append((target, block))
-        elif self.layout.needs_note(node, target):
-            block.append(expressions.assign(NOTE, ast.Constant(self.flow.actions[target].name)))
+        elif self.layout.sets_next_action(node, target):
+            block.append(expressions.assign(NEXT_ACTION, ast.Constant(self.flow.actions[target].name)))
 
     def _branch(self, node: int, block: Block, stack: Stack) -> None:
+        """Write the edges of an action as branches of an `if` statement."""
         placed = self.layout.placed[node]
         targets = {edge.target for edge in self.flow.edges[node]}
         if len(targets) == 1:
-            self._go(node, targets.pop(), block, stack, placed.follow)
+            self._continue_at(node, targets.pop(), block, stack, placed.follow)
             return
         follow = placed.follow if placed.last == END_NODE else placed.last
         branches: list[tuple[Condition | None, Block, bool]] = []
@@ -92,16 +94,15 @@ class Cycle:
             inside: Block = []
             waiting = len(stack)
             if edge.target == END_NODE or edge.target != placed.last:
-                self._go(node, edge.target, inside, stack, follow)
+                self._continue_at(node, edge.target, inside, stack, follow)
             branches.append((edge.condition, inside, bool(inside) or len(stack) > waiting))
         while branches and not branches[-1][2]:
-            # Whatever the last branches would do is what the text says next anyway.
-            branches.pop()
+            branches.pop()  # an empty last branch continues with the next statement anyway
         if not branches:
             return
         if len(self.flow.edges[node]) == 2 and not branches[0][2]:
             (first, _, _), (condition, inside, _) = branches
-            # A way without a condition is taken when the other one's does not hold.
+            # An edge without a condition is followed if the condition of the other edge does not hold.
             test = self._test(node, condition) if condition else self._test(node, first, negated=True)
             block.append(ast.If(test, inside, []))
             return
@@ -121,31 +122,33 @@ class Cycle:
 
     # ------------------------------------------------------------------------------------------------ expressions
     def _result(self, node: int, source: int, output: int, kind: str) -> str:
-        """Return the variable that holds a result of action number `source` where number `node` uses it."""
-        user, giver = self.flow.actions[node], self.flow.actions[source]
-        names, returns = self.results[source], self.declared[source][3].returns
+        """Return the variable with a result of action number `source` that action number `node` uses."""
+        consumer, producer = self.flow.actions[node], self.flow.actions[source]
+        names, returns = self.results[source], self.calls[source].meta.returns
         if output >= len(names):
             raise InvalidProject(
-                "action {name!r} uses a result that {giver_name!r} does not name", name=user.name, giver_name=giver.name
+                "action {name!r} uses a result that {producer_name!r} does not name",
+                name=consumer.name,
+                producer_name=producer.name,
             )
         if returns[output] != kind:
-            name = giver.outputs()[output]
+            name = producer.outputs()[output]
             raise InvalidProject(
-                "action {name!r} needs {type}, but {other_name} of {giver_name!r} is {return_value}",
-                name=user.name,
+                "action {name!r} needs {type}, but {other_name} of {producer_name!r} is {return_value}",
+                name=consumer.name,
                 type=kind,
                 other_name=name,
-                giver_name=giver.name,
+                producer_name=producer.name,
                 return_value=returns[output],
             )
         return names[output]
 
     def _test(self, node: int, condition: Condition | None, *, negated: bool = False) -> ast.expr:
-        assert condition is not None, "only the last of several ways on is without a condition"
+        assert condition is not None, "only the last of several edges has no condition"
         source = condition.action
         if not self.natural.always_before(source, node):
             raise self._too_early(node, source)
-        user, returns = self.flow.actions[node].name, self.declared[source][3].returns
+        user, returns = self.flow.actions[node].name, self.calls[source].meta.returns
         kind = returns[condition.output] if condition.output < len(returns) else ""
         if kind not in BRANCHABLE:
             name = self.flow.actions[source].outputs()[condition.output]
@@ -169,20 +172,22 @@ class Cycle:
         return (expressions.differs if negated else expressions.equals)(variable, condition.value)
 
     def _too_early(self, node: int, source: int) -> InvalidProject:
-        user, giver = self.flow.actions[node].name, self.flow.actions[source].name
+        consumer, producer = self.flow.actions[node].name, self.flow.actions[source].name
         return InvalidProject(
-            "action {user!r} uses a result of {giver!r}, which has not always run before it", user=user, giver=giver
+            "action {consumer!r} uses a result of {producer!r}, which has not always run before it",
+            consumer=consumer,
+            producer=producer,
         )
 
     def _linked(self, node: int, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
         action_id, flow, output = parse_link(read_reference(parameter))
         source = self.numbers.get(action_id)
         if source is None or flow != "default":
-            _, giver = self.frame.index.action(action_id)
+            _, producer = self.frame.index.action(action_id)
             raise InvalidData(
-                "parameter {name}: {giver_name!r} never runs, so it has no result",
+                "parameter {name}: {producer_name!r} never runs, so it has no result",
                 name=parameter.name,
-                giver_name=giver.name,
+                producer_name=producer.name,
             )
         if source == node or not self.natural.always_before(source, node):
             raise self._too_early(node, source)
@@ -201,7 +206,7 @@ class Cycle:
         return expressions.name(self.frame.parameters[constant.id])
 
     def _literal(self, node: int, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
-        object_id, type_name, method, _ = self.declared[node]
+        object_id, type_name, method, _ = self.calls[node]
         kind = PARAMETER_TYPES.get(meta.type)
         if kind is None or parameter.type != meta.type:
             raise InvalidData(
@@ -210,15 +215,15 @@ class Cycle:
                 type=meta.type,
                 parameter_type=parameter.type,
             )
-        if meta.type not in REFERENCES:  # those are looked up by name below
+        if meta.type not in REFERENCES:  # `expression` looks up references
             kind.check(parameter, meta)
         enumerations = self.frame.types[type_name].enumerations
         return kind.expression(parameter, References(self.frame, object_id, enumerations, method))
 
     def _arguments(self, node: int) -> tuple[list[ast.expr], list[ast.keyword]]:
-        """Return positional arguments, and keyword arguments where required or after a default value."""
-        action, (_, type_name, method, declared) = self.flow.actions[node], self.declared[node]
-        by_name = self.frame.types[type_name].keyword_only
+        """Return positional arguments, and keyword arguments if required or after a default value."""
+        action, (_, type_name, method, declared) = self.flow.actions[node], self.calls[node]
+        keyword_only = self.frame.types[type_name].keyword_only
         given = {parameter.name: parameter for parameter in action.parameters}
         positional: list[ast.expr] = []
         keywords: list[ast.keyword] = []
@@ -239,7 +244,7 @@ class Cycle:
                     value = self._constant(parameter, meta)
                 case _:
                     value = self._literal(node, parameter, meta)
-            if gap or (method, meta.name) in by_name:
+            if gap or (method, meta.name) in keyword_only:
                 keywords.append(ast.keyword(meta.name, value))
             else:
                 positional.append(value)
@@ -255,7 +260,7 @@ class Cycle:
     def _call(self, node: int) -> ast.stmt:
         """Return the statement that runs an action and stores its results."""
         action = self.flow.actions[node]
-        object_id, _, method, _ = self.declared[node]
+        object_id, _, method, _ = self.calls[node]
         try:
             positional, keywords = self._arguments(node)
         except InvalidProject:

@@ -1,4 +1,4 @@
-"""The kinds of expression that a generated script consists of. They are shared and never modified."""
+"""Syntax tree nodes of generated scripts. Nodes are cached and shared: never modify them."""
 
 import ast
 from functools import lru_cache
@@ -10,12 +10,12 @@ _STORE: Final = ast.Store()
 
 @lru_cache(maxsize=1024)
 def name(name: str) -> ast.Name:
-    """Return a variable."""
+    """Return a variable that is read."""
     return ast.Name(name, _LOAD)
 
 
 def target(name: str) -> ast.Name:
-    """Return a variable that is assigned to."""
+    """Return a variable that is assigned."""
     return ast.Name(name, _STORE)
 
 

@@ -1,10 +1,10 @@
-"""The frame of a generated script around the logic: imports, objects, project parameters, entry point and names."""
+"""The parts of a generated script around the logic: imports, objects, project parameters, entry point and names."""
 
 import ast
 import builtins
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 from arcor2_hw.actions.parameter_types import PARAMETER_TYPES
 from arcor2_hw.analysis import Enumeration
@@ -20,19 +20,33 @@ from arcor2_server.build.naming import Names
 from arcor2_server.build.points import PointNames, names_of
 from arcor2_server.build.style import Writer
 
-NOTE: Final = "next_action"
-"""Variable that stores where a program continues after a join that it skips."""
+NEXT_ACTION: Final = "next_action"
+"""Variable with the name of the action that runs next, if that is not the next one in the text (see layout.py)."""
 REFERENCES: Final = frozenset({"pose", "position", "joints"})
-"""Parameter types whose value is an id of something in the project."""
-_FIXED: Final = ("ActionPoints", "Resources", "aps", "error", "main", "print_exception", "res", NOTE)
+"""Parameter types whose value is an id in the project."""
+_RESERVED: Final = ("ActionPoints", "Resources", "aps", "error", "main", "print_exception", "res", NEXT_ACTION)
+_FRAME: Final = """
+def main(res: Resources) -> None:
+    aps = ActionPoints(res)
+
+if __name__ == "__main__":
+    try:
+        with Resources() as res:
+            main(res)
+    except Exception as error:
+        print_exception(error)
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class TypeFacts:
-    """What a script needs of one object type.
+    """What a script needs to know about an object type.
 
-    enumerations: by action and parameter, with the module from which the script imports them.
-    keyword_only: parameters that a call has to give by name, by action and parameter.
+    Args:
+        module: the module from which the script imports the type.
+        actions: its actions by name.
+        enumerations: parameter types of its actions, by action and parameter, with the module that defines them.
+        keyword_only: keyword-only parameters, by action and parameter.
     """
 
     module: str
@@ -41,18 +55,27 @@ class TypeFacts:
     keyword_only: frozenset[tuple[str, str]] = frozenset()
 
 
+class ActionCall(NamedTuple):
+    """The method call of an action."""
+
+    object_id: str
+    type_name: str
+    method: str
+    meta: ObjectAction
+
+
 class Frame:
-    """The names of one script, and all of it but its loop."""
+    """The names of one script, and all of its code except the loop."""
 
     def __init__(self, scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> None:
         self.scene, self.project, self.types = scene, project, types
         self.index = ProjectIndex(scene, project)
         self.points: PointNames = names_of(project)
-        self.names = Names([*dir(builtins), *_FIXED])
+        self.names = Names([*dir(builtins), *_RESERVED])
         self.objects = {obj.id: self.names.claim(obj.name) for obj in scene.objects}
         self.imports: dict[tuple[str, str], str] = {}
         self.classes = {obj.id: self.imported(self._facts(obj.type).module, obj.type) for obj in scene.objects}
-        self.parameters = {one.id: self.names.claim(one.name) for one in project.parameters}
+        self.parameters = {parameter.id: self.names.claim(parameter.name) for parameter in project.parameters}
         self.comments: dict[ast.stmt, str] = {}
 
     def _facts(self, type_name: str) -> TypeFacts:
@@ -62,7 +85,7 @@ class Frame:
             raise NotFound("object type {type_name} is not known", type_name=type_name) from None
 
     def imported(self, module: str, name: str) -> str:
-        """Return the name under which the script knows a class, imported where it is used first."""
+        """Import a class if it is not imported yet; return its name in the script."""
         key = (module, name)
         if key not in self.imports:
             self.imports[key] = self.names.claim(name, f"{name}Type")
@@ -70,62 +93,37 @@ class Frame:
 
     # ------------------------------------------------------------------------------------------------ module
     def module(self, loop: list[ast.stmt]) -> str:
-        """Return the text of the script with `loop` as its cycle; without one there is just the place for it."""
-        body: list[ast.stmt] = [
-            expressions.assign("aps", ast.Call(expressions.name("ActionPoints"), [expressions.name("res")], []))
-        ]
-        objects: list[ast.stmt] = [
-            ast.AnnAssign(
-                ast.Name(self.objects[obj.id], ast.Store()),
-                expressions.name(self.classes[obj.id]),
-                ast.Subscript(expressions.dotted("res", ("objects",)), ast.Constant(obj.id), ast.Load()),
-                simple=1,
-            )
+        """Return the source code of the script, with `loop` after the objects and project parameters."""
+        main, entry = ast.parse(_FRAME).body
+        assert isinstance(main, ast.FunctionDef)
+        objects = [
+            statement
             for obj in self.scene.objects
+            for statement in ast.parse(f"{self.objects[obj.id]}: {self.classes[obj.id]} = res.objects[{obj.id!r}]").body
         ]
         constants: list[ast.stmt] = [
-            expressions.assign(self.parameters[one.id], self._constant(one)) for one in self.project.parameters
+            expressions.assign(self.parameters[parameter.id], self._constant(parameter))
+            for parameter in self.project.parameters
         ]
         for part, title in ((objects, "Objects of the scene"), (constants, "Project parameters")):
             if part:
                 self.comments[part[0]] = title
-                body += part
-        body += loop
-        main = ast.FunctionDef(
-            "main",
-            ast.arguments([], [ast.arg("res", expressions.name("Resources"))], None, [], [], None, []),
-            body,
-            [],
-            ast.Constant(None),
-            lineno=0,
-        )
-        run: list[ast.stmt] = [
-            ast.With(
-                [ast.withitem(ast.Call(expressions.name("Resources"), [], []), ast.Name("res", ast.Store()))],
-                [ast.Expr(ast.Call(expressions.name("main"), [expressions.name("res")], []))],
-                lineno=0,
-            )
-        ]
-        tell = ast.Expr(ast.Call(expressions.name("print_exception"), [expressions.name("error")], []))
-        entry = ast.If(
-            ast.Compare(expressions.name("__name__"), [ast.Eq()], [ast.Constant("__main__")]),
-            [ast.Try(run, [ast.ExceptHandler(expressions.name("Exception"), "error", [tell])], [], [])],
-            [],
-        )
+                main.body += part
+        main.body += loop
         heading = ast.Expr(ast.Constant(f"Main script of the project {self.project.name}."))
         return Writer(self.comments).module(ast.Module([heading, *self._imports(), main, entry], []))
 
     def _imports(self) -> list[ast.stmt]:
-        wanted: dict[str, list[ast.alias]] = {
+        imports: dict[str, list[ast.alias]] = {
             "action_points": [ast.alias("ActionPoints")],
             "arcor2_hw.runtime.exceptions": [ast.alias("print_exception")],
             "arcor2_hw.runtime.resources": [ast.alias("Resources")],
         }
-        for (module, name), known_as in self.imports.items():
-            wanted.setdefault(module, []).append(ast.alias(name, None if known_as == name else known_as))
+        for (module, name), as_name in self.imports.items():
+            imports.setdefault(module, []).append(ast.alias(name, None if as_name == name else as_name))
         return [
             ast.ImportFrom(module, sorted(aliases, key=lambda alias: alias.name), 0)
-            for module, aliases in sorted(wanted.items())
+            for module, aliases in sorted(imports.items())
         ]
 
     def _constant(self, parameter: Parameter) -> ast.expr:
@@ -140,10 +138,12 @@ class Frame:
             raise InvalidProject("project {reason}", reason=error) from error
 
     # ------------------------------------------------------------------------------------------------ actions
-    def declared(self, action: Action) -> tuple[str, str, str, ObjectAction]:
-        """Return object id, type, method and metadata of an action.
+    def resolve(self, action: Action) -> ActionCall:
+        """Return the method call of an action.
 
-        Raise InvalidProject or NotFound if that is impossible.
+        Raises:
+            InvalidProject: the action cannot be called.
+            NotFound: the object type is unknown.
         """
         try:
             object_id, method = action.parse_type()
@@ -164,11 +164,11 @@ class Frame:
                 method=method,
                 reason=why,
             )
-        return object_id, obj.type, method, found
+        return ActionCall(object_id, obj.type, method, found)
 
 
 class References:
-    """The names of things that the parameters of one action refer to (`ScriptNames` of the parameter types)."""
+    """Expressions for what the parameters of an action refer to (`ScriptNames` of the parameter types)."""
 
     def __init__(
         self, frame: Frame, object_id: str, enumerations: Mapping[tuple[str, str], Enumeration], method: str
@@ -179,28 +179,28 @@ class References:
         self._method = method
 
     @staticmethod
-    def _below(what: str, known: Mapping[str, tuple[str, ...]], wanted: str) -> ast.expr:
-        if wanted not in known:
+    def _point_attribute(what: str, names: Mapping[str, tuple[str, ...]], wanted: str) -> ast.expr:
+        if wanted not in names:
             raise NotFound("the project has no {what} {wanted}", what=what, wanted=wanted)
-        return expressions.dotted("aps", known[wanted])
+        return expressions.dotted("aps", names[wanted])
 
     def pose(self, orientation_id: str) -> ast.expr:
         """Return the expression for the pose of an action point with this orientation."""
-        return self._below("orientation", self._frame.points.poses, orientation_id)
+        return self._point_attribute("orientation", self._frame.points.poses, orientation_id)
 
     def position(self, action_point_id: str) -> ast.expr:
         """Return the expression for the position of an action point."""
-        return self._below("action point", self._frame.points.positions, action_point_id)
+        return self._point_attribute("action point", self._frame.points.positions, action_point_id)
 
     def joints(self, joints_id: str) -> ast.expr:
         """Return the expression for joints of an action point."""
         _, joints = self._frame.index.joints(joints_id)
         if joints.robot_id != self._object_id:
             raise InvalidData("joints {name} belong to another robot", name=joints.name)
-        return self._below("joints", self._frame.points.joints, joints_id)
+        return self._point_attribute("joints", self._frame.points.joints, joints_id)
 
     def enum_member(self, parameter: Parameter, value: str | int) -> ast.expr:
-        """Return the expression for the member with `value` of the enumeration that `parameter` takes."""
+        """Return the expression for the member with `value` of the enumeration of `parameter`."""
         kind = self._enumerations.get((self._method, parameter.name))
         if kind is None or value not in kind.members:
             raise InvalidData(

@@ -1,4 +1,4 @@
-"""Reads the files of a package that is imported."""
+"""Reads the files of a package to be imported."""
 
 import ast
 from collections.abc import Iterable, Mapping
@@ -25,10 +25,15 @@ _Kind = Literal["type", "installed", "helper"]
 
 
 class Imported(Data, frozen=True):
-    """The content of a package as documents, checked as far as a package can be by itself.
+    """The documents of a package, checked without the documents of the server.
 
-    types: uploaded types and helpers, by name. installed: types whose driver the package carries a copy of.
-    helpers: those of `types` that have no class of their name.
+    Args:
+        scene: the scene.
+        project: the project.
+        script: source code of the script.
+        types: uploaded types and helper modules, by name.
+        installed: types of drivers. The package has a copy of their folders.
+        helpers: the names in `types` that are helper modules without a class of their name.
     """
 
     scene: Scene
@@ -40,7 +45,7 @@ class Imported(Data, frozen=True):
 
     @property
     def needs_source(self) -> bool:
-        """Return whether the script is the program itself, not made from the logic."""
+        """Whether the script is hand-written, not generated from the logic."""
         return not self.project.has_logic
 
 
@@ -77,7 +82,7 @@ def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
 
 def _text(files: Mapping[str, bytes], path: str) -> str:
     try:
-        return files[path].decode("utf-8-sig")  # some editors put a mark in front
+        return files[path].decode("utf-8-sig")  # some editors write a byte order mark
     except KeyError:
         raise InvalidPackage("The package has no {path}.", path=path) from None
     except UnicodeDecodeError as error:
@@ -85,9 +90,11 @@ def _text(files: Mapping[str, bytes], path: str) -> str:
 
 
 def _class_in(path: str, source: str) -> tuple[str, _Kind]:
-    """Return the name of the type in a module; "installed" if the module only imports it from a copied driver.
+    """Return the name of a module's type and the kind of the module.
 
-    A module that has no class of its name is a helper of others.
+    Returns:
+        "type" if the module defines a class of its name, "installed" if it imports the class from a copied driver,
+        "helper" if it has no such class.
     """
     stem = PurePosixPath(path).stem
     try:
@@ -108,7 +115,12 @@ def _class_in(path: str, source: str) -> tuple[str, _Kind]:
 
 
 def read(data: Path | bytes) -> Imported:
-    """Read a package. Raise InvalidPackage or StorageError if that is impossible."""
+    """Read a package from a zip file or its content.
+
+    Raises:
+        InvalidPackage: the package is damaged or contradictory.
+        StorageError: the file cannot be read.
+    """
     files = package.from_zip(data, _wanted)
     scene = _document(files, "data/scene.json", Scene)
     project = _document(files, "data/project.json", Project)
@@ -134,9 +146,9 @@ def read(data: Path | bytes) -> Imported:
     for path in files:
         if path.startswith("data/models/") and PurePosixPath(path).stem not in modules:
             raise InvalidPackage("{path} of the package belongs to none of its object types.", path=path)
-    given = Imported(scene, project, source, types, installed, helpers)
-    extra = project.project_objects_ids
-    return given if isinstance(extra, Unset) else with_helpers_named(given, extra)
+    content = Imported(scene, project, source, types, installed, helpers)
+    names = project.project_objects_ids
+    return content if isinstance(names, Unset) else with_helper_names(content, names)
 
 
 def _model(files: Mapping[str, bytes], name: str) -> ObjectModel | Unset:
@@ -153,10 +165,10 @@ def _model(files: Mapping[str, bytes], name: str) -> ObjectModel | Unset:
     return model
 
 
-def with_helpers_named(given: Imported, known: Iterable[str]) -> Imported:
-    """Return the package with helpers under their known names, since a file has only the name of its module."""
+def with_helper_names(content: Imported, known: Iterable[str]) -> Imported:
+    """Rename helpers from their module names to the known names. The files have only module names."""
     modules = {module_name(name): name for name in known}
-    names = {name: modules.get(name, name) for name in given.helpers}
-    types = {names.get(name, name): one for name, one in given.types.items()}
-    types = {name: msgspec.structs.replace(one, id=name) for name, one in types.items()}
-    return msgspec.structs.replace(given, types=types, helpers=list(names.values()))
+    names = {name: modules.get(name, name) for name in content.helpers}
+    types = {names.get(name, name): source for name, source in content.types.items()}
+    types = {name: msgspec.structs.replace(source, id=name) for name, source in types.items()}
+    return msgspec.structs.replace(content, types=types, helpers=list(names.values()))

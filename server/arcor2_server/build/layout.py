@@ -1,15 +1,15 @@
-"""Where each action stands in the text: a graph without loops as nested blocks, each action once, in linear time.
+"""Arranges an acyclic graph of actions as nested blocks of code in linear time. Each action occurs once.
 
-An action that one edge leads to stands right behind that edge. One that several lead to (a join) stands once, behind
-the branching of its immediate dominator: the last action that every way to it passes. So placed, what a block ends with
-most often leads to what the text says next, and nothing need be written. Where a way on passes by other joins, the
-program notes the action it goes to, and the joins that may be passed by are guarded: they run only if the note names
-them.
+An action with one incoming edge follows that edge directly. An action with several incoming edges (a join) follows the
+branches of its immediate dominator, the last action on all paths to it. In most cases a block then ends right before
+the action that runs next, and no jump is needed. Where a path skips other joins, the program stores the name of the
+action it continues with in a variable (`frame.NEXT_ACTION`). Joins that may be skipped are guarded: they run only if
+the variable contains their name.
 
-Placement by the dominator tree: N. Ramsey, Beyond Relooper (ICFP 2022), section 4; Python has no labelled block to
-leave, hence the guards. Dominators of a graph in topological order are the nearest common ancestors of all predecessors
-(K. D. Cooper, T. J. Harvey, K. Kennedy, A Simple, Fast Dominance Algorithm, 2001), found here by jump pointers in
-logarithmic time (E. W. Myers, An applicative random-access stack, 1983).
+The placement by the dominator tree is from N. Ramsey, Beyond Relooper (ICFP 2022), section 4. The guards replace
+leaving a labelled block, which Python does not have. The dominator of a node, in topological order, is the nearest
+common ancestor of all its predecessors (K. D. Cooper, T. J. Harvey, K. Kennedy, A Simple, Fast Dominance Algorithm,
+2001). It is found by jump pointers in logarithmic time (E. W. Myers, An applicative random-access stack, 1983).
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -19,12 +19,12 @@ from typing import Final
 from arcor2_server.documents.logic_graph import END_NODE, Edge
 
 MAX_NESTING: Final = 12
-"""Blocks within blocks that the text may have; deeper ones are moved out. Python itself ends at 100 indentations."""
+"""Maximum nesting of blocks; deeper blocks are moved out. Python allows 100 indentation levels."""
 _NOWHERE: Final = -1
 
 
 class Tree:
-    """A tree that grows by leaves and finds the nearest common ancestor of two nodes in logarithmic time."""
+    """A tree to which leaves are added. It finds the nearest common ancestor of two nodes in logarithmic time."""
 
     def __init__(self) -> None:
         self.parents: list[int] = []
@@ -47,7 +47,7 @@ class Tree:
         return node
 
     def common(self, a: int, b: int) -> int:
-        """Return the deepest node that is both, or an ancestor of both."""
+        """Return the nearest common ancestor of two nodes; a node counts as its own ancestor."""
         depths, jumps, parents = self.depths, self._jumps, self.parents
         if depths[a] < depths[b]:
             a, b = b, a
@@ -64,11 +64,13 @@ class Tree:
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """How one action stands in the text.
+    """The position of an action in the code.
 
-    joins: what stands behind it in the same block, in order. last: the one branch that is written behind the others
-    instead of inside an `else`, or -1. follow: the action that the text says next when a branch of this one ends, -1
-    for the end of the cycle. guarded: it runs only if the note names it.
+    Args:
+        joins: the joins after it in the same block, in order.
+        last: the branch that is written after the others instead of in an `else`; -1 if there is none.
+        follow: the next action in the code after a branch of this one; -1 for the end of the cycle.
+        guarded: whether it runs only if the variable contains its name.
     """
 
     joins: tuple[int, ...]
@@ -79,7 +81,13 @@ class Placed:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The whole text. `is_join[n]` tells that n does not stand right behind the edge that leads to it."""
+    """The arrangement of all actions.
+
+    Args:
+        placed: the position of each action.
+        is_join: whether an action does not directly follow the edge to it.
+        nesting: the number of blocks around each action.
+    """
 
     placed: list[Placed]
     is_join: list[bool]
@@ -88,11 +96,11 @@ class Layout:
     _end: list[int]
 
     def always_before(self, earlier: int, later: int) -> bool:
-        """Return whether every path to `later` passes `earlier`. Valid for a layout without moved actions."""
+        """Return whether all paths to `later` contain `earlier`. Valid only for a layout without moved actions."""
         return self._begin[earlier] <= self._begin[later] < self._end[earlier]
 
-    def needs_note(self, source: int, target: int) -> bool:
-        """Return whether the edge from `source` to the join `target` needs a note."""
+    def sets_next_action(self, source: int, target: int) -> bool:
+        """Return whether the edge from `source` to the join `target` stores its name in the variable."""
         return target != self.placed[source].follow or self.placed[target].guarded
 
 
@@ -101,8 +109,8 @@ class _Placing:
         self.edges = edges
         count = len(edges)
         before: list[list[int]] = [[] for _ in edges]
-        for node, ways in enumerate(edges):
-            for edge in ways:
+        for node, outgoing in enumerate(edges):
+            for edge in outgoing:
                 if edge.target != END_NODE:
                     before[edge.target].append(node)
         self.tree = tree = Tree()
@@ -121,7 +129,7 @@ class _Placing:
         self._measure()
 
     def _measure(self) -> None:
-        """Determine the number of branchings of each subtree, and how far up its exits lead."""
+        """Count the branching actions of each subtree, and find the smallest depth that its edges lead to."""
         count = len(self.edges)
         self.branchings = [0] * count
         self.leads_up_to = [count] * count
@@ -139,28 +147,29 @@ class _Placing:
                 self.leads_up_to[parent] = min(self.leads_up_to[parent], up)
 
     def _ends(self, target: int) -> bool:
-        """Return whether every path into a branch ends the cycle, so that none reaches the code after it."""
+        """Return whether all paths of a branch end the cycle, so that none reaches the code after it."""
         if target == END_NODE:
             return True
         return not self.is_join[target] and self.leads_up_to[target] >= self.tree.depths[target]
 
     def _last(self, node: int, follow: int) -> int:
-        """Choose the branch that is better written behind the other, since the other ends the cycle."""
-        ways = self.edges[node]
-        if len(ways) != 2:
+        """Return the branch to write after the other instead of in an `else`, because the other ends the cycle."""
+        outgoing = self.edges[node]
+        if len(outgoing) != 2:
             return _NOWHERE
         candidates = [
             (self.branchings[flat.target], place, flat.target)
-            for place, (flat, other) in enumerate(((ways[0], ways[1]), (ways[1], ways[0])))
+            for place, (flat, other) in enumerate((outgoing, outgoing[::-1]))
             if flat.target != END_NODE and not self.is_join[flat.target] and self._ends(other.target)
         ]
         if not candidates:
             return _NOWHERE
         branchings, _, target = max(candidates)
-        # Two short branches that both end the cycle read best side by side.
+        # Two short branches that both end the cycle are more readable as `if` and `else`.
         return target if branchings or follow != _NOWHERE else _NOWHERE
 
     def layout(self) -> Layout:
+        """Return the arrangement."""
         count = len(self.edges)
         order: list[int] = []
         begin = [0] * count
@@ -191,8 +200,8 @@ class _Placing:
                 parent = self.tree.parents[node]
                 end[parent] = max(end[parent], end[node])
         own = [
-            max((begin[e.target] for e in ways if e.target != END_NODE and self.is_join[e.target]), default=-1)
-            for ways in self.edges
+            max((begin[e.target] for e in outgoing if e.target != END_NODE and self.is_join[e.target]), default=-1)
+            for outgoing in self.edges
         ]
         for node in reversed(order):
             furthest[node] = max(furthest[node], own[node])
@@ -229,7 +238,7 @@ def _too_deep(layout: Layout, edges: Sequence[tuple[Edge, ...]], parents: Sequen
 
 
 def arrange(edges: Sequence[tuple[Edge, ...]]) -> tuple[Layout, Layout]:
-    """Return the layout of a graph, and for `always_before` the one before too deep blocks were moved out."""
+    """Return the layout of a graph, and the layout before deep blocks were moved out, for `always_before`."""
     placing = _Placing(edges, ())
     natural = layout = placing.layout()
     moved: set[int] = set()

@@ -7,15 +7,15 @@ from typing import Final
 
 import humps
 
-_NO_PART_OF_A_NAME: Final = re.compile(r"\W", re.ASCII)
+_INVALID: Final = re.compile(r"\W", re.ASCII)
 
 
 def identifier(text: str) -> str:
-    """Convert text to a Python identifier; valid characters are unchanged.
+    """Convert text to a Python identifier.
 
-    No two leading underscores: inside a class Python would change such a name.
+    It never starts with two underscores, since Python mangles such names in classes.
     """
-    name = _NO_PART_OF_A_NAME.sub("_", text)
+    name = _INVALID.sub("_", text)
     if name.startswith("__"):
         name = f"_{name.lstrip('_')}"
     if not name or name[0].isdigit():
@@ -24,7 +24,7 @@ def identifier(text: str) -> str:
 
 
 def class_name(text: str) -> str:
-    """Return text as the name of a class: `pick_up2` becomes `PickUp2`."""
+    """Convert text to a class name: `pick_up2` becomes `PickUp2`."""
     name = str(humps.pascalize(identifier(text).strip("_"))).replace("_", "")
     return identifier(name[:1].upper() + name[1:]) if name else "Nameless"
 
@@ -37,7 +37,7 @@ class Names:
         self._next: dict[str, int] = {}
 
     def claim(self, text: str, *others: str) -> str:
-        """Take a name close to `text`, or else the first free one of `others`, or else `text` with a number."""
+        """Reserve and return a name: `text`, else the first free one of `others`, else `text` with a number."""
         wanted = identifier(text)
         for name in (wanted, *map(identifier, others)):
             if name not in self._taken:

@@ -1,4 +1,4 @@
-"""A package as files, in a directory or a zip. The same files give the same bytes."""
+"""Reads and writes packages as zip archives and directories. Equal files give equal archives."""
 
 import io
 import os
@@ -16,13 +16,13 @@ from arcor2_server.files import sync_directory
 from arcor2_server.storage.packages import MAX_FILES, inside
 
 Files = Mapping[str, bytes]
-"""Content by path, relative, with slashes."""
+"""Content by relative path with slashes."""
 
 MAX_READ: Final = 64 * 1024 * 1024
-"""Bytes that are read of a package at most, counted while unpacking: a zip may lie about its sizes."""
+"""Maximum total size of the files read from a package, bytes, counted while unpacking: a zip may state false sizes."""
 _CHUNK: Final = 1 << 20
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
-"""The earliest time a zip can hold; a real one would make two zips of the same files differ."""
+"""Time stamp of all entries, the earliest one of the format. Real times would make equal archives differ."""
 _MODE: Final = (stat.S_IFREG | 0o644) << 16
 
 
@@ -34,22 +34,24 @@ def _checked(path: str) -> str:
 
 
 def to_zip(files: Files) -> bytes:
-    """Return the files as a zip, in order of their paths."""
+    """Return the files as a zip archive, sorted by path."""
     with io.BytesIO() as buffer:
         with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
             for path in sorted(files):
                 entry = zipfile.ZipInfo(_checked(path), _EPOCH)
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 entry.external_attr = _MODE
-                entry.create_system = 3  # Unix, on whatever it is made
+                entry.create_system = 3  # Unix, whatever this system is
                 archive.writestr(entry, files[path])
         return buffer.getvalue()
 
 
 def from_zip(data: Path | bytes, wanted: Callable[[PurePosixPath], bool], largest: int = MAX_READ) -> dict[str, bytes]:
-    """Return the wanted files of a zip, at most `largest` bytes in total. All paths are checked.
+    """Return the wanted files of a zip archive, at most `largest` bytes in total. All paths are checked.
 
-    Raise InvalidPackage if it is damaged, too large, leads outside, or has links or duplicate files; StorageError.
+    Raises:
+        InvalidPackage: the archive is damaged or too large, has paths outside of it, links or duplicate files.
+        StorageError: the file cannot be read.
     """
     found: dict[str, bytes] = {}
     left = largest
@@ -84,24 +86,28 @@ def from_zip(data: Path | bytes, wanted: Callable[[PurePosixPath], bool], larges
 
 
 def write(files: Files, directory: Path) -> None:
-    """Write the files as `directory`, atomically and durably.
+    """Write the files to a new directory, atomically and durably.
 
-    Raise StorageError if that is impossible.
+    Raises:
+        StorageError: the directory cannot be written.
     """
     try:
         directory.parent.mkdir(parents=True, exist_ok=True)
-        # On the same file system, for the rename, and with a leading dot, which no package id has.
+        # In the same directory, so that it can be renamed; with a leading dot, which a package id never has.
         temporary = Path(tempfile.mkdtemp(prefix=f".{directory.name}-", dir=directory.parent))
     except OSError as error:
         raise StorageError(
             "packages cannot be written into {parent}: {reason}", parent=directory.parent, reason=error.strerror
         ) from error
     try:
-        # script.py last: a directory is a package by it, even one that a crash left behind.
+        # script.py last: it makes the directory a package, and a crash must not leave an incomplete one.
         for path, content in sorted(files.items(), key=lambda entry: entry[0] == "script.py"):
             file = temporary / _checked(path)
             file.parent.mkdir(parents=True, exist_ok=True)
-            _write(file, content)
+            with file.open("wb") as stream:
+                stream.write(content)
+                stream.flush()
+                os.fsync(stream.fileno())
         temporary.chmod(0o755)
         temporary.rename(directory)
         sync_directory(directory.parent)
@@ -111,10 +117,3 @@ def write(files: Files, directory: Path) -> None:
         ) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-
-
-def _write(file: Path, content: bytes) -> None:
-    with file.open("wb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())

@@ -1,8 +1,7 @@
-"""action_points.py of a package: typed access to the action points of a project by their names.
+"""Generates action_points.py of a package: typed access to the action points of a project by name.
 
-The generated classes ask `Resources` (arcor2_hw.runtime.resources) for `position(action_point_id)`,
-`pose(orientation_id)` and `joints(joints_id)`; each gives a copy of its own, in global coordinates, that knows its
-action point.
+The generated classes call `position(action_point_id)`, `pose(orientation_id)` and `joints(joints_id)` of `Resources`
+(arcor2_hw.runtime.resources). Each call returns a new copy in world coordinates.
 """
 
 from collections.abc import Sequence
@@ -19,7 +18,7 @@ _OWN_FIELD: Final = "_res"
 
 @dataclass(frozen=True, slots=True)
 class PointNames:
-    """How a script reaches what the action points have, by id, as the parts of a dotted name."""
+    """The names of positions, poses and joints in a script, by id, as parts of a dotted name after `aps`."""
 
     positions: dict[str, tuple[str, ...]] = field(default_factory=dict)
     poses: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -27,7 +26,7 @@ class PointNames:
 
 
 def names_of(project: Project) -> PointNames:
-    """Return the names below `aps` of all positions, poses and joints."""
+    """Return the names of all positions, poses and joints of a project."""
     result = PointNames()
     points = Names([_OWN_FIELD])
     for point in project.action_points:
@@ -82,7 +81,7 @@ def _point(point: ActionPoint, names: PointNames, classes: Names) -> tuple[str, 
 
 
 def source(project: Project) -> str:
-    """Return the text of action_points.py."""
+    """Return the source code of action_points.py."""
     names = names_of(project)
     classes = Names(_IMPORTED)
     parts: list[str] = []
@@ -92,20 +91,13 @@ def source(project: Project) -> str:
         parts += needed
         fields.append(f"self.{names.positions[point.id][0]} = {own}(res)")
     parts.append(_class("ActionPoints", "The action points of the project by name.", fields, ()))
-    geometry = [
-        name
-        for name, needed in (
-            ("Pose", any(point.orientations for point in project.action_points)),
-            ("Position", bool(project.action_points)),
-        )
-        if needed
-    ]
     header = [
-        '"""Action points in global coordinates, generated from the project. Every access gives a copy of its own."""',
+        '"""Action points in world coordinates, generated from the project. Each access returns a new copy."""',
         "",
     ]
-    if geometry:
-        header.append(f"from arcor2_hw.data.geometry import {', '.join(geometry)}")
+    if project.action_points:
+        poses = "Pose, " if any(point.orientations for point in project.action_points) else ""
+        header.append(f"from arcor2_hw.data.geometry import {poses}Position")
     if any(point.robot_joints for point in project.action_points):
         header.append("from arcor2_hw.data.project import ProjectRobotJoints")
     header.append("from arcor2_hw.runtime.resources import Resources")

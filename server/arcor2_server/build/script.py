@@ -1,4 +1,4 @@
-"""script.py of a package: the logic of a project as readable Python."""
+"""Generates script.py of a package: the logic of a project as readable Python."""
 
 import ast
 from collections.abc import Mapping
@@ -12,9 +12,11 @@ from arcor2_server.documents import logic_graph
 
 
 def from_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> str:
-    """Return the script of a project's logic, which runs in a loop until it is stopped or an action finishes it.
+    """Return the script of a project's logic. It repeats the logic until it is stopped or an action finishes it.
 
-    Raises InvalidProject naming the action that is wrong, NotFound for an object type that `types` does not have.
+    Raises:
+        InvalidProject: an action or the logic is invalid.
+        NotFound: `types` does not contain an object type.
     """
     frame = Frame(scene, project, types)
     body = Cycle(frame, logic_graph.read(project)).statements()
@@ -22,12 +24,12 @@ def from_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -
 
 
 def without_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> str:
-    """Return a script that makes objects, action points and parameters known and does nothing yet."""
+    """Return a script that defines objects, action points and parameters, without a loop."""
     return Frame(scene, project, types).module([])
 
 
 def check_syntax(source: str) -> None:
-    """Return when `source` is Python; InvalidProject names the line when it is not."""
+    """Raise InvalidProject, with the line, if `source` is not valid Python."""
     try:
         compile(source, "script.py", "exec", dont_inherit=True)
     except SyntaxError as error:

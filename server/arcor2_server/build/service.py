@@ -1,4 +1,4 @@
-"""The Build service: collects what a project needs, generates its program, and writes the package."""
+"""The Build service: collects the parts of a project's package, generates the script, and writes the package."""
 
 import asyncio
 import contextlib
@@ -24,8 +24,8 @@ from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage, package_versions
 
 
-class Ingredients(Data, frozen=True):
-    """All that a package is made of. Gathered on the event loop, worked on beside it."""
+class BuildInput(Data, frozen=True):
+    """The parts of a package. They are collected on the event loop; a thread generates the files."""
 
     name: str
     scene: Scene
@@ -35,14 +35,14 @@ class Ingredients(Data, frozen=True):
     models: dict[str, ObjectModel]
     built: str
     enumerations: dict[str, list[Enumeration]] = field(default_factory=dict)
-    """By object type, for those whose code is copied from an installed driver, as the driver defines them."""
+    """The enumerations of installed object types, by type, as the driver defines them."""
     source: str | None = None
-    """The script of a project without logic, if one is stored."""
+    """The stored script of a project without logic, if there is one."""
 
 
 def _facts(types: ObjectTypes, scene: Scene, project: Project, code: Iterable[PackageType]) -> dict[str, TypeFacts]:
-    """Return the facts that the script needs about the types: their modules, and the actions that the project uses."""
-    carried = {one.name: one for one in code}
+    """Return what the script needs to know about the types of a scene, with the actions that the project uses."""
+    packaged = {packaged_type.name: packaged_type for packaged_type in code}
     type_of = {obj.id: obj.type for obj in scene.objects}
     actions: dict[str, dict[str, ObjectAction]] = {name: {} for name in type_of.values()}
     for point in project.action_points:
@@ -54,51 +54,26 @@ def _facts(types: ObjectTypes, scene: Scene, project: Project, code: Iterable[Pa
             try:
                 actions[name][method] = types.action(name, method)
             except NotFound:
-                continue  # refused where the logic uses it
+                continue  # `Frame.resolve` reports it if the logic uses the action
     facts: dict[str, TypeFacts] = {}
     for name, used in actions.items():
-        one = carried.get(name)
-        module = f"{snapshot.FOLDER}.{one.module}" if one is not None else "arcor2_hw.objects"
+        code_of = packaged.get(name)
+        module = f"{snapshot.FOLDER}.{code_of.module}" if code_of is not None else "arcor2_hw.objects"
         kinds = {key: kind for key, kind in types.enumerations(name).items() if key[0] in used}
-        if one is not None and not one.source:
-            # The copy of a driver's folder may be called otherwise; the type's own module gives them all.
+        if code_of is not None and not code_of.source:
+            # The copied driver folder may have another name; the module of the type imports the enumerations.
             kinds = {key: msgspec.structs.replace(kind, module=module) for key, kind in kinds.items()}
         facts[name] = TypeFacts(module, used, kinds, types.keyword_only(name))
     return facts
 
 
-def files_of(made_of: Ingredients) -> dict[str, bytes]:
-    """Return the files of a package (protocol, section 11). Raise InvalidProject or NotFound if that is impossible."""
-    project, scene = made_of.project, made_of.scene
-    if project.has_logic:
-        source = script.from_logic(scene, project, made_of.facts)
-    elif made_of.source is not None:
-        source = made_of.source
-        script.check_syntax(source)
-    else:
-        source = script.without_logic(scene, project, made_of.facts)
-    files = snapshot.files_of(made_of.types, made_of.enumerations)
-    files |= {
-        "script.py": source.encode(),
-        "action_points.py": points.source(project).encode(),
-        "data/scene.json": _document(scene),
-        "data/project.json": _document(project),
-        "package.json": _document(PackageMeta(made_of.name, made_of.built)),
-    }
-    for module, model in made_of.models.items():
-        files[f"data/models/{module}.json"] = _document(model)
-    files[package_versions.FILE] = _document(package_versions.present(snapshot.imported_packages(files)))
-    return files
-
-
 @contextlib.contextmanager
-def _collector_waiting() -> Iterator[None]:
-    """Keep the garbage collector from looking through a growing tree again and again.
+def _paused_garbage_collection() -> Iterator[None]:
+    """Pause the garbage collector while many objects are created, unless another thread has paused it.
 
-    A tree has no cycles and goes by itself; of 10,000 actions it took 0.5 s more, in which nothing else ran either.
+    Syntax trees have no cycles. For 10,000 actions, collection would take 0.5 s and block all threads.
     """
     if not gc.isenabled():
-        # Another build has it wait, and lets it go on.
         yield
         return
     gc.disable()
@@ -108,25 +83,50 @@ def _collector_waiting() -> Iterator[None]:
         gc.enable()
 
 
+@_paused_garbage_collection()
+def files_of(inputs: BuildInput) -> dict[str, bytes]:
+    """Return the files of a package (protocol, section 11).
+
+    Raises:
+        InvalidProject: the script cannot be generated, or the code of a type cannot be copied.
+        NotFound: an object type is unknown.
+    """
+    project, scene = inputs.project, inputs.scene
+    if project.has_logic:
+        source = script.from_logic(scene, project, inputs.facts)
+    elif inputs.source is not None:
+        source = inputs.source
+        script.check_syntax(source)
+    else:
+        source = script.without_logic(scene, project, inputs.facts)
+    files = snapshot.files_of(inputs.types, inputs.enumerations)
+    files |= {
+        "script.py": source.encode(),
+        "action_points.py": points.source(project).encode(),
+        "data/scene.json": _document(scene),
+        "data/project.json": _document(project),
+        "package.json": _document(PackageMeta(inputs.name, inputs.built)),
+    }
+    for module, model in inputs.models.items():
+        files[f"data/models/{module}.json"] = _document(model)
+    files[package_versions.FILE] = _document(package_versions.present(snapshot.imported_packages(files)))
+    return files
+
+
 def _document(value: Data) -> bytes:
     return msgspec.json.format(msgspec.json.encode(value), indent=2) + b"\n"
 
 
-def _made(made_of: Ingredients) -> dict[str, bytes]:
-    with _collector_waiting():
-        return files_of(made_of)
-
-
 class BuildService:
-    """Builds packages. Errors: NotFound (project, scene, object type), InvalidProject, StorageError."""
+    """Builds packages. All methods raise NotFound (project, scene, object type), InvalidProject and StorageError."""
 
     def __init__(self, settings: ServerSettings, storage: Storage, types: ObjectTypes) -> None:
         self._settings = settings
         self._storage = storage
         self._types = types
 
-    async def gather(self, project_id: str, package_name: str = "") -> Ingredients:
-        """Return the parts of a package of a saved project. Without a name it has the name of the project."""
+    async def collect(self, project_id: str, package_name: str = "") -> BuildInput:
+        """Return the parts of the package of a saved project. The default name is the name of the project."""
         storage, types = self._storage, self._types
         project = await storage.project(project_id)
         scene = await storage.scene(project.scene_id)
@@ -137,9 +137,9 @@ class BuildService:
                 problem = "" if isinstance(meta.problem, Unset) else f": {meta.problem}"
                 raise InvalidProject("object type {name} cannot be used{problem}", name=name, problem=problem)
         extra = [] if isinstance(project.project_objects_ids, Unset) else project.project_objects_ids
-        # Bases too: an uploaded type may derive from an installed one.
+        # With the bases, since an uploaded type may derive from an installed one.
         code = types.sources_for([*(each for name in used for each in (*reversed(types.bases(name)), name)), *extra])
-        modules = {one.name: one.module for one in code}
+        modules = {packaged_type.name: packaged_type.module for packaged_type in code}
         models = {
             modules[name]: model
             for name in used
@@ -147,11 +147,9 @@ class BuildService:
         }
         source: str | None = None
         if not project.has_logic:
-            try:
+            with contextlib.suppress(NotFound):
                 source = await storage.project_source(project_id)
-            except NotFound:
-                source = None
-        return Ingredients(
+        return BuildInput(
             package_name or project.name,
             scene,
             project,
@@ -164,14 +162,14 @@ class BuildService:
         )
 
     async def build(self, project_id: str, package_name: str, package_id: str = "") -> str:
-        """Write the package of a saved project among the packages, under a new id unless one is given; gives the id."""
-        made_of = await self.gather(project_id, package_name)
+        """Store the package of a saved project and return its id. The default is a new id."""
+        inputs = await self.collect(project_id, package_name)
         package_id = package_id or new_id("pkg")
         directory = self._settings.packages_dir / package_id
-        await asyncio.to_thread(lambda: package.write(_made(made_of), directory))
+        await asyncio.to_thread(lambda: package.write(files_of(inputs), directory))
         return package_id
 
     async def publish(self, project_id: str, package_name: str = "") -> bytes:
         """Return the package of a saved project as a zip."""
-        made_of = await self.gather(project_id, package_name)
-        return await asyncio.to_thread(lambda: package.to_zip(_made(made_of)))
+        inputs = await self.collect(project_id, package_name)
+        return await asyncio.to_thread(lambda: package.to_zip(files_of(inputs)))

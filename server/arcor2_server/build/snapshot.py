@@ -1,8 +1,8 @@
-"""The code of object types in a package: uploaded modules, and copies of the folders of drivers."""
+"""Copies the code of object types into a package: uploaded modules and driver folders."""
 
 import ast
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -20,9 +20,9 @@ _MODULE: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 class _Imports(NamedTuple):
     absolute: frozenset[str]
-    """Dotted names of what may be modules."""
+    """Dotted names that may be modules."""
     level: int
-    """The most leading dots of a relative import."""
+    """The largest number of leading dots of a relative import."""
 
 
 @lru_cache(maxsize=1024)
@@ -31,7 +31,7 @@ def _imports(source: bytes) -> _Imports:
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
-        return _Imports(frozenset(), 0)  # what is wrong with it is for the analysis to say
+        return _Imports(frozenset(), 0)  # the analysis reports the error
     found: set[str] = set()
     level = 0
     for node in ast.walk(tree):
@@ -63,13 +63,13 @@ def _files_below(folder: Path) -> Iterator[Path]:
             yield path
 
 
-def _inside(one: PackageType, folder: Path) -> tuple[str, str]:
-    """Return the dotted name of a driver's folder, and of the type's module within it ("" for the folder itself)."""
+def _module_names(one: PackageType, folder: Path) -> tuple[str, str]:
+    """Return the dotted names of a driver's folder and of the type's module in it ("" for the folder itself)."""
     module = one.entry_point.partition(":")[0].split(".")
     for end in range(1, len(module) + 1):
         *between, last = module[end:] or [""]
         files = (folder.joinpath(*between, f"{last}.py"), folder.joinpath(*between, last, "__init__.py"))
-        # A module may be called like its folder, and that like the one above: what is there decides.
+        # A module and nested folders may have the same name: check which files exist.
         if module[end - 1] == folder.name and any(file.is_file() for file in files):
             return ".".join(module[:end]), ".".join(module[end:])
     raise InvalidProject(
@@ -80,10 +80,10 @@ def _inside(one: PackageType, folder: Path) -> tuple[str, str]:
     )
 
 
-def _check_own(one: PackageType, path: Path, content: bytes, own: str) -> None:
-    """Refuse a driver that imports itself by its full name: the package would run the hub's code, not its own.
+def _check_imports(one: PackageType, path: Path, content: bytes, own: str) -> None:
+    """Raise InvalidProject if a driver imports itself by its full name, or a module outside of its folder.
 
-    Likewise one that imports, with more dots than its file lies deep, from outside of its folder.
+    With such an import the package would run the installed code instead of its copy.
     """
     if path.suffix != ".py" or one.folder is None:
         return
@@ -106,31 +106,35 @@ def _check_own(one: PackageType, path: Path, content: bytes, own: str) -> None:
             )
 
 
-def _given(one: PackageType, own: str, copied: str, inner: str, kinds: Iterable[Enumeration]) -> bytes:
-    """Return the module for an installed type: its class, and the enumerations of its actions."""
+def _import_module(one: PackageType, own: str, copied: str, inner: str, kinds: Iterable[Enumeration]) -> bytes:
+    """Return a module that imports an installed type and the enumerations of its actions from the copied folder."""
     place = f".{copied}{'.' if inner else ''}{inner}"
-    given = {one.entry_point.partition(":")[2] or one.name: place}
+    imported = {one.entry_point.partition(":")[2] or one.name: place}
     for kind in kinds:
         inside = kind.module == own or kind.module.startswith(f"{own}.")
         source = f".{copied}{kind.module.removeprefix(own)}" if inside else kind.module
         name = kind.name.partition(".")[0]
-        if "." in kind.name and given.get(name) == place:
+        if "." in kind.name and imported.get(name) == place:
             continue  # nested in the type itself
-        if given.setdefault(name, source) != source:
+        if imported.setdefault(name, source) != source:
             raise InvalidProject(
                 "object type {name}: its actions take two things called {other_name}", name=one.name, other_name=name
             )
     about = docstring(f"{one.name} of {one.distribution} {one.version}, as it was when this package was built.")
-    lines = [f"from {source} import {name} as {name}" for name, source in given.items()]
+    lines = [f"from {source} import {name} as {name}" for name, source in imported.items()]
     return "\n".join([about, "", *lines, ""]).encode()
 
 
-def files_of(types: "Iterable[PackageType]", enumerations: Mapping[str, Iterable[Enumeration]]) -> dict[str, bytes]:
-    """Return the files of object types by their path in a package.
+def files_of(types: Sequence[PackageType], enumerations: Mapping[str, Iterable[Enumeration]]) -> dict[str, bytes]:
+    """Return the files of object types by path in the package.
 
-    `enumerations`: those of the actions, by type. Raise InvalidProject naming a type that cannot be copied.
+    Args:
+        types: the object types.
+        enumerations: parameter types of the actions, by object type.
+
+    Raises:
+        InvalidProject: a type cannot be copied.
     """
-    types = list(types)
     files: dict[str, bytes] = {f"{FOLDER}/__init__.py": b""}
     for one in types:
         if not _MODULE.fullmatch(one.module):
@@ -146,13 +150,13 @@ def files_of(types: "Iterable[PackageType]", enumerations: Mapping[str, Iterable
             continue
         if one.folder is None or not one.folder.is_dir():
             raise InvalidProject("object type {name} is not in a folder of its own and cannot be copied", name=one.name)
-        own, inner = _inside(one, one.folder)
+        own, inner = _module_names(one, one.folder)
         if one.folder not in folders:
             folders[one.folder] = copied = names.claim(one.folder.name, f"{one.folder.name}_driver")
             for path in _files_below(one.folder):
                 content = path.read_bytes()
-                _check_own(one, path, content, own)
+                _check_imports(one, path, content, own)
                 files[f"{FOLDER}/{copied}/{path.relative_to(one.folder).as_posix()}"] = content
         copied = folders[one.folder]
-        files[f"{FOLDER}/{one.module}.py"] = _given(one, own, copied, inner, enumerations.get(one.name, ()))
+        files[f"{FOLDER}/{one.module}.py"] = _import_module(one, own, copied, inner, enumerations.get(one.name, ()))
     return files

@@ -1,4 +1,4 @@
-"""Formats a syntax tree as readable source: blank lines, comments, quotes and line lengths."""
+"""Formats a syntax tree as readable source code with blank lines, comments, double quotes and short lines."""
 
 import ast
 import re
@@ -12,14 +12,14 @@ _BLOCKS: Final = (ast.If, ast.While, ast.With, ast.Try, ast.FunctionDef)
 
 
 def quoted(value: str) -> str:
-    """Return a string as Python, in double quotes unless it has some inside."""
+    """Return a string literal, in double quotes unless the string contains double quotes."""
     shown = repr(value)
     return f'"{shown[1:-1]}"' if shown[0] == "'" and '"' not in shown else shown
 
 
 def _constant(node: ast.Constant) -> str:
     value = node.value
-    # A float beyond all bounds has no literal of its own.
+    # Python has no literal for infinity.
     return quoted(value) if type(value) is str else repr(value).replace("inf", "1e309")
 
 
@@ -61,13 +61,13 @@ _FREQUENT: Final[dict[type[ast.AST], Callable[[Any], str]]] = {
     ast.Name: _name,
     ast.keyword: _keyword,
 }
-"""The statements of a generated loop. ast.unparse supports all statements, but is ten times slower."""
+"""Writers of the nodes in a generated loop. `ast.unparse` supports all nodes, but is ten times slower."""
 
 
 def _unparse(node: ast.AST) -> str:
-    """Write a one-line statement of a generated tree, which never needs parentheses."""
+    """Return the code of a one-line node of a generated tree, which never needs parentheses."""
     write = _FREQUENT.get(type(node))
-    # The text is one line and has no comment, so what starts with a quote is a string.
+    # The code has no comments, so that a quote always starts a string.
     return write(node) if write is not None else _STRING.sub(_in_quotes, ast.unparse(node))
 
 
@@ -77,13 +77,13 @@ def _in_quotes(match: re.Match[str]) -> str:
 
 
 def docstring(text: str) -> str:
-    """Return text as a docstring on one line."""
+    """Return text as a one-line docstring."""
     plain = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     return '"""' + plain.replace("\\", "\\\\").replace('"', '\\"') + '"""'
 
 
 def _simple(node: ast.stmt, indent: str) -> list[str]:
-    """Write a statement that holds no others; a call too long for a line gets one argument per line."""
+    """Return the lines of a simple statement. A call that is too long has one argument per line."""
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
         return [indent + docstring(node.value.value)]
     text = indent + _unparse(node)
@@ -100,22 +100,26 @@ def _simple(node: ast.stmt, indent: str) -> list[str]:
 
 
 def _reads(test: ast.expr, before: ast.stmt) -> bool:
-    """Return whether a condition checks the result of the statement before it."""
+    """Return whether a condition uses a variable that the statement before it assigns."""
     if not isinstance(before, ast.Assign):
         return False
-    given = {name.id for target in before.targets for name in ast.walk(target) if isinstance(name, ast.Name)}
-    return any(isinstance(name, ast.Name) and name.id in given for name in ast.walk(test))
+    assigned = {name.id for target in before.targets for name in ast.walk(target) if isinstance(name, ast.Name)}
+    return any(isinstance(name, ast.Name) and name.id in assigned for name in ast.walk(test))
 
 
 class Writer:
-    """Writes a module. `comments` gives the line to put above a statement."""
+    """Writes a module.
+
+    Args:
+        comments: the comment above a statement.
+    """
 
     def __init__(self, comments: Mapping[ast.stmt, str]) -> None:
         self._comments = comments
         self._lines: list[str] = []
 
     def module(self, module: ast.Module) -> str:
-        """Return the text of the module."""
+        """Return the source code of the module."""
         self._block(module.body, "")
         return "\n".join(self._lines) + "\n"
 
@@ -130,7 +134,8 @@ class Writer:
             self._statement(node, indent)
             before = node
 
-    def _distance(self, before: ast.stmt, node: ast.stmt, indent: str, *, commented: bool) -> int:
+    @staticmethod
+    def _distance(before: ast.stmt, node: ast.stmt, indent: str, *, commented: bool) -> int:
         """Return the number of blank lines between two statements of a block."""
         if not indent:
             if isinstance(before, ast.FunctionDef) or isinstance(node, ast.FunctionDef):

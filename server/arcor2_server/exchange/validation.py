@@ -12,7 +12,7 @@ from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, InvalidProject, NotFound
 from arcor2_server.build import script
-from arcor2_server.build.candidates import Candidates
+from arcor2_server.build.combined_types import CombinedTypes
 from arcor2_server.documents.checks import project_findings, scene_findings
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.exchange.archive import PROJECT, SCENE, SCRIPT, Archive, mesh_of
@@ -51,7 +51,7 @@ class Known:
         actions: Mapping[str, Mapping[str, ObjectAction]] | None = None,
         robots: Mapping[str, RobotMeta] | None = None,
     ) -> None:
-        self.candidates = Candidates(installed, archive.types)
+        self.candidates = CombinedTypes(installed, archive.types)
         self._given = archive.types
         self._elsewhere = elsewhere or {}
         self._actions = actions or {}

@@ -19,7 +19,7 @@ class SceneTask:
         """The user who last started or stopped the scene."""
 
     def entered(self, state: SceneStateEnum, scene: str, message: str) -> None:
-        """The scene of that name is in another state, `message` says why."""
+        """Show that the scene has entered a state, with the reason `message`."""
         task = self._task
         match state:
             case SceneStateEnum.STARTING:

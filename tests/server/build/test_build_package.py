@@ -25,7 +25,7 @@ from arcor2_hw.data.project_index import ProjectIndex, global_pose
 from arcor2_hw.data.rpc import BuildProjectArgs, BuildProjectData
 from arcor2_hw.exceptions import InvalidPackage, InvalidProject, NotFound, StorageError
 from arcor2_server.build import package
-from arcor2_server.build.service import BuildService, Ingredients, files_of
+from arcor2_server.build.service import BuildInput, BuildService, files_of
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.catalog import PackageType
 from arcor2_server.rpc.build import BuildRequests
@@ -39,9 +39,9 @@ MODELS = {"table": ObjectModel(Model3dType.BOX, box=Box("table", 1.0, 1.0, 0.02)
 
 
 @pytest.fixture
-def made_of(code: list[PackageType]) -> Ingredients:
+def inputs(code: list[PackageType]) -> BuildInput:
     built = "2026-11-21T06:43:11.414039+00:00"
-    return Ingredients(
+    return BuildInput(
         "Boards",
         workplace.scene(),
         workplace.project(),
@@ -54,14 +54,14 @@ def made_of(code: list[PackageType]) -> Ingredients:
 
 
 # ------------------------------------------------------------------------------------------------ content
-def test_a_script_and_its_points_read_well(made_of: Ingredients) -> None:
-    files = files_of(made_of)
+def test_a_script_and_its_points_read_well(inputs: BuildInput) -> None:
+    files = files_of(inputs)
     for name, golden in (("script.py", "workplace_script.txt"), ("action_points.py", "workplace_points.txt")):
         assert files[name].decode() == Path(__file__).with_name(golden).read_text()
 
 
-def test_a_package_contains_everything_it_needs(made_of: Ingredients) -> None:
-    files = files_of(made_of)
+def test_a_package_contains_everything_it_needs(inputs: BuildInput) -> None:
+    files = files_of(inputs)
     assert set(files) == {
         "script.py",
         "action_points.py",
@@ -78,16 +78,16 @@ def test_a_package_contains_everything_it_needs(made_of: Ingredients) -> None:
         *(f"object_types/acme_reader_driver/{name}" for name in workplace.DRIVER if "pycache" not in name),
         *(f"object_types/stock/{file.name}" for file in STOCK.glob("*.py")),
     }
-    assert json.loads(files["package.json"]) == {"name": "Boards", "built": made_of.built}
-    assert msgspec.json.decode(files["data/project.json"], type=Project) == made_of.project
+    assert json.loads(files["package.json"]) == {"name": "Boards", "built": inputs.built}
+    assert msgspec.json.decode(files["data/project.json"], type=Project) == inputs.project
     assert b"null" not in files["data/scene.json"]
     assert files["object_types/__init__.py"] == b""
     recorded = json.loads(files["versions.json"])
     assert recorded["distributions"] == {"msgspec": msgspec.__version__}
 
 
-def test_a_zip_is_reproducible_and_complete(made_of: Ingredients) -> None:
-    files = files_of(made_of)
+def test_a_zip_is_reproducible_and_complete(inputs: BuildInput) -> None:
+    files = files_of(inputs)
     shuffled = dict(sorted(files.items(), key=lambda entry: hash(entry[0])))
     packed = package.to_zip(files)
     assert package.to_zip(shuffled) == packed
@@ -106,62 +106,62 @@ def test_no_file_is_written_outside_the_package(path: str, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("module", ["../evil", "", "a.b", "a/b", "ä"])
-def test_invalid_type_names_name_no_file(module: str, made_of: Ingredients) -> None:
-    made_of.types.append(PackageType("Bad", module, "x = 1"))
+def test_invalid_type_names_name_no_file(module: str, inputs: BuildInput) -> None:
+    inputs.types.append(PackageType("Bad", module, "x = 1"))
     with pytest.raises(InvalidProject, match="Bad"):
-        files_of(made_of)
+        files_of(inputs)
 
 
 @pytest.mark.parametrize(
     "line",
     ["from acme_devices.acme_reader import codes", "import acme_devices.other", "from acme_devices import other"],
 )
-def test_a_driver_that_imports_server_code_is_refused(line: str, driver: PackageType, made_of: Ingredients) -> None:
+def test_a_driver_that_imports_server_code_is_refused(line: str, driver: PackageType, inputs: BuildInput) -> None:
     assert driver.folder is not None
     (driver.folder / "codes.py").write_text(f"def late():\n    {line}\n")
     with pytest.raises(InvalidProject, match=r"AcmeReader: codes\.py imports acme_devices"):
-        files_of(made_of)
+        files_of(inputs)
     (driver.folder / "codes.py").write_text("from ..other import FIRST\n")
     with pytest.raises(InvalidProject, match=r"AcmeReader: codes\.py imports from outside"):
-        files_of(made_of)
+        files_of(inputs)
 
 
 def test_links_out_of_a_driver_folder_are_not_followed(
-    driver: PackageType, made_of: Ingredients, tmp_path: Path
+    driver: PackageType, inputs: BuildInput, tmp_path: Path
 ) -> None:
     assert driver.folder is not None
     (tmp_path / "secret").write_text("secret")
     (driver.folder / "innocent.txt").symlink_to(tmp_path / "secret")
-    assert not [name for name in files_of(made_of) if name.endswith("innocent.txt")]
+    assert not [name for name in files_of(inputs) if name.endswith("innocent.txt")]
 
 
-def test_two_drivers_with_folders_of_the_same_name(driver: PackageType, made_of: Ingredients, tmp_path: Path) -> None:
+def test_two_drivers_with_folders_of_the_same_name(driver: PackageType, inputs: BuildInput, tmp_path: Path) -> None:
     other = tmp_path / "other" / "acme_reader"
     other.mkdir(parents=True)
     (other / "__init__.py").write_text("class Other: ...\n")
-    made_of.types.append(PackageType("Other", "other", "", "acme_reader:Other", other, "other", "1"))
-    files = files_of(made_of)
+    inputs.types.append(PackageType("Other", "other", "", "acme_reader:Other", other, "other", "1"))
+    files = files_of(inputs)
     assert b"from .acme_reader_2 import Other as Other" in files["object_types/other.py"]
     assert files["object_types/acme_reader_2/__init__.py"] == b"class Other: ...\n"
 
 
 @pytest.mark.parametrize("above", ["acme_devices", "acme_reader"])
-def test_a_module_with_the_name_of_its_folder(made_of: Ingredients, tmp_path: Path, above: str) -> None:
+def test_a_module_with_the_name_of_its_folder(inputs: BuildInput, tmp_path: Path, above: str) -> None:
     folder = tmp_path / "like" / above / "acme_reader"
     folder.mkdir(parents=True)
     (folder / "__init__.py").write_text("")
     (folder / "acme_reader.py").write_text("class Like: ...\n")
     entry = f"{above}.acme_reader.acme_reader:Like"
-    made_of.types.append(PackageType("Like", "like", "", entry, folder, "like", "1"))
-    files = files_of(made_of)
+    inputs.types.append(PackageType("Like", "like", "", entry, folder, "like", "1"))
+    files = files_of(inputs)
     assert b"from .acme_reader_2.acme_reader import Like as Like" in files["object_types/like.py"]
 
 
 # ------------------------------------------------------------------------------------------------ running
 @pytest.fixture
-def directory(made_of: Ingredients, tmp_path: Path) -> Path:
+def directory(inputs: BuildInput, tmp_path: Path) -> Path:
     target = tmp_path / "packages" / "pkg_1"
-    package.write(files_of(made_of), target)
+    package.write(files_of(inputs), target)
     return target
 
 
@@ -298,7 +298,7 @@ async def test_a_build_does_not_block_the_event_loop(service: tuple[BuildService
     [point, *_] = project.action_points
     points = [msgspec.structs.replace(point, actions=long)]
     await storage.put_project(msgspec.structs.replace(project, action_points=points, logic=logic))
-    made_of = await build.gather("pro_1")
+    inputs = await build.collect("pro_1")
     turns = 0
 
     async def turn() -> None:
@@ -308,7 +308,7 @@ async def test_a_build_does_not_block_the_event_loop(service: tuple[BuildService
             turns += 1
 
     turning = asyncio.create_task(turn())
-    publishing = asyncio.create_task(asyncio.to_thread(files_of, made_of))
+    publishing = asyncio.create_task(asyncio.to_thread(files_of, inputs))
     await asyncio.wait_for(build.publish("pro_1"), 60)
     await publishing
     turning.cancel()
@@ -319,12 +319,12 @@ async def test_a_build_does_not_block_the_event_loop(service: tuple[BuildService
 async def test_projects_without_logic(service: tuple[BuildService, Storage], tmp_path: Path) -> None:
     build, storage = service
     await storage.put_project(msgspec.structs.replace(workplace.project(), has_logic=False, logic=[]))
-    made_of = await build.gather("pro_1")
-    empty = files_of(made_of)["script.py"].decode()
+    inputs = await build.collect("pro_1")
+    empty = files_of(inputs)["script.py"].decode()
     assert "while" not in empty
     assert "reader: AcmeReader" in empty
     await storage.put_project_source("pro_1", "print(1)\n")
-    assert files_of(await build.gather("pro_1"))["script.py"] == b"print(1)\n"
+    assert files_of(await build.collect("pro_1"))["script.py"] == b"print(1)\n"
     await storage.put_project_source("pro_1", "fine = 1\ndef broken(:\n")
     with pytest.raises(InvalidProject, match="line 2"):
         await build.build("pro_1", "x")

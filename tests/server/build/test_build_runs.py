@@ -41,7 +41,7 @@ async def build(directory: Path, project: Project, source: str | None = None) ->
             await services.storage.put_project(project)
             if source is not None:
                 await services.storage.put_project_source(project.id, source)
-            return files_of(await services.build.gather(project.id))
+            return files_of(await services.build.collect(project.id))
 
 
 async def upload(server: Server, files: dict[str, bytes]) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from arcor2_hw.data.object_type import ObjectAction, find_action
-from arcor2_server.build.frame import NOTE, Frame
+from arcor2_server.build.frame import NEXT_ACTION, Frame
 from arcor2_server.build.reading.errors import NotUnderstood, shown
 from arcor2_server.build.reading.module import Script
 from arcor2_server.build.reading.values import Values
@@ -82,7 +82,7 @@ class Ways:
             if not going:
                 raise NotUnderstood(node.lineno, "{node} is never reached", node=shown(node))
             match node:
-                case ast.Assign([ast.Name(name)], ast.Constant(str(note))) if name == NOTE:
+                case ast.Assign([ast.Name(name)], ast.Constant(str(note))) if name == NEXT_ACTION:
                     going = [way._replace(note=note) for way in going]
                 case ast.Expr(ast.Call() as call):
                     going = self._call(node, call, [], going)
@@ -217,9 +217,11 @@ class Ways:
     def _split(self, test: ast.expr, going: list[_Going]) -> tuple[list[_Going], list[_Going]]:
         """Return the paths on which a condition holds, and those on which it does not."""
         match test:
-            case ast.Compare(ast.Name(name), [ast.Eq()], [ast.Constant(str(note))]) if name == NOTE:
+            case ast.Compare(ast.Name(name), [ast.Eq()], [ast.Constant(str(note))]) if name == NEXT_ACTION:
                 if any(way.note is None for way in going):
-                    raise NotUnderstood(test.lineno, "{note} is not set on every way that leads here", note=NOTE)
+                    raise NotUnderstood(
+                        test.lineno, "{next_action} is not set on every way that leads here", next_action=NEXT_ACTION
+                    )
                 return [way for way in going if way.note == note], [way for way in going if way.note != note]
         condition, variable, negated = self._condition(test)
         opposite = condition._replace(value=not condition.value) if isinstance(condition.value, bool) else None

@@ -13,19 +13,20 @@ from arcor2_server.build import snapshot
 from arcor2_server.build.frame import TypeFacts
 
 
-class Candidates:
-    """Look-ups over object types (`Types` of session.checks); each raises NotFound for a type that is not known.
+class CombinedTypes:
+    """Look-ups over object types (`Types` of documents.checks). Each raises NotFound if the type is unknown.
 
-    known: the sources that are here; of two with one name the later counts. given: those of the package, which take the
-    place of those of the same names.
+    Args:
+        known: sources on this server. If two have the same name, the later one is used.
+        packaged: types of the package by name. They replace known types of the same name.
     """
 
-    def __init__(self, known: Iterable[SourceFile], given: Mapping[str, ObjectTypeSource]) -> None:
-        self._given = given
+    def __init__(self, known: Iterable[SourceFile], packaged: Mapping[str, ObjectTypeSource]) -> None:
+        self._packaged = packaged
         self._library = Library(known)
-        for name, one in given.items():
+        for name, packaged_type in packaged.items():
             try:
-                self._library.add(SourceFile(name, module_name(name), one.source))
+                self._library.add(SourceFile(name, module_name(name), packaged_type.source))
             except InvalidData as error:
                 raise InvalidPackage("object type {name}: {reason}", name=name, reason=error) from error
 
@@ -36,31 +37,31 @@ class Candidates:
         return self._library.analyse(name)
 
     def meta(self, name: str) -> ObjectTypeMeta:
-        """Return one type."""
+        """Return the metadata of a type."""
         found = self.analysis(name)
         if not found.is_object_type:
             raise NotFound("{name} is no object type.", name=name)
-        given = self._given.get(name)
-        return found.meta if given is None else msgspec.structs.replace(found.meta, object_model=given.model)
+        packaged = self._packaged.get(name)
+        return found.meta if packaged is None else msgspec.structs.replace(found.meta, object_model=packaged.model)
 
     def action(self, type_name: str, name: str) -> ObjectAction:
-        """Return one action, by its name or a former one."""
+        """Return an action by its present or a former name."""
         if (action := find_action(self.analysis(type_name).actions, name)) is not None:
             return action
         raise NotFound("The object type {type_name} has no action {name!r}.", type_name=type_name, name=name)
 
     def robot_meta(self, name: str) -> RobotMeta:
-        """Return the features of a robot type; raise NotFound when it is none."""
+        """Return the metadata of a robot type. Raise NotFound if the type is not a robot."""
         if (robot := self.analysis(name).robot) is None:
             raise NotFound("The object type {name} is not a robot.", name=name)
         return robot
 
     def enumerations(self, name: str) -> dict[tuple[str, str], Enumeration]:
-        """Return the enumerations that the actions of a type take."""
+        """Return the enumerations that are parameter types of a type's actions, by action and parameter."""
         return self.analysis(name).enumerations
 
     def facts(self, scene: Scene) -> dict[str, TypeFacts]:
-        """Return the facts that a script needs about the types in a scene: all their actions."""
+        """Return what a script needs to know about the types of a scene, by type."""
         facts: dict[str, TypeFacts] = {}
         for name in {obj.type for obj in scene.objects}:
             found = self.analysis(name)
