@@ -1,4 +1,4 @@
-"""A Python process of the server: connected by a socket, its output read line by line, killed if it does not end."""
+"""Starts Python child processes of the server, connected by a socket, and reads their output line by line."""
 
 import asyncio
 import contextlib
@@ -45,9 +45,9 @@ class ChildProcess:
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.STDOUT,
-                # The processes have their own threads; a thread pool of the linear algebra only costs memory.
+                # The processes use their own threads; a thread pool of OpenBLAS would only cost memory.
                 env={"OPENBLAS_NUM_THREADS": "1", **environment},
-                start_new_session=True,  # Ctrl-C goes to the server, which ends its processes in order
+                start_new_session=True,  # Ctrl-C reaches only the server, which stops its processes in order
             )  # fmt: skip
         finally:
             connection.close()
@@ -73,7 +73,7 @@ class ChildProcess:
         """Wait for the end of the process and return its exit status."""
         return await self._process.wait()
 
-    async def ended(self, within: float) -> int:
+    async def wait_or_kill(self, within: float) -> int:
         """Wait for the end of the process, kill it after `within` seconds, and return its exit status.
 
         The process is killed at once if the caller is cancelled.

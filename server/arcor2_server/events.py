@@ -1,4 +1,4 @@
-"""Events of the protocol, and the interface through which the parts of the server publish them."""
+"""Creation of protocol events, and the interface through which parts of the server publish them."""
 
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
@@ -20,13 +20,7 @@ def make_event(name: str, data: Any = UNSET, change: ChangeType | None = None, p
     Raises:
         KeyError: the protocol has no event of this name.
     """
-    declared = EVENTS[name]
-    return Event(
-        declared.name,
-        UNSET if change is None else change,
-        UNSET if parent is None else parent,
-        data,
-    )
+    return Event(EVENTS[name].name, change or UNSET, UNSET if parent is None else parent, data)
 
 
 class Connection(Protocol):

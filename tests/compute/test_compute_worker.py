@@ -99,7 +99,7 @@ async def test_a_frozen_worker_is_replaced(compute: Compute, monkeypatch: pytest
     await compute.run(question())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
-    monkeypatch.setattr(process, "START_WITHIN", 0.3)
+    monkeypatch.setattr(process, "START_TIMEOUT", 0.3)
     os.kill(pid, signal.SIGSTOP)
     with pytest.raises(ComputeTimeout, match=r"A frame by touch took longer than 0\.1 s"):
         await compute.run(question(), within=0.1)
@@ -123,7 +123,7 @@ async def test_an_endless_task_is_ended_at_its_deadline(compute: Compute, monkey
     begun = own_time()
     with pytest.raises(ComputeTimeout, match=r"longer than 0\.2 s"):
         await compute.run(question(), within=0.2)
-    assert own_time() - begun < process.START_WITHIN
+    assert own_time() - begun < process.START_TIMEOUT
     monkeypatch.undo()
     assert (await compute.run(question(0.5))).pose.position.x == pytest.approx(0.5)
 
@@ -181,7 +181,7 @@ async def test_background_tasks_wait_for_all_others(compute: Compute) -> None:
 
 
 async def test_too_many_waiting_tasks_are_refused(compute: Compute, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compute_module, "MOST_WAITING", 2)
+    monkeypatch.setattr(compute_module, "MAX_WAITING", 2)
     tasks = [asyncio.create_task(compute.run(question())) for _ in range(3)]
     await asyncio.sleep(0)
     # the first has not been taken yet
@@ -255,7 +255,7 @@ async def test_closing_ends_a_busy_worker() -> None:
 async def test_a_worker_ends_with_its_server() -> None:
     process = await ComputeProcess.start(WorkerKind.CALIBRATION)
     try:
-        await process.ask(question(), 10.0, None, None)
+        await process.compute(question(), 10.0, None, None)
         process._writer.transport.abort()  # as when the server was killed
         async with asyncio.timeout(20):
             assert await process.process.wait() == 0

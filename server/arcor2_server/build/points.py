@@ -92,7 +92,7 @@ def source(project: Project) -> str:
         fields.append(f"self.{names.positions[point.id][0]} = {own}(res)")
     parts.append(_class("ActionPoints", "The action points of the project by name.", fields, ()))
     header = [
-        '"""Action points in world coordinates, generated from the project. Each access returns a new copy."""',
+        '"""Action points in world coordinates, generated from the project. Each access is a new copy."""',
         "",
     ]
     if project.action_points:

@@ -1,1 +1,1 @@
-"""Clients of the compute workers, the processes that run numerics."""
+"""Clients of the compute workers, the processes for numerical computations."""

@@ -5,7 +5,7 @@ import os
 import signal
 import socket
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import msgspec
@@ -23,21 +23,20 @@ from arcor2_server.child_process import ChildProcess, describe_exit
 log = structlog.get_logger(__name__)
 
 ProgressCallback = Callable[[float, str], None]
-"""Takes how far a computation is, 0..1, and what it does."""
+"""Receives the progress of a computation, 0 to 1, and what it is doing."""
 
-START_WITHIN: Final = 15.0
-"""Seconds for the start of Python and the first imports on a machine that is busy, and for the end beyond the
-deadline, which the process has to keep by itself.
-"""
-GOES_WITHIN: Final = 3.0
-"""Seconds that a process may take to go once its socket is closed; then it is killed."""
+START_TIMEOUT: Final = 15.0
+"""Time added to the limit of a task, s: for the start of Python on a busy machine. The process keeps the limit."""
+EXIT_TIMEOUT: Final = 3.0
+"""Time limit for a process to end after its socket is closed, before it is killed, s."""
 COMMAND: Final = ("-P", "-m", "arcor2_hw.compute")
-PIECE: Final = 256 * 1024
-"""Bytes that are handed to the socket at once."""
-WORLDS: Final = 16
+CHUNK_SIZE: Final = 256 * 1024
+"""Maximum number of bytes written to the socket at once."""
+MAX_WORLDS: Final = 16
 """Maximum number of worlds cached by a process."""
-LONGEST_LINE: Final = 4096
-LINES: Final = 30
+MAX_LINE: Final = 4096
+"""Maximum length of an output line, bytes."""
+REPORTED_LINES: Final = 30
 """Number of output lines reported when a process ends unexpectedly."""
 
 
@@ -49,13 +48,17 @@ class ComputeProcess:
         self._reader = reader
         self._writer = writer
         self._sent_worlds: dict[str, dict[str, WorldItem]] = {}
-        """The worlds cached by the process, the last used one at the end."""
-        self._lines: deque[str] = deque(maxlen=LINES)
+        """The worlds cached by the process, in the order of their last use."""
+        self._lines: deque[str] = deque(maxlen=REPORTED_LINES)
         self._output = asyncio.create_task(self._read_output(), name=f"output of compute worker {process.pid}")
 
     @classmethod
     async def start(cls, kind: WorkerKind, environment: Mapping[str, str] = os.environ) -> "ComputeProcess":
-        """Start a process. OSError when that cannot be done."""
+        """Start a process.
+
+        Raises:
+            OSError: it cannot be started.
+        """
         ours, theirs = socket.socketpair()
         try:
             reader, writer = await asyncio.open_unix_connection(sock=ours)
@@ -73,10 +76,10 @@ class ComputeProcess:
 
     @property
     def alive(self) -> bool:
-        """Return whether the process can be asked."""
+        """Whether the process can compute tasks."""
         return self.process.returncode is None and not self._reader.at_eof() and not self._writer.is_closing()
 
-    async def ask(
+    async def compute(
         self,
         task: Task[Any],
         within: float,
@@ -84,9 +87,15 @@ class ComputeProcess:
         on_progress: ProgressCallback | None,
         place: str = "",
     ) -> Any:
-        """Return the result of a task. Raise the error of the computation, ComputeStopped or ComputeTimeout."""
+        """Return the result of a task.
+
+        Raises:
+            Arcor2Error: the error of the computation.
+            ComputeStopped: the process ended.
+            ComputeTimeout: the task took longer than `within` s.
+        """
         try:
-            async with asyncio.timeout(within + START_WITHIN):
+            async with asyncio.timeout(within + START_TIMEOUT):
                 if world is not None:
                     await self._send_world(world, place)
                 await self._send(m.Work(task, within, place))  # type: ignore[arg-type]
@@ -97,28 +106,28 @@ class ComputeProcess:
             await self.close()
             raise ComputeTimeout(_too_long(task, within)) from None
         except (OSError, EOFError, msgspec.MsgspecError, ValueError) as error:
-            raise await self._why(task, within, error) from error
+            raise await self._missing_answer(task, within, error) from error
         if isinstance(message, m.Failed):
             raise error_of(message)
         return msgspec.msgpack.decode(message.value, type=task.result_type)
 
     async def _send_world(self, world: WorldDescription, place: str) -> None:
-        """Send the changes of a world since the last task."""
+        """Send the changes of a world since its last task."""
         known = self._sent_worlds.pop(place, {})
         put = [body for key, body in world.items() if (old := known.get(key)) is not body and old != body]
         remove = [key for key in known if key not in world]
         if put or remove:
             await self._send(m.ChangeWorld(place, put, remove))
         self._sent_worlds[place] = dict(world)
-        while len(self._sent_worlds) > WORLDS:
+        while len(self._sent_worlds) > MAX_WORLDS:
             oldest = next(iter(self._sent_worlds))
             del self._sent_worlds[oldest]
             await self._send(m.ForgetWorld(oldest))
 
     async def _send(self, message: m.ToWorker) -> None:
         data = memoryview(m.encode(message))
-        for start in range(0, len(data), PIECE):
-            self._writer.write(data[start : start + PIECE])
+        for start in range(0, len(data), CHUNK_SIZE):
+            self._writer.write(data[start : start + CHUNK_SIZE])
             await self._writer.drain()
 
     async def _read(self) -> m.FromWorker:
@@ -126,11 +135,11 @@ class ComputeProcess:
         message: m.FromWorker = m.decode_from_worker(await self._reader.readexactly(size))
         return message
 
-    async def _why(self, task: Task[Any], within: float, error: Exception) -> Arcor2Error:
-        """Return the reason for a missing answer."""
+    async def _missing_answer(self, task: Task[Any], within: float, error: Exception) -> Arcor2Error:
+        """Return the error for a missing answer, after the end of the process."""
         self._writer.transport.abort()
-        code = await self.process.ended(GOES_WITHIN)
-        await asyncio.wait({self._output}, timeout=GOES_WITHIN)
+        code = await self.process.wait_or_kill(EXIT_TIMEOUT)
+        await asyncio.wait({self._output}, timeout=EXIT_TIMEOUT)
         detail = "\n".join([f"pid {self.process.pid}: {error!r}", *self._lines])
         log.error("compute worker ended", pid=self.process.pid, task=type(task).__name__, status=code, detail=detail)
         if code == -signal.SIGALRM:
@@ -139,9 +148,8 @@ class ComputeProcess:
             "The compute worker {code} while it worked on {label}.", detail, code=describe_exit(code), label=task.label
         )
 
-    # -------------------------------------------------------------------------------- ending
     async def close(self) -> None:
-        """Kill the process, which stores nothing, and wait for its end."""
+        """Kill the process and wait for its end. It stores nothing."""
         self._writer.transport.abort()
         self.process.kill()
         await self.process.wait()
@@ -149,9 +157,9 @@ class ComputeProcess:
 
     async def _read_output(self) -> None:
         """Log the output of libraries."""
-        async for line in self.process.output(LONGEST_LINE):
+        async for line in self.process.output(MAX_LINE):
             self._lines.append(line)
-            log.info("compute worker", pid=self.process.pid, text=line)
+            log.info("compute worker output", pid=self.process.pid, text=line)
 
 
 def _too_long(task: Task[Any], within: float) -> str:
@@ -159,20 +167,17 @@ def _too_long(task: Task[Any], within: float) -> str:
     return f"{what} took longer than {within:g} s, and was given up."
 
 
-def _tree(kind: type[Arcor2Error]) -> Iterator[type[Arcor2Error]]:
-    yield kind
-    for below in kind.__subclasses__():
-        if below.__module__ == exceptions.__name__:
-            yield from _tree(below)
-
-
-_KNOWN: Final[list[type[Arcor2Error]]] = [*_tree(Arcor2Error), CalibrationRefused, NotInstalled]
-_KINDS: Final = {kind.code: kind for kind in _KNOWN}
+_CLASSES: Final[dict[str, type[Arcor2Error]]] = {
+    kind.code: kind
+    for kind in (*vars(exceptions).values(), CalibrationRefused, NotInstalled)
+    if isinstance(kind, type) and issubclass(kind, Arcor2Error)
+}
+"""Error classes by code."""
 
 
 def error_of(failed: m.Failed) -> Arcor2Error:
-    """Return the error of a computation, as the nearest class that is known here, with its own code and reason."""
-    kind = next((_KINDS[code] for code in failed.codes if code in _KINDS), Arcor2Error)
+    """Return the error of a computation, with its code and reason, as the most specific known class."""
+    kind = next((_CLASSES[code] for code in failed.codes if code in _CLASSES), Arcor2Error)
     error = kind.__new__(kind)
     Arcor2Error.__init__(error, failed.message, failed.detail)
     error.code = failed.codes[0]  # type: ignore[misc]

@@ -1,4 +1,4 @@
-"""The compute workers: one process per package of numerics, started on first use and ended when idle."""
+"""The compute workers: one process per numerical package, started on first use and stopped when idle."""
 
 import asyncio
 from collections import deque
@@ -14,41 +14,42 @@ from arcor2_server.compute.process import ComputeProcess, ProgressCallback
 log = structlog.get_logger(__name__)
 R = TypeVar("R")
 
-MOST_WAITING: Final = 1000
-"""Computations that wait for one worker; further ones are refused."""
+MAX_WAITING: Final = 1000
+"""Maximum number of computations that wait for a worker; more are refused."""
 
 
 @dataclass(slots=True)
-class _Question:
+class _Job:
     task: Task[Any]
     within: float
     world: WorldDescription | None
     on_progress: ProgressCallback | None
     place: str = ""
-    answer: asyncio.Future[Any] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
+    result: asyncio.Future[Any] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
 
 
 class _Worker:
-    """The questions to one room, in the order in which they came; those in the background only while no other waits."""
+    """The queue of one worker process. Background jobs run only while no other job waits."""
 
     def __init__(self, kind: WorkerKind, idle: float) -> None:
         self.kind = kind
         self.process: ComputeProcess | None = None
         self._idle = idle
-        self._waiting: tuple[deque[_Question], deque[_Question]] = (deque(), deque())
+        self._waiting: tuple[deque[_Job], deque[_Job]] = (deque(), deque())
+        """Waiting jobs and waiting background jobs."""
         self._wake = asyncio.Event()
         self._serving: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
-        """The one that serves, and one that may be ending its process still."""
+        """The serving task, and one that may still be closing its process."""
 
-    def put(self, question: _Question, *, background: bool) -> None:
-        """Let a question wait; ComputeBusy."""
+    def put(self, job: _Job, *, background: bool) -> None:
+        """Queue a job. Raise ComputeBusy if the queue is full."""
         queue = self._waiting[background]
-        if len(queue) >= MOST_WAITING:
+        if len(queue) >= MAX_WAITING:
             raise ComputeBusy(
-                "{count} computations wait already: {label} is not begun.", count=len(queue), label=question.task.label
+                "{count} computations wait already: {label} is not begun.", count=len(queue), label=job.task.label
             )
-        queue.append(question)
+        queue.append(job)
         self._wake.set()
         if self._serving is None:
             self._serving = asyncio.create_task(self._serve(), name=f"compute worker {self.kind.value}")
@@ -56,28 +57,27 @@ class _Worker:
             self._serving.add_done_callback(self._tasks.discard)
 
     async def close(self) -> None:
-        """Refuse waiting tasks and end the process."""
+        """Cancel all jobs and stop the process."""
         if self._serving is not None:
             self._serving.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     async def _serve(self) -> None:
         try:
-            while (question := await self._next()) is not None:
-                # Who asked may have gone meanwhile.
-                if not question.answer.done():
-                    await self._answer(question)
+            while (job := await self._next()) is not None:
+                if not job.result.done():  # it is done if the caller was cancelled
+                    await self._run(job)
         finally:
             self._serving = None
             process, self.process = self.process, None
             for queue in self._waiting:
                 while queue:
-                    _settle(queue.popleft(), ComputeStopped("The server is ending."))
+                    _fail(queue.popleft(), ComputeStopped("The server is ending."))
             if process is not None:
                 await process.close()
 
-    async def _next(self) -> _Question | None:
-        """Return the next question, None when none came for long."""
+    async def _next(self) -> _Job | None:
+        """Wait for the next job; return None if there is none within the idle time."""
         while True:
             for queue in self._waiting:
                 if queue:
@@ -90,44 +90,42 @@ class _Worker:
                 if not self._wake.is_set():
                     return None
 
-    async def _answer(self, question: _Question) -> None:
+    async def _run(self, job: _Job) -> None:
         try:
-            process = await self._ready()
-            value = await process.ask(
-                question.task, question.within, question.world, question.on_progress, question.place
-            )
+            process = await self._running_process()
+            value = await process.compute(job.task, job.within, job.world, job.on_progress, job.place)
         except asyncio.CancelledError:
-            _settle(question, ComputeStopped("The server is ending."))
+            _fail(job, ComputeStopped("The server is ending."))
             raise
-        except Exception as error:  # noqa: BLE001 - it is for who asked
-            _settle(question, error)
+        except Exception as error:  # noqa: BLE001 - `run` raises it in the caller
+            _fail(job, error)
         else:
-            if not question.answer.done():
-                question.answer.set_result(value)
+            if not job.result.done():
+                job.result.set_result(value)
 
-    async def _ready(self) -> ComputeProcess:
+    async def _running_process(self) -> ComputeProcess:
         if self.process is not None and not self.process.alive:
-            gone, self.process = self.process, None
-            await gone.close()
+            ended, self.process = self.process, None
+            await ended.close()
         if self.process is None:
             self.process = await ComputeProcess.start(self.kind)
         return self.process
 
 
-def _settle(question: _Question, error: Exception) -> None:
-    if not question.answer.done():
-        question.answer.set_exception(error)
+def _fail(job: _Job, error: Exception) -> None:
+    if not job.result.done():
+        job.result.set_exception(error)
 
 
 class Compute:
-    """Runs tasks in the workers. A crash of a worker fails only the task that it computes."""
+    """Runs tasks in the workers. If a worker crashes, only its current task fails."""
 
     def __init__(self, idle: float) -> None:
         self._workers = {kind: _Worker(kind, idle) for kind in WorkerKind}
         self._closed = False
 
     def pid(self, kind: WorkerKind) -> int | None:
-        """Return the process that is there for a room, None while there is none."""
+        """Return the id of a worker's process, None while no process is running."""
         process = self._workers[kind].process
         return None if process is None or not process.alive else process.process.pid
 
@@ -141,22 +139,31 @@ class Compute:
         on_progress: ProgressCallback | None = None,
         background: bool = False,
     ) -> R:
-        """Return the result of a task.
+        """Return the result of a task. If the caller is cancelled, a started computation still runs to its end.
 
-        within: seconds, where not as the task has it. world: what stands in the way, by id, where the task asks for
-        it. place: the name of that world; what is kept of it is worth keeping while the same things stand in it. told:
-        called with the progress. background: wait for everything else. Raises what the computation raises;
-        ComputeStopped, ComputeTimeout, ComputeBusy, NotInstalled. Who is cancelled leaves a computation that runs to
-        its end.
+        Args:
+            task: the task.
+            within: time limit, s; the default is the limit of the task.
+            world: the collision world, by id of the object, if the task needs it.
+            place: the name of the world. The worker caches worlds by name, so that only changes are sent.
+            on_progress: receives the progress.
+            background: run the task only while no other task waits.
+
+        Raises:
+            Arcor2Error: the error of the computation.
+            ComputeStopped: the worker or the server ended.
+            ComputeTimeout: the task took too long.
+            ComputeBusy: too many tasks wait.
+            NotInstalled: the worker's library is not installed.
         """
         if self._closed:
             raise ComputeStopped("The server is ending.")
-        question = _Question(task, task.timeout if within is None else within, world, on_progress, place)
-        self._workers[task.worker].put(question, background=background)
-        answer: R = await question.answer
-        return answer
+        job = _Job(task, task.timeout if within is None else within, world, on_progress, place)
+        self._workers[task.worker].put(job, background=background)
+        result: R = await job.result
+        return result
 
     async def close(self) -> None:
-        """End the workers."""
+        """Stop the workers."""
         self._closed = True
         await asyncio.gather(*(worker.close() for worker in self._workers.values()))

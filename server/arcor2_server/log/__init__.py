@@ -1,1 +1,1 @@
-"""Logging: set-up, redaction of secrets, the last lines in memory, the audit log."""
+"""Logging: configuration, redaction of secrets, recent lines in memory, audit log."""

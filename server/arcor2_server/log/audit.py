@@ -1,4 +1,4 @@
-"""The audit log: one line for each request refused by role, and for each command that moves or changes something."""
+"""The audit log: one line for each command that moves or changes something, and for each request refused by role."""
 
 from typing import Any, Final
 
@@ -28,8 +28,8 @@ READING: Final = frozenset(
         "Version",
     }
 )
-"""Requests that change nothing, in addition to those whose names begin with Get and List."""
-OF_THE_SCREEN: Final = frozenset(
+"""Requests that change nothing, in addition to those whose names start with Get and List."""
+CLIENT_STATE: Final = frozenset(
     {
         "PreviewMove",
         "ReadLock",
@@ -45,46 +45,37 @@ OF_THE_SCREEN: Final = frozenset(
         "WriteUnlock",
     }
 )
-"""Requests that concern what a client shows, receives or holds, not the cell or a document."""
+"""Requests that change only the state of a client, such as its view, subscriptions and locks."""
 _TARGETS: Final = (
     *("robot_id", "object_id", "object_type_id", "package_id", "action_point_id", "orientation_id", "joints_id"),
-    *(
-        "action_id",
-        "logic_item_id",
-        "project_id",
-        "scene_id",
-        "id",
-        "target_id",
-        "original_id",
-        "start",
-        "name",
-        "type",
-    ),
+    *("action_id", "logic_item_id", "project_id", "scene_id", "id", "target_id", "original_id"),
+    *("start", "name", "type"),
 )
 """Argument fields that identify the target of a request, most specific first. Their values are not secret."""
-LONGEST_TARGET: Final = 100
+MAX_TARGET: Final = 100
+"""Maximum length of a logged target."""
 
 
 def is_command(rpc: Rpc) -> bool:
     """Return whether a request moves or changes something."""
-    return not (rpc.name.startswith(("Get", "List")) or rpc.name in READING or rpc.name in OF_THE_SCREEN)
+    return not (rpc.name.startswith(("Get", "List")) or rpc.name in READING or rpc.name in CLIENT_STATE)
 
 
 def target_of(args: Any) -> str:
-    """Return what the arguments of a request are about; empty where they do not say."""
+    """Return the target that the arguments of a request name; empty if they name none."""
     robot = getattr(args, "robot", None)
     for each in (args, robot):
         for name in _TARGETS:
             value = getattr(each, name, None)
             if isinstance(value, str) and value:
-                return value[:LONGEST_TARGET]
+                return value[:MAX_TARGET]
     if isinstance(args, set | frozenset):
-        return ", ".join(sorted(str(each) for each in args))[:LONGEST_TARGET]
+        return ", ".join(sorted(map(str, args)))[:MAX_TARGET]
     return ""
 
 
 def note(outcome: str, request: str, *, user: str, role: Role | None, address: str, target: str) -> None:
-    """Log one request. outcome: done, refused or forbidden."""
+    """Log a request. The outcome is done, refused or forbidden."""
     write = log.warning if outcome == "forbidden" else log.info
     name = "none" if role is None else role.name.lower()
     write("command", outcome=outcome, request=request, target=target, user=user, role=name, address=address)

@@ -1,4 +1,4 @@
-"""Set-up of the log: one line per event on standard error, readable on a terminal, JSON elsewhere."""
+"""Configures logging: one line per event on standard error, as text on a terminal, else as JSON."""
 
 import contextlib
 import logging
@@ -13,21 +13,25 @@ from arcor2_server.log.redaction import REDACTION
 
 
 class _StandardError:
-    """Standard error as it is when something is logged: loggers are cached, and the stream may be replaced."""
+    """The present `sys.stderr`: loggers are cached, but the stream may be replaced."""
 
     def write(self, text: str) -> None:
-        """Write; a stream that is closed or broken must not end what was to be logged."""
+        """Write a text. Errors are ignored: a closed stream must not stop the caller."""
         with contextlib.suppress(OSError, ValueError):
             sys.stderr.write(text)
 
     def flush(self) -> None:
-        """Flush, as `write` does."""
+        """Flush the stream. Errors are ignored."""
         with contextlib.suppress(OSError, ValueError):
             sys.stderr.flush()
 
 
 def set_up(level: str = "info") -> None:
-    """Send what the server and its libraries log to standard error. KeyError for a level that is none."""
+    """Write the log of the server and its libraries to standard error.
+
+    Raises:
+        KeyError: there is no level of this name.
+    """
     number = logging.getLevelNamesMapping()[level.upper()]
     shared: list[structlog.typing.Processor] = [
         structlog.contextvars.merge_contextvars,

@@ -208,7 +208,7 @@ def _note(outcome: str, declared: Operation, request: Request[Any, Any, Any]) ->
         user=request.state.get(PERSON, ""),
         role=request.state.get(AS_ROLE),
         address=request.client.host if request.client else "",
-        target=", ".join(str(request.path_params[name]) for name in declared.path_names)[: audit.LONGEST_TARGET],
+        target=", ".join(str(request.path_params[name]) for name in declared.path_names)[: audit.MAX_TARGET],
     )
 
 

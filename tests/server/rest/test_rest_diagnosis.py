@@ -21,7 +21,7 @@ from arcor2_hw.data.secret import HIDDEN, is_secret_name
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.main import app
-from arcor2_server.log.recent import LONGEST_LINE, RecentLog
+from arcor2_server.log.recent import MAX_LINE, RecentLog
 from arcor2_server.log.redaction import clean, hide, secrets_in
 from arcor2_server.rest.diagnosis_bundle import LARGEST_PART, packed
 from tests.server.core.serving import ServerProcess, running
@@ -70,7 +70,7 @@ def test_the_newest_part_of_the_log_is_included() -> None:
     for number in range(50):
         log.add(b"line %2d..." % number)
     assert log.lines() == [f"line {number}..." for number in range(40, 50)]
-    log.add(b"x" * (2 * LONGEST_LINE))
+    log.add(b"x" * (2 * MAX_LINE))
     assert log.lines() == []  # longer than all of it may be
     event = {"event": "failed", "_record": object(), "what": object(), "exc_info": ValueError("why")}
     wide = RecentLog()
