@@ -33,14 +33,14 @@ class CombinedTypes:
     def analysis(self, name: str) -> TypeAnalysis:
         """Return the analysis of the source of a type, helper or mixin."""
         if name not in self._library:
-            raise NotFound("The object type {name} is neither in the package nor here.", name=name)
+            raise NotFound("The object type {name} is neither in the package nor on this server.", name=name)
         return self._library.analyse(name)
 
     def meta(self, name: str) -> ObjectTypeMeta:
         """Return the metadata of a type."""
         found = self.analysis(name)
         if not found.is_object_type:
-            raise NotFound("{name} is no object type.", name=name)
+            raise NotFound("{name} is not an object type.", name=name)
         packaged = self._packaged.get(name)
         return found.meta if packaged is None else msgspec.structs.replace(found.meta, object_model=packaged.model)
 

@@ -26,9 +26,7 @@ class Cycle:
         names: set[str] = set()
         for action in flow.actions:
             if action.name in names:
-                raise InvalidProject(
-                    "two actions are named {name!r}: a program could not tell them apart", name=action.name
-                )
+                raise InvalidProject("two actions have the name {name!r}; rename one of them", name=action.name)
             names.add(action.name)
         self.calls = [frame.resolve(action) for action in flow.actions]
         self.results = [self._name_results(number) for number in range(len(flow.actions))]
@@ -40,7 +38,7 @@ class Cycle:
         if outputs and len(outputs) != len(returns):
             method = self.calls[number].method
             raise InvalidProject(
-                "action {name!r} names {count} results, but {method} gives {other_count}",
+                "action {name!r} names {count} results, but {method} returns {other_count}",
                 name=action.name,
                 count=len(outputs),
                 method=method,
@@ -153,16 +151,16 @@ class Cycle:
         if kind not in BRANCHABLE:
             name = self.flow.actions[source].outputs()[condition.output]
             raise InvalidProject(
-                "action {user!r}: {name} is {type}, which cannot be branched on",
+                "action {user!r}: {name} is {type}, which a condition cannot use",
                 user=user,
                 name=name,
                 type=kind or "nothing",
             )
         variable = self._result(node, source, condition.output, kind)
         if type(condition.value) is not BRANCHABLE[kind]:
-            allowed = "true and false" if kind == "boolean" else "texts" if kind == "string_enum" else "integers"
+            allowed = "true and false" if kind == "boolean" else "strings" if kind == "string_enum" else "integers"
             raise InvalidProject(
-                "action {user!r}: on {variable}, which is {type}, only {allowed} can be branched on, not {value!r}",
+                "action {user!r}: {variable} is {type}; a condition can compare it with {allowed}, not with {value!r}",
                 user=user,
                 variable=variable,
                 type=kind,
@@ -174,7 +172,7 @@ class Cycle:
     def _too_early(self, node: int, source: int) -> InvalidProject:
         consumer, producer = self.flow.actions[node].name, self.flow.actions[source].name
         return InvalidProject(
-            "action {consumer!r} uses a result of {producer!r}, which has not always run before it",
+            "action {consumer!r} uses a result of {producer!r}, which does not run before it on all paths",
             consumer=consumer,
             producer=producer,
         )
@@ -185,7 +183,7 @@ class Cycle:
         if source is None or flow != "default":
             _, producer = self.frame.index.action(action_id)
             raise InvalidData(
-                "parameter {name}: {producer_name!r} never runs, so it has no result",
+                "parameter {name}: {producer_name!r} never runs and has no result",
                 name=parameter.name,
                 producer_name=producer.name,
             )

@@ -82,7 +82,7 @@ class Frame:
         try:
             return self.types[type_name]
         except KeyError:
-            raise NotFound("object type {type_name} is not known", type_name=type_name) from None
+            raise NotFound("unknown object type {type_name}", type_name=type_name) from None
 
     def imported(self, module: str, name: str) -> str:
         """Import a class if it is not imported yet; return its name in the script."""
@@ -196,7 +196,7 @@ class References:
         """Return the expression for joints of an action point."""
         _, joints = self._frame.index.joints(joints_id)
         if joints.robot_id != self._object_id:
-            raise InvalidData("joints {name} belong to another robot", name=joints.name)
+            raise InvalidData("the joints {name} belong to another robot", name=joints.name)
         return self._point_attribute("joints", self._frame.points.joints, joints_id)
 
     def enum_member(self, parameter: Parameter, value: str | int) -> ast.expr:
@@ -204,7 +204,7 @@ class References:
         kind = self._enumerations.get((self._method, parameter.name))
         if kind is None or value not in kind.members:
             raise InvalidData(
-                "parameter {name}: {value!r} is no member of its enumeration", name=parameter.name, value=value
+                "parameter {name}: {value!r} is not a member of the enumeration", name=parameter.name, value=value
             )
         first, *inner = kind.name.split(".")
         return expressions.dotted(self._frame.imported(kind.module, first), (*inner, kind.members[value]))

@@ -86,7 +86,7 @@ def _text(files: Mapping[str, bytes], path: str) -> str:
     except KeyError:
         raise InvalidPackage("The package has no {path}.", path=path) from None
     except UnicodeDecodeError as error:
-        raise InvalidPackage("{path} of the package is no text: {reason}", path=path, reason=error) from error
+        raise InvalidPackage("{path} of the package is not UTF-8 text: {reason}", path=path, reason=error) from error
 
 
 def _class_in(path: str, source: str) -> tuple[str, _Kind]:
@@ -100,7 +100,7 @@ def _class_in(path: str, source: str) -> tuple[str, _Kind]:
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise InvalidPackage("{path} of the package is no Python: {reason}", path=path, reason=error) from error
+        raise InvalidPackage("{path} of the package is not valid Python: {reason}", path=path, reason=error) from error
     for node in tree.body:
         if isinstance(node, ast.ClassDef) and module_name(node.name) == stem:
             return node.name, "type"
@@ -111,7 +111,7 @@ def _class_in(path: str, source: str) -> tuple[str, _Kind]:
                     return alias.asname or alias.name, "installed"
     if is_valid_name(stem) and module_name(stem) == stem:
         return stem, "helper"
-    raise InvalidPackage("{path} of the package has no class that the file is named after.", path=path)
+    raise InvalidPackage("{path} of the package has no class whose name matches the file name.", path=path)
 
 
 def read(data: Path | bytes) -> Imported:
@@ -126,7 +126,7 @@ def read(data: Path | bytes) -> Imported:
     project = _document(files, "data/project.json", Project)
     for what, key in (("scene", scene.id), ("project", project.id)):
         if not key or len(key) > MAX_ID or not key.isprintable():
-            raise InvalidPackage("The {what} of the package has no usable id: {key!r}.", what=what, key=key[:80])
+            raise InvalidPackage("The {what} of the package has an invalid id: {key!r}.", what=what, key=key[:80])
     source = _text(files, "script.py")
     types: dict[str, ObjectTypeSource] = {}
     installed: list[str] = []
@@ -145,7 +145,7 @@ def read(data: Path | bytes) -> Imported:
     modules = {module_name(name) for name in (*types, *installed)}
     for path in files:
         if path.startswith("data/models/") and PurePosixPath(path).stem not in modules:
-            raise InvalidPackage("{path} of the package belongs to none of its object types.", path=path)
+            raise InvalidPackage("{path} of the package does not belong to any of its object types.", path=path)
     content = Imported(scene, project, source, types, installed, helpers)
     names = project.project_objects_ids
     return content if isinstance(names, Unset) else with_helper_names(content, names)

@@ -56,7 +56,7 @@ def _check(package: Imported, types: CombinedTypes) -> None:
         types.analysis(name)  # NotFound
     if problems := project_problems(package.scene, package.project, types):
         raise InvalidPackage(
-            "The project {name} of the package is not sound. {problems}",
+            "The project {name} of the package has errors. {problems}",
             name=package.project.name,
             problems=" ".join(problems),
         )
@@ -72,7 +72,7 @@ def _check_logic(project: Project) -> None:
         for place in {item.start.partition("/")[0], item.end.partition("/")[0]} - {START, END}:
             if place not in known:
                 raise InvalidPackage(
-                    "The logic of the package leads from or to an action {place}, which is not there.", place=place
+                    "The logic of the package refers to the action {place}, which does not exist.", place=place
                 )
 
 
@@ -91,7 +91,7 @@ def _from_script(package: Imported, types: CombinedTypes) -> Project:
 
     if package.needs_source:
         raise InvalidProject(
-            "The project {name} has no logic that its script could be read back into.", name=package.project.name
+            "The project {name} has no logic, so its script cannot be converted to logic.", name=package.project.name
         )
     facts = types.facts(package.scene)
     project = from_script(
@@ -137,7 +137,7 @@ def _plan(package: Imported, saved: _Saved, options: ImportOptions) -> tuple[_Pl
 
     def differs(what: str, option: str, allowed: bool) -> None:
         if not allowed:
-            conflicts.append(f"{what} is saved already and differs ({option} would replace it).")
+            conflicts.append(f"{what} is already saved and differs. Set {option} to replace it.")
 
     written: list[ObjectTypeSource] = []
     for name, one in package.types.items():
@@ -171,7 +171,7 @@ def _plan(package: Imported, saved: _Saved, options: ImportOptions) -> tuple[_Pl
         ("project", package.project.name, saved.project_of_name, package.project.id),
     ):
         if other is not None and other != own:
-            conflicts.append(f"Another {what} is named {name}: rename one of them.")
+            conflicts.append(f"Another {what} has the name {name}. Rename one of them.")
     return _Plan(written, scene, project, source), conflicts
 
 
@@ -223,9 +223,9 @@ class PackageImport:
         scene, project = session.scene, session.project
         found = []
         if plan.scene and scene is not None and scene.id == package.scene.id:
-            found.append(f"The scene {scene.name} is open: close it first.")
+            found.append(f"The scene {scene.name} is open. Close it first.")
         if (plan.project or plan.source) and project is not None and project.id == package.project.id:
-            found.append(f"The project {project.name} is open: close it first.")
+            found.append(f"The project {project.name} is open. Close it first.")
         return found
 
     def _check_meshes(self, package: Imported) -> None:
@@ -233,7 +233,7 @@ class PackageImport:
             mesh = UNSET if isinstance(one.model, Unset) else one.model.model()
             if isinstance(mesh, Mesh) and not self._assets.exists(mesh.asset_id):
                 raise NotFound(
-                    "The mesh of {id} needs the asset {asset_id!r}, which is not here.",
+                    "The mesh of {id} needs the asset {asset_id!r}, which is not on this server.",
                     id=one.id,
                     asset_id=mesh.asset_id,
                 )

@@ -29,7 +29,7 @@ _MODE: Final = (stat.S_IFREG | 0o644) << 16
 def _checked(path: str) -> str:
     parts = PurePosixPath(path).parts
     if not parts or path.startswith("/") or ".." in parts or "\\" in path or "\0" in path:
-        raise InvalidPackage("a package cannot have a file {path!r}", path=path)
+        raise InvalidPackage("invalid path in the package: {path!r}", path=path)
     return path
 
 
@@ -74,14 +74,14 @@ def from_zip(data: Path | bytes, wanted: Callable[[PurePosixPath], bool], larges
                         left -= len(chunk)
                         if left < 0:
                             raise InvalidPackage(
-                                "What the package tells is larger than {largest} bytes.", largest=largest
+                                "The files of the package are larger than {largest} bytes.", largest=largest
                             )
                         content += chunk
                 found[path.as_posix()] = bytes(content)
     except OSError as error:
         raise StorageError("the package cannot be read: {reason}", reason=error.strerror or error) from error
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
-        raise InvalidPackage("The package is no usable zip: {reason}.", reason=error) from error
+        raise InvalidPackage("The package is not a valid zip archive: {reason}.", reason=error) from error
     return found
 
 

@@ -37,4 +37,4 @@ def check_syntax(source: str) -> None:
             "script.py, line {lineno}: {msg}", error.text or "", lineno=error.lineno, msg=error.msg
         ) from error
     except (ValueError, RecursionError, MemoryError) as error:
-        raise InvalidProject("script.py is no Python: {reason}", reason=error) from error
+        raise InvalidProject("script.py is not valid Python: {reason}", reason=error) from error

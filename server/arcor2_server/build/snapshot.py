@@ -118,7 +118,9 @@ def _import_module(one: PackageType, own: str, copied: str, inner: str, kinds: I
             continue  # nested in the type itself
         if imported.setdefault(name, source) != source:
             raise InvalidProject(
-                "object type {name}: its actions take two things called {other_name}", name=one.name, other_name=name
+                "object type {name}: two parameter types of its actions have the name {other_name}",
+                name=one.name,
+                other_name=name,
             )
     about = docstring(f"{one.name} of {one.distribution} {one.version}, as it was when this package was built.")
     lines = [f"from {source} import {name} as {name}" for name, source in imported.items()]
@@ -139,7 +141,7 @@ def files_of(types: Sequence[PackageType], enumerations: Mapping[str, Iterable[E
     for one in types:
         if not _MODULE.fullmatch(one.module):
             raise InvalidProject(
-                "object type {name}: {module!r} is no name of a module", name=one.name, module=one.module
+                "object type {name}: {module!r} is not a valid module name", name=one.name, module=one.module
             )
         if one.source:
             files[f"{FOLDER}/{one.module}.py"] = one.source.encode()
@@ -149,7 +151,7 @@ def files_of(types: Sequence[PackageType], enumerations: Mapping[str, Iterable[E
         if one.source:
             continue
         if one.folder is None or not one.folder.is_dir():
-            raise InvalidProject("object type {name} is not in a folder of its own and cannot be copied", name=one.name)
+            raise InvalidProject("object type {name} cannot be copied: it is not in its own folder", name=one.name)
         own, inner = _module_names(one, one.folder)
         if one.folder not in folders:
             folders[one.folder] = copied = names.claim(one.folder.name, f"{one.folder.name}_driver")

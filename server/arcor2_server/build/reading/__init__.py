@@ -1,4 +1,4 @@
-"""Turns a script that keeps the conventions back into actions and logic."""
+"""Converts an edited script that follows the conventions of generated scripts to actions and logic."""
 
 from arcor2_server.build.reading.errors import NotUnderstood
 from arcor2_server.build.reading.project import from_script

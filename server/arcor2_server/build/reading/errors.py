@@ -1,4 +1,4 @@
-"""Errors in scripts that do not keep the conventions."""
+"""Errors in scripts that do not follow the conventions of generated scripts."""
 
 import ast
 
@@ -6,7 +6,7 @@ from arcor2_hw.exceptions import InvalidProject
 
 
 class NotUnderstood(InvalidProject):
-    """A line of a script cannot become actions and logic. `line` counts from 1."""
+    """A line of a script cannot be converted to actions and logic. `line` counts from 1."""
 
     code = "script_not_understood"
 
@@ -16,8 +16,8 @@ class NotUnderstood(InvalidProject):
         self.line = line
 
 
-def shown(node: ast.AST) -> str:
-    """Return the text of a piece of a script, shortened, to be quoted."""
+def excerpt(node: ast.AST) -> str:
+    """Return the code of a node for an error message, at most 60 characters."""
     try:
         text = " ".join(ast.unparse(node).split())
     except RecursionError:

@@ -1,8 +1,8 @@
-"""The loop of a script as calls and the ways between them: what runs after what, under which condition.
+"""Reads the loop of a script as calls and the paths between them, with their conditions.
 
-The text is followed as it would be run, with all ways at once that lead to a line. A way begins behind a call and ends
-at the next one, or at the end of the cycle; on it there may be one condition that holds, or several that do not, and
-a note where it is going (see layout.py).
+The reader follows the code in the order of execution, on all paths to a line at the same time. A path starts after a
+call and ends at the next call or at the end of the cycle. It has at most one condition that is true, or several that
+are false, and may set the variable `next_action` (see layout.py).
 """
 
 import ast
@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 from arcor2_hw.data.object_type import ObjectAction, find_action
 from arcor2_server.build.frame import NEXT_ACTION, Frame
-from arcor2_server.build.reading.errors import NotUnderstood, shown
+from arcor2_server.build.reading.errors import NotUnderstood, excerpt
 from arcor2_server.build.reading.module import Script
 from arcor2_server.build.reading.values import Values
 from arcor2_server.documents.logic_graph import BRANCHABLE, END_NODE, Condition
@@ -22,7 +22,17 @@ START_NODE: Final = -2
 
 @dataclass(slots=True)
 class Call:
-    """One action as it is written. outputs: the variables that take its results."""
+    """The call of an action in the script.
+
+    Args:
+        line: its line, from 1.
+        name: name of the action (`an`).
+        object_id: id of the scene object.
+        type_name: its object type.
+        declared: the called method.
+        arguments: the arguments by parameter.
+        outputs: the variables for its results.
+    """
 
     line: int
     name: str
@@ -32,28 +42,28 @@ class Call:
     arguments: dict[str, ast.expr]
     outputs: list[str]
     results: dict[str, tuple[int, int]] = field(default_factory=dict)
-    """What its arguments link to: number of the call and of its output, by variable."""
+    """The results that its arguments use, by parameter: number of the call and of its result."""
 
 
-class Way(NamedTuple):
-    """The end of a way: `taken` is the condition that holds on it; without one, none of `tried` does."""
+class LogicPath(NamedTuple):
+    """A path to `target`. Its condition is `taken`; without it, all conditions in `tried` are false."""
 
     target: int
     tried: tuple[Condition, ...]
     taken: Condition | None
 
 
-class _Going(NamedTuple):
-    """A way on which the text is being followed."""
+class _OpenPath(NamedTuple):
+    """A path from call `source` whose end is not reached yet."""
 
     source: int
     tried: tuple[Condition, ...] = ()
     taken: Condition | None = None
-    note: str | None = None
+    next_action: str | None = None
 
 
 class Use(NamedTuple):
-    """A result of `source` that is used at or behind the call `node`."""
+    """A use of a result of call `source`, at or after call `node`."""
 
     node: int
     source: int
@@ -61,72 +71,77 @@ class Use(NamedTuple):
     name: str
 
 
-class Ways:
-    """Reads a loop. `calls` in the order of the text, `ways` by the number of the call that they leave."""
+class LoopReader:
+    """The calls of a loop in the order of the code, and the paths by the number of the call where they start."""
 
     def __init__(self, frame: Frame, script: Script, values: Values) -> None:
         self.calls: list[Call] = []
-        self.ways: dict[int, list[Way]] = {START_NODE: []}
+        self.paths: dict[int, list[LogicPath]] = {START_NODE: []}
         self.uses: list[Use] = []
         self._frame, self._script, self._values = frame, script, values
         self._results: dict[str, tuple[int, int]] = {}
         self._lines: dict[str, int] = {}
-        going = self._block(script.loop, [_Going(START_NODE)])
-        self._end(going, script.loop[-1].lineno)
-        for ways in self.ways.values():
-            ways.sort(key=lambda way: (len(way.tried), way.taken is None))
+        open_paths = self._block(script.loop, [_OpenPath(START_NODE)])
+        self._end(open_paths, script.loop[-1].lineno)
+        for paths in self.paths.values():
+            paths.sort(key=lambda path: (len(path.tried), path.taken is None))
 
     # ------------------------------------------------------------------------------------------------ statements
-    def _block(self, body: Sequence[ast.stmt], going: list[_Going]) -> list[_Going]:
+    def _block(self, body: Sequence[ast.stmt], open_paths: list[_OpenPath]) -> list[_OpenPath]:
         for node in body:
-            if not going:
-                raise NotUnderstood(node.lineno, "{node} is never reached", node=shown(node))
+            if not open_paths:
+                raise NotUnderstood(node.lineno, "{node} is never reached", node=excerpt(node))
             match node:
-                case ast.Assign([ast.Name(name)], ast.Constant(str(note))) if name == NEXT_ACTION:
-                    going = [way._replace(note=note) for way in going]
+                case ast.Assign([ast.Name(name)], ast.Constant(str(next_action))) if name == NEXT_ACTION:
+                    open_paths = [path._replace(next_action=next_action) for path in open_paths]
                 case ast.Expr(ast.Call() as call):
-                    going = self._call(node, call, [], going)
+                    open_paths = self._call(node, call, [], open_paths)
                 case ast.Assign([target], ast.Call() as call) | ast.AnnAssign(target, _, ast.Call() as call):
-                    going = self._call(node, call, self._targets(target), going)
+                    open_paths = self._call(node, call, self._targets(target), open_paths)
                 case ast.If():
-                    going = self._if(node, going)
+                    open_paths = self._if(node, open_paths)
                 case ast.Continue():
-                    self._end(going, node.lineno)
-                    going = []
+                    self._end(open_paths, node.lineno)
+                    open_paths = []
                 case ast.Pass():
                     continue
                 case _:
                     raise NotUnderstood(
                         node.lineno,
-                        "the loop has calls of actions, conditions and `continue`, but here is {node}",
-                        node=shown(node),
+                        "the loop contains only calls of actions, conditions and `continue`, but this is {node}",
+                        node=excerpt(node),
                     )
-        return going
+        return open_paths
 
-    def _end(self, going: list[_Going], line: int) -> None:
-        for way in going:
-            if way.source == START_NODE:
-                raise NotUnderstood(line, "the loop does nothing before it ends")
-            self._arrive(way, END_NODE)
+    def _end(self, open_paths: list[_OpenPath], line: int) -> None:
+        for path in open_paths:
+            if path.source == START_NODE:
+                raise NotUnderstood(line, "the loop has no action before its end")
+            self._arrive(path, END_NODE)
 
-    def _arrive(self, way: _Going, target: int) -> None:
-        self.ways[way.source].append(Way(target, way.tried, way.taken))
+    def _arrive(self, path: _OpenPath, target: int) -> None:
+        self.paths[path.source].append(LogicPath(target, path.tried, path.taken))
 
     # ------------------------------------------------------------------------------------------------ calls
-    def _targets(self, target: ast.expr) -> list[str]:
+    @staticmethod
+    def _targets(target: ast.expr) -> list[str]:
         match target:
             case ast.Name(name):
                 return [name]
             case ast.Tuple(parts) if parts and all(isinstance(part, ast.Name) for part in parts):
                 return [part.id for part in parts if isinstance(part, ast.Name)]
-        raise NotUnderstood(target.lineno, "results go into variables, not into {target}", target=shown(target))
+        raise NotUnderstood(
+            target.lineno, "results must be assigned to variables, not to {target}", target=excerpt(target)
+        )
 
-    def _call(self, node: ast.stmt, call: ast.Call, outputs: list[str], going: list[_Going]) -> list[_Going]:
+    def _call(self, node: ast.stmt, call: ast.Call, outputs: list[str], open_paths: list[_OpenPath]) -> list[_OpenPath]:
         match call.func:
             case ast.Attribute(ast.Name(variable), method) if variable in self._script.objects:
                 object_id = self._script.objects[variable]
             case _:
-                raise NotUnderstood(call.lineno, "{func} is no action of an object of the scene", func=shown(call.func))
+                raise NotUnderstood(
+                    call.lineno, "{func} is not an action of an object in the scene", func=excerpt(call.func)
+                )
         obj = self._frame.index.scene_object(object_id)
         declared = find_action(self._frame.types[obj.type].actions.values(), method)
         if declared is None:
@@ -143,7 +158,7 @@ class Ways:
         if outputs and len(outputs) != len(declared.returns):
             raise NotUnderstood(
                 node.lineno,
-                "{method} gives {count} results, not {other_count}",
+                "{method} returns {count} results, not {other_count}",
                 method=method,
                 count=len(declared.returns),
                 other_count=len(outputs),
@@ -155,10 +170,10 @@ class Ways:
         for place, output in enumerate(outputs):
             self._script.claim(output, node.lineno)
             self._results[output] = (number, place)
-        self.ways[number] = []
-        for way in going:
-            self._arrive(way, number)
-        return [_Going(number)]
+        self.paths[number] = []
+        for path in open_paths:
+            self._arrive(path, number)
+        return [_OpenPath(number)]
 
     def _name(self, call: ast.Call) -> str:
         for keyword in call.keywords:
@@ -167,13 +182,13 @@ class Ways:
                     case ast.Constant(str(name)) if name:
                         break
                 raise NotUnderstood(
-                    call.lineno, "the name of an action is a text, not {value}", value=shown(keyword.value)
+                    call.lineno, "the name of an action must be a string, not {value}", value=excerpt(keyword.value)
                 )
         else:
-            raise NotUnderstood(call.lineno, '{call} has no name: add an="..."', call=shown(call))
+            raise NotUnderstood(call.lineno, '{call} has no name: add an="..."', call=excerpt(call))
         if name in self._lines:
             raise NotUnderstood(
-                call.lineno, "the action {name!r} is there already, in line {row}", name=name, row=self._lines[name]
+                call.lineno, "line {row} already has an action {name!r}", name=name, row=self._lines[name]
             )
         self._lines[name] = call.lineno
         return name
@@ -199,51 +214,52 @@ class Ways:
         return links
 
     # ------------------------------------------------------------------------------------------------ conditions
-    def _if(self, node: ast.If, going: list[_Going]) -> list[_Going]:
-        behind: list[_Going] = []
+    def _if(self, node: ast.If, open_paths: list[_OpenPath]) -> list[_OpenPath]:
+        after: list[_OpenPath] = []
         while True:
-            holds, going = self._split(node.test, going)
+            holds, open_paths = self._split(node.test, open_paths)
             if not holds:
-                raise NotUnderstood(node.lineno, "{test} never holds here", test=shown(node.test))
-            behind += self._block(node.body, holds)
+                raise NotUnderstood(node.lineno, "{test} is never true here", test=excerpt(node.test))
+            after += self._block(node.body, holds)
             if not node.orelse:
-                return behind + going
-            if not going:
-                raise NotUnderstood(node.orelse[0].lineno, "{orelse} is never reached", orelse=shown(node.orelse[0]))
+                return after + open_paths
+            if not open_paths:
+                raise NotUnderstood(node.orelse[0].lineno, "{orelse} is never reached", orelse=excerpt(node.orelse[0]))
             if len(node.orelse) > 1 or not isinstance(node.orelse[0], ast.If):
-                return behind + self._block(node.orelse, going)
+                return after + self._block(node.orelse, open_paths)
             node = node.orelse[0]
 
-    def _split(self, test: ast.expr, going: list[_Going]) -> tuple[list[_Going], list[_Going]]:
-        """Return the paths on which a condition holds, and those on which it does not."""
+    def _split(self, test: ast.expr, open_paths: list[_OpenPath]) -> tuple[list[_OpenPath], list[_OpenPath]]:
+        """Return the paths on which a condition is true, and those on which it is false."""
         match test:
-            case ast.Compare(ast.Name(name), [ast.Eq()], [ast.Constant(str(note))]) if name == NEXT_ACTION:
-                if any(way.note is None for way in going):
+            case ast.Compare(ast.Name(name), [ast.Eq()], [ast.Constant(str(next_action))]) if name == NEXT_ACTION:
+                if any(path.next_action is None for path in open_paths):
                     raise NotUnderstood(
-                        test.lineno, "{next_action} is not set on every way that leads here", next_action=NEXT_ACTION
+                        test.lineno, "{next_action} is not set on all paths to this line", next_action=NEXT_ACTION
                     )
-                return [way for way in going if way.note == note], [way for way in going if way.note != note]
+                matching = [path for path in open_paths if path.next_action == next_action]
+                return matching, [path for path in open_paths if path.next_action != next_action]
         condition, variable, negated = self._condition(test)
         opposite = condition._replace(value=not condition.value) if isinstance(condition.value, bool) else None
-        holds: list[_Going] = []
-        others: list[_Going] = []
-        for way in going:
-            if way.source == START_NODE:
-                raise NotUnderstood(test.lineno, "there is no result yet to be asked for")
-            self.uses.append(Use(way.source, condition.action, test.lineno, variable))
-            if way.taken is not None:
-                if way.taken[:2] != condition[:2]:
-                    raise NotUnderstood(test.lineno, "between one condition and the next there has to be an action")
-                # The same result is asked again: what it is here is known.
-                (holds if way.taken == condition else others).append(way)
+        holds: list[_OpenPath] = []
+        others: list[_OpenPath] = []
+        for path in open_paths:
+            if path.source == START_NODE:
+                raise NotUnderstood(test.lineno, "a condition needs the result of an action before it")
+            self.uses.append(Use(path.source, condition.action, test.lineno, variable))
+            if path.taken is not None:
+                if path.taken[:2] != condition[:2]:
+                    raise NotUnderstood(test.lineno, "an action is required between two conditions")
+                # The same result is compared again; its value on this path is known.
+                (holds if path.taken == condition else others).append(path)
                 continue
-            if opposite in way.tried:
-                holds.append(way)
-            elif condition in way.tried:
-                others.append(way)
+            if opposite in path.tried:
+                holds.append(path)
+            elif condition in path.tried:
+                others.append(path)
             else:
-                holds.append(way._replace(taken=condition))
-                others.append(way._replace(tried=(*way.tried, condition)))
+                holds.append(path._replace(taken=condition))
+                others.append(path._replace(tried=(*path.tried, condition)))
         return (others, holds) if negated else (holds, others)
 
     def _condition(self, test: ast.expr) -> tuple[Condition, str, bool]:
@@ -260,16 +276,16 @@ class Ways:
                 value, negated = self._values.compared(right), True
             case _:
                 raise NotUnderstood(
-                    test.lineno, "a condition is written `result == value`, not {test}", test=shown(test)
+                    test.lineno, "a condition must be `result == value`, not {test}", test=excerpt(test)
                 )
         if variable not in self._results:
-            raise NotUnderstood(test.lineno, "{variable} is no result of an action above", variable=variable)
+            raise NotUnderstood(test.lineno, "{variable} is not a result of an action above", variable=variable)
         source, output = self._results[variable]
         kind = self.calls[source].declared.returns[output]
         if kind not in BRANCHABLE:
             raise NotUnderstood(
                 test.lineno,
-                "{variable} is {type}, which cannot be asked for in a condition",
+                "{variable} is {type}, which a condition cannot use",
                 variable=variable,
                 type=kind,
             )

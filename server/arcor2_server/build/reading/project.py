@@ -1,4 +1,4 @@
-"""Turns the calls and paths of a script into a project. Existing items keep their ids and positions."""
+"""Converts the calls and paths of a script to a project. Existing items keep their ids and positions."""
 
 import json
 from collections.abc import Mapping
@@ -28,27 +28,38 @@ from arcor2_server.build.frame import Frame, TypeFacts
 from arcor2_server.build.reading import module
 from arcor2_server.build.reading.errors import NotUnderstood
 from arcor2_server.build.reading.module import Script
-from arcor2_server.build.reading.paths import START_NODE, Call, Way, Ways
-from arcor2_server.build.reading.values import PLAIN, Values, json_of, kept, of_type, plain
+from arcor2_server.build.reading.paths import START_NODE, Call, LogicPath, LoopReader
+from arcor2_server.build.reading.values import PLAIN, Values, json_as_before, json_of, of_type, plain
 from arcor2_server.documents import logic_graph
 from arcor2_server.documents.logic_graph import END_NODE, Condition, Edge
 
-_Asked = tuple[str, object] | None
-"""A condition to be compared: what it asks for, and the value."""
+_ConditionKey = tuple[str, object] | None
+"""A condition in comparable form: the result and its value."""
 
 
 def from_script(source: str, scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> Project:
-    """Return the project with the actions, logic and project parameters that the script has.
+    """Return the project with the actions, logic and project parameters of its edited script.
 
-    project: what the script was made from. An action of the same name (`an`) keeps its id, action point and what the
-    script does not say; one that the script left out is removed, one that could not be in it stays. A new action lies
-    on the action point that it uses, else on the one of the action written before it.
-    Raises NotUnderstood naming the line, NotFound for an object type that `types` does not have.
+    An action with the same name (`an`) keeps its id, action point and everything that is not in the script. Actions
+    missing in the script are removed, except those that no path of the old logic reached. A new action is added to the
+    action point that it uses, else to that of the action before it.
+
+    Args:
+        source: source code of the script.
+        scene: the scene of the project.
+        project: the project from which the script was generated.
+        types: the object types of the scene.
+
+    Raises:
+        NotUnderstood: a line cannot be converted. The error has its number.
+        NotFound: `types` does not contain an object type.
     """
     return _Reading(source, scene, project, types).project()
 
 
 class _Reading:
+    """One conversion of a script to a project."""
+
     def __init__(self, source: str, scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> None:
         self._old = project
         frame = Frame(scene, project, types)
@@ -61,10 +72,10 @@ class _Reading:
                 )
         self._values = Values(frame, self._script)
         self._parameters = self._read_parameters(frame)
-        ways = Ways(frame, self._script, self._values)
-        self._calls = ways.calls
-        self._ways = {number: _merged(found) for number, found in ways.ways.items()}
-        self._check_uses(ways)
+        loop = LoopReader(frame, self._script, self._values)
+        self._calls = loop.calls
+        self._paths = {number: _merged(found) for number, found in loop.paths.items()}
+        self._check_uses(loop)
 
         points = [(point, action) for point in project.action_points for action in point.actions]
         self._before: dict[str, tuple[ActionPoint, Action]] = {}
@@ -75,18 +86,18 @@ class _Reading:
             self._before[call.name][1].id if call.name in self._before else new_id("act") for call in self._calls
         ]
 
-    def _check_uses(self, ways: Ways) -> None:
-        """Refuse results that are not always there where they are used."""
-        edges = [tuple(Edge(way.target, None) for way in ways.ways[number]) for number in range(len(self._calls))]
+    def _check_uses(self, loop: LoopReader) -> None:
+        """Raise NotUnderstood for uses of results that are not set on all paths."""
+        edges = [tuple(Edge(path.target, None) for path in loop.paths[number]) for number in range(len(self._calls))]
         _, natural = layout.arrange(edges)
-        for use in ways.uses:
+        for use in loop.uses:
             if not natural.always_before(use.source, use.node):
-                giver = self._calls[use.source].name
+                producer = self._calls[use.source].name
                 raise NotUnderstood(
                     use.line,
-                    "{name} is not always there: {giver!r} has not run on every way",
+                    "{name} is not always set: {producer!r} does not run on all paths to this line",
                     name=use.name,
-                    giver=giver,
+                    producer=producer,
                 )
 
     # ------------------------------------------------------------------------------------------------ parameters
@@ -98,7 +109,7 @@ class _Reading:
             key = by_name.get(name)
             if key is None:
                 if not is_valid_name(name):
-                    raise NotUnderstood(node.lineno, "{name} cannot name a project parameter", name=name)
+                    raise NotUnderstood(node.lineno, "{name} is not a valid name of a project parameter", name=name)
                 key = new_id("pco")
                 found[key] = ProjectParameter(name, PLAIN[type(value)], json_of(value), id=key)
             else:
@@ -112,18 +123,18 @@ class _Reading:
                         type=old.type,
                         value=value,
                     )
-                found[key] = replace(old, value=kept(old.type, value, old))
+                found[key] = replace(old, value=json_as_before(old.type, value, old))
             self._values.parameters[name] = (key, found[key].type)
         return list(found.values())
 
     # ------------------------------------------------------------------------------------------------ actions
     def project(self) -> Project:
-        """Return the project as the script has it."""
+        """Return the project."""
         reached = _reached(self._old)
         number_of = {call.name: number for number, call in enumerate(self._calls)}
         named: dict[str, str] = {}
         actions: dict[str, list[Action]] = {point.id: [] for point in self._old.action_points}
-        left_over: set[str] = set()
+        unreachable: set[str] = set()
         for point in self._old.action_points:
             for old in point.actions:
                 number = number_of.get(old.name)
@@ -131,7 +142,7 @@ class _Reading:
                     actions[point.id].append(self._action(number, old))
                 elif old.id not in reached and number is None:
                     actions[point.id].append(old)
-                    left_over.add(old.id)
+                    unreachable.add(old.id)
                     named |= dict.fromkeys(old.outputs(), old.name)
         place: str | None = None
         for number, call in enumerate(self._calls):
@@ -140,19 +151,19 @@ class _Reading:
                 continue
             place = self._place(call, place)
             actions[place].append(self._action(number, None))
-        for action in (action for of in actions.values() for action in of if action.id not in left_over):
+        for action in (action for of in actions.values() for action in of if action.id not in unreachable):
             for output in action.outputs():
                 if output in named:
                     line = self._calls[number_of[action.name]].line
                     raise NotUnderstood(
-                        line, "{output} is a result of the action {named!r} already", output=output, named=named[output]
+                        line, "{output} is already a result of the action {named!r}", output=output, named=named[output]
                     )
                 named[output] = action.name
         return replace(
             self._old,
             action_points=[replace(point, actions=actions[point.id]) for point in self._old.action_points],
             parameters=self._parameters,
-            logic=self._logic(left_over),
+            logic=self._logic(unreachable),
         )
 
     def _place(self, call: Call, before: str | None) -> str:
@@ -163,9 +174,7 @@ class _Reading:
         if before is not None:
             return before
         if not self._old.action_points:
-            raise NotUnderstood(
-                call.line, "the project has no action point on which {name!r} could lie", name=call.name
-            )
+            raise NotUnderstood(call.line, "the project has no action point for the action {name!r}", name=call.name)
         return self._old.action_points[0].id
 
     def _action(self, number: int, old: Action | None) -> Action:
@@ -200,69 +209,69 @@ class _Reading:
                 outputs.append(old.outputs()[place])
                 continue
             if not is_valid_name(variable):
-                raise NotUnderstood(call.line, "{variable} cannot name a result", variable=variable)
+                raise NotUnderstood(call.line, "{variable} is not a valid name of a result", variable=variable)
             outputs.append(variable)
         if old is not None and old.outputs() == outputs:
             return old.flows
         return [Flow(outputs=outputs)]
 
     # ------------------------------------------------------------------------------------------------ logic
-    def _logic(self, left_over: set[str]) -> list[LogicItem]:
+    def _logic(self, unreachable: set[str]) -> list[LogicItem]:
         old_items: dict[str, list[LogicItem]] = {}
         for item in self._old.logic:
             old_items.setdefault(item.start.partition("/")[0], []).append(item)
-        kept_items: dict[int, LogicItem] = {}
+        unchanged: dict[int, LogicItem] = {}
         changed: list[LogicItem] = []
-        for number, ways in self._ways.items():
+        for number, paths in self._paths.items():
             start = START if number == START_NODE else self._ids[number]
             old = old_items.get(start, [])
-            wanted = self._steps(ways, old)
+            wanted = self._steps(paths, old)
             same = {_key(item): item for item in old}
-            keys = [(end, _asked(condition)) for end, condition in wanted]
-            # The order in which conditions are tried counts; the one way without a condition is the last anyway.
+            keys = [(end, _condition_key(condition)) for end, condition in wanted]
+            # The order of conditions matters; the edge without a condition is always the last.
             ordered = len(wanted) <= 2 or [key for key in same if key[1]] == [key for key in keys if key[1]]
             if len(same) == len(old) == len(keys) and set(same) == set(keys) and ordered:
-                kept_items |= {id(item): item for item in old}
+                unchanged |= {id(item): item for item in old}
                 continue
             spare = {item.end.partition("/")[0]: item for item in old}
             for end, condition in wanted:
                 key = spare.pop(end).id if end in spare else new_id("lit")
                 changed.append(LogicItem(start, end, condition, key))
-        there = {*self._ids, *left_over, END}
+        known = {*self._ids, *unreachable, END}
         for item in self._old.logic:
-            if item.start.partition("/")[0] in left_over and item.end.partition("/")[0] in there:
-                kept_items[id(item)] = item
-        return [*(item for item in self._old.logic if id(item) in kept_items), *changed]
+            if item.start.partition("/")[0] in unreachable and item.end.partition("/")[0] in known:
+                unchanged[id(item)] = item
+        return [*(item for item in self._old.logic if id(item) in unchanged), *changed]
 
-    def _steps(self, ways: list[Way], old: list[LogicItem]) -> list[tuple[str, ProjectLogicIf | Unset]]:
+    def _steps(self, paths: list[LogicPath], old: list[LogicItem]) -> list[tuple[str, ProjectLogicIf | Unset]]:
         steps: list[tuple[str, ProjectLogicIf | Unset]] = []
-        for way in ways:
-            end = END if way.target == END_NODE else self._ids[way.target]
-            if way.taken is not None:
-                steps.append((end, self._written(way.taken)))
+        for path in paths:
+            end = END if path.target == END_NODE else self._ids[path.target]
+            if path.taken is not None:
+                steps.append((end, self._logic_if(path.taken)))
                 continue
             opposites = [
-                self._written(one._replace(value=not one.value)) for one in way.tried if isinstance(one.value, bool)
+                self._logic_if(one._replace(value=not one.value)) for one in path.tried if isinstance(one.value, bool)
             ]
             before = {_key(item) for item in old}
-            known = [one for one in opposites if (end, _asked(one)) in before]
+            known = [one for one in opposites if (end, _condition_key(one)) in before]
             chosen = [*known, *reversed(opposites)]
             steps.append((end, chosen[0] if chosen else UNSET))
         return steps
 
-    def _written(self, condition: Condition) -> ProjectLogicIf:
+    def _logic_if(self, condition: Condition) -> ProjectLogicIf:
         return ProjectLogicIf(f"{self._ids[condition.action]}/default/{condition.output}", json_of(condition.value))
 
 
-def _merged(ways: list[Way]) -> list[Way]:
-    """Drop conditions without effect: those of the last edges that lead to the same action."""
-    *others, last = ways
+def _merged(paths: list[LogicPath]) -> list[LogicPath]:
+    """Remove conditions without effect: those of the last edges if these lead to the same action."""
+    *others, last = paths
     while others and others[-1].target == last.target:
         others.pop()
-    return [*others, last._replace(tried=tuple(way.taken for way in others if way.taken is not None))]
+    return [*others, last._replace(tried=tuple(path.taken for path in others if path.taken is not None))]
 
 
-def _asked(condition: ProjectLogicIf | Unset) -> _Asked:
+def _condition_key(condition: ProjectLogicIf | Unset) -> _ConditionKey:
     if isinstance(condition, Unset):
         return None
     try:
@@ -272,12 +281,12 @@ def _asked(condition: ProjectLogicIf | Unset) -> _Asked:
     return condition.what, (type(value).__name__, value)
 
 
-def _key(item: LogicItem) -> tuple[str, _Asked]:
-    return item.end.partition("/")[0], _asked(item.condition)
+def _key(item: LogicItem) -> tuple[str, _ConditionKey]:
+    return item.end.partition("/")[0], _condition_key(item.condition)
 
 
 def _variables(frame: Frame, project: Project) -> dict[str, list[str]]:
-    """Return the variables for the results of actions in the script of a project, by action."""
+    """Return the variables for the results of actions in the script of the old project, by id of the action."""
     try:
         cycle = Cycle(frame, logic_graph.read(project))
     except InvalidProject:
@@ -286,7 +295,7 @@ def _variables(frame: Frame, project: Project) -> dict[str, list[str]]:
 
 
 def _reached(project: Project) -> set[str]:
-    """Return the actions reachable from START, which are those in a script of the project."""
+    """Return the ids of the actions reachable from START, which are those in the script of the project."""
     following: dict[str, list[str]] = {}
     for item in project.logic:
         following.setdefault(item.start.partition("/")[0], []).append(item.end.partition("/")[0])

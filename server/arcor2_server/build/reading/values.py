@@ -1,4 +1,4 @@
-"""Arguments of a call: literals, members of enumerations, action points, project parameters, results."""
+"""Reads the arguments of calls: literals, enumeration members, action points and project parameters."""
 
 import ast
 from collections.abc import Mapping
@@ -13,38 +13,38 @@ from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import ActionParameter, ActionParameterType
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.build.frame import REFERENCES, Frame, TypeFacts
-from arcor2_server.build.reading.errors import NotUnderstood, shown
+from arcor2_server.build.reading.errors import NotUnderstood, excerpt
 from arcor2_server.build.reading.module import Script
 
 ENUMERATIONS: Final = ("string_enum", "integer_enum")
 PLAIN: Final[dict[type, str]] = {bool: "boolean", int: "integer", float: "double", str: "string"}
-"""The parameter type of a plain value."""
+"""Parameter types of literals."""
 
 
 def json_of(value: Any) -> str:
-    """Return a plain value as JSON."""
+    """Return a value as JSON."""
     return msgspec.json.encode(value).decode()
 
 
 def plain(node: ast.expr) -> Any:
-    """Return the value of a literal: truth value, number or text; NotUnderstood for anything else."""
+    """Return the value of a bool, number or string literal. Raise NotUnderstood for anything else."""
     match node:
         case ast.Constant(bool() | int() | float() | str() as value):
             return value
         case ast.UnaryOp(ast.USub(), ast.Constant(int() | float() as value)) if not isinstance(value, bool):
             return -value
-    raise NotUnderstood(node.lineno, "{node} is no truth value, number or text", node=shown(node))
+    raise NotUnderstood(node.lineno, "{node} is not a bool, number or string literal", node=excerpt(node))
 
 
 def of_type(value: Any, kind: str) -> Any:
-    """Convert a plain value for a parameter kind: an integer may be used for a double."""
+    """Convert a value to a parameter type: an integer may be used as a double."""
     if kind == "double" and type(value) is int:
         return float(value)
     return value
 
 
-def kept(kind: str, value: Any, old: Parameter | None) -> str:
-    """Return a plain value as JSON: as it was written before if it is still the same."""
+def json_as_before(kind: str, value: Any, old: Parameter | None) -> str:
+    """Return a value as JSON. The old text is returned if the value has not changed."""
     if old is not None and old.type == kind:
         try:
             before = msgspec.json.decode(old.value)
@@ -56,13 +56,18 @@ def kept(kind: str, value: Any, old: Parameter | None) -> str:
 
 
 class Values:
-    """Reads the arguments of calls. `frame` knows the names that Build gives to what is in the project."""
+    """Reads the arguments of calls.
+
+    Args:
+        frame: the names in the generated script of the old project.
+        script: the script.
+    """
 
     def __init__(self, frame: Frame, script: Script) -> None:
         self._frame = frame
         self._script = script
         self.parameters: dict[str, tuple[str, str]] = {}
-        """Ids and types of project parameters by their names in the script."""
+        """Ids and types of project parameters, by their names in the script."""
         self._poses = {path: key for key, path in frame.points.poses.items()}
         self._joints = {path: key for key, path in frame.points.joints.items()}
         self._positions = {path: key for key, path in frame.points.positions.items()}
@@ -78,27 +83,27 @@ class Values:
 
     # ------------------------------------------------------------------------------------------------ calls
     def arguments(self, call: ast.Call, declared: ObjectAction, type_name: str) -> dict[str, ast.expr]:
-        """Return the argument of each parameter except `an`. Raise NotUnderstood if it does not fit."""
+        """Return the arguments by parameter, without `an`. Raise NotUnderstood if they do not fit the parameters."""
         given: dict[str, ast.expr] = {}
         names = [meta.name for meta in declared.parameters]
         by_name = self._frame.types[type_name].keyword_only
         by_place = [name for name in names if (declared.name, name) not in by_name]
         for name, node in zip(by_place, call.args, strict=False):
             if isinstance(node, ast.Starred):
-                raise NotUnderstood(node.lineno, "arguments have to be written one by one")
+                raise NotUnderstood(node.lineno, "arguments must be written one by one, without * or **")
             given[name] = node
         if len(call.args) > len(by_place):
             node, count = call.args[len(by_place)], len(by_place)
             raise NotUnderstood(
                 node.lineno,
-                "{name} takes {count} arguments without a name; {node} is too much",
+                "{name} has {count} positional parameters; {node} is too many",
                 name=declared.name,
                 count=count,
-                node=shown(node),
+                node=excerpt(node),
             )
         for keyword in call.keywords:
             if keyword.arg is None:
-                raise NotUnderstood(keyword.value.lineno, "arguments have to be written one by one")
+                raise NotUnderstood(keyword.value.lineno, "arguments must be written one by one, without * or **")
             if keyword.arg == "an":
                 continue
             name = declared.present_name(keyword.arg)
@@ -120,14 +125,14 @@ class Values:
         return given
 
     def points_in(self, node: ast.expr) -> list[str]:
-        """Return the ids of the action points that an argument refers to."""
+        """Return the id of the action point that an argument refers to, in a list; empty if there is none."""
         path = self._path(node)
         return [self._points[path[0]]] if path and path[0] in self._points else []
 
     def constant(
         self, node: ast.expr, meta: ParameterMeta, object_id: str, type_name: str, method: str, old: Parameter | None
     ) -> ActionParameter:
-        """Read an argument that is not the result of an action."""
+        """Return the parameter for an argument that is not a result of an action."""
         if isinstance(node, ast.Name):
             return self._project_parameter(node, meta)
         path = self._path(node)
@@ -137,11 +142,11 @@ class Values:
             value = self._member(node, meta, type_name, method)
         elif meta.type in REFERENCES or meta.type == "image":
             raise NotUnderstood(
-                node.lineno, "{name} is {type}, not {node}", name=meta.name, type=meta.type, node=shown(node)
+                node.lineno, "{name} is {type}, not {node}", name=meta.name, type=meta.type, node=excerpt(node)
             )
         else:
             value = of_type(plain(node), meta.type)
-        text = kept(meta.type, value, old)
+        text = json_as_before(meta.type, value, old)
         parameter = ActionParameter(meta.name, meta.type, text)
         try:
             PARAMETER_TYPES[meta.type].check(parameter, meta)
@@ -151,7 +156,7 @@ class Values:
 
     def _project_parameter(self, node: ast.Name, meta: ParameterMeta) -> ActionParameter:
         if node.id not in self.parameters:
-            raise NotUnderstood(node.lineno, "{id} is not known here", id=node.id)
+            raise NotUnderstood(node.lineno, "unknown name {id}", id=node.id)
         key, kind = self.parameters[node.id]
         if kind != meta.type:
             raise NotUnderstood(
@@ -166,7 +171,7 @@ class Values:
 
     # ------------------------------------------------------------------------------------------------ references
     def _path(self, node: ast.expr) -> tuple[str, ...] | None:
-        """Return the parts behind the name of the action points, None when something else is meant."""
+        """Return the parts of a dotted name after the action points variable, None for other expressions."""
         parts: list[str] = []
         while isinstance(node, ast.Attribute):
             parts.append(node.attr)
@@ -183,24 +188,24 @@ class Values:
         }
         kind = next((kind for kind, table in tables.items() if path in table), None)
         if kind is None:
-            raise NotUnderstood(node.lineno, "the project has no {node}", node=shown(node))
+            raise NotUnderstood(node.lineno, "the project has no {node}", node=excerpt(node))
         if kind != meta.type:
             raise NotUnderstood(
                 node.lineno,
                 "{name} is {type}, but {node} is {other_type}",
                 name=meta.name,
                 type=meta.type,
-                node=shown(node),
+                node=excerpt(node),
                 other_type=kind,
             )
         key = tables[kind][path]
         if kind == "joints" and self._frame.index.joints(key)[1].robot_id != object_id:
-            raise NotUnderstood(node.lineno, "{node} belong to another robot", node=shown(node))
+            raise NotUnderstood(node.lineno, "{node} belong to another robot", node=excerpt(node))
         return ActionParameter(meta.name, kind, json_of(key))
 
     # ------------------------------------------------------------------------------------------------ enumerations
     def _named_member(self, node: ast.expr) -> tuple[str, str] | None:
-        """Return the enumeration, as it is called where it is defined, and the member that an expression names."""
+        """Return the enumeration, by its name where it is defined, and the member that an expression names."""
         match node:
             case ast.Attribute(ast.Name(name), member) if name in self._script.imports:
                 return self._script.imports[name], member
@@ -215,7 +220,7 @@ class Values:
         if kind is None or named is None or named[0] != kind.name:
             wanted = "an enumeration" if kind is None else f"one of {kind.name}"
             raise NotUnderstood(
-                node.lineno, "{name} takes {wanted}, not {node}", name=meta.name, wanted=wanted, node=shown(node)
+                node.lineno, "{name} takes {wanted}, not {node}", name=meta.name, wanted=wanted, node=excerpt(node)
             )
         for value, member in kind.members.items():
             if member == named[1]:
@@ -227,12 +232,12 @@ class Values:
         named = self._named_member(node)
         if named is not None:
             if named not in self._members:
-                raise NotUnderstood(node.lineno, "{node} is not known", node=shown(node))
+                raise NotUnderstood(node.lineno, "unknown enumeration member {node}", node=excerpt(node))
             return self._members[named]
         value = plain(node)
         if isinstance(value, float):
             raise NotUnderstood(
-                node.lineno, "a condition compares with a truth value, integer or text, not {value}", value=value
+                node.lineno, "a condition must compare with a bool, integer or string, not {value}", value=value
             )
         assert isinstance(value, bool | int | str)
         return value
