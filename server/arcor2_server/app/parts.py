@@ -155,7 +155,7 @@ async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
         stack.push_async_callback(compute.close)
         hosts = CellHosts(settings.device_files_dirs)
         scene_host = HostSession(hub, hosts, "scene")
-        program_host = HostSession(hub, hosts, "program", everybody=True)
+        program_host = HostSession(hub, hosts, "program", to_all_clients=True)
 
         # ------------------------------------------------------------------------------------ session
         session = Session(settings, storage, types, damage, secrets)

@@ -338,7 +338,7 @@ class Execution(PackageLibrary):
                 announced = self._exception
                 self.last_error = msgspec.structs.replace(message.error, type=announced.type, message=announced.message)
             self._ended()
-            self._spawn(host.gone(), "end of the program's host")
+            self._spawn(host.wait_or_kill(), "end of the program's host")
         elif self.state is not S.STOPPING:
             state = S(message.state)
             if self.state is not state:

@@ -1,4 +1,4 @@
-"""States of the devices of a cell host: connection, health, alarms and control."""
+"""The states of the devices of a cell host: connection, health, alarms and control."""
 
 from collections.abc import Callable, Iterable, Mapping
 
@@ -21,10 +21,19 @@ log = structlog.get_logger(__name__)
 
 
 class DeviceStatus(Data, frozen=True):
-    """The state of one object of the scene; `answering` is false while its cell host does not answer.
+    """The state of an object of the scene.
 
-    reason: why the connection is lost.
-    overlaid: names of the settings that the cell file of the server overrides.
+    Args:
+        id: id of the scene object.
+        name: its name.
+        type: its object type.
+        connection: state of its connection.
+        health: its health.
+        alarms: its active alarms.
+        control_owner: who has control of the device, None if unknown.
+        answering: false while the cell host does not answer.
+        reason: why the connection is lost.
+        overlaid: names of the settings that the cell file of the server overrides.
     """
 
     id: str
@@ -59,14 +68,14 @@ def overlay_for(
     for override in overrides:
         of = objects[override.id]
         laid = {each.name: HIDDEN if is_secret(of.type, each.name) else each.value for each in override.parameters}
-        log.info("settings from the cell file", object=of.name, settings=laid)
+        log.info("cell file overrides settings", object=of.name, settings=laid)
     if unknown := strangers(cell, scene):
-        log.warning("the cell file names what is not in the scene", objects=unknown, scene=scene.name)
+        log.warning("objects of the cell file are not in the scene", objects=unknown, scene=scene.name)
     return overrides, {override.id: [parameter.name for parameter in override.parameters] for override in overrides}
 
 
 class DeviceBoard:
-    """Stores the last report of each device, and publishes each change of connection or health once."""
+    """Stores the last report of each device and publishes changes of connection and health."""
 
     def __init__(self, hub: EventHub) -> None:
         self.on_connection: list[Callable[[], None]] = []
@@ -85,7 +94,7 @@ class DeviceBoard:
             notify()
 
     def set_answering(self, answering: bool) -> None:
-        """Note whether the process that controls the devices answers, and publish it with the state of each device."""
+        """Store whether the cell host answers, and publish it with the state of each device."""
         if self.answering == answering:
             return
         self.answering = answering
@@ -93,7 +102,7 @@ class DeviceBoard:
             self._publish(state)
 
     def clear(self, reason: str = "") -> None:
-        """Forget all devices and publish connected ones as offline, with a reason."""
+        """Remove all devices, and publish those that were connected as offline with a reason."""
         before, self._reports = self._reports, {}
         for report in before.values():
             if report.connection is not Connection.OFFLINE:
@@ -111,7 +120,9 @@ class DeviceBoard:
     def show(self, objects: Iterable[SceneObject], overlaid: Mapping[str, list[str]]) -> None:
         """Set the objects of the scene. Objects without a report are offline.
 
-        overlaid: by id, the settings that the cell file of the server overrides.
+        Args:
+            objects: the objects.
+            overlaid: names of the settings that the cell file of the server overrides, by id of the object.
         """
         self._objects = {obj.id: obj for obj in objects}
         self._overlaid = overlaid
@@ -138,11 +149,11 @@ class DeviceBoard:
         return [_health(self._report(object_id)) for object_id in self._objects]
 
     def failed(self) -> list[str]:
-        """Name the objects that have failed, in the order of the scene."""
-        return [one.name for one in self._objects.values() if self._report(one.id).connection is Connection.FAILED]
+        """Return the names of the objects that failed to connect, in the order of the scene."""
+        return [obj.name for obj in self._objects.values() if self._report(obj.id).connection is Connection.FAILED]
 
     def require_not_failed(self, object_id: str) -> None:
-        """Raise RequestRefused when an object has failed, with its name and why."""
+        """Raise RequestRefused, with name and reason, if an object failed to connect."""
         report, known = self._reports.get(object_id), self._objects.get(object_id)
         if report is not None and known is not None and report.connection is Connection.FAILED:
             raise RequestRefused(
@@ -153,12 +164,12 @@ class DeviceBoard:
         """Return the connection of every object, in the order of the scene."""
         return [self._state(self._report(object_id)) for object_id in self._objects]
 
-    def not_in_the_way(self) -> frozenset[str]:
-        """Return the collision objects that do not count for now."""
+    def disabled_obstacles(self) -> frozenset[str]:
+        """Return the ids of the collision objects that are disabled."""
         return frozenset(report.object_id for report in self._reports.values() if not report.in_the_way)
 
     def held_parts(self) -> dict[str, tuple[str, HeldPart]]:
-        """Return the parts that robots hold, by name, each with the id of its robot."""
+        """Return the gripped parts by name, each with the id of its robot."""
         return {part.name: (report.object_id, part) for report in self._reports.values() for part in report.held}
 
     def _report(self, object_id: str) -> DeviceChanged:
@@ -172,29 +183,27 @@ class DeviceBoard:
         )
 
     def statuses(self) -> list[DeviceStatus]:
-        """Return all objects in the order of the scene."""
-        found = []
-        for obj in self._objects.values():
-            report = self._report(obj.id)
-            found.append(
-                DeviceStatus(
-                    obj.id,
-                    obj.name,
-                    obj.type,
-                    report.connection,
-                    report.health,
-                    report.alarms,
-                    report.control_owner,
-                    self.answering,
-                    report.reason,
-                    list(self._overlaid.get(obj.id, ())),
-                )
+        """Return the states of all objects, in the order of the scene."""
+        return [
+            DeviceStatus(
+                obj.id,
+                obj.name,
+                obj.type,
+                report.connection,
+                report.health,
+                report.alarms,
+                report.control_owner,
+                self.answering,
+                report.reason,
+                list(self._overlaid.get(obj.id, ())),
             )
-        return found
+            for obj in self._objects.values()
+            for report in (self._report(obj.id),)
+        ]
 
 
 def _obstacles(report: DeviceChanged | None) -> tuple[bool, list[HeldPart]]:
-    """Return what a device contributes to the obstacles: whether it counts, and the parts that it holds."""
+    """Return whether a device is an obstacle, and the parts that it holds."""
     return (True, []) if report is None else (report.in_the_way, report.held)
 
 

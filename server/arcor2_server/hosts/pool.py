@@ -1,4 +1,4 @@
-"""The pool of cell hosts: one spare has its imports done, so that a start does not wait for Python."""
+"""The pool of cell hosts. One spare host is already started, so that going online does not wait for Python."""
 
 import asyncio
 import contextlib
@@ -15,32 +15,33 @@ from arcor2_server.hosts.process import CellHost, HostUser
 
 log = structlog.get_logger(__name__)
 
-CLOSE_WITHIN: Final = 1.5
-"""Seconds that the end of the server waits for a host that is just starting."""
-READY_WITHIN: Final = 20.0
-"""Seconds for the start of Python and the common imports on a machine that is busy."""
+CLOSE_TIMEOUT: Final = 1.5
+"""Time limit for a host that is still starting when the server ends, s."""
+READY_TIMEOUT: Final = 20.0
+"""Time limit for the start of a host on a busy machine, s."""
 
 
 class CellHosts:
-    """Hands out cell hosts. Call `prepare` when the taken host has started its devices and the processors are idle.
+    """Provides cell hosts. Call `prepare` when the taken host has connected its devices and the processor is idle.
 
-    device_files: the directories in which the settings of devices may name files.
+    Args:
+        device_files: directories of the files that settings of devices may name.
     """
 
     def __init__(self, device_files: Sequence[Path]) -> None:
         self._environment = os.environ | {DEVICE_FILES: os.pathsep.join(map(str, device_files))}
         self._spare: asyncio.Task[CellHost] | None = None
-        self._given: set[CellHost] = set()
+        self._taken: set[CellHost] = set()
         self._closed = False
 
     def prepare(self) -> None:
-        """Begin to start the spare, unless there is one."""
+        """Start a spare host unless there is one."""
         if self._spare is None and not self._closed:
             self._spare = asyncio.create_task(self._start(), name="spare cell host")
-            self._spare.add_done_callback(_look)
+            self._spare.add_done_callback(_log_failure)
 
     async def take(self, user: HostUser) -> CellHost:
-        """Return a ready host, the spare one or a new one. Raise Arcor2Error if none can be started."""
+        """Return the spare host, or a new one. Raise Arcor2Error if no host can be started."""
         while True:
             self.prepare()
             if self._spare is None:
@@ -49,20 +50,20 @@ class CellHosts:
             host = await spare
             if host.alive:
                 break
-            await host.gone()
+            await host.wait_or_kill()
         host.user = user
-        self._given.add(host)
-        host.ended.add_done_callback(lambda _: self._given.discard(host))
+        self._taken.add(host)
+        host.ended.add_done_callback(lambda _: self._taken.discard(host))
         return host
 
     async def close(self) -> None:
-        """End all hosts."""
+        """Close all hosts."""
         self._closed = True
-        hosts = set(self._given)
+        hosts = set(self._taken)
         spare, self._spare = self._spare, None
         if spare is not None:
-            # One that is just starting is let finish, which is sooner over than a start cut off in the middle.
-            await asyncio.wait({spare}, timeout=CLOSE_WITHIN)
+            # Completing a start takes less time than interrupting it.
+            await asyncio.wait({spare}, timeout=CLOSE_TIMEOUT)
             spare.cancel()
             with contextlib.suppress(Arcor2Error, asyncio.CancelledError):
                 hosts.add(await spare)
@@ -71,19 +72,17 @@ class CellHosts:
     async def _start(self) -> CellHost:
         host = await CellHost.start(self._environment)
         try:
-            async with asyncio.timeout(READY_WITHIN):
+            async with asyncio.timeout(READY_TIMEOUT):
                 await asyncio.shield(host.ready)
-        except (TimeoutError, Arcor2Error) as error:
+        except BaseException as error:
             host.kill()
-            await host.gone()
-            raise Arcor2Error("No cell host can be started.", str(error)) from error
-        except BaseException:
-            host.kill()
-            await host.gone()
+            await host.wait_or_kill()
+            if isinstance(error, TimeoutError | Arcor2Error):
+                raise Arcor2Error("No cell host can be started.", str(error)) from error
             raise
         return host
 
 
-def _look(spare: "asyncio.Task[CellHost]") -> None:
+def _log_failure(spare: "asyncio.Task[CellHost]") -> None:
     if not spare.cancelled() and (error := spare.exception()) is not None:
-        log.error("no spare cell host", reason=str(error), detail=getattr(error, "detail", ""))
+        log.error("spare cell host not started", reason=str(error), detail=getattr(error, "detail", ""))

@@ -1,4 +1,4 @@
-"""One cell host process: its socket, calls, heartbeat and end."""
+"""A cell host process: its socket, calls, heartbeat and end."""
 
 import asyncio
 import contextlib
@@ -6,7 +6,7 @@ import itertools
 import os
 import signal
 import socket
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final, Protocol, TypeVar, cast
 
 import msgspec
@@ -22,22 +22,22 @@ log = structlog.get_logger(__name__)
 T = TypeVar("T", bound=m.ToServer)
 
 COMMAND: Final = ("-P", "-m", "arcor2_hw.runtime.host")
-GOES_WITHIN: Final = 3.0
+EXIT_TIMEOUT: Final = 3.0
 """Time limit for a host to end by itself before it is killed, s."""
-DEVICES_END_WITHIN: Final = 2.0
+DEVICE_EXIT_TIMEOUT: Final = 2.0
 """Time limit for the processes of devices to end after their host, before they are killed, s."""
-LAST_WORDS: Final = 0.2
-"""Time between the two signs of the end, closed socket and ended process, s."""
-HELD_WITHIN: Final = 15.0
+LATE_TIMEOUT: Final = 0.2
+"""Time limit for the second sign of the end after the first one, s: closed socket and exit of the process."""
+HOLD_TIMEOUT: Final = 15.0
 """Time limit for the start of a hold, including taking control, or for a robot to stop, s."""
-STOPPED_WITHIN: Final = 3.0
-"""Time limit for stopping all devices, s; the host allows the devices two."""
-ANSWERS_WITHIN: Final = 5.0
+STOP_TIMEOUT: Final = 3.0
+"""Time limit for stopping all devices, s; the host allows the devices 2 s."""
+ANSWER_TIMEOUT: Final = 5.0
 """Time after the deadline of a call at which the host is reported as not answering, s."""
 
 
 class CellError(Arcor2Error):
-    """An error in the cell host, with the code and type that it has there."""
+    """An error of the cell host, with its code and type."""
 
     def __init__(self, data: m.ErrorData) -> None:
         super().__init__(data.message, data.detail)
@@ -47,16 +47,16 @@ class CellError(Arcor2Error):
 
 
 class HostUser(Protocol):
-    """The user of a host. It receives all messages that answer no call."""
+    """The user of a host. It receives all messages that are not answers to calls."""
 
     def host_message(self, host: "CellHost", message: m.ServerBound) -> None:
-        """Take a message."""
+        """Handle a message."""
 
     def host_silent(self, host: "CellHost", silent: bool) -> None:
-        """Handle that the host does not answer, or answers again."""
+        """Handle that the host stopped answering, or answers again."""
 
     def host_ended(self, host: "CellHost", reason: str) -> None:
-        """Handle the end of the host; called once, as the last call."""
+        """Handle the end of the host. This is the last call."""
 
 
 class _Connection(asyncio.Protocol):
@@ -66,18 +66,18 @@ class _Connection(asyncio.Protocol):
         self.host: CellHost | None = None
         self._buffer = bytearray()
         self.transport: asyncio.Transport | None = None
-        self.pieces = 0
-        """How often something has come."""
+        self.chunks = 0
+        """Number of received chunks."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self.transport = cast("asyncio.Transport", transport)
 
     def data_received(self, data: bytes) -> None:
         host, buffer = self.host, self._buffer
-        self.pieces += 1
+        self.chunks += 1
         buffer += data
         if host is None:
-            return  # `start` looks again
+            return  # `start` calls again
         start = 0
         try:
             while len(buffer) - start >= m.PREFIX_SIZE:
@@ -87,14 +87,14 @@ class _Connection(asyncio.Protocol):
                 host._receive(m.decode_server_bound(bytes(buffer[start + m.PREFIX_SIZE : end])))
                 start = end
         except (msgspec.MsgspecError, ValueError):
-            log.exception("the cell host sent what is no message", pid=host.pid)
+            log.exception("invalid message of the cell host", pid=host.pid)
             host.kill()
             return
         del buffer[:start]
 
-    def connection_lost(self, error: Exception | None) -> None:  # noqa: ARG002 - the process tells why
+    def connection_lost(self, error: Exception | None) -> None:  # noqa: ARG002 - the exit status has the reason
         if self.host is not None:
-            self.host._disconnected()
+            self.host._lost.set()
 
 
 class CellHost:
@@ -118,11 +118,11 @@ class CellHost:
 
     @classmethod
     async def start(cls, environment: Mapping[str, str] = os.environ) -> "CellHost":
-        """Start the process; it is usable once `ready` is done."""
+        """Start the process. It can be used when `ready` is done."""
         ours, theirs = socket.socketpair()
         connection = _Connection()
         try:
-            # First the wire, then the process: nothing is awaited between a process and the tasks that look after it.
+            # The connection first: nothing may be awaited between the start of the process and of its tasks.
             await asyncio.get_running_loop().create_unix_connection(lambda: connection, sock=ours)
             process = await ChildProcess.start(COMMAND, theirs, environment)
         except BaseException:
@@ -148,18 +148,23 @@ class CellHost:
 
     @property
     def alive(self) -> bool:
-        """Return whether the host has not ended."""
+        """Whether the host has not ended."""
         return not self.reason
 
-    # -------------------------------------------------------------------------------- saying
+    # -------------------------------------------------------------------------------- sending
     def send(self, message: m.ToHost) -> None:
-        """Send a message. It is dropped if the host has ended, which is reported to its user."""
+        """Send a message. It is dropped if the host has ended."""
         transport = self._connection.transport
         if transport is not None and not transport.is_closing():
             transport.write(m.encode(message))
 
     async def expect(self, kind: type[T], timeout: float | None = None) -> T:
-        """Wait for the next message of a kind; raise ConnectionLost when the host ends before, TimeoutError."""
+        """Wait for the next message of a type.
+
+        Raises:
+            ConnectionLost: the host ended.
+            TimeoutError: there was no message within the time limit.
+        """
         future: asyncio.Future[T] = asyncio.get_running_loop().create_future()
         if self.reason:
             raise ConnectionLost(self.reason)
@@ -177,71 +182,86 @@ class CellHost:
         cancel: bool = False,
         deadline: float | None = None,
     ) -> bytes:
-        """Call a method of a device, or cancel it; return the result as JSON, empty for None.
+        """Call a method of a device, or cancel the call; return the result as JSON, empty for None.
 
-        Raise CellError if the device reports an error, ConnectionLost if the host ends.
+        Raises:
+            CellError: the device refused the call or failed.
+            ConnectionLost: the host ended.
+            DeviceTimeout: the host did not answer in time.
         """
-        number = next(self._number)
-        message = m.Call(number, object_id, method, dict(arguments or {}), control, cancel, deadline)
-        return await self._ask(number, message, deadline)
+        limit = None if deadline is None else deadline + ANSWER_TIMEOUT
+        return await self._request(
+            m.Call, object_id, method, dict(arguments or {}), control, cancel, deadline, limit=limit
+        )
 
     async def stop_motion(self, object_id: str) -> None:
-        """Stop a device past whatever it does. Raise CellError or ConnectionLost if that is impossible."""
-        number = next(self._number)
-        await self._ask(number, m.StopMotion(number, object_id), None)
+        """Stop a device, also while it executes a call. Raise CellError or ConnectionLost if that is impossible."""
+        await self._request(m.StopMotion, object_id)
 
     async def stop_all(self) -> list[m.DeviceStop]:
-        """Stop the program and all devices; return what became of each.
+        """Stop the program and all devices; return the outcome for each device.
 
-        Raise ConnectionLost or DeviceTimeout if that is impossible.
+        Raises:
+            ConnectionLost: the host ended.
+            DeviceTimeout: the host did not answer in time.
         """
-        number = next(self._number)
-        try:
-            async with asyncio.timeout(STOPPED_WITHIN):
-                raw = await self._ask(number, m.StopAll(number), None)
-        except TimeoutError:
-            raise DeviceTimeout("The cell host does not answer.", f"pid {self.pid}") from None
-        return msgspec.json.decode(raw, type=list[m.DeviceStop])
+        return msgspec.json.decode(await self._request(m.StopAll, limit=STOP_TIMEOUT), type=list[m.DeviceStop])
 
     async def lease(self, object_id: str, hold: int, kind: HoldKind, until: float, **motion: Any) -> bytes:
-        """Allow a robot to move until a time of the monotonic clock, 0: release it. Return the scale as JSON, or empty.
+        """Allow a robot to move until a time of the monotonic clock, s; 0 releases it.
 
-        motion: the further fields of the message. CellError, ConnectionLost, DeviceTimeout.
+        Args:
+            object_id: the robot.
+            hold: number of the hold.
+            kind: kind of the motion.
+            until: end of the lease.
+            motion: further fields of the message.
+
+        Returns:
+            The scale of the motion as JSON, empty after a release.
+
+        Raises:
+            CellError: the robot refused the motion or failed.
+            ConnectionLost: the host ended.
+            DeviceTimeout: the host did not answer in time.
         """
-        number = next(self._number)
-        return await self._ask(number, m.Lease(number, object_id, hold, kind, until, **motion), HELD_WITHIN)
+        limit = HOLD_TIMEOUT + ANSWER_TIMEOUT
+        return await self._request(m.Lease, object_id, hold, kind, until, limit=limit, **motion)
 
     async def retry(self, object_id: str) -> None:
         """Create and connect a failed object again. Raise CellError or ConnectionLost if that is impossible."""
-        number = next(self._number)
-        await self._ask(number, m.RetryObject(number, object_id), None)
+        await self._request(m.RetryObject, object_id)
 
-    async def _ask(self, number: int, message: m.ToHost, deadline: float | None) -> bytes:
+    async def _request(
+        self, message: Callable[..., m.ToHost], *fields: Any, limit: float | None = None, **more: Any
+    ) -> bytes:
+        """Send a message with a new number and wait for the answer at most `limit` s."""
         if self.reason:
             raise ConnectionLost(self.reason)
+        number = next(self._number)
         future: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
         self._calls[number] = future
-        self.send(message)
+        self.send(message(number, *fields, **more))
         try:
-            async with asyncio.timeout(None if deadline is None else deadline + ANSWERS_WITHIN):
+            async with asyncio.timeout(limit):
                 return await future
         except TimeoutError:
             raise DeviceTimeout("The cell host does not answer.", f"pid {self.pid}") from None
         finally:
             self._calls.pop(number, None)
 
-    # -------------------------------------------------------------------------------- ending
+    # -------------------------------------------------------------------------------- end
     def kill(self) -> None:
         """Kill the process."""
         self.process.kill()
 
-    async def close(self, timeout: float = GOES_WITHIN) -> None:
-        """Close the socket: the host stops motion, disconnects and ends; killed when it does not. Waits for the end."""
+    async def close(self, timeout: float = EXIT_TIMEOUT) -> None:
+        """Close the socket, on which the host stops all motion, disconnects and ends; wait for the end."""
         if self._connection.transport is not None:
             self._connection.transport.close()
-        await self.gone(timeout)
+        await self.wait_or_kill(timeout)
 
-    async def gone(self, timeout: float = GOES_WITHIN) -> None:
+    async def wait_or_kill(self, timeout: float = EXIT_TIMEOUT) -> None:
         """Wait until the process has ended, and kill it after `timeout` s."""
         try:
             async with asyncio.timeout(timeout):
@@ -253,24 +273,21 @@ class CellHost:
         finally:
             await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    def _disconnected(self) -> None:
-        self._lost.set()
-
     async def _watch_end(self) -> None:
-        """Report the end as soon as the process has ended or its socket is closed."""
+        """Report the end when the process has ended or its socket is closed."""
         waiting = asyncio.create_task(self.process.wait())
         lost = asyncio.create_task(self._lost.wait())
         try:
             await asyncio.wait({waiting, lost}, return_when=asyncio.FIRST_COMPLETED)
-            # What it said last is still on its way when the process is gone; the exit status when the socket is.
+            # Wait for the other sign too: the last messages may arrive after the exit of the process, and the exit
+            # status after the end of the connection. Repeat while data arrives, which takes time on a busy server.
             received = -1
-            while not (lost.done() and waiting.done()) and received != self._connection.pieces:
-                # A busy server may have much to take in yet.
-                received = self._connection.pieces
-                await asyncio.wait({waiting if lost.done() else lost}, timeout=LAST_WORDS)
+            while not (lost.done() and waiting.done()) and received != self._connection.chunks:
+                received = self._connection.chunks
+                await asyncio.wait({waiting if lost.done() else lost}, timeout=LATE_TIMEOUT)
             if not waiting.done():
                 self._report_end("the cell host closed its connection")
-                _, late = await asyncio.wait({waiting}, timeout=GOES_WITHIN)
+                _, late = await asyncio.wait({waiting}, timeout=EXIT_TIMEOUT)
                 if late:
                     self.kill()
             self._report_end(f"the cell host {describe_exit(await waiting)}")
@@ -281,12 +298,12 @@ class CellHost:
             if self._connection.transport is not None:
                 self._connection.transport.abort()
             self.ended.set_result(None)
-            asyncio.get_running_loop().call_later(DEVICES_END_WITHIN, self._kill_rest)
+            asyncio.get_running_loop().call_later(DEVICE_EXIT_TIMEOUT, self._kill_rest)
 
     def _kill_rest(self) -> None:
-        """Kill processes of devices that a C call keeps from ending, which hold the output of the host open."""
+        """Kill processes of devices that hang in a C call and keep the output of the host open."""
         with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(self.pid, signal.SIGKILL)  # the host was the leader of its process group
+            os.killpg(self.pid, signal.SIGKILL)  # the host was the leader of their process group
 
     def _report_end(self, reason: str) -> None:
         if self.reason:
@@ -296,12 +313,12 @@ class CellHost:
         for future in [*self._calls.values(), *(future for _, future in self._waiting), self.ready]:
             if not future.done():
                 future.set_exception(error)
-                future.exception()  # nobody may be waiting
+                future.exception()  # marks it as retrieved, in case nothing awaits it
         self._waiting.clear()
         if self.user is not None:
             self.user.host_ended(self, reason)
 
-    # -------------------------------------------------------------------------------- hearing
+    # -------------------------------------------------------------------------------- receiving
     def _receive(self, message: m.ServerBound) -> None:
         self._received_at = asyncio.get_running_loop().time()
         if self._silent:
@@ -313,12 +330,13 @@ class CellHost:
                 if not self.ready.done():
                     self.ready.set_result(None)
                 return
-            case m.CallDone():
-                if (future := self._calls.get(message.id)) is not None and not future.done():
+            case m.CallDone() | m.CallFailed():
+                future = self._calls.get(message.id)
+                if future is None or future.done():
+                    return
+                if isinstance(message, m.CallDone):
                     future.set_result(message.value)
-                return
-            case m.CallFailed():
-                if (future := self._calls.get(message.id)) is not None and not future.done():
+                else:
                     future.set_exception(CellError(message.error))
                 return
         for waiting in self._waiting:
@@ -348,16 +366,16 @@ class CellHost:
             self.user.host_silent(self, silent)
 
     async def _read_output(self) -> None:
-        """Log what the script, the drivers and vendor libraries print."""
+        """Log the output of the script, drivers and libraries."""
         async for line in self.process.output():
             if self.user is not None:
                 self.user.host_message(self, m.LogLine("info", line))
             else:
-                log.info("cell host", pid=self.pid, text=line)
+                log.info("cell host output", pid=self.pid, text=line)
 
 
 def json_of(value: Any) -> bytes:
-    """Return an argument of a call as it travels."""
+    """Return an argument of a call as JSON."""
     if isinstance(value, msgspec.Raw):
         return bytes(value)
     return encode(value).encode()

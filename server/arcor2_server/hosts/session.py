@@ -1,4 +1,4 @@
-"""The use of one cell host: its process, the state of its devices, calls to them and their streams."""
+"""The use of a cell host by the online scene or a program: process, device states, calls and streams."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Final
@@ -17,44 +17,44 @@ from arcor2_server.hosts.streams import RobotStreams
 
 log = structlog.get_logger(__name__)
 
-OBSERVE_WITHIN: Final = 5.0
-"""Time limit for reading a value, s; a device on a local network answers within one."""
-CANCEL_WITHIN: Final = 5.0
+READ_TIMEOUT: Final = 5.0
+"""Time limit for reading a value, s; a device on a local network needs less than 1 s."""
+CANCEL_TIMEOUT: Final = 5.0
 """Time limit for cancelling an action, s."""
 
 
 class HostSession:
-    """The scene that is online, or the program that runs: at most one cell host at a time.
+    """The cell host of the online scene or of the running program.
 
     Args:
         hub: publishes the states and streams of the devices.
         pool: provides the hosts.
         what: names the session in the log, "scene" or "program".
-        everybody: send the streams at the streaming period to all clients, as the protocol does for a program.
+        to_all_clients: send streams at the streaming period to all clients, as the protocol requires for a program.
     """
 
-    def __init__(self, hub: EventHub, pool: CellHosts, what: str, *, everybody: bool = False) -> None:
+    def __init__(self, hub: EventHub, pool: CellHosts, what: str, *, to_all_clients: bool = False) -> None:
         self.host: CellHost | None = None
         self.online = False
         """Whether the devices are in operation. Set by the owner of the session."""
         self.package_info: bytes | None = None
-        """The encoded PackageInfo while a program runs. Set by the owner of the session."""
+        """The encoded event PackageInfo while a program runs. Set by the owner of the session."""
         self.board = DeviceBoard(hub)
-        self.streams = RobotStreams(hub, self.send, everybody=everybody)
+        self.streams = RobotStreams(hub, self.send, to_all_clients=to_all_clients)
         self.on_message: Callable[[CellHost, m.ServerBound], None] = lambda _host, _message: None
-        """Receives the messages that the session does not handle by itself."""
+        """Receives the messages that the session does not handle."""
         self.on_end: Callable[[str], None] = lambda _reason: None
-        """Called when the host has ended by itself, with the reason."""
+        """Called with the reason when the host has ended by itself."""
         self._pool = pool
         self._what = what
         hub.on_leave.append(self.streams.forget)
 
     # -------------------------------------------------------------------------------- the process
     async def take(self) -> CellHost:
-        """Take a host from the pool. Its messages arrive from now on; it becomes `host` by assignment.
+        """Take a host from the pool. The caller assigns it to `host`; its messages may arrive before.
 
         Raises:
-            ConnectionLost: the process ended while it started.
+            Arcor2Error: no host can be started.
         """
         return await self._pool.take(self)
 
@@ -101,7 +101,7 @@ class HostSession:
             self.on_end(reason)
 
     async def close(self) -> None:
-        """Close all hosts of the pool, in reaction to the end of the server."""
+        """Close all hosts of the pool when the server ends."""
         self.host = None
         await self._pool.close()
 
@@ -127,36 +127,37 @@ class HostSession:
             object_id: the device.
             method: the name of the method.
             args: its arguments.
-            control: take control of the device before.
-            deadline: time limit, s; None: as the host has it.
+            control: take control of the device first.
+            deadline: time limit, s; None: the limit of the host.
 
         Returns:
             The result as JSON, empty for None.
 
         Raises:
-            CellError: the device refused, or failed.
+            CellError: the device refused the call or failed.
             ConnectionLost: the host ended.
             DeviceTimeout: the device or the host did not answer in time.
+            RequestRefused: the scene is offline.
         """
         encoded = {name: json_of(value) for name, value in (args or {}).items()}
         return await self.require_online().call(object_id, method, encoded, control=control, deadline=deadline)
 
     async def ask(self, kind: type[Any], object_id: str, method: str, args: Mapping[str, Any] | None = None) -> Any:
-        """Call a method that only observes, and decode its result as `kind`. Raises what `call` raises."""
-        raw = await self.call(object_id, method, args, deadline=OBSERVE_WITHIN)
+        """Call a method that only reads, and decode its result as `kind`. Raise the same errors as `call`."""
+        raw = await self.call(object_id, method, args, deadline=READ_TIMEOUT)
         try:
             return msgspec.json.decode(raw, type=kind)
         except msgspec.MsgspecError as error:
             raise Arcor2Error("{method} gave something else than it should.", str(error), method=method) from error
 
     async def cancel(self, object_id: str, action: str) -> None:
-        """Cancel an action of a device while it runs."""
-        await self.require_online().call(object_id, action, cancel=True, deadline=CANCEL_WITHIN)
+        """Cancel the running action of a device."""
+        await self.require_online().call(object_id, action, cancel=True, deadline=CANCEL_TIMEOUT)
 
     async def retry(self, object_id: str) -> None:
         """Create and connect a failed device again."""
         await self.require_online().retry(object_id)
 
     async def stop_motion(self, object_id: str) -> None:
-        """Stop a device, whatever it does."""
+        """Stop a device, also while it executes a call."""
         await self.require_online().stop_motion(object_id)

@@ -1,4 +1,4 @@
-"""Subscriptions to joints and end effector poses, at the streaming period or at the rate of a client."""
+"""Subscriptions to joints and end effector poses of robots, at the streaming period or at a rate set by the client."""
 
 from collections.abc import Callable
 from typing import Final
@@ -12,20 +12,25 @@ _KINDS: Final = {"RobotJoints": RobotEventKind.JOINTS, "RobotEef": RobotEventKin
 
 
 class RobotStreams:
-    """The subscriptions to the streams of robots; `send_message` sends a message to the host, if there is one.
+    """The subscriptions to the streams of robots.
 
-    everybody: streams at the streaming period go to all clients, as the protocol requires while a program runs.
+    Args:
+        hub: publishes the streams.
+        send_message: sends a message to the host, if there is one.
+        to_all_clients: send streams at the streaming period to all clients, as the protocol requires for a program.
     """
 
-    def __init__(self, hub: EventHub, send_message: Callable[[m.ToHost], None], *, everybody: bool = False) -> None:
+    def __init__(
+        self, hub: EventHub, send_message: Callable[[m.ToHost], None], *, to_all_clients: bool = False
+    ) -> None:
         self._hub = hub
         self._send = send_message
-        self._everybody = everybody
+        self._to_all_clients = to_all_clients
         self._subscribers: dict[tuple[str, RobotEventKind], set[Connection]] = {}
         self._rates: dict[tuple[str, RobotEventKind], dict[Connection, float]] = {}
 
     def subscribe(self, client: Connection, robot_id: str, what: RobotEventKind, send: bool) -> None:
-        """Send a robot's state to a client, or no longer; raise RequestRefused when it was not sent."""
+        """Start or stop a stream at the streaming period. Raise RequestRefused if it was not subscribed to."""
         clients = self._subscribers.setdefault((robot_id, what), set())
         if send:
             clients.add(client)
@@ -36,7 +41,7 @@ class RobotStreams:
         self._update_host(robot_id)
 
     def at_rate(self, client: Connection, robot_id: str, what: RobotEventKind, rate: float, send: bool) -> None:
-        """Send a robot's state to a client `rate` times a second, or no longer; RequestRefused when it was not sent."""
+        """Start or stop a stream at `rate`, 1/s. Raise RequestRefused if it was not subscribed to."""
         rates = self._rates.setdefault((robot_id, what), {})
         if send:
             rates[client] = rate
@@ -45,7 +50,7 @@ class RobotStreams:
         self._update_host_rates(robot_id)
 
     def publish(self, message: m.StreamEvent) -> None:
-        """Publish what the host has read, encoded once for all clients."""
+        """Publish a message of the host. It is encoded once for all clients."""
         kind = _KINDS.get(message.event)
         if kind is None:
             return
@@ -54,13 +59,13 @@ class RobotStreams:
             clients = {client for client, rate in rates.items() if rate == message.rate}
             stream = f"{message.object_id}/{message.rate:g}"
         else:
-            clients = (self._hub.clients if self._everybody else self._subscribers.get(key, set())) - rates.keys()
+            clients = (self._hub.clients if self._to_all_clients else self._subscribers.get(key, set())) - rates.keys()
             stream = message.object_id
         if clients:
             self._hub.stream(message.event, stream, message.encoded, clients)
 
     def forget(self, client: Connection) -> None:
-        """Forget a client that left."""
+        """Remove the subscriptions of a client that disconnected."""
         for (robot_id, _), clients in list(self._subscribers.items()):
             if client in clients:
                 clients.discard(client)
@@ -70,7 +75,7 @@ class RobotStreams:
                 self._update_host_rates(robot_id)
 
     def clear(self) -> None:
-        """Forget all: the scene is offline, or the program over."""
+        """Remove all subscriptions, after the scene went offline or the program ended."""
         self._subscribers.clear()
         self._rates.clear()
 

@@ -9,7 +9,7 @@ from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_server.documents import Session
 from arcor2_server.errors import RequestRefused
-from arcor2_server.hosts.session import OBSERVE_WITHIN
+from arcor2_server.hosts.session import READ_TIMEOUT
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
 
@@ -45,7 +45,7 @@ class Cameras:
 
     async def camera_parameters(self, camera: SceneObject) -> CameraParameters:
         """Return the intrinsics that a live camera has; raise RequestRefused when it has none."""
-        raw = await self._online.call(camera.id, "color_camera_params", deadline=OBSERVE_WITHIN)
+        raw = await self._online.call(camera.id, "color_camera_params", deadline=READ_TIMEOUT)
         if not raw:
             raise RequestRefused("{name} does not know its parameters.", name=camera.name)
         try:

@@ -20,7 +20,7 @@ from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.hosts.devices import DeviceBoard
 from arcor2_server.hosts.process import CellHost
-from arcor2_server.hosts.session import OBSERVE_WITHIN, HostSession
+from arcor2_server.hosts.session import READ_TIMEOUT, HostSession
 from arcor2_server.hosts.streams import RobotStreams
 from arcor2_server.online.actions import LastStop, RunningAction
 from arcor2_server.online.hold_to_run import HoldToRun
@@ -243,7 +243,7 @@ class OnlineScene:
             except TimeoutError:
                 problem = "The devices could not be closed in time."
                 host.kill()
-            await host.gone()
+            await host.wait_or_kill()
         self._gone_offline(problem)
 
     async def close(self) -> None:
@@ -335,7 +335,7 @@ class OnlineScene:
 
     async def object_pose_changed(self, object_id: str, pose: Pose) -> None:
         """Update the pose of the live object."""
-        await self.call(object_id, "set_pose", {"pose": pose}, deadline=OBSERVE_WITHIN)
+        await self.call(object_id, "set_pose", {"pose": pose}, deadline=READ_TIMEOUT)
 
     def robot(self, robot_id: str) -> SceneObject:
         """Return the scene object of a robot; NotFound, RequestRefused when it is none."""

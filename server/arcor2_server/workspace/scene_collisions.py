@@ -115,7 +115,7 @@ class SceneCollisions:
             board, obstacles = self._program_host.board, list(_of_program(encoded))
         else:
             return
-        disabled, held = board.not_in_the_way(), board.held_parts()
+        disabled, held = board.disabled_obstacles(), board.held_parts()
         for key, name, one in obstacles:
             if key not in disabled:
                 yield key, _gripped(one, *held[name]) if name in held else one

@@ -173,7 +173,7 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     locks = Locks(session, is_stored, 2, 0.05)
     users = Users(hub, locks, settings)
     compute, tasks, hosts = Compute(settings.compute_idle), Tasks(hub), CellHosts(settings.device_files_dirs)
-    scene_host, program_host = HostSession(hub, hosts, "scene"), HostSession(hub, hosts, "program", everybody=True)
+    scene_host, program_host = HostSession(hub, hosts, "scene"), HostSession(hub, hosts, "program", to_all_clients=True)
     robots = SceneRobots(assets, known, session, scene_host)
     calibrations = RobotCalibrations(settings, hub, known, session, scene_host, compute, damage, robots)
     models, collisions = RobotModels(robots, calibrations), ObstacleRegistry(settings.scene_inflation)

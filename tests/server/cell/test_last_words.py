@@ -29,7 +29,7 @@ class Listener:
 async def test_all_output_of_a_host_is_read_before_its_end_is_reported(
     monkeypatch: pytest.MonkeyPatch, closes: bool
 ) -> None:
-    monkeypatch.setattr(host_module, "LAST_WORDS", 0.8)
+    monkeypatch.setattr(host_module, "LATE_TIMEOUT", 0.8)
 
     async def wait() -> int:
         return 0
