@@ -1,4 +1,4 @@
-"""Breakpoints that users share, on action points and actions of a project."""
+"""Breakpoints on action points and actions of a project, shared by all users."""
 
 import asyncio
 from collections.abc import Callable, Sequence
@@ -13,9 +13,10 @@ from arcor2_server.events import EventHub, make_event
 from arcor2_server.storage import Storage
 from arcor2_server.storage.shared_data import SharedData
 
-MOST: Final = 1000
-"""Breakpoints of one project."""
-IN_MEMORY: Final = 64
+MAX_BREAKPOINTS: Final = 1000
+"""Maximum number of breakpoints of a project."""
+MAX_CACHED: Final = 64
+"""Maximum number of projects whose breakpoints are cached."""
 _KINDS: Final = frozenset({Kind.POINT, Kind.ACTION})
 
 
@@ -27,43 +28,52 @@ class SharedBreakpoints:
         self._storage = storage
         self._session = session
         self._data = data
-        self._set: dict[str, tuple[set[str], str]] = {}
+        self._cache: dict[str, tuple[set[str], str]] = {}
+        """Breakpoints and the user who last changed them, by project."""
         self._last: tuple[str, set[str]] = ("", set())
-        self._turn = asyncio.Lock()
+        self._lock = asyncio.Lock()
         self.on_change: list[Callable[[str, set[str]], None]] = []
-        """Called with a project, and the breakpoints that it has now."""
+        """Called with the id of a project and its active breakpoints."""
 
     async def get(self, project_id: str) -> ProjectBreakpoints:
-        """Return the breakpoints of a project, open or saved. Raise NotFound or StorageError if that is impossible."""
-        async with self._turn:
-            return self._data_of(project_id, await self._known(project_id), await self._items(project_id))
+        """Return the active breakpoints of an open or saved project.
+
+        Raises:
+            NotFound: there is no such project.
+            StorageError: the breakpoints cannot be read.
+        """
+        async with self._lock:
+            return self._data_of(project_id, await self._stored(project_id), await self._items(project_id))
 
     async def ids(self, project_id: str) -> set[str]:
-        """Return what was set on a project, whether that is there or not. Raise StorageError if that is impossible."""
-        async with self._turn:
-            return set((await self._known(project_id))[0])
+        """Return all breakpoints of a project, also on missing items. Raise StorageError if they cannot be read."""
+        async with self._lock:
+            return set((await self._stored(project_id))[0])
 
     async def change(self, project_id: str, add: set[str], remove: set[str], user: str) -> ProjectBreakpoints:
         """Set and remove breakpoints, and publish them.
 
-        Raise NotFound, RequestRefused or StorageError if that is impossible.
+        Raises:
+            NotFound: there is no such project.
+            RequestRefused: an item does not exist, or there are too many breakpoints.
+            StorageError: the breakpoints cannot be stored.
         """
-        async with self._turn:
-            before, _ = known = await self._known(project_id)
+        async with self._lock:
+            before, _ = stored = await self._stored(project_id)
             items = await self._items(project_id)
             if unknown := add - items:
                 names = ", ".join(sorted(unknown)[:5])
                 raise RequestRefused("The project has no action point or action {names}.", names=names)
-            # Those that are not there wait for an undo, but not beyond what is kept.
+            # Breakpoints on removed items are kept for an undo, up to the limit.
             after = (before | add) - remove
-            if len(after & items) > MOST:
-                raise RequestRefused("A project has at most {most} breakpoints.", most=MOST)
-            if len(after) > MOST:
+            if len(after & items) > MAX_BREAKPOINTS:
+                raise RequestRefused("A project has at most {count} breakpoints.", count=MAX_BREAKPOINTS)
+            if len(after) > MAX_BREAKPOINTS:
                 after &= items
             if after == before:
-                return self._data_of(project_id, known, items)
+                return self._data_of(project_id, stored, items)
             await self._data.put_breakpoints(project_id, after, user)
-            self._set[project_id] = (after, user)
+            self._cache[project_id] = (after, user)
             data = self._data_of(project_id, (after, user), items)
         self._publish(data)
         return data
@@ -71,41 +81,40 @@ class SharedBreakpoints:
     def changed(self, changes: Sequence[Change]) -> None:
         """Publish breakpoints whose items were added or removed."""
         project = self._session.document.of_kind(Kind.PROJECT)
-        if not project or (known := self._set.get(project[0].id)) is None:
+        if not project or (stored := self._cache.get(project[0].id)) is None:
             return
         ids = {c.id for c in changes if c.kind in _KINDS and (c.before is None or c.after is None)}
-        if ids & known[0]:
-            data = self._data_of(project[0].id, known, self._of_open())
+        if ids & stored[0]:
+            data = self._data_of(project[0].id, stored, self._items_of_open_project())
             if self._last != (data.project_id, data.ids):
                 self._publish(data)
 
     async def forget(self, project_id: str) -> None:
-        """Forget the breakpoints of a deleted project. Those on disk are deleted with its views."""
-        self._set.pop(project_id, None)
+        """Remove the breakpoints of a deleted project from the cache. The stored ones are deleted with its views."""
+        self._cache.pop(project_id, None)
 
-    # -------------------------------------------------------------------------------- inside
-    async def _known(self, project_id: str) -> tuple[set[str], str]:
-        if (known := self._set.get(project_id)) is None:
-            if len(self._set) >= IN_MEMORY:
-                open_one = {item.id for item in self._session.document.of_kind(Kind.PROJECT)}
-                self._set = {key: value for key, value in self._set.items() if key in open_one}
-            known = self._set[project_id] = await self._data.breakpoints(project_id)
-        return known
+    async def _stored(self, project_id: str) -> tuple[set[str], str]:
+        if (stored := self._cache.get(project_id)) is None:
+            if len(self._cache) >= MAX_CACHED:
+                open_ids = {item.id for item in self._session.document.of_kind(Kind.PROJECT)}
+                self._cache = {key: value for key, value in self._cache.items() if key in open_ids}
+            stored = self._cache[project_id] = await self._data.breakpoints(project_id)
+        return stored
 
     async def _items(self, project_id: str) -> set[str]:
-        """Return the ids on which a project may have breakpoints. Raise NotFound if there is none."""
+        """Return the ids of the action points and actions of a project. Raise NotFound if there is no such project."""
         if any(item.id == project_id for item in self._session.document.of_kind(Kind.PROJECT)):
-            return self._of_open()
+            return self._items_of_open_project()
         points = (await self._storage.project(project_id)).action_points
         return {point.id for point in points} | {action.id for point in points for action in point.actions}
 
-    def _of_open(self) -> set[str]:
+    def _items_of_open_project(self) -> set[str]:
         document = self._session.document
         return {item.id for kind in _KINDS for item in document.of_kind(kind)}
 
     @staticmethod
-    def _data_of(project_id: str, known: tuple[set[str], str], items: set[str]) -> ProjectBreakpoints:
-        return ProjectBreakpoints(project_id, known[0] & items, known[1] or UNSET)
+    def _data_of(project_id: str, stored: tuple[set[str], str], items: set[str]) -> ProjectBreakpoints:
+        return ProjectBreakpoints(project_id, stored[0] & items, stored[1] or UNSET)
 
     def _publish(self, data: ProjectBreakpoints) -> None:
         self._last = (data.project_id, data.ids)

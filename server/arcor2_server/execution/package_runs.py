@@ -1,4 +1,4 @@
-"""Runs a package although a scene or project is open that no connected user works on."""
+"""Runs packages. An open scene or project that no connected user works on is closed during the run."""
 
 import asyncio
 
@@ -22,7 +22,7 @@ log = structlog.get_logger(__name__)
 
 
 class PackageRuns:
-    """Runs packages, also while a scene or project is open that no connected user works on."""
+    """Runs packages, also while a scene or project is open on which no connected user works."""
 
     def __init__(
         self,
@@ -45,23 +45,24 @@ class PackageRuns:
         self._lock_takeover = lock_takeover
 
     def is_left_open(self) -> bool:
-        """Return whether a scene or project is open that no connected user has open, or holds locks in."""
+        """Return whether a scene or project is open on which no connected user works or holds locks."""
         opened = [item.id for kind in (Kind.SCENE, Kind.PROJECT) for item in self._session.document.of_kind(kind)]
         if not opened or self._presence.users_of(opened):
             return False
         return not set(self._locks.owners()) & set(self._users.names())
 
     async def run_package(self, package_id: str, how: How) -> None:
-        """Run a package; return once it has started.
+        """Run a package; return when it has started.
 
-        A document that no connected user works on is set aside and is open again afterwards, with its unsaved changes.
-        Its devices go offline and stay offline. Users who left lose their locks and are notified on returning.
+        An open document on which no connected user works is closed and opened again after the run, with its unsaved
+        changes. Its devices go offline and stay offline. Disconnected users lose their locks and are notified when they
+        return.
         """
         if not self.is_left_open():
             await self._execution.run(package_id, how)
             return
         started: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._online.spawn(self._run_in_place(package_id, how, started), "package in place of what is open")
+        self._online.spawn(self._run_in_place(package_id, how, started), "package in place of the open document")
         await started
 
     async def _require_runnable(self, package_id: str) -> None:
@@ -82,20 +83,20 @@ class PackageRuns:
                 await self._require_runnable(package_id)
                 await self._go_offline()
                 scene, project = self._session.require_scene(), self._session.project
-                show_again = self._session.set_aside()
+                reopen = self._session.set_aside()
                 execution.reserved = True
-            log.info("set aside for a program", scene=scene.name, project=project and project.name, by=how.by)
+            log.info("document closed for a program", scene=scene.name, project=project and project.name, by=how.by)
             self._hub.broadcast(make_event("SceneClosed" if project is None else "ProjectClosed"))
             try:
                 await execution.run_through(package_id, how, temporary=False, started=started)
             finally:
-                show_again()
+                reopen()
                 execution.reserved = False
                 for event in self._session.greeting(self._online.state):
                     self._hub.broadcast(event)
         except Arcor2Error as error:
             if started.done():
-                log.warning("package not run", package=package_id, reason=str(error))
+                log.warning("package run failed", package=package_id, reason=str(error))
             else:
                 started.set_exception(error)
         except BaseException:

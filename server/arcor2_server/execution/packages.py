@@ -1,4 +1,4 @@
-"""Uploads, renames and deletes packages while one of them may be running."""
+"""Uploads, renames and deletes packages, one of which may be running."""
 
 import abc
 import asyncio
@@ -19,33 +19,33 @@ class PackageLibrary(abc.ABC):
 
     @abc.abstractmethod
     def _require_not_used(self, package_id: str) -> None:
-        """Raise RequestRefused for the package that runs."""
+        """Raise RequestRefused if the package is running."""
 
     async def list(self) -> list[PackageSummary]:
         """Return all packages."""
         return await asyncio.to_thread(self.packages.all)
 
     async def upload(self, package_id: str, data: str) -> PackageSummary:
-        """Take a package as a zip in base64, in place of one of the same id."""
+        """Store a package from a zip archive in Base64. It replaces a package with the same id."""
         self._require_not_used(package_id)
         return await asyncio.to_thread(self.packages.upload, package_id, data)
 
     async def take(self, package_id: str, content: IO[bytes]) -> PackageSummary:
-        """Take a package as a zip, in place of one of the same id."""
+        """Store a package from a zip archive. It replaces a package with the same id."""
         self._require_not_used(package_id)
         return await asyncio.to_thread(self.packages.put_zip, package_id, content)
 
     async def delete(self, package_id: str) -> PackageSummary:
-        """Delete a package that does not run."""
+        """Delete a package."""
         self._require_not_used(package_id)
         return await asyncio.to_thread(self.packages.delete, package_id)
 
     async def rename(self, package_id: str, name: str) -> PackageSummary:
-        """Give a package another name."""
+        """Rename a package."""
         return await asyncio.to_thread(self.packages.rename, package_id, name)
 
     async def added(self, package_id: str) -> None:
-        """Notify all clients of a package that was written among the others, after the answer that is being given."""
+        """Notify all clients of a new package, after the answer to the present request."""
         summary = await asyncio.to_thread(self.packages.summary, package_id)
         event = make_event("PackageChanged", summary, ChangeType.ADD)
         asyncio.get_running_loop().call_soon(self._hub.broadcast, event)

@@ -1,4 +1,4 @@
-"""The message with which a cell host runs a package."""
+"""Creates the message that runs a package in a cell host."""
 
 import asyncio
 from pathlib import Path
@@ -14,7 +14,7 @@ from arcor2_server.workspace.host_world import HostWorld
 
 
 class RunMessages:
-    """Prepares the messages."""
+    """Creates the messages with settings, secrets, breakpoints and collision models."""
 
     def __init__(
         self,
@@ -29,12 +29,12 @@ class RunMessages:
         self._host_world = host_world
 
     def prepare(self, package_id: str, directory: Path, how: How) -> m.RunPackage:
-        """Return the message without what changes until the host is ready.
+        """Return the message without the parts that may change until the host is ready.
 
         Args:
             package_id: the package.
-            directory: where its files are.
-            how: how it runs.
+            directory: the directory of its files.
+            how: options of the run.
         """
         return m.RunPackage(
             package_id,
@@ -47,11 +47,11 @@ class RunMessages:
         )
 
     async def complete(self, message: m.RunPackage, shared_of: str) -> m.RunPackage:
-        """Add secrets, shared breakpoints, collision models and robot calibrations. Send the message at once.
+        """Add secrets, shared breakpoints, collision models and robot calibrations. Send the message immediately.
 
         Args:
-            message: what `prepare` returned.
-            shared_of: the project whose shared breakpoints the program pauses at; empty for none.
+            message: the result of `prepare`.
+            shared_of: the project with the shared breakpoints; empty for none.
 
         Raises:
             NotFound: a secret is missing.
@@ -59,7 +59,7 @@ class RunMessages:
         """
         directory = Path(message.directory)
         message = replace(message, secrets=await asyncio.to_thread(self._secrets.values_for_package, directory))
-        if shared_of:  # at the last moment: a later change is sent to the program
+        if shared_of:  # read last: later changes are sent to the program
             shared = await self._breakpoints.ids(shared_of)
             message = replace(message, shared_breakpoints=sorted(shared))
         calibrations = await self._host_world.calibrations_of_package(directory)

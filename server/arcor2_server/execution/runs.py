@@ -1,4 +1,4 @@
-"""The history of runs, and the trace of actions of the present or last run."""
+"""The history of runs, and the trace of the actions of the present or last run."""
 
 import asyncio
 from collections import OrderedDict
@@ -23,10 +23,11 @@ from arcor2_server.storage.shared_data import SharedData
 
 log = structlog.get_logger(__name__)
 
-KEPT: Final = 1000
+MAX_RUNS: Final = 1000
 """Maximum number of stored runs."""
 TRACE: Final = "ExecutionTrace"
-KEPT_ACTIONS: Final = 1000
+"""The additional event with the start and end of actions."""
+MAX_ACTIONS: Final = 1000
 """Maximum number of stored actions of the last run."""
 
 
@@ -39,7 +40,7 @@ class _After(Struct):
 
 
 class _Call:
-    """One call of an action as published; it is decoded only on request."""
+    """The published events of an action. They are decoded only on request."""
 
     __slots__ = ("before", "end")
 
@@ -71,9 +72,11 @@ class _Call:
 class How(Struct, frozen=True):
     """Options of a run.
 
-    by: name of the user.
-    breakpoints: ids of action points and actions.
-    shared_breakpoints: pause also at the breakpoints that users share on the project.
+    Args:
+        start_paused: pause before the first action.
+        breakpoints: ids of action points and actions.
+        shared_breakpoints: pause also at the shared breakpoints of the project.
+        by: name of the user.
     """
 
     start_paused: bool = False
@@ -83,7 +86,7 @@ class How(Struct, frozen=True):
 
 
 class Runs:
-    """All runs by number. They are also stored in the database once `open` has read it."""
+    """All runs by number. They are stored in the database after `open` was called."""
 
     def __init__(self, hub: EventHub) -> None:
         self._hub = hub
@@ -95,25 +98,26 @@ class Runs:
         self._trace_of = 0
 
     async def open(self, data: SharedData) -> None:
-        """Read the stored runs; mark unfinished ones as lost.
+        """Read the stored runs and mark unfinished ones as lost.
 
-        Raise StorageError if that is impossible.
+        Raises:
+            StorageError: the runs cannot be read.
         """
         self._data = data
-        for run in await data.runs(KEPT):
+        for run in await data.runs(MAX_RUNS):
             self._runs[run.number] = run
             if run.end is RunEnd.RUNNING:
                 lost = replace(run, end=RunEnd.LOST, error="The server ended in mid-run.", error_type="ConnectionLost")
                 self._put(lost)
 
     async def close(self) -> None:
-        """Write what is not written yet."""
+        """Wait until all runs are stored."""
         if self._writing is not None:
             await asyncio.gather(self._writing, return_exceptions=True)
 
     # -------------------------------------------------------------------------------- a run
     def begin(self, package_id: str, *, by: str, temporary: bool, start_paused: bool) -> int:
-        """Note that a run begins; return its number."""
+        """Add a run that starts now; return its number."""
         number = next(reversed(self._runs), 0) + 1
         run = Run(
             number,
@@ -131,12 +135,12 @@ class Runs:
         return number
 
     def describe(self, number: int, **values: Any) -> None:
-        """Add to a run what is known a moment after its start: names, the project."""
+        """Set fields of a run that are known after its start, such as names and the project."""
         if (run := self._runs.get(number)) is not None:
             self._put(replace(run, **values))
 
     def end(self, number: int, end: RunEnd, *, error: str = "", error_type: str = "", stopped_by: str = "") -> None:
-        """Note how a run ended."""
+        """Store the end of a run."""
         if (run := self._runs.get(number)) is None:
             return
         last: ActionOfRun | Any = UNSET
@@ -157,17 +161,17 @@ class Runs:
         )
 
     def announced(self, announced: m.ProgramEvent) -> None:
-        """Note that an action of the present run was announced (ActionStateBefore), or has ended (ActionStateAfter)."""
+        """Handle ActionStateBefore or ActionStateAfter of the present run."""
         if announced.event != "ActionStateBefore":
             self.ended(announced)
             return
         call = self._trace[announced.number] = _Call(announced)
-        if len(self._trace) > KEPT_ACTIONS:
+        if len(self._trace) > MAX_ACTIONS:
             self._trace.popitem(last=False)
         self._publish(call)
 
     def ended(self, announced: m.ProgramEvent | m.ActionFailed) -> None:
-        """Note that an action of the present run has ended (ActionStateAfter), or failed."""
+        """Handle the end (ActionStateAfter) or failure of an action of the present run."""
         if (call := self._trace.get(announced.number)) is not None:
             call.end = announced
             self._publish(call)
@@ -176,41 +180,32 @@ class Runs:
         if self._hub.subscribers(TRACE):
             self._hub.broadcast(make_event(TRACE, call.entry(self._trace_of)))
 
-    # -------------------------------------------------------------------------------- what is asked
-    def newest(
-        self, limit: int, before: int | None = None, package_id: str | None = None, project_id: str | None = None
-    ) -> list[Run]:
-        """Return runs, newest first."""
-        found = (
-            self._counted(run)
-            for run in reversed(self._runs.values())
-            if (before is None or run.number < before)
-            and (package_id is None or run.package_id == package_id)
-            and (project_id is None or run.project_id == project_id)
-        )
-        return [*islice(found, limit)]
-
+    # -------------------------------------------------------------------------------- queries
     def find(self, args: ListRunsArgs) -> list[Run]:
-        """Return the newest runs that the arguments of ListRuns select."""
-        before = None if isinstance(args.before, Unset) else args.before
-        package = None if isinstance(args.package_id, Unset) else args.package_id
-        project = None if isinstance(args.project_id, Unset) else args.project_id
-        return self.newest(args.limit, before, package, project)
+        """Return the runs selected by the arguments of ListRuns, newest first."""
+        found = (
+            self._with_action_count(run)
+            for run in reversed(self._runs.values())
+            if (isinstance(args.before, Unset) or run.number < args.before)
+            and args.package_id in (UNSET, run.package_id)
+            and args.project_id in (UNSET, run.project_id)
+        )
+        return [*islice(found, args.limit)]
 
     def trace(self, limit: int, before: int | None = None) -> tuple[int, list[TraceEntry]]:
         """Return the number of the last run (0: none) and its actions, newest first."""
         calls = (call for number, call in reversed(self._trace.items()) if before is None or number < before)
         return self._trace_of, [call.entry(self._trace_of) for call in islice(calls, limit)]
 
-    # -------------------------------------------------------------------------------- inside
-    def _counted(self, run: Run) -> Run:
+    # -------------------------------------------------------------------------------- storage
+    def _with_action_count(self, run: Run) -> Run:
         if run.end is RunEnd.RUNNING and run.number == self._trace_of and self._trace:
             return replace(run, actions=next(reversed(self._trace)))
         return run
 
     def _put(self, run: Run) -> None:
         self._runs[run.number] = run
-        if len(self._runs) > KEPT:
+        if len(self._runs) > MAX_RUNS:
             self._runs.popitem(last=False)
         self._hub.broadcast(make_event("RunChanged", run))
         if self._data is not None:
@@ -219,12 +214,12 @@ class Runs:
                 self._writing = asyncio.create_task(self._write(self._data), name="runs")
 
     async def _write(self, data: SharedData) -> None:
-        """Write what is new until nothing is: the newest state of a run is enough."""
+        """Store changed runs until none is left. Only the newest state of a run is stored."""
         try:
             while self._unwritten:
                 run = self._unwritten.pop(next(iter(self._unwritten)))
                 await data.put_run(run, next(iter(self._runs)))
         except StorageError as error:
-            log.warning("run not noted on disk", reason=str(error))
+            log.warning("run not stored", reason=str(error))
         finally:
             self._writing = None

@@ -1,4 +1,4 @@
-"""The Execution service: packages and the running program (protocol, section 12)."""
+"""The Execution service: runs packages (protocol, section 12)."""
 
 import asyncio
 import contextlib
@@ -37,15 +37,18 @@ log = structlog.get_logger(__name__)
 S = PackageStateEnum
 
 STOP_WITHIN: Final = 5.0
-"""Seconds a stopped program has to end by itself before its host is killed."""
+"""Time limit for a stopped program to end before its host is killed, s."""
 SPARE_AFTER: Final = 1.0
-"""Seconds after the first action when the next spare host is started: it must not slow down the one that begins."""
+"""Time from PackageInfo to the start of the next spare host, s, so that it does not delay the starting program."""
 RUN_STATES: Final = frozenset({S.RUNNING, S.PAUSING, S.PAUSED, S.RESUMING})
 _IDLE: Final = frozenset({S.UNDEFINED, S.STOPPED})
 
 
 class Execution(PackageLibrary):
-    """Runs one package at a time in its own cell host. Raises RequestRefused if the state forbids a request."""
+    """Runs one package at a time in its own cell host.
+
+    Methods raise RequestRefused if the present state does not allow them.
+    """
 
     def __init__(
         self,
@@ -65,9 +68,9 @@ class Execution(PackageLibrary):
         self.package_id = ""
         self.stop_within = STOP_WITHIN
         self.reserved = False
-        """Whether a project is closed only for the time of its program."""
+        """Whether a document is closed only for the time of the run, or a project is about to run."""
         self.last_error: m.ErrorData | None = None
-        """What ended the last program, None when it ended by itself or was stopped."""
+        """The error that ended the last program, None if it finished or was stopped."""
         self._host = host
         self._online = online
         self._settings = settings
@@ -80,7 +83,7 @@ class Execution(PackageLibrary):
         self._run_number = 0
         self._stopped_by: str | None = None
         self._shared_of = ""
-        """The project whose shared breakpoints the program pauses at."""
+        """The project with the shared breakpoints of the program."""
         self._over: asyncio.Future[None] | None = None
         self._killing: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
@@ -92,17 +95,17 @@ class Execution(PackageLibrary):
     # -------------------------------------------------------------------------------- state
     @property
     def running(self) -> bool:
-        """Return whether a program is in a run state: running, pausing, paused or resuming."""
+        """Whether a program is running, pausing, paused or resuming."""
         return self.state in RUN_STATES
 
     @property
     def busy(self) -> bool:
-        """Return whether nothing else may be opened or run: from a program's start until what follows it is over."""
+        """Whether no document may be opened and no other program run, including the time before and after a run."""
         return self.reserved or self.active
 
     @property
     def active(self) -> bool:
-        """Return whether a program is starting, running or ending."""
+        """Whether a program is starting, running or ending."""
         return self.state not in _IDLE
 
     @property
@@ -125,26 +128,26 @@ class Execution(PackageLibrary):
         if self._host.package_info is None:
             raise RequestRefused("The devices of the program are not there yet: ask again once PackageInfo has come.")
         found = self.board.object(robot_id)
-        with contextlib.suppress(NotFound):  # a package may bring a type that is not known here
+        with contextlib.suppress(NotFound):  # the type may be only in the package
             if not self._types.derives_from(found.type, "Robot"):
                 raise RequestRefused("{name} is not a robot.", name=found.name)
         return self.streams
 
     @property
     def action_in_progress(self) -> bytes | None:
-        """Give the ActionStateBefore of the action that runs, or that the program is paused before, as it was sent."""
+        """The encoded ActionStateBefore of the running action, or of the action before which the program is paused."""
         return self._before
 
     def state_and_info(self) -> tuple[Event, bytes | None]:
-        """Return the present PackageState, and the PackageInfo as it was sent while a program runs."""
+        """Return the present PackageState, and the encoded PackageInfo while a program runs."""
         return self._state_event(), self._host.package_info
 
     def greeting(self) -> list[Event]:
-        """Return the events that describe the running program to a new client; empty if none runs."""
+        """Return the events that describe the running program to a new client; empty if no program runs."""
         if self._host.package_info is None:
             return []
-        known = [encoded for encoded in (self._host.package_info, self._before) if encoded is not None]
-        return [self._state_event(), *(msgspec.json.decode(encoded, type=Event) for encoded in known)]
+        encoded = [event for event in (self._host.package_info, self._before) if event is not None]
+        return [self._state_event(), *(msgspec.json.decode(event, type=Event) for event in encoded)]
 
     def _state_event(self) -> Event:
         return make_event("PackageState", e.PackageStateData(self.state, self.package_id or UNSET))
@@ -160,14 +163,21 @@ class Execution(PackageLibrary):
             raise RequestRefused("This package is running: stop it first.")
 
     async def run(self, package_id: str, how: How | None = None) -> None:
-        """Start a package. Its states are published."""
+        """Start a package. Its state is published as PackageState."""
         self._require_not_reserved()
         await self._run(package_id, how or How())
 
     async def run_through(
         self, package_id: str, how: How, *, temporary: bool = True, started: "asyncio.Future[None] | None" = None
     ) -> None:
-        """Run a package and wait for its end, after which clients are not sent to the list of packages."""
+        """Run a package and wait for its end. Clients are not sent to the list of packages afterwards.
+
+        Args:
+            package_id: the package.
+            how: options of the run.
+            temporary: whether the package is deleted after the run.
+            started: is set to done when the program has started.
+        """
         over = self._over = asyncio.get_running_loop().create_future()
         try:
             await self._run(package_id, how, temporary=temporary)
@@ -194,7 +204,7 @@ class Execution(PackageLibrary):
         message = self._messages.prepare(package_id, directory, how)
         self._run_number = self._runs.begin(package_id, by=how.by, temporary=temporary, start_paused=how.start_paused)
         self._spawn(self._begin(message), "program start")
-        self._spawn(self._note_run(package_id, self._run_number), "note of the run")
+        self._spawn(self._describe_run(package_id, self._run_number), "description of the run")
 
     def _require_not_reserved(self) -> None:
         if self.reserved:
@@ -221,7 +231,8 @@ class Execution(PackageLibrary):
         self._host.host = host
         host.send(message)
 
-    async def _note_run(self, package_id: str, number: int) -> None:
+    async def _describe_run(self, package_id: str, number: int) -> None:
+        """Store the names of package and project with the run, and log differences of package versions."""
         try:
             summary = await asyncio.to_thread(self.packages.mark_executed, package_id)
             project = summary.project_meta
@@ -233,12 +244,12 @@ class Execution(PackageLibrary):
             for difference in await asyncio.to_thread(check_versions, directory):
                 log.warning("package was built with another version", package=package_id, difference=difference)
         except Arcor2Error as error:
-            log.warning("run not noted", package=package_id, reason=str(error))
+            log.warning("run not described", package=package_id, reason=str(error))
 
     def stop(self, by: str = "") -> None:
-        """Stop the program: devices first, then the script; its host is killed when it does not end in time.
+        """Stop the devices, then the script. The host is killed if the program does not end in time.
 
-        One that has just been started is refused, as the protocol says, unless its host has fallen silent.
+        As the protocol requires, a program cannot be stopped while it is starting, unless its host does not answer.
         """
         host = self._require(RUN_STATES if self.board.answering else RUN_STATES | {S.STARTED}, "stopped")
         self._stop(by)
@@ -251,25 +262,25 @@ class Execution(PackageLibrary):
             self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, self._host.host)
 
     def begin_stop_all(self, by: str) -> CellHost | None:
-        """Stop the program in every state; return the host that is to stop it and its devices, None without one."""
+        """Start stopping the program in any state; return its host, None if there is no host."""
         if self.state in RUN_STATES | {S.STARTED}:
             self._stop(by)
         return self._host.host
 
     def pause(self) -> None:
-        """Let no further action begin."""
+        """Pause the program before its next action."""
         host = self._require({S.RUNNING}, "paused")
         self._enter(S.PAUSING)
         host.send(m.Pause())
 
     def resume(self) -> None:
-        """Let a paused program go on."""
+        """Resume a paused program."""
         host = self._require({S.PAUSED}, "resumed")
         self._enter(S.RESUMING)
         host.send(m.Resume())
 
     def step(self) -> None:
-        """Let a paused program go on for one action."""
+        """Let a paused program execute one action."""
         host = self._require({S.PAUSED}, "stepped")
         self._enter(S.RESUMING)
         host.send(m.Step())
@@ -285,14 +296,14 @@ class Execution(PackageLibrary):
         return host
 
     def _kill(self, host: CellHost) -> None:
-        log.warning("program killed: it did not stop", package=self.package_id, within=self.stop_within)
+        log.warning("program killed because it did not stop", package=self.package_id, within=self.stop_within)
         host.kill()
 
     async def close(self) -> None:
-        """End with the server; the hosts, which the cell ends, stop motion and disconnect by themselves."""
-        self._host.host = None  # its end is intended
+        """Mark the running program as lost when the server ends. The online scene closes the hosts."""
+        self._host.host = None  # its end is expected
         if self.state not in _IDLE:
-            error = "The server ended in mid-run."
+            error = "The server ended during the run."
             self._runs.end(self._run_number, RunEnd.LOST, error=error, error_type="ConnectionLost")
             self.state = S.STOPPED
         if self._killing is not None:
@@ -305,7 +316,7 @@ class Execution(PackageLibrary):
     def _handle(self, host: CellHost, message: m.ServerBound) -> None:
         match message:
             case m.ProgramEvent():
-                self._take_over(message)
+                self._handle_event(message)
                 self._hub.broadcast_encoded(message.event, message.encoded)
             case m.ActionFailed():
                 self._runs.ended(message)
@@ -314,7 +325,8 @@ class Execution(PackageLibrary):
             case _:
                 pass
 
-    def _take_over(self, message: m.ProgramEvent) -> None:
+    def _handle_event(self, message: m.ProgramEvent) -> None:
+        """Store the parts of an event of the program that the server needs."""
         if message.number:
             self._runs.announced(message)
         match message.event:
@@ -334,9 +346,9 @@ class Execution(PackageLibrary):
     def _program_changed(self, host: CellHost, message: m.ProgramChanged) -> None:
         if message.state == "stopped":
             self.last_error = message.error
-            if message.error is not None and self._exception is not None:  # as it was told: with the device
-                announced = self._exception
-                self.last_error = msgspec.structs.replace(message.error, type=announced.type, message=announced.message)
+            if message.error is not None and self._exception is not None:  # the published text names the device
+                published = self._exception
+                self.last_error = msgspec.structs.replace(message.error, type=published.type, message=published.message)
             self._ended()
             self._spawn(host.wait_or_kill(), "end of the program's host")
         elif self.state is not S.STOPPING:
@@ -345,9 +357,9 @@ class Execution(PackageLibrary):
                 self._enter(state)
 
     def _host_ended(self, reason: str) -> None:
-        """Report a program whose host has ended before the program."""
+        """Report that the host has ended before the program."""
         if self.state is not S.STOPPING:
-            self._fail(f"The program was lost: {reason}.", "ConnectionLost")
+            self._fail(f"Connection to the program lost: {reason}.", "ConnectionLost")
         self._ended(lost=True)
 
     def _fail(self, message: str, kind: str) -> None:
@@ -356,7 +368,7 @@ class Execution(PackageLibrary):
 
     def _ended(self, *, lost: bool = False) -> None:
         self._host.host = None
-        self._note_end(lost)
+        self._store_end(lost)
         self.streams.clear()
         self.board.clear("" if self.last_error is None else self.last_error.message)
         self._host.package_info = self._before = None
@@ -371,7 +383,7 @@ class Execution(PackageLibrary):
             self._over.set_result(None)
         self._host.prepare()
 
-    def _note_end(self, lost: bool) -> None:
+    def _store_end(self, lost: bool) -> None:
         error = self.last_error
         end = RunEnd.FINISHED if error is None else RunEnd.LOST if lost else RunEnd.FAILED
         if self._stopped_by is not None:

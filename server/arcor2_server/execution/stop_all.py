@@ -1,4 +1,4 @@
-"""StopAll: stops the program, all robots and devices, and the action being executed."""
+"""StopAll: stops the program, all devices and the running action."""
 
 import asyncio
 from typing import TYPE_CHECKING, Final
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
 
 log = structlog.get_logger(__name__)
 
-SILENT: Final = "the process that controls the devices does not answer; go offline to end it"
+SILENT: Final = "the cell host that controls the devices does not answer; go offline to end it"
 
 
 async def _stop(host: CellHost, board: "DeviceBoard") -> tuple[str, list[DeviceStop]]:
-    """Stop everything in a host; return why that failed, empty if it did not, and what became of the devices."""
+    """Stop everything in a host; return the reason for a failure, empty on success, and the outcome per device."""
     try:
         return "", await host.stop_all()
-    except ConnectionLost:  # the host has ended: before it does, it stops and disconnects the devices
+    except ConnectionLost:  # before a host ends, it stops and disconnects the devices
         return "", []
     except DeviceTimeout:
-        return SILENT, [DeviceStop(one.id, f"{one.name}: {SILENT}") for one in board.statuses()]
+        return SILENT, [DeviceStop(status.id, f"{status.name}: {SILENT}") for status in board.statuses()]
 
 
 def _outcome(stop: DeviceStop, names: dict[str, str]) -> StopOutcome:
@@ -39,7 +39,7 @@ def _outcome(stop: DeviceStop, names: dict[str, str]) -> StopOutcome:
 
 
 class StopAll:
-    """Stops the program, all devices and the action that is being executed."""
+    """Stops the program, all devices and the running action."""
 
     def __init__(self, session: Session, online: OnlineScene, execution: Execution) -> None:
         self._session = session
@@ -47,7 +47,7 @@ class StopAll:
         self._execution = execution
 
     async def stop_all(self, by: str) -> StopAllData:
-        """Stop everything that moves or runs, in every state; return what was stopped and what was not."""
+        """Stop everything that moves or runs, in any state; return what was stopped and what was not."""
         execution = self._execution
         active, action = execution.active, self._online.running_action
         program, scene = execution.begin_stop_all(by), self._online.begin_stop_all(by)
@@ -78,7 +78,7 @@ class StopAll:
         for outcome in outcomes:
             if outcome.id == running.object_id and not outcome.stopped:
                 missed = str(outcome.reason)
-                outcomes.remove(outcome)  # the same fact as that of the action
+                outcomes.remove(outcome)  # reported with the action
                 break
         if cell.running_action is not running:  # it has ended
             missed = ""

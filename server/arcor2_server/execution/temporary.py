@@ -1,4 +1,4 @@
-"""Runs the open project as a package of its own and opens it again afterwards (protocol, 12.6)."""
+"""Runs the open project as a temporary package and opens the project again afterwards (protocol, 12.6)."""
 
 import asyncio
 import contextlib
@@ -8,7 +8,7 @@ import structlog
 
 from arcor2_hw.data.base import new_id
 from arcor2_hw.data.editor import TaskKind
-from arcor2_hw.data.events import ChangeType, Event, MainScreen, OpenProjectData, SceneStateEnum, ShowMainScreenData
+from arcor2_hw.data.events import ChangeType, MainScreen, OpenProjectData, SceneStateEnum, ShowMainScreenData
 from arcor2_hw.data.project import Project
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.build.service import BuildService
@@ -29,7 +29,7 @@ log = structlog.get_logger(__name__)
 
 
 def _settle(built: "asyncio.Future[None]", error: Exception | None = None) -> None:
-    """Answer the request, unless the caller has left."""
+    """Answer the request unless the caller has disconnected."""
     if built.done():
         return
     if error is None:
@@ -39,7 +39,7 @@ def _settle(built: "asyncio.Future[None]", error: Exception | None = None) -> No
 
 
 class _Run:
-    """One run, from the check whether it is allowed to the project being open again."""
+    """One run, from the checks until the project is open again."""
 
     def __init__(self, runs: "TemporaryRuns", how: How) -> None:
         self._runs = runs
@@ -54,10 +54,10 @@ class _Run:
         self._requested_at = time.monotonic()
         self._online = False
 
-    async def whole(self, built: "asyncio.Future[None]") -> None:
-        """Build, run and delete the package; `built` is done when the request can be answered, or refused.
+    async def execute(self, built: "asyncio.Future[None]") -> None:
+        """Build, run and delete the package. Set `built` when the request can be answered.
 
-        One task holds the exclusive lock from the checks until the project is closed.
+        The exclusive lock is held from the checks until the project is closed.
         """
         try:
             async with self._locks.exclusive():
@@ -65,7 +65,7 @@ class _Run:
                 self._scene.last_stop.require_none_since(self._requested_at)
                 self._execution.reserved = True
                 _settle(built)
-                await asyncio.sleep(0)  # the answer goes out first
+                await asyncio.sleep(0)  # the answer is sent first
                 await self._close()
         except Exception as error:
             self._execution.reserved = False
@@ -73,7 +73,7 @@ class _Run:
             if not built.done():
                 _settle(built, error)
                 return
-            log.exception("project not run")
+            log.exception("run of the project failed")
             return
         except BaseException:
             built.cancel()
@@ -83,7 +83,7 @@ class _Run:
             await self._run()
             await self._delete()
             await self._open_again(project)
-        except BaseException:  # the server ends: at its next start the project is open, as it was
+        except BaseException:  # the server ends: the project must be open at its next start
             await self._discard_package()
             await self._open_again(project)
             raise
@@ -96,13 +96,10 @@ class _Run:
                 log.warning("scene not started again", reason=str(error))
 
     async def _discard_package(self) -> None:
-        """Delete the package without an event, since no client knows of it."""
+        """Delete the package without an event. No client knows it."""
         if self._package:
             with contextlib.suppress(Arcor2Error):
                 await asyncio.to_thread(self._execution.packages.delete_temporary, self._package)
-
-    def _publish(self, event: Event) -> None:
-        self._hub.broadcast(event)
 
     async def _build(self) -> Project:
         project = self._session.require_project()
@@ -129,16 +126,16 @@ class _Run:
         ids = [item.id for item in self._session.document.items()]
         await self._session.discard()
         self._locks.drop(ids)
-        self._publish(make_event("ProjectClosed"))
+        self._hub.broadcast(make_event("ProjectClosed"))
         summary = await asyncio.to_thread(self._execution.packages.summary, self._package)
-        self._publish(make_event("PackageChanged", summary, ChangeType.ADD))
+        self._hub.broadcast(make_event("PackageChanged", summary, ChangeType.ADD))
 
     async def _run(self) -> None:
         try:
             self._scene.last_stop.require_none_since(self._requested_at)
             await self._execution.run_through(self._package, self._how)
         except Arcor2Error as error:
-            log.warning("temporary package not run", package=self._package, reason=str(error))
+            log.warning("run of the temporary package failed", package=self._package, reason=str(error))
 
     async def _delete(self) -> None:
         try:
@@ -146,17 +143,17 @@ class _Run:
         except Arcor2Error as error:
             log.warning("temporary package not deleted", package=self._package, reason=str(error))
         else:
-            self._publish(make_event("PackageChanged", summary, ChangeType.REMOVE))
+            self._hub.broadcast(make_event("PackageChanged", summary, ChangeType.REMOVE))
 
     async def _open_again(self, project: Project) -> None:
-        """Open the project as it is saved now; without it, clients get the list of projects."""
+        """Open the saved project. If that fails, send clients to the list of projects."""
         try:
             opened = await self._runs.open(project.id)
         except Arcor2Error as error:
             log.warning("project not opened again", project=project.name, reason=str(error))
-            self._publish(make_event("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id)))
+            self._hub.broadcast(make_event("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id)))
             return
-        self._publish(make_event("OpenProject", opened))
+        self._hub.broadcast(make_event("OpenProject", opened))
 
 
 class TemporaryRuns:
@@ -185,18 +182,24 @@ class TemporaryRuns:
         self._types = types
 
     async def run(self, how: How) -> None:
-        """Run the open project, which is closed meanwhile; return once the package is built.
+        """Run the open project and close it for the time of the run; return when the package is built.
 
         Raises:
             RequestRefused: the project has unsaved changes, or something is running.
             InvalidProject: the project cannot be built.
         """
         built: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self.online.spawn(_Run(self, how).whole(built), "temporary package")
+        self.online.spawn(_Run(self, how).execute(built), "temporary package")
         await built
 
     async def open(self, project_id: str) -> OpenProjectData:
-        """Open a project as it is saved. Raise RequestRefused, NotFound or StorageError if that is impossible."""
+        """Open a saved project.
+
+        Raises:
+            RequestRefused: the project has errors.
+            NotFound: the project or its scene does not exist.
+            StorageError: a document cannot be read.
+        """
         project = await self._storage.project(project_id)
         scene = await self._storage.scene(project.scene_id)
         if problems := project_problems(scene, project, self._types):
@@ -206,10 +209,10 @@ class TemporaryRuns:
         return OpenProjectData(scene, project)
 
     async def recover(self) -> None:
-        """After a crash: delete the package of a project that was being run, and open the project again."""
+        """Delete the package of a run that a crash interrupted, and open its project again."""
         try:
             projects = await asyncio.to_thread(self.execution.packages.remove_leftovers)
             if self.session.scene is None and len(projects) == 1:
                 await self.open(projects[0])
         except Arcor2Error as error:
-            log.warning("a run that a crash ended is not cleared up", reason=str(error))
+            log.warning("cleaning up after an interrupted run failed", reason=str(error))

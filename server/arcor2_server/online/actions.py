@@ -1,4 +1,4 @@
-"""Execution of a single action in the online scene."""
+"""Executes single actions in the online scene."""
 
 import math
 import time
@@ -20,19 +20,19 @@ log = structlog.get_logger(__name__)
 
 
 class LastStop:
-    """The time at which everything was last stopped. Motion requested before does not start."""
+    """The time of the last StopAll. Motion requested before it does not start."""
 
     def __init__(self) -> None:
         self._at = -math.inf
 
     def note(self) -> None:
-        """Note that everything is being stopped now."""
+        """Store that everything is being stopped now."""
         self._at = time.monotonic()
 
     def require_none_since(self, moment: float | None) -> None:
-        """Raise Cancelled if everything was stopped since `moment`, s of the monotonic clock; None: never raise."""
+        """Raise Cancelled if everything was stopped since `moment`, s of the monotonic clock. Ignore None."""
         if moment is not None and self._at >= moment:
-            raise Cancelled("It was stopped before it started.")
+            raise Cancelled("Stopped before it started.")
 
 
 class RunningAction:
@@ -45,11 +45,11 @@ class RunningAction:
         self.requested_at = requested_at
         self.cancelled = False
         self.stop_requested = False
-        """Everything was stopped while it ran: the scene may go offline even if the action does not return."""
+        """Whether everything was stopped while it ran. Then the scene may go offline before the action returns."""
 
 
 class PreparedAction(Data, frozen=True):
-    """The resolved call of an action."""
+    """The method call of an action. `returns` is the number of its results."""
 
     action_id: str
     object_id: str
@@ -59,9 +59,16 @@ class PreparedAction(Data, frozen=True):
 
 
 def argument(parameter: ActionParameter, lookup: ProjectLookup, results: dict[str, list[str]]) -> Any:
-    """Return the value of a parameter at execution. RequestRefused for a link without a result.
+    """Return the value of a parameter.
 
-    Raise InvalidData if that is impossible.
+    Args:
+        parameter: the parameter.
+        lookup: the items of the project.
+        results: results of executed actions by action id, as JSON.
+
+    Raises:
+        RequestRefused: the parameter links to an action that has not been executed.
+        InvalidData: the parameter is invalid.
     """
     if parameter.type == ActionParameterType.LINK:
         try:
@@ -83,7 +90,7 @@ def argument(parameter: ActionParameter, lookup: ProjectLookup, results: dict[st
 
 
 def prepare(action: Action, meta: ObjectAction, lookup: ProjectLookup, results: dict[str, list[str]]) -> PreparedAction:
-    """Work out the call of an action. RequestRefused, InvalidData, NotFound say what is missing."""
+    """Return the method call of an action. Raise the errors of `argument`, and NotFound if a reference is missing."""
     try:
         object_id, method = action.parse_type()
     except ValueError as error:
@@ -93,7 +100,7 @@ def prepare(action: Action, meta: ObjectAction, lookup: ProjectLookup, results: 
 
 
 def split_results(raw: bytes, returns: int) -> list[str]:
-    """Return the results of a call as the protocol lists them."""
+    """Return the results of a call as a list of JSON values."""
     if not raw:
         return []
     if returns > 1:
@@ -102,7 +109,7 @@ def split_results(raw: bytes, returns: int) -> list[str]:
 
 
 class ActionScene(Protocol):
-    """The online scene, as far as the execution of one action needs it."""
+    """The methods of the online scene that the execution of an action needs."""
 
     async def call(
         self,
@@ -117,11 +124,11 @@ class ActionScene(Protocol):
         """Call a method of an object; return the result as JSON."""
 
     def action_ended(self, action: RunningAction, results: list[str] | None, error: str | None) -> None:
-        """Take over the end of an action."""
+        """Handle the end of an action."""
 
 
 async def execute(scene: ActionScene, prepared: PreparedAction, running: RunningAction) -> None:
-    """Call the method of an action and report how it ended."""
+    """Call the method of an action and report its end."""
     results: list[str] | None = None
     error: str | None = None
     try:
@@ -133,6 +140,6 @@ async def execute(scene: ActionScene, prepared: PreparedAction, running: Running
         error = str(caught)
         log.info("action failed", action=prepared.action_id, reason=error, detail=caught.detail)
     except msgspec.MsgspecError as caught:
-        error = f"The action gave something else than it declares: {caught}"
+        error = f"The results of the action do not have the declared types: {caught}"
     finally:
         scene.action_ended(running, results, error)

@@ -37,14 +37,19 @@ class Cameras:
         self._online = online
 
     def require_camera(self, object_id: str) -> SceneObject:
-        """Return a camera of the open scene. Raise NotFound or RequestRefused if there is none."""
+        """Return a camera of the open scene.
+
+        Raises:
+            NotFound: the scene has no such object.
+            RequestRefused: the object is not a camera.
+        """
         found = self._session.document.scene_object(object_id)
         if not self._types.derives_from(found.type, "Camera"):
             raise RequestRefused("{name} is not a camera.", name=found.name)
         return found
 
     async def camera_parameters(self, camera: SceneObject) -> CameraParameters:
-        """Return the intrinsics that a live camera has; raise RequestRefused when it has none."""
+        """Return the intrinsics of an online camera. Raise RequestRefused if it has none."""
         raw = await self._online.call(camera.id, "color_camera_params", deadline=READ_TIMEOUT)
         if not raw:
             raise RequestRefused("{name} does not know its parameters.", name=camera.name)

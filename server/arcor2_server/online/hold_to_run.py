@@ -1,6 +1,7 @@
-"""Hold-to-run: which user holds which robot, and which messages arrive too late.
+"""Hold-to-run: which user moves which robot, and which messages arrive too late.
 
-The cell host ends a lease by itself (deadman timeout). This module handles users, presses and connections.
+The cell host stops the robot when a lease expires (deadman timeout). This module handles users, presses of the button
+and connections.
 """
 
 import asyncio
@@ -27,39 +28,42 @@ from arcor2_server.workspace.robots import SceneRobots
 
 log = structlog.get_logger(__name__)
 
-QUICKEST_OF: Final = 30.0
-"""Time span for measuring the fastest message, s; the last one or two spans count."""
-STOPS_WITHIN: Final = 5.0
-"""Time limit for a released robot to stop, s; a normal stop takes a tenth of it."""
+DELAY_WINDOW: Final = 30.0
+"""Time window for finding the fastest message, s; the present and the previous window count."""
 
-Held = JogRobotArgs | HoldHandTeachingArgs
+HoldArgs = JogRobotArgs | HoldHandTeachingArgs
 
 
 class Delay:
-    """Measures the delay of a client's messages relative to its fastest message, by the clocks of both sides.
+    """Measures the delay of a client's messages relative to its fastest message in the last minute.
 
-    The clocks may differ and drift: only the last minute counts.
+    The clocks of client and server may differ and drift.
     """
 
     def __init__(self) -> None:
-        self._begin = -math.inf
-        self._quickest = [math.inf, math.inf]
+        self._window_start = -math.inf
+        self._smallest_offsets = [math.inf, math.inf]
 
     def of(self, sent_ms: float, arrived: float) -> float:
-        """Return the delay, s, of a message sent at `sent_ms` (their clock) that arrived at `arrived` (s, ours)."""
+        """Return the delay of a message, s.
+
+        Args:
+            sent_ms: time at which it was sent, by the clock of the client, ms.
+            arrived: time at which it arrived, by the clock of the server, s.
+        """
         offset = arrived - sent_ms / 1e3
-        spans = (arrived - self._begin) / QUICKEST_OF
-        if spans >= 1.0:
-            self._begin = arrived
-            self._quickest = [self._quickest[1] if spans < 2.0 else math.inf, math.inf]
-        self._quickest[1] = min(self._quickest[1], offset)
-        return offset - min(self._quickest)
+        windows = (arrived - self._window_start) / DELAY_WINDOW
+        if windows >= 1.0:
+            self._window_start = arrived
+            self._smallest_offsets = [self._smallest_offsets[1] if windows < 2.0 else math.inf, math.inf]
+        self._smallest_offsets[1] = min(self._smallest_offsets[1], offset)
+        return offset - min(self._smallest_offsets)
 
 
 class _Press:
     """One press of the hold-to-run button."""
 
-    def __init__(self, client: Connection, user: str, kind: HoldKind, args: Held, number: int) -> None:
+    def __init__(self, client: Connection, user: str, kind: HoldKind, args: HoldArgs, number: int) -> None:
         loop = asyncio.get_running_loop()
         self.client = client
         self.user = user
@@ -68,15 +72,15 @@ class _Press:
         self.arm_id = args.arm_id
         self.press = args.hold
         self.number = number
-        self.begun = False
+        self.started = False
         self.over = False
         self.reason = ""
-        """Why it is being ended from here; empty when it is not, or was let go."""
+        """Why the server ended it; empty if it did not, or after a release of the button."""
         self.allowed: asyncio.Future[None] = loop.create_future()
         self.ended: asyncio.Future[None] = loop.create_future()
 
     def state(self, held: bool, reason: str = "") -> RobotHoldData:
-        """Return what RobotHold tells."""
+        """Return the data of the event RobotHold."""
         return RobotHoldData(self.robot_id, self.kind, self.user, held, reason or UNSET, self.arm_id)
 
 
@@ -105,32 +109,44 @@ class HoldToRun:
         self._numbers = itertools.count(1)
         self._held: dict[str, _Press] = {}
         self._spent: dict[Connection, int] = {}
-        """The newest ended press by client. It and earlier ones never start again."""
+        """The number of the newest ended press by client. Messages of it and earlier presses are refused."""
         self._delays: dict[Connection, Delay] = {}
 
     def holder(self, robot_id: str) -> str | None:
-        """Return the user who holds a robot, None if no user does."""
+        """Return the user who holds a robot, None if it is not held."""
         press = self._held.get(robot_id)
         return None if press is None else press.user
 
     def states(self) -> list[RobotHoldData]:
-        """Return the holds that have begun."""
-        return [press.state(True) for press in self._held.values() if press.begun]
+        """Return the states of the started holds."""
+        return [press.state(True) for press in self._held.values() if press.started]
 
     # -------------------------------------------------------------------------------- leases
     async def lease(
         self,
         client: Connection,
         user: str,
-        args: Held,
+        args: HoldArgs,
         kind: HoldKind,
         motion: Mapping[str, Any],
         allow: Callable[[], Awaitable[None]],
     ) -> float:
-        """Start, renew or end a hold; return the scale of the motion, 0 after a release.
+        """Start, renew or end a hold.
 
-        motion: further fields of the lease. allow: raises an error if a new hold must not start.
-        Raise RequestRefused or CellError if that is impossible.
+        Args:
+            client: the client.
+            user: its user.
+            args: arguments of the request.
+            kind: kind of the motion.
+            motion: further fields of the lease.
+            allow: raises an error if a new hold must not start.
+
+        Returns:
+            The scale of the motion, 0 after a release.
+
+        Raises:
+            RequestRefused: the robot cannot be held, or the message is too late.
+            CellError: the robot refused the motion or failed.
         """
         arrived = asyncio.get_running_loop().time()
         if not 0 <= args.valid_ms <= LONGEST_LEASE_MS:
@@ -148,9 +164,9 @@ class HoldToRun:
             raise RequestRefused("The request came {delay:.0f} ms late: it was thrown away.", delay=delay * 1000.0)
         press = self._held.get(args.robot_id)
         if press is None or press.client is not client or press.press != args.hold or press.kind is not kind:
-            press = await self._begin(client, user, args, kind, until, allow)
+            press = await self._start(client, user, args, kind, until, allow)
         elif not self._locks.holds(user, args.robot_id):
-            self._end(press, f"{user} does not hold the lock any more")
+            self._end(press, f"{user} no longer holds the lock")
             self._require_lock(user, args.robot_id)
         else:
             await asyncio.shield(press.allowed)
@@ -169,25 +185,25 @@ class HoldToRun:
                 arm_id=None if isinstance(press.arm_id, Unset) else press.arm_id,
             )
         except Arcor2Error:
-            if not (press.begun or press.over):  # the host may not even know of it
-                press.reason = "it could not begin"
+            if not (press.started or press.over):  # the host may not know the hold
+                press.reason = "it could not start"
                 await self._release(press, quietly=True)
             raise
-        if not press.begun and not press.over:
-            press.begun = True
+        if not press.started and not press.over:
+            press.started = True
             self._publish(press, True)
         return msgspec.json.decode(raw, type=_Scale).scale
 
-    async def _begin(
+    async def _start(
         self,
         client: Connection,
         user: str,
-        args: Held,
+        args: HoldArgs,
         kind: HoldKind,
         until: float,
         allow: Callable[[], Awaitable[None]],
     ) -> _Press:
-        """Take hold of a robot; waits for the one before of the same client to come to rest."""
+        """Start a hold, after the robot has stopped if the same client held it before."""
         robot_id, loop = args.robot_id, asyncio.get_running_loop()
         name = self._robots.robot(robot_id).name
         self._require_unspent(client, args.hold)
@@ -209,7 +225,7 @@ class HoldToRun:
             self._finish(press, "")
             refusal = error if isinstance(error, Arcor2Error) else RequestRefused("The hold could not begin.")
             press.allowed.set_exception(refusal)
-            press.allowed.exception()  # nobody may be waiting
+            press.allowed.exception()  # marks it as retrieved, in case nothing awaits it
             raise
         self._moving.add(robot_id)
         press.allowed.set_result(None)
@@ -228,8 +244,8 @@ class HoldToRun:
             raise RequestRefused("Lock {name} before you move it.", name=name)
 
     # -------------------------------------------------------------------------------- ends
-    async def _let_go(self, client: Connection, args: Held) -> None:
-        """End a press and return when the robot is at rest; harmless when it has ended."""
+    async def _let_go(self, client: Connection, args: HoldArgs) -> None:
+        """End a press and return when the robot has stopped. Do nothing if the press has ended."""
         press = self._held.get(args.robot_id)
         if press is None or press.client is not client or press.press != args.hold:
             self._spent[client] = max(self._spent.get(client, -1), args.hold)
@@ -237,7 +253,7 @@ class HoldToRun:
         await self._release(press)
 
     def _end(self, press: _Press, reason: str) -> None:
-        """Start to stop the robot, with a reason for its user."""
+        """Start stopping the robot, with a reason for the user."""
         if not press.over:
             press.over, press.reason = True, press.reason or reason
             self._spawn(self._release(press, quietly=True), f"end of a hold of {press.robot_id}")
@@ -247,14 +263,14 @@ class HoldToRun:
         try:
             await self._host.require_online().lease(press.robot_id, press.number, press.kind, 0.0)
         except Arcor2Error as error:
-            log.warning("held robot", robot=press.robot_id, reason=str(error), detail=error.detail)
+            log.warning("held robot not released", robot=press.robot_id, reason=str(error), detail=error.detail)
             if not quietly:
                 raise
         finally:
-            self._finish(press, press.reason)  # unless the host has told
+            self._finish(press, press.reason)  # no effect if the host has reported the end
 
     def ended(self, message: m.HoldEnded) -> None:
-        """Note that a robot is at rest."""
+        """Finish the hold of a robot that has stopped."""
         press = self._held.get(message.object_id)
         if press is not None and press.number == message.hold:
             self._finish(press, "" if message.error is None else message.error.message)
@@ -271,7 +287,7 @@ class HoldToRun:
             self._moving.discard(press.robot_id)
         if press.client not in self._hub.clients:
             self._spent.pop(press.client, None)
-        if press.begun:
+        if press.started:
             self._publish(press, False, press.reason)
 
     def _publish(self, press: _Press, held: bool, reason: str = "") -> None:
@@ -283,7 +299,7 @@ class HoldToRun:
             hub.broadcast(make_event("HandTeachingMode", data))
 
     def teaching_ended(self, message: m.HandTeachingEnded) -> None:
-        """Publish that hand teaching, which was on until switched off, has ended without a request."""
+        """Publish that hand teaching mode ended without a request."""
         hub = self._hub
         log.warning("hand teaching ended", robot=message.object_id, reason=message.error.message)
         data = HandTeachingModeData(message.object_id, False, message.arm_id or UNSET)
@@ -295,14 +311,14 @@ class HoldToRun:
         self._delays.pop(client, None)
         self._spent.pop(client, None)
         for press in [press for press in self._held.values() if press.client is client]:
-            self._end(press, f"{press.user} is not connected any more")
+            self._end(press, f"{press.user} is no longer connected")
 
     def stop(self, by: str) -> None:
-        """End all holds because a user stopped everything."""
+        """End all holds because a user sent StopAll."""
         for press in list(self._held.values()):
             self._end(press, f"{by} stopped everything" if by else "everything was stopped")
 
     def offline(self, reason: str) -> None:
-        """Forget all: the scene is offline, and whatever moved was stopped by the host."""
+        """Finish all holds after the scene went offline. The host has stopped the robots."""
         for press in list(self._held.values()):
             self._finish(press, reason or "the scene is offline")

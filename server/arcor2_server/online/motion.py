@@ -1,4 +1,4 @@
-"""Robot motion requested by users: checks, events and the end of the motion."""
+"""Robot motion requested by users: checks, execution and events."""
 
 import asyncio
 from collections.abc import Callable, Mapping
@@ -30,8 +30,9 @@ FEATURES = {
     "forward_kinematics": "compute forward kinematics",
     "hand_teaching": "be moved by hand",
     "jog": "be jogged",
-    "acknowledge_stop": "be acknowledged from here: do it at the robot",
+    "acknowledge_stop": "be acknowledged from here. Acknowledge the stop at the robot",
 }
+"""What a robot without a feature cannot do, by feature."""
 
 MoveEventData = Callable[[MoveEventType, str | Unset], Any]
 """Creates the data of the event for a phase of the motion."""
@@ -63,15 +64,17 @@ class RobotMotion:
         self._kinematics = kinematics
 
     def require_feature(self, robot_id: str, feature: str) -> None:
-        """Raise RequestRefused when the robot's type does not have the feature."""
+        """Raise RequestRefused if the robot's type does not have the feature."""
         robot = self._online.robot(robot_id)
         if not getattr(self._types.robot_meta(robot.type).features, feature):
             raise RequestRefused("{name} cannot {features}.", name=robot.name, features=FEATURES[feature])
 
     def require_not_moving(self, robot_id: str, *, held: bool = False) -> None:
-        """Raise RequestRefused if the robot moves, is held, executes an action, or has failed.
+        """Raise RequestRefused if the robot moves, is held by a user, executes an action, or failed to connect.
 
-        held: whether the caller holds it.
+        Args:
+            robot_id: the robot.
+            held: whether the caller holds it.
         """
         cell = self._online
         name = cell.robot(robot_id).name
@@ -84,7 +87,7 @@ class RobotMotion:
             raise RequestRefused("{name} is executing an action.", name=name)
 
     async def require_ready(self, robot_id: str, feature: str, arm_id: str | None, *, held: bool = False) -> None:
-        """Raise RequestRefused unless the robot may begin a motion now. `held`: see `require_not_moving`."""
+        """Raise RequestRefused unless the robot may start a motion now. `held`: see `require_not_moving`."""
         cell = self._online
         arm = cell.arm(robot_id, arm_id)
         self.require_not_moving(robot_id, held=held)
@@ -96,11 +99,12 @@ class RobotMotion:
             raise RequestRefused("{name} is being moved by hand.", name=robot.name)
 
     async def take_control(self, robot_id: str, arm_id: str | None) -> None:
-        """Take control before a goal is computed from where the robot is: with control comes the tool of its settings.
+        """Take control before a target is computed from the present pose, since control activates the configured tool.
 
-        Raises what the robot refuses with.
+        Raises:
+            CellError: the robot refused control.
         """
-        if arm_id is None:  # of several arms each has its own tool all the time
+        if arm_id is None:  # the arms of multi-arm robots always have their own tools
             await self._online.call(robot_id, "check_if_ready_to_move", control=True)
 
     async def move(
@@ -112,7 +116,7 @@ class RobotMotion:
         event_data: MoveEventData,
         requested_at: float,
     ) -> None:
-        """Move, and publish the end or the failure. The robot counts as moving from the request on (`cell.moving`)."""
+        """Move a robot and publish the end or failure. The caller has added the robot to `OnlineScene.moving`."""
         phase, problem = MoveEventType.END, ""
         try:
             await self._online.call(robot_id, method, arguments, control=True, requested_at=requested_at)
@@ -126,9 +130,11 @@ class RobotMotion:
         self._hub.broadcast(make_event(event, event_data(phase, problem or UNSET)))
 
     def require_robot_online(self, robot_id: str) -> OnlineScene:
-        """Return the online scene if the object is a robot in it; else raise RequestRefused.
+        """Return the online scene with the robot.
 
-        Raise NotFound if there is none.
+        Raises:
+            RequestRefused: the scene is offline, or the object is not a robot.
+            NotFound: the scene has no such object.
         """
         self._session.require_scene_open()
         self._online.require_online()
@@ -136,7 +142,12 @@ class RobotMotion:
         return self._online
 
     async def solve_inverse(self, args: InverseKinematicsArgs) -> list[Joint]:
-        """Give joints that reach a pose; RequestRefused when the robot cannot compute that, CellError when none do."""
+        """Return joints that reach a pose.
+
+        Raises:
+            RequestRefused: the robot does not compute inverse kinematics.
+            CellError: no joints reach the pose.
+        """
         cell = self._online
         arguments: dict[str, Any] = cell.arm(args.robot_id, optional(args.arm_id))
         self.require_feature(args.robot_id, "inverse_kinematics")
@@ -147,12 +158,11 @@ class RobotMotion:
         }
         if not isinstance(args.start_joints, Unset):
             arguments["start_joints"] = args.start_joints
-        joints: list[Joint]
         try:
-            joints = await cell.ask(list[Joint], args.robot_id, "inverse_kinematics", arguments)
+            joints: list[Joint] = await cell.ask(list[Joint], args.robot_id, "inverse_kinematics", arguments)
         except CellError as error:
             robot = cell.robot(args.robot_id)
-            # Some controllers answer only whom they obey. The question moves nothing: its model answers as well.
+            # Some controllers compute it only for the client in control. Then use the kinematic model.
             if error.code != NotInControl.code or self._robots.model_of_type(robot.type) is None:
                 raise
             return await self._kinematics.inverse(robot, args)

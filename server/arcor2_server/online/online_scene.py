@@ -34,13 +34,13 @@ log = structlog.get_logger(__name__)
 SPARE_AFTER: Final = 0.5
 """Time from the start of the server to the start of the first spare host, s."""
 START_WITHIN: Final = 60.0
-"""Time limit for importing object types, which may hang, and connecting, s; the host allows each device less."""
+"""Time limit for importing object types and connecting devices, s; the host has a shorter limit for each device."""
 STOP_WITHIN: Final = 5.0
-"""Time limit for the host to close the devices, s; its own limit is two."""
+"""Time limit for the host to close the devices, s; the host allows 2 s."""
 
 
 class OnlineScene:
-    """The scene, offline or online. Create it inside the event loop.
+    """The open scene, which goes online and offline. Create it inside the event loop.
 
     Calls to devices raise CellError, ConnectionLost or DeviceTimeout.
     """
@@ -62,12 +62,13 @@ class OnlineScene:
         """Results of executed actions by action id, as JSON; deleted when the scene goes offline."""
         self.last_stop = LastStop()
         self.moving: set[str] = set()
-        """Robots that move on request."""
+        """Ids of the robots that are moving on request."""
         self.before_start: list[Callable[[], None]] = []
         """Called before the scene goes online; may raise RequestRefused."""
         self.held = HoldToRun(host, hub, locks, robots, self.moving, self.spawn)
         self.task = SceneTask(tasks)
-        self._host = host
+        self.host = host
+        """The devices. Its calls raise RequestRefused while the scene is offline."""
         self._opening = opening
         self._hub = hub
         self._locks = locks
@@ -80,28 +81,28 @@ class OnlineScene:
         self._preparing = asyncio.get_running_loop().call_later(SPARE_AFTER, host.prepare)
         host.on_message = self._handle
         host.on_end = self._host_ended
-        host.board.on_connection.append(self._one_connected)
+        host.board.on_connection.append(self._connection_changed)
         hub.on_leave.append(self.held.forget)
 
     # -------------------------------------------------------------------------------- state
     @property
     def board(self) -> DeviceBoard:
         """The states of the devices."""
-        return self._host.board
+        return self.host.board
 
     @property
     def streams(self) -> RobotStreams:
         """The subscriptions to joints and end effector poses."""
-        return self._host.streams
+        return self.host.streams
 
     @property
     def online(self) -> bool:
         """Whether the scene is online."""
-        return self._host.online
+        return self.host.online
 
     def require_online(self) -> None:
         """Raise RequestRefused unless the scene is online."""
-        self._host.require_online()
+        self.host.require_online()
 
     def require_offline(self) -> None:
         """Raise RequestRefused unless the scene is offline."""
@@ -114,14 +115,14 @@ class OnlineScene:
             await asyncio.wait([self._task])
         return self.state
 
-    def _one_connected(self) -> None:
+    def _connection_changed(self) -> None:
         if self.state is SceneStateEnum.STARTING:
             self.task.connected(self.board.states())
         self._robot_calibrations.read_connected()
 
     def _publish(self, state: SceneStateEnum, message: str = "") -> None:
         self.state = state
-        self._host.online = state is SceneStateEnum.STARTED
+        self.host.online = state is SceneStateEnum.STARTED
         scene = self._session.scene
         self.task.entered(state, "" if scene is None else scene.name, message)
         log.info("scene", state=state.value, reason=message)
@@ -130,9 +131,15 @@ class OnlineScene:
 
     # -------------------------------------------------------------------------------- going online
     async def begin_start(self, *, dry_run: bool = False, keep_going: bool = False) -> None:
-        """Start the scene: return when that is allowed; SceneState reports the rest.
+        """Start going online. The event SceneState reports the progress.
 
-        keep_going: leave out objects that cannot be created or connected. Raise RequestRefused or Locked.
+        Args:
+            dry_run: only check whether the scene may go online.
+            keep_going: leave out objects that cannot be created or connected.
+
+        Raises:
+            RequestRefused: the scene cannot go online now.
+            Locked: a user is editing the scene or project.
         """
         self._session.require_scene_open()
         self.require_offline()
@@ -156,37 +163,37 @@ class OnlineScene:
         self._publish(SceneStateEnum.STARTING)
         self.board.clear()
         try:
-            problem = await self._bring_up(scene, keep_going)
+            problem = await self._go_online(scene, keep_going)
         except Arcor2Error as error:
             problem = str(error)
         except Exception as error:
             log.exception("scene start failed")
-            problem = f"An error inside the server: {error}"
+            problem = f"Internal error of the server: {error}"
         if problem is None:
             failed = self.board.failed()
-            self._done(SceneStateEnum.STARTED, f"Not there: {', '.join(failed)}." if failed else "")
-            self._host.prepare()
+            self._done(SceneStateEnum.STARTED, f"Not connected: {', '.join(failed)}." if failed else "")
+            self.host.prepare()
             return
         self._publish(SceneStateEnum.STOPPING, problem)
-        host, self._host.host = self._host.host, None
+        host, self.host.host = self.host.host, None
         if host is not None:
             await host.close()
         self._gone_offline(problem)
 
-    async def _bring_up(self, scene: Scene, keep_going: bool) -> str | None:
-        """Return why the scene did not start, None if it did."""
+    async def _go_online(self, scene: Scene, keep_going: bool) -> str | None:
+        """Start a host and connect the devices; return the reason for a failure, None on success."""
         self.board.show(scene.objects, {})
         message, overlaid = await self._opening.prepare(scene, keep_going)
         self.board.show(scene.objects, overlaid)
         self._answer = asyncio.get_running_loop().create_future()
-        host = self._host.host = await self._host.take()
+        host = self.host.host = await self.host.take()
         host.send(self._opening.with_workspace(message, scene))
         try:
             async with asyncio.timeout(START_WITHIN):
                 error = await self._answer
         except TimeoutError:
             host.kill()
-            return f"The scene did not come up within {START_WITHIN:g} s."
+            return f"The scene was not online within {START_WITHIN:g} s."
         if error is None:
             return None
         if error.detail:
@@ -200,18 +207,26 @@ class OnlineScene:
         self._publish(state, message)
 
     def _gone_offline(self, message: str = "") -> None:
-        self._host.host = None
+        self.host.host = None
         self.board.clear(message)
         self.results.clear()
         self.held.offline(message)
         self.moving.clear()
         self.streams.clear()
         self._done(SceneStateEnum.STOPPED, message)
-        self._host.prepare()
+        self.host.prepare()
 
     # -------------------------------------------------------------------------------- going offline
     async def begin_stop(self, *, dry_run: bool = False) -> None:
-        """Stop the scene: return when that is allowed; SceneState reports the rest."""
+        """Start going offline. The event SceneState reports the progress.
+
+        Args:
+            dry_run: only check whether the scene may go offline.
+
+        Raises:
+            RequestRefused: the scene cannot go offline now.
+            Locked: a user is editing the scene or project.
+        """
         self._session.require_scene_open()
         if not self.online:
             raise RequestRefused("The scene is not online.")
@@ -229,7 +244,7 @@ class OnlineScene:
 
     async def _stop(self) -> None:
         self._publish(SceneStateEnum.STOPPING)
-        host = self._host.host
+        host = self.host.host
         problem = ""
         if host is not None:
             self._answer = asyncio.get_running_loop().create_future()
@@ -247,9 +262,9 @@ class OnlineScene:
         self._gone_offline(problem)
 
     async def close(self) -> None:
-        """Stop when the server ends. The hosts stop motion and disconnect by themselves."""
+        """Close the hosts when the server ends. They stop all motion and disconnect."""
         self._preparing.cancel()
-        await self._host.close()
+        await self.host.close()
         tasks = [task for task in (self._task, *self._background) if task is not None]
         for task in tasks:
             task.cancel()
@@ -278,7 +293,7 @@ class OnlineScene:
         if self._answer is not None and not self._answer.done():
             self._answer.set_exception(ConnectionLost(reason[:1].upper() + reason[1:] + "."))
         elif self.online:
-            message = f"Lost the devices: {reason}."
+            message = f"Connection to the devices lost: {reason}."
             self._publish(SceneStateEnum.STOPPING, message)
             self._gone_offline(message)
 
@@ -293,61 +308,49 @@ class OnlineScene:
         deadline: float | None = None,
         requested_at: float | None = None,
     ) -> bytes:
-        """Call a method of an object, as HostSession.call does.
+        """Call a method of an object as `HostSession.call`.
 
-        requested_at: when the motion was requested, s of the monotonic clock; Cancelled if all was stopped since.
+        If `requested_at` is set, s of the monotonic clock, raise Cancelled if everything was stopped since.
         """
         self.last_stop.require_none_since(requested_at)
-        return await self._host.call(object_id, method, args, control=control, deadline=deadline)
-
-    async def cancel(self, object_id: str, action: str) -> None:
-        """Cancel an action of an object while it runs."""
-        await self._host.cancel(object_id, action)
-
-    async def retry(self, object_id: str) -> None:
-        """Create and connect a failed object again."""
-        await self._host.retry(object_id)
-
-    async def stop_motion(self, object_id: str) -> None:
-        """Stop an object, whatever it does."""
-        await self._host.stop_motion(object_id)
+        return await self.host.call(object_id, method, args, control=control, deadline=deadline)
 
     def begin_stop_all(self, by: str) -> CellHost | None:
-        """End holds and pending motions; return the host whose devices are to be stopped, None without one."""
+        """End all holds and prevent requested motion from starting; return the host, None if offline."""
         self.last_stop.note()
         self.held.stop(by)
         if self.running_action is not None:
             self.running_action.stop_requested = True
-            self.running_action.cancelled = True  # its end is published as ActionCancelled, unless it goes on
-        return self._host.host
+            self.running_action.cancelled = True  # its end is published as ActionCancelled
+        return self.host.host
 
     async def ask(self, kind: type[Any], object_id: str, method: str, args: Mapping[str, Any] | None = None) -> Any:
-        """Call a method that only observes, and decode its result as `kind`."""
-        return await self._host.ask(kind, object_id, method, args)
+        """Call a method that only reads, and decode its result as `kind`."""
+        return await self.host.ask(kind, object_id, method, args)
 
     async def robot_joints(self, robot_id: str, arm_id: str | None = None, *, gripper: bool = False) -> list[Joint]:
         """Return the present joint values of a robot."""
         return await self._robots.robot_joints(robot_id, arm_id, gripper=gripper)
 
     async def end_effector_pose(self, robot_id: str, end_effector: str, arm_id: str | None = None) -> Pose:
-        """Return the present pose of an end effector in the world."""
+        """Return the present pose of an end effector in world coordinates."""
         return await self._robots.end_effector_pose(robot_id, end_effector, arm_id)
 
     async def object_pose_changed(self, object_id: str, pose: Pose) -> None:
-        """Update the pose of the live object."""
+        """Update the pose of an online object."""
         await self.call(object_id, "set_pose", {"pose": pose}, deadline=READ_TIMEOUT)
 
     def robot(self, robot_id: str) -> SceneObject:
-        """Return the scene object of a robot; NotFound, RequestRefused when it is none."""
+        """Return the scene object of a robot. Raise NotFound if it is missing, RequestRefused if it is not a robot."""
         return self._robots.robot(robot_id)
 
     def arm(self, robot_id: str, arm_id: str | None) -> dict[str, Any]:
-        """Return the argument that names the arm; RequestRefused unless it is set exactly for multi-arm robots."""
+        """Return the argument for the arm. Raise RequestRefused unless an arm is given only for multi-arm robots."""
         return self._robots.arm(robot_id, arm_id)
 
     # -------------------------------------------------------------------------------- in the background
     def spawn(self, work: Any, name: str) -> None:
-        """Run what goes on after a request was answered."""
+        """Run a coroutine in the background. It is cancelled when the server ends."""
         task = asyncio.create_task(work, name=name)
         self._background.add(task)
         task.add_done_callback(self._background.discard)

@@ -1,4 +1,4 @@
-"""The message with which a cell host opens a scene."""
+"""Creates the message that opens a scene in a cell host."""
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectModel
@@ -13,7 +13,7 @@ from arcor2_server.workspace.host_world import HostWorld
 
 
 class SceneOpening:
-    """Prepares the opening of a scene."""
+    """Creates the message with settings, secrets, object types and collision models."""
 
     def __init__(
         self,
@@ -30,7 +30,7 @@ class SceneOpening:
         self._host_world = host_world
 
     async def prepare(self, scene: Scene, keep_going: bool) -> tuple[m.OpenScene, dict[str, list[str]]]:
-        """Return the message, and by object the names of the settings that the cell file of the server overrides.
+        """Return the message without the workspace, and the names of overridden settings by id of the object.
 
         Args:
             scene: the scene.
@@ -64,5 +64,5 @@ class SceneOpening:
         return message, overlaid
 
     def with_workspace(self, message: m.OpenScene, scene: Scene) -> m.OpenScene:
-        """Add the collision models and calibrations in force now. Send the message at once."""
+        """Add the present collision models and calibrations. Send the message immediately."""
         return self._host_world.with_world(message, self._host_world.calibrations(scene.objects))

@@ -15,6 +15,7 @@ from typing import Any, Final
 import msgspec
 
 from arcor2_hw.data.base import Data, Unset, now
+from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_server.documents import Session
 from arcor2_server.events import EventHub
 from arcor2_server.execution.runs import Runs
@@ -127,7 +128,7 @@ class Diagnosis:
                 "objects": execution.board.states() or cell.board.states(),
                 "unsaved": session.has_changes,
             },
-            "runs.json": self._runs.newest(RUNS, None, None, None),
+            "runs.json": self._runs.find(ListRunsArgs(limit=RUNS)),
         }
 
     def _type(self, name: str) -> dict[str, Any]:

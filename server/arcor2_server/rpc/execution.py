@@ -50,19 +50,19 @@ class ExecutionRequests:
     @rpc("StartScene")
     async def start_scene(self, context: Context, args: None) -> None:
         """Start the scene: connect its devices. SceneState reports the progress."""
-        self._online.task.asked_by = context.client.name
+        self._online.task.requested_by = context.client.name
         await self._online.begin_start(dry_run=context.dry_run)
 
     @rpc("StartSceneKeepGoing")
     async def start_scene_keep_going(self, context: Context, args: None) -> None:
         """Start the scene without the devices that cannot be connected. SceneState reports the progress."""
-        self._online.task.asked_by = context.client.name
+        self._online.task.requested_by = context.client.name
         await self._online.begin_start(dry_run=context.dry_run, keep_going=True)
 
     @rpc("StopScene")
     async def stop_scene(self, context: Context, args: None) -> None:
         """Stop the scene: disconnect its devices. SceneState reports the progress."""
-        self._online.task.asked_by = context.client.name
+        self._online.task.requested_by = context.client.name
         await self._online.begin_stop(dry_run=context.dry_run)
 
     # ------------------------------------------------------------------------------------------------ single actions
@@ -103,7 +103,7 @@ class ExecutionRequests:
             )
         running.cancelled = True
         try:
-            await self._online.cancel(running.object_id, running.method)
+            await self._online.host.cancel(running.object_id, running.method)
         except BaseException:
             running.cancelled = False
             raise

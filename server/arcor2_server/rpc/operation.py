@@ -169,7 +169,7 @@ class OperationRequests:
         self._session.require_scene_open()
         self._online.require_online()
         self._session.document.scene_object(args.object_id)
-        await self._online.retry(args.object_id)
+        await self._online.host.retry(args.object_id)
 
     @rpc("AcknowledgeStop")
     async def acknowledge_stop(self, context: Context, args: AcknowledgeStopArgs) -> None:

@@ -143,7 +143,7 @@ class RobotRequests:
         acting = cell.running_action is not None and cell.running_action.object_id == args.robot_id
         if args.robot_id not in cell.moving and not acting:
             raise RequestRefused("{name} is not moving.", name=cell.robot(args.robot_id).name)
-        await cell.stop_motion(args.robot_id)
+        await cell.host.stop_motion(args.robot_id)
 
     @rpc("HandTeachingMode")
     async def hand_teaching_mode(self, context: Context, args: HandTeachingModeArgs) -> None:

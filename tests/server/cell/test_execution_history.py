@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from arcor2_hw.data.editor import Run, RunEnd, TraceEntry
+from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.runtime import messages as m
 from arcor2_server.execution import runs
@@ -175,8 +176,8 @@ async def test_shared_breakpoints_apply_on_request_and_can_change(server: Server
 
 # ---------------------------------------------------------------------------------------------- kept
 async def test_the_newest_runs_and_actions_are_stored(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runs, "KEPT", 5)
-    monkeypatch.setattr(runs, "KEPT_ACTIONS", 3)
+    monkeypatch.setattr(runs, "MAX_RUNS", 5)
+    monkeypatch.setattr(runs, "MAX_ACTIONS", 3)
     storage = await Storage.open(ServerSettings(data_dir=tmp_path))
     try:
         kept = Runs(Hub())
@@ -188,8 +189,8 @@ async def test_the_newest_runs_and_actions_are_stored(tmp_path: Any, monkeypatch
                 kept.announced(m.ProgramEvent("ActionStateAfter", AFTER, action, time=0.1))
             if number != 8:
                 kept.end(number, RunEnd.FINISHED)
-        assert [run.number for run in kept.newest(100)] == [8, 7, 6, 5, 4]
-        assert kept.newest(1)[0].actions == 5
+        assert [run.number for run in kept.find(ListRunsArgs(limit=100))] == [8, 7, 6, 5, 4]
+        assert kept.find(ListRunsArgs(limit=1))[0].actions == 5
         _, entries = kept.trace(100)
         assert [entry.number for entry in entries] == [5, 4, 3]
         assert entries[0] == TraceEntry(8, 5, "act", entries[0].started, "a", duration=0.1, results=["1"], thread_id=7)
@@ -198,7 +199,7 @@ async def test_the_newest_runs_and_actions_are_stored(tmp_path: Any, monkeypatch
         again = Runs(Hub())
         await again.open(SharedData(storage))
         await again.close()
-        assert [(run.number, run.end.value) for run in again.newest(100)] == [
+        assert [(run.number, run.end.value) for run in again.find(ListRunsArgs(limit=100))] == [
             (8, "lost"),
             *((number, "finished") for number in (7, 6, 5, 4)),
         ]

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.exceptions import StorageError
 from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused, until
 
@@ -194,6 +195,6 @@ async def test_a_server_killed_during_the_run_cleans_up_at_its_next_start(tmp_pa
         opened = stage.services.session.require_project()
         assert (opened.name, stage.services.session.has_changes) == ("round", False)
         assert list(packages.iterdir()) == [kept]
-        (run,) = stage.services.runs.newest(10)
+        (run,) = stage.services.runs.find(ListRunsArgs(limit=10))
         assert (run.end, run.temporary, run.project_name, run.started_by) == ("lost", True, "round", "alice")
         assert "server" in str(run.error)

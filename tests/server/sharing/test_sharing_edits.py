@@ -46,7 +46,7 @@ async def test_breakpoints_are_shared_and_announced(alice: Person, bob: Person, 
 
 
 async def test_the_number_of_breakpoints_is_limited(monkeypatch: pytest.MonkeyPatch, alice: Person, work: Work) -> None:
-    monkeypatch.setattr(breakpoints, "MOST", 2)
+    monkeypatch.setattr(breakpoints, "MAX_BREAKPOINTS", 2)
     await work.project("p", "q", "r")
     points = [work.point(name) for name in "pqr"]
     await alice.ask("SetBreakpoints", add=points[:2])
