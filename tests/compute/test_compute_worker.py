@@ -185,7 +185,7 @@ async def test_too_many_waiting_tasks_are_refused(compute: Compute, monkeypatch:
     tasks = [asyncio.create_task(compute.run(question())) for _ in range(3)]
     await asyncio.sleep(0)
     # the first has not been taken yet
-    with pytest.raises(ComputeBusy, match="2 computations wait already"):
+    with pytest.raises(ComputeBusy, match="2 computations are already waiting"):
         await asyncio.gather(*tasks)
     await asyncio.gather(*tasks, return_exceptions=True)
 

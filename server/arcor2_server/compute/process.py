@@ -164,7 +164,7 @@ class ComputeProcess:
 
 def _too_long(task: Task[Any], within: float) -> str:
     what = task.label[:1].upper() + task.label[1:]
-    return f"{what} took longer than {within:g} s, and was given up."
+    return f"{what} took longer than {within:g} s, and was cancelled."
 
 
 _CLASSES: Final[dict[str, type[Arcor2Error]]] = {

@@ -47,7 +47,9 @@ class _Worker:
         queue = self._waiting[background]
         if len(queue) >= MAX_WAITING:
             raise ComputeBusy(
-                "{count} computations wait already: {label} is not begun.", count=len(queue), label=job.task.label
+                "{count} computations are already waiting. {label} is not started.",
+                count=len(queue),
+                label=job.task.label,
             )
         queue.append(job)
         self._wake.set()

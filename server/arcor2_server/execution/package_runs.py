@@ -75,7 +75,7 @@ class PackageRuns:
         try:
             await self._require_runnable(package_id)
             if not self.is_left_open():
-                raise RequestRefused("The scene or project was opened by somebody meanwhile.")
+                raise RequestRefused("A user has opened the scene or project in the meantime.")
             for user in self._locks.owners():
                 for event in self._lock_takeover.release(user, how.by or "An operator"):
                     self._hub.broadcast(event)

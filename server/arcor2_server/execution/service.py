@@ -121,12 +121,14 @@ class Execution(PackageLibrary):
     def require_no_program(self) -> None:
         """Raise RequestRefused while a program runs."""
         if self.busy:
-            raise RequestRefused("A program is running: stop it first.")
+            raise RequestRefused("A program is running. Stop it first.")
 
     def streams_of(self, robot_id: str) -> RobotStreams:
         """Return the subscriptions to a robot of the running program. Raise RequestRefused while it starts."""
         if self._host.package_info is None:
-            raise RequestRefused("The devices of the program are not there yet: ask again once PackageInfo has come.")
+            raise RequestRefused(
+                "The devices of the program are not connected yet. Try again after the event PackageInfo."
+            )
         found = self.board.object(robot_id)
         with contextlib.suppress(NotFound):  # the type may be only in the package
             if not self._types.derives_from(found.type, "Robot"):
@@ -160,7 +162,7 @@ class Execution(PackageLibrary):
     # -------------------------------------------------------------------------------- commands
     def _require_not_used(self, package_id: str) -> None:
         if self.state not in _IDLE and package_id == self.package_id:
-            raise RequestRefused("This package is running: stop it first.")
+            raise RequestRefused("This package is running. Stop it first.")
 
     async def run(self, package_id: str, how: How | None = None) -> None:
         """Start a package. Its state is published as PackageState."""
@@ -208,13 +210,13 @@ class Execution(PackageLibrary):
 
     def _require_not_reserved(self) -> None:
         if self.reserved:
-            raise RequestRefused("A project is being run: wait until it is open again, or stop it.")
+            raise RequestRefused("A project is being run. Wait until it is open again, or stop it.")
 
     def _require_idle(self) -> None:
         if self.state not in _IDLE:
-            raise RequestRefused("A package is {value}: stop it first.", value=self.state.value)
+            raise RequestRefused("A package is {value}. Stop it first.", value=self.state.value)
         if self._online.state.value != "stopped":
-            raise RequestRefused("The scene is online: stop it first, its devices are in use.")
+            raise RequestRefused("The scene is online and uses the devices. Stop the scene first.")
 
     async def _begin(self, message: m.RunPackage) -> None:
         try:

@@ -104,13 +104,15 @@ class _Run:
     async def _build(self) -> Project:
         project = self._session.require_project()
         if self._session.has_changes:
-            raise RequestRefused("{name} has changes that are not saved: save it first.", name=project.name)
+            raise RequestRefused("{name} has unsaved changes. Save it first.", name=project.name)
         if self._execution.busy:
-            raise RequestRefused("A program is running: stop it first.")
+            raise RequestRefused("A program is running. Stop it first.")
         if self._scene.running_action is not None:
-            raise RequestRefused("An action is running: wait for it, or stop it.")
+            raise RequestRefused("An action is running. Wait until it ends, or stop it.")
         if self._scene.state not in (SceneStateEnum.STOPPED, SceneStateEnum.STARTED):
-            raise RequestRefused("The scene is {value}: wait until that is over.", value=self._scene.state.value)
+            raise RequestRefused(
+                "The scene is {value}. Wait until it is started or stopped.", value=self._scene.state.value
+            )
         name = f"Temporary package for project '{project.name}'."
         self._package = new_id("pkg")
         await asyncio.to_thread(self._execution.packages.mark_temporary, self._package, project.id)

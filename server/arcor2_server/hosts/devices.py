@@ -130,7 +130,7 @@ class DeviceBoard:
     def object(self, object_id: str) -> SceneObject:
         """Return an object of the scene. Raise NotFound if there is none."""
         if (found := self._objects.get(object_id)) is None:
-            raise NotFound("There is no object {object_id!r} in operation.", object_id=object_id)
+            raise NotFound("There is no online object with the id {object_id!r}.", object_id=object_id)
         return found
 
     def changed(self, message: DeviceChanged) -> None:
@@ -157,7 +157,7 @@ class DeviceBoard:
         report, known = self._reports.get(object_id), self._objects.get(object_id)
         if report is not None and known is not None and report.connection is Connection.FAILED:
             raise RequestRefused(
-                "{name} is not there: {reason}.", name=known.name, reason=report.reason or "it could not be connected"
+                "{name} is not connected: {reason}.", name=known.name, reason=report.reason or "the connection failed"
             )
 
     def states(self) -> list[ObjectStateData]:

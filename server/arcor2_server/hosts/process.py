@@ -246,7 +246,9 @@ class CellHost:
             async with asyncio.timeout(limit):
                 return await future
         except TimeoutError:
-            raise DeviceTimeout("The cell host does not answer.", f"pid {self.pid}") from None
+            raise DeviceTimeout(
+                "The cell host (the process with the devices) does not answer.", f"pid {self.pid}"
+            ) from None
         finally:
             self._calls.pop(number, None)
 

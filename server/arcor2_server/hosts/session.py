@@ -109,7 +109,7 @@ class HostSession:
     def require_online(self) -> CellHost:
         """Return the host. Raise RequestRefused unless the devices are in operation."""
         if not self.online or self.host is None:
-            raise RequestRefused("The scene is offline: start it first.")
+            raise RequestRefused("The scene is offline. Start it first.")
         return self.host
 
     async def call(
@@ -148,7 +148,7 @@ class HostSession:
         try:
             return msgspec.json.decode(raw, type=kind)
         except msgspec.MsgspecError as error:
-            raise Arcor2Error("{method} gave something else than it should.", str(error), method=method) from error
+            raise Arcor2Error("{method} returned an invalid value.", str(error), method=method) from error
 
     async def cancel(self, object_id: str, action: str) -> None:
         """Cancel the running action of a device."""

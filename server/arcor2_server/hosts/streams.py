@@ -35,7 +35,7 @@ class RobotStreams:
         if send:
             clients.add(client)
         elif client not in clients:
-            raise RequestRefused("This was not subscribed to.")
+            raise RequestRefused("This stream is not subscribed to.")
         else:
             clients.discard(client)
         self._update_host(robot_id)
@@ -46,7 +46,7 @@ class RobotStreams:
         if send:
             rates[client] = rate
         elif rates.pop(client, None) is None:
-            raise RequestRefused("This was not streamed.")
+            raise RequestRefused("This stream is not subscribed to.")
         self._update_host_rates(robot_id)
 
     def publish(self, message: m.StreamEvent) -> None:

@@ -79,7 +79,7 @@ def argument(parameter: ActionParameter, lookup: ProjectLookup, results: dict[st
         if stored is None or index >= len(stored):
             name = lookup.action(action_id)[1].name
             raise RequestRefused(
-                "Parameter {name} needs a result of the action {other_name}: execute that first.",
+                "Parameter {name} needs a result of the action {other_name}: execute that action first.",
                 name=parameter.name,
                 other_name=name,
             )

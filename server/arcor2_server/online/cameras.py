@@ -52,7 +52,7 @@ class Cameras:
         """Return the intrinsics of an online camera. Raise RequestRefused if it has none."""
         raw = await self._online.call(camera.id, "color_camera_params", deadline=READ_TIMEOUT)
         if not raw:
-            raise RequestRefused("{name} does not know its parameters.", name=camera.name)
+            raise RequestRefused("{name} has no camera parameters.", name=camera.name)
         try:
             return msgspec.json.decode(raw, type=CameraParameters)
         except msgspec.MsgspecError as error:

@@ -161,7 +161,7 @@ class HoldToRun:
         delay = self._delays.setdefault(client, Delay()).of(args.sent_ms, arrived)
         until = arrived + args.valid_ms / 1e3 - delay
         if until <= arrived:
-            raise RequestRefused("The request came {delay:.0f} ms late: it was thrown away.", delay=delay * 1000.0)
+            raise RequestRefused("The request arrived {delay:.0f} ms late and was ignored.", delay=delay * 1000.0)
         press = self._held.get(args.robot_id)
         if press is None or press.client is not client or press.press != args.hold or press.kind is not kind:
             press = await self._start(client, user, args, kind, until, allow)
@@ -174,7 +174,7 @@ class HoldToRun:
 
     async def _send_lease(self, press: _Press, until: float, motion: Mapping[str, Any]) -> float:
         if press.over:
-            raise RequestRefused("The hold was ended: {reason}.", reason=press.reason or "it was let go")
+            raise RequestRefused("The motion was stopped: {reason}.", reason=press.reason or "the button was released")
         try:
             raw = await self._host.require_online().lease(
                 press.robot_id,
@@ -211,7 +211,7 @@ class HoldToRun:
             self._end(former, "" if former.press < args.hold else "another button was pressed")
             await asyncio.wait({former.ended}, timeout=until - loop.time())
             if loop.time() >= until:
-                raise RequestRefused("{name} is still coming to rest.", name=name)
+                raise RequestRefused("{name} is still stopping. Try again when it has stopped.", name=name)
             self._require_unspent(client, args.hold)
         if (former := self._held.get(robot_id)) is not None:
             raise RequestRefused("{name} is held by {user}.", name=name, user=former.user)
@@ -220,10 +220,10 @@ class HoldToRun:
         try:
             await allow()
             if press.over:
-                raise RequestRefused("The hold was ended: {reason}.", reason=press.reason)
+                raise RequestRefused("The motion was stopped: {reason}.", reason=press.reason)
         except BaseException as error:
             self._finish(press, "")
-            refusal = error if isinstance(error, Arcor2Error) else RequestRefused("The hold could not begin.")
+            refusal = error if isinstance(error, Arcor2Error) else RequestRefused("The motion could not start.")
             press.allowed.set_exception(refusal)
             press.allowed.exception()  # marks it as retrieved, in case nothing awaits it
             raise
@@ -233,7 +233,7 @@ class HoldToRun:
 
     def _require_unspent(self, client: Connection, press: int) -> None:
         if press <= self._spent.get(client, -1):
-            raise RequestRefused("That hold has ended: let go, and press again.")
+            raise RequestRefused("That motion has ended. Release the button and press it again.")
 
     def _require_lock(self, user: str, robot_id: str) -> None:
         locks = self._locks
@@ -316,7 +316,7 @@ class HoldToRun:
     def stop(self, by: str) -> None:
         """End all holds because a user sent StopAll."""
         for press in list(self._held.values()):
-            self._end(press, f"{by} stopped everything" if by else "everything was stopped")
+            self._end(press, f"{by} stopped all motion" if by else "all motion was stopped")
 
     def offline(self, reason: str) -> None:
         """Finish all holds after the scene went offline. The host has stopped the robots."""

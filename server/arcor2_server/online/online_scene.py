@@ -107,7 +107,7 @@ class OnlineScene:
     def require_offline(self) -> None:
         """Raise RequestRefused unless the scene is offline."""
         if self.state is not SceneStateEnum.STOPPED:
-            raise RequestRefused("The scene is online: stop it first.")
+            raise RequestRefused("The scene is online. Stop it first.")
 
     async def settled(self) -> SceneStateEnum:
         """Wait until the scene neither starts nor stops; return its state."""
@@ -146,7 +146,9 @@ class OnlineScene:
         for check in self.before_start:
             check()
         if self._session.project is None and (locked := self._locks.write_locked_roots()):
-            raise RequestRefused("Something is being edited: {locked}.", locked=", ".join(locked))
+            raise RequestRefused(
+                "These items are being edited: {locked}. Wait until they are unlocked.", locked=", ".join(locked)
+            )
         await self._locks.acquire(SERVER, SCENE, PROJECT)
         try:
             self.require_offline()
@@ -231,7 +233,7 @@ class OnlineScene:
         if not self.online:
             raise RequestRefused("The scene is not online.")
         if self.running_action is not None and not self.running_action.stop_requested:
-            raise RequestRefused("An action is running: wait for it, or stop it.")
+            raise RequestRefused("An action is running. Wait until it ends, or stop it.")
         await self._locks.acquire(SERVER, SCENE, PROJECT)
         try:
             self.require_online()

@@ -288,7 +288,7 @@ async def test_all_conflicts_are_named_at_once(here: Any, packed: bytes) -> None
 
 async def test_a_used_name_is_a_conflict(here: Any, packed: bytes) -> None:
     await here.storage.put_scene(replace(workplace.scene(), id="scn_other"))
-    with pytest.raises(Conflict, match="Another scene is named workplace"):
+    with pytest.raises(Conflict, match="Another scene has the name workplace"):
         await here.package_import.import_package(packed, ALL)
 
 
@@ -334,7 +334,7 @@ async def test_a_driver_that_is_not_installed_is_named(
 
 
 async def test_a_type_whose_file_lacks_its_class_is_named(here: Any, packed: bytes) -> None:
-    with pytest.raises(NotFound, match="The object type Arm is neither in the package nor here"):
+    with pytest.raises(NotFound, match="The object type Arm is neither in the package nor on this server"):
         await here.package_import.import_package(changed(packed, object_types__arm_py=b"class Leg:\n    pass\n"), ALL)
     assert here.storage.revision == 0
 
@@ -369,16 +369,16 @@ def _renamed_action() -> bytes:
         ({"data__scene_json": None}, "no data/scene.json"),
         ({"data__project_json": b"{"}, "data/project.json of the package is damaged"),
         ({"data__project_json": b"[" * 200_000}, "data/project.json of the package is damaged"),
-        ({"data__project_json": _project(id="")}, "no usable id"),
+        ({"data__project_json": _project(id="")}, "invalid id"),
         ({"data__project_json": _project(scene_id="scn_2")}, "another scene"),
         ({"data__project_json": _renamed_action()}, "fly"),
         (
             {"data__project_json": _project(logic=[workplace.step(START, "pick"), workplace.step("gone", END)])},
             "act_gone",
         ),
-        ({"object_types__arm_py": b"class Arm(:\n"}, "object_types/arm.py of the package is no Python"),
+        ({"object_types__arm_py": b"class Arm(:\n"}, "object_types/arm.py of the package is not valid Python"),
         ({"object_types__0arm_py": b"class Leg:\n    pass\n"}, "object_types/0arm.py of the package has no class"),
-        ({"object_types__arm_py": b"\xff"}, "is no text"),
+        ({"object_types__arm_py": b"\xff"}, "is not UTF-8 text"),
         (
             {"object_types__arm_py": b"from .nothing import Base\n\n\nclass Arm(Base):\n    pass\n"},
             "The object type Arm of the package cannot be used",
@@ -388,7 +388,7 @@ def _renamed_action() -> bytes:
             {"data__models__table_json": b'{"type":"Sphere","sphere":{"id":"Arm","radius":1.0}}'},
             "is the model of Arm, not of table",
         ),
-        ({"data__models__chair_json": b"{}"}, "belongs to none"),
+        ({"data__models__chair_json": b"{}"}, "does not belong to any"),
     ],
 )
 async def test_an_invalid_package_is_refused_completely(

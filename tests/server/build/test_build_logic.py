@@ -305,7 +305,7 @@ def _linked_to_itself() -> Draft:
         (Draft().action("a", "x").chain(START, "a").way("a", "b", ("a", "x", True)).chain("b", END), "x is false"),
         (_no_condition(), "'a': one of its connections has no condition"),
         (_never_taken(), "'a': the connection to 'd' is never taken"),
-        (_linked_from_a_branch(), "'d' uses a result of 'b', which has not always run before"),
+        (_linked_from_a_branch(), "'d' uses a result of 'b', which does not run before it on all paths"),
         (_linked_to_itself(), "'a' uses a result of 'a'"),
     ],
 )
@@ -376,9 +376,9 @@ def test_a_default_branch_with_actions() -> None:
         (choosing(0, 1), "no action follows it when no condition holds"),
         (choosing(0, None, None), "one of its connections has no condition"),
         (choosing(0, 0, None), "is never taken"),
-        (choosing(0, "low", None), "only integers can be branched on, not 'low'"),
+        (choosing(0, "low", None), "can compare it with integers, not with 'low'"),
         (choosing(0, True, None), "one of its connections has no condition"),
-        (choosing("low", 1, None), "only texts can be branched on, not 1"),
+        (choosing("low", 1, None), "can compare it with strings, not with 1"),
         (choosing(0, 1.5, None), "compares with true, false, an integer or a text"),  # type: ignore[arg-type]
     ],
 )
@@ -399,5 +399,5 @@ def test_branching_requires_a_supported_result_type() -> None:
     draft = choosing("low", None)
     project = draft.project()
     types = {"Thing": TypeFacts("object_types.thing", {**DECLARED, "sort": ObjectAction("sort", returns=["double"])})}
-    with pytest.raises(InvalidProject, match="r is double, which cannot be branched on"):
+    with pytest.raises(InvalidProject, match="r is double, which a condition cannot use"):
         from_logic(SCENE, project, types)

@@ -333,14 +333,14 @@ def test_a_script_of_the_original_is_read() -> None:
     [
         (ABOVE, "        import os  #!\n", "import os"),
         (ABOVE, "        for n in range(3):  #!\n            pass\n", "for n in range(3)"),
-        (ABOVE, "        print('x')  #!\n", "print is no action"),
+        (ABOVE, "        print('x')  #!\n", "print is not an action"),
         (ABOVE, "        while True:  #!\n            pass\n", "while True"),
         (ABOVE, "        return  #!\n", "return"),
         (ABOVE, "        x = 1  #!\n", "x = 1"),
-        (ABOVE, "        robot.pose.x()  #!\n", "robot.pose.x is no action"),
+        (ABOVE, "        robot.pose.x()  #!\n", "robot.pose.x is not an action"),
         (ABOVE, "        robot.pick(  #!\n            aps.feeder.poses.default)\n", "has no name"),
-        (ABOVE, "        robot.pick(aps.feeder.poses.default, an=name)  #!\n", "is a text, not name"),
-        (BACK, '        robot.pick(aps.feeder.poses.default, an="pick")  #!\n', "'pick' is there already, in line"),
+        (ABOVE, "        robot.pick(aps.feeder.poses.default, an=name)  #!\n", "must be a string, not name"),
+        (BACK, '        robot.pick(aps.feeder.poses.default, an="pick")  #!\n', "already has an action 'pick'"),
         (ABOVE, '        robot.fly(an="x")  #!\n', "Arm has no action fly"),
         (ABOVE, '        robot.pick(an="x")  #!\n', "parameter pose of pick is missing"),
         (ABOVE, '        robot.pick(aps.nowhere.poses.default, an="x")  #!\n', "the project has no aps.nowhere"),
@@ -364,35 +364,35 @@ def test_a_script_of_the_original_is_read() -> None:
         (
             ABOVE,
             '        robot.pick(aps.feeder.poses.default, 0.5, Grip.SOFT, 1, an="x")  #!\n',
-            "takes 3 arguments without a name",
+            "has 3 positional parameters",
         ),
-        (ABOVE, '        robot.pick(here, an="x")  #!\n', "here is not known"),
+        (ABOVE, '        robot.pick(here, an="x")  #!\n', "unknown name here"),
         (ABOVE, '        robot.pick(code, an="x")  #!\n', "pose is pose, but code is string"),
-        (ABOVE, '        x = robot.pick(aps.feeder.poses.default, an="x")  #!\n', "gives 0 results, not 1"),
-        (ABOVE, '        code = reader.scan(1.0, an="x")  #!\n', "code means something else already"),
-        (ABOVE, '        robot = reader.scan(1.0, an="x")  #!\n', "robot means something else already"),
-        (ABOVE, '        list = reader.scan(1.0, an="x")  #!\n', "list cannot name a result"),
-        (ABOVE, '        x[0] = reader.scan(1.0, an="x")  #!\n', "into variables"),
-        (ABOVE, '        reader.known(fresh, an="x")  #!\n', "fresh is not known"),
+        (ABOVE, '        x = robot.pick(aps.feeder.poses.default, an="x")  #!\n', "returns 0 results, not 1"),
+        (ABOVE, '        code = reader.scan(1.0, an="x")  #!\n', "code is already defined"),
+        (ABOVE, '        robot = reader.scan(1.0, an="x")  #!\n', "robot is already defined"),
+        (ABOVE, '        list = reader.scan(1.0, an="x")  #!\n', "list is not a valid name of a result"),
+        (ABOVE, '        x[0] = reader.scan(1.0, an="x")  #!\n', "must be assigned to variables"),
+        (ABOVE, '        reader.known(fresh, an="x")  #!\n', "unknown name fresh"),
         (IF_KNOWN, "        if known > 1:  #!\n", "known > 1"),
         (IF_KNOWN, "        if known == 1:  #!\n", "known is boolean and cannot be 1"),
         (IF_KNOWN, '        if code == "x":  #!\n', "code is string"),
-        (IF_KNOWN, "        if fresh == True:  #!\n", "fresh is no result"),
+        (IF_KNOWN, "        if fresh == True:  #!\n", "fresh is not a result"),
         (IF_KNOWN, "        if known == True and left == True:  #!\n", "known == True and left == True"),
-        (GOOD, "            if left == True:  #!\n    " + GOOD, "has to be an action"),
-        (BACK, '        next_action = "x"\n        if next_action == "y":  #!\n    ' + BACK, "never holds"),
-        (BACK, '        if next_action == "y":  #!\n    ' + BACK, "not set on every way"),
+        (GOOD, "            if left == True:  #!\n    " + GOOD, "an action is required"),
+        (BACK, '        next_action = "x"\n        if next_action == "y":  #!\n    ' + BACK, "is never true"),
+        (BACK, '        if next_action == "y":  #!\n    ' + BACK, "not set on all paths"),
         (AWAY, AWAY + "            continue\n            pass  #!\n", "never reached"),
         (
             BACK,
             "        if known == True:\n    " + BACK + "        elif known == True:  #!\n            pass\n",
-            "never holds here",
+            "is never true here",
         ),
-        (BACK, BACK + "    robot.drop(aps.good.position, 1.0)  #!\n", "nothing stands behind the loop"),
+        (BACK, BACK + "    robot.drop(aps.good.position, 1.0)  #!\n", "must be the last statement"),
         ("    # Project parameters\n", '    robot.drop(aps.good.position, 1.0, an="x")  #!\n', "before the loop"),
         ("    boards = 2\n", "    boards = 2.5  #!\n", "boards is integer, not 2.5"),
-        ("    boards = 2\n", "    boards = len('ab')  #!\n", "plain value"),
-        ("    boards = 2\n", "    boards = 2\n    robot = 3  #!\n", "robot means something else"),
+        ("    boards = 2\n", "    boards = len('ab')  #!\n", "literal"),
+        ("    boards = 2\n", "    boards = 2\n    robot = 3  #!\n", "robot is already defined"),
         ('res.objects["obj_robot"]', 'res.objects["obj_gone"]  #!', "the scene has no object obj_gone"),
         ("from action_points import ActionPoints\n", "import os  #!\n", "import os"),
         ("from action_points import ActionPoints\n", "from os import path  #!\n", "not from os"),
@@ -417,7 +417,7 @@ def test_a_result_that_may_be_missing_is_named() -> None:
         (GOOD, GOOD + '            label = reader.scan(1.0, an="label")\n'),
         (BACK, '        reader.known(label, an="late")\n'),
     )
-    with pytest.raises(NotUnderstood, match="label is not always there: 'label' has not run on every way") as caught:
+    with pytest.raises(NotUnderstood, match="label is not always set: 'label' does not run on all paths") as caught:
         from_script(source, workplace.scene(), workplace.project(), workplace.FACTS)
     assert source.splitlines()[caught.value.line - 1].strip().startswith("reader.known(label")
 
@@ -452,7 +452,7 @@ def test_a_project_without_action_points_has_no_place_for_actions() -> None:
         ),
         workplace.FACTS,
     )
-    with pytest.raises(NotUnderstood, match="no action point on which 'a' could lie"):
+    with pytest.raises(NotUnderstood, match="no action point for the action 'a'"):
         from_script(source, workplace.scene(), bare, workplace.FACTS)
 
 
@@ -461,7 +461,7 @@ def test_keyword_only_parameters_are_read() -> None:
     source = edited((PICK, PICK.replace("grip=", "speed=0.5, grip=")))
     project = from_script(source, workplace.scene(), workplace.project(), facts)
     assert from_logic(workplace.scene(), project, facts) == source
-    with pytest.raises(NotUnderstood, match="takes 1 arguments without a name"):
+    with pytest.raises(NotUnderstood, match="has 1 positional parameters"):
         from_script(source.replace("speed=0.5", "0.5"), workplace.scene(), workplace.project(), facts)
 
 
@@ -483,9 +483,9 @@ def replace_facts(keyword_only: frozenset[tuple[str, str]]) -> TypeFacts:
 def test_unusual_scripts_are_read_or_refused() -> None:
     sums = "+".join(["1.0"] * 1500)
     for changes, line in (
-        ((PICK, f'        robot.pick(aps.feeder.poses.default, {sums}, an="pick")\n'), "is no truth value"),
-        ((PICK, f"        {sums}\n"), "the loop has calls"),
-        ((IF_KNOWN, f"        if {sums} == 1:\n"), "a condition is written"),
+        ((PICK, f'        robot.pick(aps.feeder.poses.default, {sums}, an="pick")\n'), "is not a bool"),
+        ((PICK, f"        {sums}\n"), "the loop contains only calls"),
+        ((IF_KNOWN, f"        if {sums} == 1:\n"), "a condition must be"),
     ):
         with pytest.raises(NotUnderstood, match=line):
             read(changes)

@@ -226,11 +226,14 @@ def _with(name: str, *arguments: tuple[str, str, str], method: str = "", results
         ),
         (_with("pick", ("pose", "pose", '"ori_good"'), ("grip", "string_enum", '"x"')), "'pick': parameter grip"),
         (_with("pick", ("pose", "pose", "not json")), "'pick': parameter pose: the value is not JSON"),
-        (_with("pick", ("pose", "pose", '"ori_good"'), results=("a",)), "'pick' names 1 results, but pick gives 0"),
+        (_with("pick", ("pose", "pose", '"ori_good"'), results=("a",)), "'pick' names 1 results, but pick returns 0"),
         (_with("pick", method="obj_robot/fly"), "'pick': Arm has no action fly"),
         (_with("pick", method="nonsense"), "'pick'"),
         (_with("scan code", ("timeout", "link", '"act_boards_left?/default/0"'), results=("code",)), "needs double"),
-        (_with("scan code", ("timeout", "link", '"act_known?/default/0"'), results=("code",)), "has not always run"),
+        (
+            _with("scan code", ("timeout", "link", '"act_known?/default/0"'), results=("code",)),
+            "does not run before it on all paths",
+        ),
         (_with("scan code", ("timeout", "link", '"act_none/default/0"'), results=("code",)), "no action act_none"),
         (_with("scan code", ("timeout", "link", '"x"'), results=("code",)), "'scan code'"),
         (_with("scan code", ("timeout", "project_parameter", '"pco_boards"'), results=("code",)), "boards is integer"),
@@ -262,7 +265,7 @@ def test_two_actions_with_the_same_name_are_refused() -> None:
     first, second = project.action_points
     actions = [msgspec.structs.replace(one, name="pick") for one in second.actions]
     project = msgspec.structs.replace(project, action_points=[first, msgspec.structs.replace(second, actions=actions)])
-    with pytest.raises(InvalidProject, match="two actions are named 'pick'"):
+    with pytest.raises(InvalidProject, match="two actions have the name 'pick'"):
         script.from_logic(workplace.scene(), project, workplace.FACTS)
 
 

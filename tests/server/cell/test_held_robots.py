@@ -186,7 +186,7 @@ async def test_only_one_client_can_jog_a_robot(arm: Server) -> None:
     with pytest.raises(RequestRefused, match="Lock arm before"):
         await alice.jog()
     told = await bob.client.event("RobotHold", lambda data: not data["held"])
-    assert "alice does not hold the lock any more" in told["reason"]
+    assert "alice no longer holds the lock" in told["reason"]
     assert (await report(arm))[1] == 1
     await arm.services.locks.write_lock("bob", OBJ)
     await bob.jog(new=True)
@@ -366,7 +366,7 @@ async def test_any_client_can_stop_and_going_offline_stops(arm: Server) -> None:
     await hand.jog(new=True)
     assert [outcome.stopped for outcome in (await arm.ask("StopAll", client=operator)).outcomes] == [True]
     told = await operator.event("RobotHold", lambda data: not data["held"])
-    assert told["reason"] == "olga stopped everything"
+    assert told["reason"] == "olga stopped all motion"
     with pytest.raises(Arcor2Error):
         await hand.jog()
     await hand.jog(new=True)

@@ -83,11 +83,11 @@ async def test_a_scene_starts_without_a_device_and_a_retry_connects_it(server: S
     failed = await client.event("ObjectState", lambda data: data["state"] == "failed")
     assert failed["object_id"] == "obj_away"
     assert "192.0.2.7:502" in failed["reason"]
-    assert (await client.state("started"))["message"] == "Not there: away."
+    assert (await client.state("started"))["message"] == "Not connected: away."
     with pytest.raises(RequestRefused, match="online"):
         await server.ask("StartSceneKeepGoing")
 
-    with pytest.raises(RequestRefused, match=r"away is not available: .*192\.0\.2\.7:502"):
+    with pytest.raises(RequestRefused, match=r"away is not connected: .*192\.0\.2\.7:502"):
         await server.ask("ExecuteAction", {"action_id": "act_away"})
     await server.ask("ExecuteAction", {"action_id": "act_here"})
     assert (await client.event("ActionResult"))["results"] == ["true"]

@@ -149,7 +149,7 @@ async def test_a_camera_returns_its_picture_and_parameters(tmp_path: Path) -> No
         for name in ("CameraColorImage", "CameraColorParameters"):
             assert "part is not a camera" in await refused(alice, name, id=part)
             assert "lock" in await refused(bob, name, id=eye)
-        assert "does not know its parameters" in await refused(alice, "CameraColorParameters", id=blind)
+        assert "has no camera parameters" in await refused(alice, "CameraColorParameters", id=blind)
 
 
 @pytest.mark.parametrize("request_name", ["GetCameraPose", "MarkersCorners"])
@@ -190,7 +190,7 @@ async def test_a_camera_pose_is_set_from_its_picture(tmp_path: Path) -> None:
         alice, service = await ready(stage, eye="Eye", blind="BlindEye", part="Part")
         bob, stranger = await stage.person("bob"), await stage.person()
         eye = stage.ids["eye"]
-        assert "does not know its parameters" in await refused(alice, "CalibrateCamera", id=stage.ids["blind"])
+        assert "has no camera parameters" in await refused(alice, "CalibrateCamera", id=stage.ids["blind"])
         assert "not a camera" in await refused(alice, "CalibrateCamera", id=stage.ids["part"])
         assert "not logged in" in await refused(stranger, "CalibrateCamera", id=eye)
         assert "lock" in await refused(alice, "CalibrateCamera", id=eye)

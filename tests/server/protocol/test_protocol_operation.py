@@ -94,7 +94,7 @@ async def test_a_robot_is_streamed_while_a_program_runs(tmp_path: Path) -> None:
         what: dict[str, Any] = {"robot_id": arm, "what": "joints"}
         assert "offline" in await refused(viewer, "StreamRobot", **what)
         await alice.ask("TemporaryPackage")
-        with pytest.raises(Refused, match="not there yet"):
+        with pytest.raises(Refused, match="not connected yet"):
             await viewer.ask("StreamRobot", **what)
         await happens(viewer, "ActionStateBefore")
 

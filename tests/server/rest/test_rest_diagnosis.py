@@ -66,7 +66,7 @@ def test_secrets_are_removed_from_texts(text: str, left: str) -> None:
 
 
 def test_the_newest_part_of_the_log_is_included() -> None:
-    log = RecentLog(most=100)
+    log = RecentLog(max_bytes=100)
     for number in range(50):
         log.add(b"line %2d..." % number)
     assert log.lines() == [f"line {number}..." for number in range(40, 50)]

@@ -155,7 +155,7 @@ async def test_a_project_that_was_left_open_does_not_block_a_program(tmp_path: P
         await happens(olga, "PackageState", state="running")
         assert (
             await _refusal(olga, "OpenProject", id=opened.id if opened else "")
-            == "A program is running: stop it first."
+            == "A program is running. Stop it first."
         )
         await olga.ask("StopPackage")
         again = await happens(olga, "OpenProject")
