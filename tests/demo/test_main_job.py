@@ -92,7 +92,9 @@ async def cell(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Cell]:
         at = await until(run.at, "the demo to say where everything is", 40)
         script: list[bool] = []
         observer = asyncio.create_task(watch(at["url"], script))
-        await until(lambda: "serving at" in run.output or run.process.returncode is not None, "the cycle to end", 200)
+        await until(
+            lambda: "The server runs at" in run.output or run.process.returncode is not None, "the cycle to end", 200
+        )
         yield Cell(run, script)
         run.process.send_signal(signal.SIGINT)
         assert await asyncio.wait_for(run.process.wait(), 15) == 0, run.output

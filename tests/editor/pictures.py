@@ -99,7 +99,7 @@ async def main(to: Path) -> None:
     to.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="arcor2-hw-pictures-") as name:
         async with demo(Path(name), "--boards", "1", "--seed", str(SEED)) as run, running_browser() as browser:
-            await until(lambda: "serving at" in run.output, "the demo to serve", 240)
+            await until(lambda: "The server runs at" in run.output, "the demo to serve", 240)
             await _tablet(browser, run, to)
             await _phone(browser, run, to)
             await _lists(browser, run, to)

@@ -26,7 +26,9 @@ GOOD = 3
 async def workplace(tmp_path_factory: pytest.TempPathFactory, built_editor: object) -> AsyncIterator[Run]:
     """`make run` after its program has ended."""
     async with demo(tmp_path_factory.mktemp("demo"), "--boards", "1", "--seed", str(GOOD)) as run:
-        await until(lambda: "serving at" in run.output or run.process.returncode is not None, "the cycle to end", 200)
+        await until(
+            lambda: "The server runs at" in run.output or run.process.returncode is not None, "the cycle to end", 200
+        )
         assert run.at() is not None, run.output
         yield run
 

@@ -1,4 +1,4 @@
-"""`arcor2-hw device`: list usable devices and the state of running ones; commands for integrators."""
+"""`arcor2-hw device`: list device types, show the state of running devices, and commands for integrators."""
 
 import sys
 from typing import Any
@@ -13,40 +13,54 @@ from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.server_connection import HERE, Server, run
 from arcor2_server.cli.tables import console
 
-app = App(name="device", help="Devices: which there are, how they are; bring in one of your own.")
+app = App(name="device", help="List, find and check devices; create a driver.")
 
-app.command("arcor2_server.cli.device_new:new", name="new")
-app.command("arcor2_server.cli.device_scan:scan", name="scan")
-app.command("arcor2_server.cli.device_cell:export", name="export")
-app.command("arcor2_server.cli.device_cell:check", name="check")
+app.command(
+    "arcor2_server.cli.device_new:new",
+    name="new",
+    help="Create a driver for a new device with a fake, a test and a page. It passes the conformance suite.",
+)
+app.command(
+    "arcor2_server.cli.device_scan:scan",
+    name="scan",
+    help="Find serial ports, OAK cameras, and the nodes of CAN buses. Nothing is switched or moved.",
+)
+app.command(
+    "arcor2_server.cli.device_cell:export",
+    name="export",
+    help="Write the devices of a scene of a server as a cell.yaml to standard output.",
+)
+app.command(
+    "arcor2_server.cli.device_cell:check",
+    name="check",
+    help="Connect to each device of a cell.yaml and read its state. Nothing is moved, switched or written.",
+)
 
 
 @app.command(name="list")
 def list_devices() -> int:
-    """List the device types that are installed on this machine; no driver is loaded for it."""
+    """List the device types that are installed on this machine. No driver is loaded."""
     installed = installed_types()
     if not installed:
-        sys.stdout.write("No device types are installed: install a driver, or upload a type to a server.\n")
+        sys.stdout.write("No device types are installed. Install a driver, or upload a type to a server.\n")
         return ExitStatus.OK
     library = Library(one.file for one in installed if one.file is not None)
-    table = Table("type", "kind", "actions", "comes with", "description", box=None, pad_edge=False)
-    broken: list[str] = []
+    table = Table("type", "kind", "actions", "distribution", "description", box=None, pad_edge=False)
+    unusable = False
     for one in installed:
         origin = f"{one.distribution} {one.version}".strip()
         if one.file is None:
             table.add_row(one.name, "", "", origin, f"[red]cannot be used: {one.problem}")
-            broken.append(one.name)
+            unusable = True
             continue
-        found = library.analyse(one.name)
-        text = _described(found.meta)
-        if found.meta.disabled:
-            broken.append(one.name)
-        table.add_row(one.name, found.meta.base, str(len(found.actions)), origin, text)
+        analysis = library.analyse(one.name)
+        unusable |= analysis.meta.disabled
+        table.add_row(one.name, analysis.meta.base, str(len(analysis.actions)), origin, _description(analysis.meta))
     console().print(table)
-    return ExitStatus.ANALYSIS_PROBLEMS if broken else ExitStatus.OK
+    return ExitStatus.ANALYSIS_PROBLEMS if unusable else ExitStatus.OK
 
 
-def _described(meta: ObjectTypeMeta) -> str:
+def _description(meta: ObjectTypeMeta) -> str:
     if meta.disabled and not isinstance(meta.problem, Unset):
         return f"[red]cannot be used: {meta.problem}"
     return meta.description
@@ -54,7 +68,7 @@ def _described(meta: ObjectTypeMeta) -> str:
 
 @app.command
 def status(*, server: Server = HERE) -> int:
-    """Show connection, health and alarms of the devices that a running server has in operation."""
+    """Show connection, health and alarms of the online devices of a running server."""
 
     async def work() -> None:
         async with server.rest() as rest:
@@ -65,18 +79,18 @@ def status(*, server: Server = HERE) -> int:
 
 def _show(devices: list[dict[str, Any]]) -> None:
     if not devices:
-        sys.stdout.write("No device is in operation: start a scene or run a package first.\n")
+        sys.stdout.write("No device is online. Start a scene or run a package first.\n")
         return
     columns = sorted({key for device in devices for key in device})
     table = Table(*columns, box=None, pad_edge=False)
     for device in devices:
-        table.add_row(*(_shown(device.get(column)) for column in columns))
+        table.add_row(*(_text(device.get(column)) for column in columns))
     console().print(table)
 
 
-def _shown(value: Any) -> str:
+def _text(value: Any) -> str:
     if isinstance(value, list):
-        return "; ".join(_shown(item) for item in value)
+        return "; ".join(map(_text, value))
     if isinstance(value, dict):
         return str(value.get("text") or value)
     return "" if value is None else str(value)

@@ -1,4 +1,4 @@
-"""`arcor2-hw diagnosis`: write the diagnosis bundle of a running server into one file."""
+"""`arcor2-hw diagnosis`: write the diagnosis bundle of a running server to a file."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,22 +11,19 @@ from arcor2_server.cli.server_connection import HERE, Failed, Server, run
 
 
 def diagnosis(
-    output: Annotated[Path, Parameter(help="The zip that is written.")],
+    output: Annotated[Path, Parameter(help="The zip file to write.")],
     /,
     *,
     force: Force = False,
     server: Server = HERE,
 ) -> int:
-    """Write a zip of what is open, types and versions, states of devices and the log's last lines of a running server.
-
-    Secrets are left out. It is sent to nobody: look through it before you give it away.
-    """
+    """Write the diagnosis bundle of a running server."""
 
     async def work() -> None:
         if output.exists() and not force:
-            raise Failed(ExitStatus.CONFLICT, f"{output} exists: --force replaces it")
+            raise Failed(ExitStatus.CONFLICT, f"{output} already exists; use --force to replace it")
         async with server.rest() as rest:
             await rest.diagnosis(output)
-        say(f"{output}: {output.stat().st_size} bytes. It was sent to nobody; README.txt in it says what it has.")
+        say(f"{output}: {output.stat().st_size} bytes. It was not sent anywhere; README.txt in it lists its content.")
 
     return run("diagnosis", work)

@@ -1,18 +1,19 @@
 """Exit statuses of the commands."""
 
 import enum
+import sys
 
 
 class ExitStatus(enum.IntEnum):
-    """Kept stable: scripts test it. Every status but OK comes with a line on standard error."""
+    """The exit status of a command. Scripts depend on the numbers. Each failure is explained on standard error."""
 
     OK = 0
     FAILED = 1
-    """Something went wrong that has no status of its own."""
+    """Any error without its own status."""
     USAGE = 2
-    """The command line makes no sense."""
+    """The command line is invalid."""
     PORT_TAKEN = 3
-    """Another program listens there, or the address is none of this machine."""
+    """Another program uses the port, or the address is not an address of this machine."""
     DATA_UNUSABLE = 4
     """The data directory cannot be created or written."""
     DATABASE_UNUSABLE = 5
@@ -20,30 +21,36 @@ class ExitStatus(enum.IntEnum):
     DATA_IN_USE = 6
     """Another server uses the data directory."""
     NO_SERVER = 7
-    """There is no server at the address, or it does not answer."""
+    """No server answers at the address."""
     PROGRAM_FAILED = 8
-    """The program did not run to its end, or not to the right one."""
+    """The program failed, or its results are wrong."""
     NOT_FOUND = 9
-    """What was named does not exist."""
+    """The named file or item does not exist."""
     ANALYSIS_PROBLEMS = 10
     """An object type has problems."""
     CELL_UNUSABLE = 11
     """A cell file is damaged or contradictory."""
     DEVICE_UNREACHABLE = 12
-    """A device did not connect, or is not fit for work."""
+    """A device did not connect, or is not ready for use."""
     NO_TOKENS = 13
     """Other machines could reach a server that requires no token."""
     CERTIFICATE_UNUSABLE = 14
-    """The certificate or its key cannot be read, or do not belong together."""
+    """The certificate or its key cannot be read, or they do not match."""
     DIFFERENT = 15
-    """What was compared is not the same."""
+    """The compared items differ."""
     DOCUMENT_PROBLEMS = 16
-    """A scene, a project or an export file is damaged, or not sound."""
+    """A scene, project or export file is damaged or has errors."""
     CONFLICT = 17
-    """Something else is there already, or is open."""
+    """Another item or file already exists, or is open."""
     NOT_PERMITTED = 18
-    """The token is missing or not valid, or its role is too low."""
+    """The token is missing or invalid, or its role does not allow the command."""
     CALIBRATION_REFUSED = 19
-    """What was measured determines no result that could be trusted."""
+    """The measurements do not determine a reliable result."""
     INTERRUPTED = 130
     """Ctrl-C (128 + SIGINT)."""
+
+
+def fail(command: str, reason: object, status: ExitStatus) -> ExitStatus:
+    """Print why a command failed on standard error; return the status."""
+    sys.stderr.write(f"arcor2-hw {command}: {reason}\n")
+    return status

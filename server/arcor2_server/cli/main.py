@@ -1,4 +1,4 @@
-"""The entry point `arcor2-hw`. Subcommands are imported only when they are called."""
+"""The entry point `arcor2-hw`. Commands are imported only when they are called."""
 
 import gc
 import os
@@ -10,12 +10,12 @@ from cyclopts.exceptions import CycloptsError
 
 from arcor2_server.cli.exit_status import ExitStatus
 
-# A command's imports make many objects that stay; searching them for cycles again and again takes 6 % of a start.
+# Imports create many permanent objects; searching them for cycles repeatedly would take 6 % of the start.
 gc.set_threshold(200_000)
 
 app = App(
     name="arcor2-hw",
-    help="Set up, program and run robotic workplaces. Try `arcor2-hw demo`, or `arcor2-hw serve` and open a client.",
+    help="Set up, program and run robot cells. Start with `arcor2-hw demo`, or with `arcor2-hw serve` and a browser.",
     version=lambda: f"arcor2-hw {version('arcor2-hw')}",
     version_flags=["--version"],
     result_action="return_value",
@@ -23,38 +23,57 @@ app = App(
     print_error=False,
     suppress_keyboard_interrupt=False,
 )
-app.command("arcor2_server.cli.serve:serve", help="Run the server until it is told to end.")
-app.command("arcor2_server.cli.demo:demo", help="Bring up the demo workplace and run its program.")
+app.command(
+    "arcor2_server.cli.serve:serve",
+    help="Run the server until Ctrl-C or SIGTERM.\n\n"
+    "Prints `ready URL` on standard output when the server accepts requests.",
+)
+app.command(
+    "arcor2_server.cli.demo:demo",
+    help="Start the demo cell and run its program.\n\n"
+    "The cell tests printed circuit boards. All devices are simulated and use their real protocols: robot, two-axis "
+    "robot, tester, conveyor, I/O block with tower light, barcode reader, label printer, camera and planning service. The "
+    "program processes one order: it scans and tests the boards, labels the good ones, sorts all of them and reports "
+    "the results. Afterwards, also after a fault, the server keeps running until Ctrl-C. `arcor2-hw fake fault` "
+    "injects faults.",
+)
 app.command("arcor2_server.cli.scene:app", name="scene", help="List, export, import, check and compare scenes.")
 app.command("arcor2_server.cli.project:app", name="project", help="List, export, import, check and compare projects.")
-app.command("arcor2_server.cli.package:app", name="package", help="List the packages of a server, or run one.")
+app.command("arcor2_server.cli.package:app", name="package", help="List and run packages, and show past runs.")
 app.command(
-    "arcor2_server.cli.object_type:app",
-    name="object-type",
-    help="Bring object types into a server, compare them.",
+    "arcor2_server.cli.object_type:app", name="object-type", help="Upload, list, check and compare object types."
 )
-app.command("arcor2_server.cli.token:app", name="token", help="Say who may connect to a server, and in which role.")
-app.command("arcor2_server.cli.device:app", name="device", help="List, find, check devices; write a driver.")
+app.command("arcor2_server.cli.token:app", name="token", help="Manage the access tokens of a server.")
+app.command("arcor2_server.cli.device:app", name="device", help="List, find and check devices; create a driver.")
 app.command(
-    "arcor2_server.cli.calibrate:app", name="calibrate", help="Find out where cameras, robots and tools really are."
+    "arcor2_server.cli.calibrate:app", name="calibrate", help="Calibrate the poses of cameras, robots and tools."
 )
-app.command("arcor2_server.cli.diagnosis:diagnosis", help="Write what somebody who helps has to know into one file.")
-app.command("arcor2_server.cli.fake:app", name="fake", help="List and run simulated devices, and let them fail.")
-app.command("arcor2_server.cli.analyse:analyse", help="Show what an object type offers, and what is wrong with it.")
+app.command(
+    "arcor2_server.cli.diagnosis:diagnosis",
+    help="Write a diagnosis bundle of a running server.\n\n"
+    "The zip file contains the open document, object types, versions, device states and the latest log lines. Secrets "
+    "are removed. The file is not sent anywhere; check its content before you pass it on.",
+)
+app.command("arcor2_server.cli.fake:app", name="fake", help="List and run simulated devices, and inject faults.")
+app.command(
+    "arcor2_server.cli.analyse:analyse",
+    help="Show the settings, actions and problems of an object type.\n\n"
+    "The source code is only read: neither the driver nor its imports are loaded, and no device is needed. The exit "
+    "status is 10 if there are problems.",
+)
 
 
 def main() -> None:
-    """Run the command line; the process ends with an ExitStatus."""
+    """Run the command line and exit with an ExitStatus."""
     try:
         status = app()
     except CycloptsError as error:
-        # One line: which option, and what is wrong with it.
         sys.stderr.write(f"arcor2-hw: {' '.join(str(error).split())} Try --help.\n")
         status = ExitStatus.USAGE
     except KeyboardInterrupt:
         status = ExitStatus.INTERRUPTED
     except BrokenPipeError:
-        # The reader of our output is gone (`| head`); the interpreter must not try to flush it.
+        # The reader of the output has ended (`| head`); the interpreter must not try to flush it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = ExitStatus.OK
     sys.exit(status if isinstance(status, int) else ExitStatus.OK)

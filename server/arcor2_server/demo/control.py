@@ -7,27 +7,35 @@ import msgspec
 
 from arcor2_hw.exceptions import ConnectionLost, Refused
 
-MOST = 4 * 1024 * 1024
-"""Bytes of an answer."""
+MAX_ANSWER = 4 * 1024 * 1024
+"""Maximum length of an answer, bytes."""
 
 
 async def ask(address: str, do: str, /, *, within: float = 5.0, **arguments: Any) -> Any:
-    """Ask a fake at HOST:PORT and give its data.
+    """Send a command to a fake and return the data of its answer.
 
-    Raises ConnectionLost naming the address when it does not answer within so many seconds, Refused with its reason.
+    Args:
+        address: address of its control channel, HOST:PORT.
+        do: the command.
+        within: time limit, s.
+        arguments: arguments of the command.
+
+    Raises:
+        ConnectionLost: the fake does not answer.
+        Refused: the fake refused the command.
     """
     host, _, port = address.rpartition(":")
     try:
         async with asyncio.timeout(within):
-            reader, writer = await asyncio.open_connection(host.strip("[]"), int(port), limit=MOST)
+            reader, writer = await asyncio.open_connection(host.strip("[]"), int(port), limit=MAX_ANSWER)
             try:
                 writer.write(msgspec.json.encode({"id": 1, "do": do, **arguments}) + b"\n")
                 answer = msgspec.json.decode(await reader.readline())
             finally:
                 writer.close()
     except (OSError, OverflowError, ValueError, msgspec.DecodeError) as e:
-        reason = "no answer in time" if isinstance(e, TimeoutError) else "it is no control channel of a fake"
-        reason = "nobody listens there" if isinstance(e, ConnectionRefusedError) else reason
+        reason = "no answer in time" if isinstance(e, TimeoutError) else "it is not the control channel of a fake"
+        reason = "connection refused" if isinstance(e, ConnectionRefusedError) else reason
         raise ConnectionLost(
             "the fake at {address} does not answer: {reason}", str(e), address=address, reason=reason
         ) from e

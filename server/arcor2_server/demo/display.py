@@ -17,12 +17,13 @@ from rich.text import Text
 
 _CONNECTION = {"online": "green", "back": "yellow", "connecting": "yellow", "lost": "red", "failed": "red"}
 _HISTORY = 6
+"""Number of displayed events."""
 PICTURE_WIDTH = 84
-"""Characters in a line of the picture."""
+"""Width of the picture, characters."""
 
 
 class Display:
-    """A live view on a terminal, one line per happening elsewhere."""
+    """A live view on a terminal; elsewhere one line per event."""
 
     def __init__(self, console: Console, boards: int) -> None:
         self._console = console
@@ -51,30 +52,30 @@ class Display:
         self.close()
 
     def close(self) -> None:
-        """Leave the terminal as it is; harmless when done before."""
+        """Stop the live view and keep its last state. May be called again."""
         if self._live is not None:
             self._live.update(self._view())
             self._live.stop()
             self._live = None
 
-    # ------------------------------------------------------------------------------------------------ happenings
+    # ------------------------------------------------------------------------------------------------ events
     def note(self, text: str) -> None:
-        """Say what is being done."""
+        """Show what is being done."""
         self._now = text
         self._line(Text(text))
 
     def addresses(self, url: str, devices: Mapping[str, str]) -> None:
-        """Say where everything is."""
+        """Show the addresses of the server and the devices."""
         self._where = dict(devices)
         self._line(Text(f"server at {url}; " + ", ".join(f"{name} at {at}" for name, at in devices.items())))
 
     def action(self, name: str) -> None:
-        """Say which action runs."""
+        """Show the running action."""
         self._now = name
         self._line(Text(f"  {name}"))
 
     def board(self, number: int, of: int, passed: bool) -> None:
-        """Say what became of a board."""
+        """Show the result of a board."""
         self._passed += passed
         self._failed += not passed
         self._progress.update(self._task, completed=number, result=f"{self._passed} passed, {self._failed} failed")
@@ -84,34 +85,34 @@ class Display:
             self._pictured = [self._view()]
 
     def failed(self, problem: str) -> None:
-        """Say what ended the program before its time."""
+        """Show the error that ended the program."""
         self._now = ""
         self.close()
         self._out(Text(problem, "red"))
 
-    def finish(self, summary: str, wrong: list[str]) -> None:
-        """Say how the cycle ended."""
+    def finish(self, summary: str, errors: list[str]) -> None:
+        """Show the outcome of the run."""
         self._now = ""
         self.close()
-        lines = [*(Text(line, "red") for line in wrong), Text(summary, "bold")]
+        lines = [*(Text(line, "red") for line in errors), Text(summary, "bold")]
         for line in lines:
             self._out(line)
         self._pictured += lines
 
     def serving(self, url: str) -> None:
-        """Say that the server goes on."""
+        """Show that the server keeps running."""
         page = url.replace("ws", "http", 1)
-        self._out(Text(f"serving at {url} until Ctrl-C; the editor: {page} in a browser"))
+        self._out(Text(f"The server runs at {url} until Ctrl-C. Open the editor in a browser: {page}"))
 
     def save_picture(self, file: Path) -> None:
-        """Write what stood in the terminal when the last board was done, and how it ended, to an SVG file."""
+        """Write the view at the last board and the outcome to an SVG file."""
         console = Console(record=True, file=io.StringIO(), width=PICTURE_WIDTH, force_terminal=True)
         console.print(Group(*self._pictured))
-        # Without rich's fonts from the network: whoever opens the picture need not fetch anything.
+        # Without the web fonts of rich, so that the picture loads nothing from the network.
         file.write_text(re.sub(r"@font-face \{.*?\}", "", console.export_svg(title="make run"), flags=re.DOTALL))
 
     async def follow_devices(self, url: str, period: float) -> None:
-        """Ask the server for its devices again and again, until cancelled."""
+        """Read the states of the devices from the server every `period` s, until cancelled."""
         base = url.replace("ws://", "http://", 1).replace("wss://", "https://", 1)
         async with httpx.AsyncClient(base_url=base, timeout=2.0) as client:
             while True:
@@ -125,7 +126,7 @@ class Display:
                 await asyncio.sleep(period)
 
     def alarms(self) -> list[str]:
-        """Return the alarms that stood when the devices were last asked."""
+        """Return the alarms at the last reading of the devices."""
         return [f"{device['name']}: {alarm['text']}" for device in self._devices for alarm in device.get("alarms", [])]
 
     # ------------------------------------------------------------------------------------------------ drawing
@@ -145,7 +146,7 @@ class Display:
 
     def _view(self) -> Group:
         devices = Table(box=None, pad_edge=False, show_edge=False)
-        for heading in ("device", "type", "address", "connection", "health", "says"):
+        for heading in ("device", "type", "address", "connection", "health", "alarms"):
             devices.add_column(heading, header_style="dim")
         known = {device["name"]: device for device in self._devices}
         for name in self._where:
@@ -164,4 +165,4 @@ class Display:
                 Text(alarms, "yellow"),
             )
         now = Text.assemble(("now  ", "dim"), (self._now, "bold cyan")) if self._now else Text("")
-        return Group(Text("ARCOR2-HW demo workplace", "bold"), devices, *self._history, now, self._progress)
+        return Group(Text("ARCOR2-HW demo cell", "bold"), devices, *self._history, now, self._progress)

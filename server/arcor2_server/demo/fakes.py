@@ -1,4 +1,4 @@
-"""The simulated devices of the demo: how each is started, and its address in the scene."""
+"""The simulated devices of the demo: their start commands and their addresses in the scene."""
 
 import contextlib
 import random
@@ -16,16 +16,22 @@ Ready = Mapping[str, Any]
 """The content of a fake's ready line."""
 
 _UR_PORTS: Final = (30004, 30003, 29999)
-_HURRY: Final = ("--time-scale", "3")
+_FAST: Final = ("--time-scale", "3")
 _PICTURES: Final = ("--width", "640", "--height", "360", "--fps", "5")
-"""Enough to see boards on the belt; a whole cell has to fit on two cores."""
+"""Enough to see boards on the conveyor. The whole cell must run on two cores."""
 
 
 class Fake(Struct, frozen=True):
-    """A fake: its name in the demo, its module, and what it is started with.
+    """A simulated device.
 
-    `wire` is what its ready line calls its wire; `settings` gives what the scene's settings call it. `role` is what the
-    small world calls it; empty when the world has nothing to do with it. One that computes much gives way to others.
+    Args:
+        name: its name in the demo.
+        module: its module.
+        arguments: its arguments.
+        wire: the key of its address in the ready line.
+        settings: returns the settings of the scene object from the ready line.
+        role: its name in the simulated world; empty if the world does not need it.
+        low_priority: run it with low priority, since it needs much processor time.
     """
 
     name: str
@@ -34,12 +40,12 @@ class Fake(Struct, frozen=True):
     wire: str
     settings: Callable[[Ready], dict[str, Scalar]]
     role: str = ""
-    gives_way: bool = False
+    low_priority: bool = False
 
     def command(self) -> list[str]:
         """Return the command that starts it."""
-        first = ["nice", "-n", "10"] if self.gives_way else []
-        return [*first, *python_module(self.module, *self.arguments, "--control", "127.0.0.1:0")]
+        priority = ["nice", "-n", "10"] if self.low_priority else []
+        return [*priority, *python_module(self.module, *self.arguments, "--control", "127.0.0.1:0")]
 
 
 def _host_and_port(name: str, key: str) -> Callable[[Ready], dict[str, Scalar]]:
@@ -55,28 +61,28 @@ def _plain(name: str, key: str, prefix: str = "") -> Callable[[Ready], dict[str,
 
 
 def fakes(boards: int, seed: int, fast: bool) -> list[Fake]:
-    """Return the fakes of one run; `fast` lets the machines among them hurry."""
+    """Return the fakes of a run. With `fast`, machines run three times as fast."""
     robot = free_loopback_address(_UR_PORTS)
     loopback = "127.0.0.1:0"
-    hurry = _HURRY if fast else ()
+    speed = _FAST if fast else ()
     order = f"ORDER-{seed:06d}=Controller board:{boards}"
     return [
         Fake("robot", "arcor2_fakes.ur", ("--host", robot), "host", _plain("robot", "host"), "robot"),
-        Fake("tester", "arcor2_fakes.functional_tester", hurry, "modbus", _host_and_port("tester", "modbus"), "tester"),
+        Fake("tester", "arcor2_fakes.functional_tester", speed, "modbus", _host_and_port("tester", "modbus"), "tester"),
         Fake("reader", "arcor2_fakes.barcode_reader", (), "port", _plain("reader", "port"), "reader"),
-        Fake("belt", "arcor2_fakes.conveyor", hurry, "can", _plain("belt", "can", "socket://"), "conveyor"),
+        Fake("belt", "arcor2_fakes.conveyor", speed, "can", _plain("belt", "can", "socket://"), "conveyor"),
         Fake("io", "arcor2_fakes.remote_io", (), "modbus", _host_and_port("io", "modbus"), "io"),
         Fake(
             "printer", "arcor2_fakes.label_printer", ("--tcp", loopback), "port", _plain("printer", "port"), "printer"
         ),
-        Fake("press", "arcor2_fakes.two_axis_robot", hurry, "port", _plain("press", "port"), "arm"),
+        Fake("press", "arcor2_fakes.two_axis_robot", speed, "port", _plain("press", "port"), "arm"),
         Fake("camera", "arcor2_fakes.oak_d", _PICTURES, "stream", _plain("camera", "stream"), "camera", True),
         Fake("erp", "arcor2_fakes.erp", ("--order", order), "url", _plain("erp", "url")),
     ]
 
 
 def wires(started: Mapping[str, tuple[Fake, Ready]]) -> dict[str, str]:
-    """Return where each device is, for people; the tower light hangs on the I/O block."""
+    """Return the address of each device. The tower light is connected to the I/O block."""
     found = {name: str(ready[fake.wire]).removeprefix("socket://") for name, (fake, ready) in started.items()}
     return found | {"tower": found["io"]}
 
@@ -84,15 +90,15 @@ def wires(started: Mapping[str, tuple[Fake, Ready]]) -> dict[str, str]:
 def world_arguments(
     started: Mapping[str, tuple[Fake, Ready]], layout: Path | Any, boards: int, seed: int
 ) -> tuple[str, ...]:
-    """Return what the small world is started with."""
-    follows = [
+    """Return the arguments of the simulated world."""
+    devices = [
         part for fake, ready in started.values() if fake.role for part in (f"--{fake.role}", str(ready["control"]))
     ]
-    return ("--layout", str(layout), *follows, "--boards", str(boards), "--seed", str(seed))
+    return ("--layout", str(layout), *devices, "--boards", str(boards), "--seed", str(seed))
 
 
 def free_loopback_address(ports: tuple[int, ...] = _UR_PORTS) -> str:
-    """Find an address 127.x.y.z on which all `ports` are free: a UR controller's ports are fixed."""
+    """Return an address 127.x.y.z on which all `ports` are free. The ports of a UR controller are fixed."""
     for _ in range(100):
         address = f"127.{random.randint(1, 254)}.{random.randint(0, 255)}.{random.randint(1, 254)}"
         with contextlib.ExitStack() as stack:

@@ -14,10 +14,11 @@ from arcor2_hw.exceptions import Arcor2Error
 READY_TIMEOUT: Final = 20.0
 """Time limit for a child to report that it is ready, s; interpreters start slowly on a busy machine."""
 END_TIMEOUT: Final = 5.0
+"""Time limit for a child to end before it is killed, s."""
 
 
 class ChildFailed(Arcor2Error):
-    """A process of the demo did not come up, or ended before it should."""
+    """A process of the demo did not start, or ended too early."""
 
     code = "child_failed"
 
@@ -32,15 +33,10 @@ class Child:
         self._process: asyncio.subprocess.Process | None = None
         self._drain: asyncio.Task[None] | None = None
 
-    @property
-    def ended(self) -> bool:
-        """Return whether it has ended."""
-        return self._process is not None and self._process.returncode is not None
-
     async def start(self) -> str:
-        """Start it and give the rest of its ready line. Raises ChildFailed with the end of its log."""
+        """Start it and return the rest of its ready line. Raise ChildFailed with the last line of its log."""
         with self._log.open("wb") as log:
-            # A session of its own: Ctrl-C in the terminal reaches the demo alone, which then ends all in order.
+            # In a new session: Ctrl-C in the terminal reaches only the demo, which stops the children in order.
             self._process = await asyncio.create_subprocess_exec(
                 *self._command,
                 stdin=asyncio.subprocess.DEVNULL,
@@ -73,7 +69,7 @@ class Child:
         )
 
     async def start_json(self) -> dict[str, Any]:
-        """Start it and give the addresses of its ready line."""
+        """Start it and return the addresses in its ready line."""
         addresses: dict[str, Any] = msgspec.json.decode(await self.start())
         return addresses
 
@@ -89,7 +85,7 @@ class Child:
         return ""
 
     async def stop(self) -> None:
-        """End it: SIGTERM, and SIGKILL after END_TIMEOUT."""
+        """Terminate it, and kill it after END_TIMEOUT."""
         process = self._process
         if process is None:
             return

@@ -1,4 +1,4 @@
-"""The main job: start the fakes, the server and the cell, and run the program."""
+"""The demo: starts the fakes, the simulated world and the server, creates the cell, and runs its program."""
 
 import asyncio
 import contextlib
@@ -18,18 +18,20 @@ from arcor2_hw.exceptions import Arcor2Error, DeviceTimeout
 from arcor2_server.demo.control import ask
 from arcor2_server.demo.display import Display
 from arcor2_server.demo.fakes import Fake, Ready, fakes, wires, world_arguments
-from arcor2_server.demo.outcome import Outcome, wrong_boards, wrong_results
+from arcor2_server.demo.outcome import Outcome, board_errors, report_errors
 from arcor2_server.demo.processes import Child, python_module
 from arcor2_server.demo.workplace import Creation, Scalar, layout_file, load, markers_file
+from arcor2_server.files import replace_file
 
 ONLINE_TIMEOUT: Final = 30.0
 BOARD_TIMEOUT: Final = 120.0
-"""Seconds without any event after which the program counts as stuck."""
+"""Time without any event after which the program counts as stuck, s."""
 DEVICE_POLL: Final = 0.5
+"""Period for reading the states of the devices, s."""
 ACCELERATIONS: Final[dict[str, Scalar]] = {"joint_acceleration": 10.0, "tcp_acceleration": 5.0}
-"""rad/s² and m/s²: what acceleration 1 of the robot means."""
+"""Maximum accelerations of the robot, rad/s² and m/s²."""
 FAST: Final[dict[str, Scalar]] = {"speed": 1.0, "slow_speed": 0.7}
-"""What the project's constants are when the cell hurries."""
+"""Project parameters of the fast demo."""
 FAST_ACCELERATIONS: Final[dict[str, Scalar]] = {"joint_acceleration": 30.0, "tcp_acceleration": 15.0}
 
 
@@ -40,7 +42,7 @@ class ProgramFailed(Arcor2Error):
 
 
 def first_of(group: BaseExceptionGroup[Any]) -> BaseException:
-    """Return the first error in a group: what a person wants to read is what began it."""
+    """Return the first error in a group, which caused the others."""
     first: BaseException = group.exceptions[0]
     return first_of(first) if isinstance(first, BaseExceptionGroup) else first
 
@@ -79,7 +81,7 @@ class Demo:
         return child
 
     async def run(self) -> Outcome:
-        """Bring everything up, run the program, keep serving unless it is to run once; end everything."""
+        """Start everything, run the program, wait for Ctrl-C unless it runs only once, and stop everything."""
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, self._stop.set)
@@ -99,7 +101,7 @@ class Demo:
             stop.cancel()
             for number in (signal.SIGINT, signal.SIGTERM):
                 loop.remove_signal_handler(number)
-            # The server first: it stops motion while the devices still listen. Then the world, which ends with a fake.
+            # The server first: it stops all motion while the devices are running. Then the world, which needs the fakes.
             order = {"server": 0, "world": 1}
             for child in sorted(self._children, key=lambda child: order.get(child.name, 2)):
                 if child.name in order:
@@ -120,7 +122,7 @@ class Demo:
         at: dict[str, Any] = {name: ready for name, (_, ready) in started.items()}
         at["world"] = await world.start_json()
         self._display.addresses(server_at, wires(started))
-        self._tell_where({"url": server_at, **at})
+        self._write_addresses({"url": server_at, **at})
         settings: dict[str, Scalar] = {"outbox": str((self._data_dir / "outbox").absolute())}
         settings |= FAST_ACCELERATIONS if self._fast else ACCELERATIONS
         for fake, ready in started.values():
@@ -131,7 +133,7 @@ class Demo:
             poll = asyncio.create_task(self._display.follow_devices(server_at, DEVICE_POLL))
             try:
                 await self._cycle(client, settings, outcome)
-                outcome.wrong = await self._wrong(at)
+                outcome.errors = await self._errors(at)
             except ProgramFailed as e:
                 if self._once:
                     raise
@@ -141,7 +143,7 @@ class Demo:
                 with contextlib.suppress(asyncio.CancelledError):
                     await poll
         if problem is None:
-            self._display.finish(outcome.summary(), outcome.wrong)
+            self._display.finish(outcome.summary(), outcome.errors)
         else:
             self._display.failed(str(problem))
         if not self._once:
@@ -149,14 +151,12 @@ class Demo:
             await self._stop.wait()
         return outcome
 
-    def _tell_where(self, at: dict[str, Any]) -> None:
-        """Write where everything is; who looks meanwhile finds no half of it."""
-        new = self._where.with_suffix(".new")
-        new.write_bytes(msgspec.json.format(msgspec.json.encode(at)))
-        new.replace(self._where)
+    def _write_addresses(self, addresses: dict[str, Any]) -> None:
+        """Write the addresses for `arcor2-hw fake fault`."""
+        replace_file(self._where, msgspec.json.format(msgspec.json.encode(addresses)))
 
     async def _start_all(self) -> tuple[dict[str, tuple[Fake, Ready]], str]:
-        """Start the fakes and the server, all at once; return what their ready lines say."""
+        """Start the fakes and the server concurrently; return the addresses in their ready lines."""
         wanted = fakes(self._boards, self._seed, self._fast)
         self._display.note(f"starting {', '.join(fake.name for fake in wanted)} and the server")
         server = self._child(
@@ -176,32 +176,32 @@ class Demo:
     async def _cycle(self, client: Client, settings: dict[str, Scalar], outcome: Outcome) -> None:
         workplace = load()
         creation = Creation(client, workplace, settings)
-        self._display.note("opening the workplace")
+        self._display.note("opening the scene and the project")
         await creation.close_all()
         scene = await creation.open_scene()
         project = await creation.open_project(scene, FAST if self._fast else workplace.constants)
         self._display.note("going online")
-        await client.call("StartScene")
+        await client.start_scene()
         await self._scene_state(client, SceneStateEnum.STARTED)
         await asyncio.sleep(DEVICE_POLL)
-        await client.call("StopScene")
+        await client.stop_scene()
         await self._scene_state(client, SceneStateEnum.STOPPED)
         self._display.note("building the package")
         built = await client.call("BuildProject", rpc.BuildProjectArgs(project.id, project.name))
-        await client.call("CloseProject")
-        began = time.monotonic()
-        await client.call("RunPackage", rpc.RunPackageArgs(built.package_id))
+        await client.close_project()
+        started = time.monotonic()
+        await client.run_package(built.package_id)
         await self._follow(client, project, outcome)
-        outcome.seconds = time.monotonic() - began
+        outcome.seconds = time.monotonic() - started
 
     async def _scene_state(self, client: Client, wanted: SceneStateEnum) -> None:
-        begun = False  # opening a scene tells that it is stopped, too
+        starting = False  # opening a scene also publishes "stopped"
         while True:
             event = await client.next_event("SceneState", timeout=ONLINE_TIMEOUT)
             if event.data.state is wanted:
                 return
-            begun = begun or event.data.state is SceneStateEnum.STARTING
-            if event.data.state is SceneStateEnum.STOPPED and begun:
+            starting = starting or event.data.state is SceneStateEnum.STARTING
+            if event.data.state is SceneStateEnum.STOPPED and starting:
                 raise ProgramFailed(
                     "The workplace did not come online: {text}", text=event.data.message or "no reason given"
                 )
@@ -231,7 +231,7 @@ class Demo:
                     problem = event.data.message
                 case "PackageState" if event.data.state is PackageStateEnum.STOPPED:
                     if problem:
-                        # What began it may be the fault of another device, which no action was waiting for.
+                        # The cause may be a fault of a device on which no action was waiting.
                         alarms = "".join(f"; {alarm}" for alarm in self._display.alarms())
                         raise ProgramFailed(
                             "The program ended with an error: {problem}{alarms}", problem=problem, alarms=alarms
@@ -240,6 +240,6 @@ class Demo:
                     return
 
     @staticmethod
-    async def _wrong(at: dict[str, Any]) -> list[str]:
+    async def _errors(at: dict[str, Any]) -> list[str]:
         world, erp = await ask(at["world"]["control"], "truth"), await ask(at["erp"]["control"], "truth")
-        return wrong_boards(world) + wrong_results(world, erp)
+        return board_errors(world) + report_errors(world, erp)

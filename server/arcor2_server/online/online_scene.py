@@ -170,7 +170,7 @@ class OnlineScene:
             problem = str(error)
         except Exception as error:
             log.exception("scene start failed")
-            problem = f"Internal error of the server: {error}"
+            problem = f"An error inside the server: {error}"
         if problem is None:
             failed = self.board.failed()
             self._done(SceneStateEnum.STARTED, f"Not connected: {', '.join(failed)}." if failed else "")

@@ -295,5 +295,5 @@ def test_a_condition_needs_a_named_boolean() -> None:
         for item in workplace.project().logic
     ]
     project = msgspec.structs.replace(workplace.project(), logic=numbers)
-    with pytest.raises(InvalidProject, match="boolean, only true and false can be branched on"):
+    with pytest.raises(InvalidProject, match="boolean; a condition can compare it with true and false"):
         script.from_logic(workplace.scene(), project, workplace.FACTS)

@@ -166,7 +166,7 @@ async def test_a_jog_runs_from_press_to_release(arm: Server) -> None:
     jogs, stops, *_ = await report(arm)
     assert jogs == [[[0.1, 0, 0, 0, 0, 0], None, "world"], [[0, 0, 0.25, 0, 0, 0], None, "world"]]
     assert stops == 1
-    with pytest.raises(RequestRefused, match="press again"):
+    with pytest.raises(RequestRefused, match="press it again"):
         await hand.jog()
     await hand.jog(0)  # letting go twice does no harm
     await arm.ask("ExecuteAction", {"action_id": "act_wave"})
@@ -201,7 +201,7 @@ async def test_motion_that_is_not_renewed_stops_until_the_next_press(arm: Server
     told = await arm.client.event("RobotHold", lambda data: not data["held"])
     assert "not renewed in time" in told["reason"]
     assert (await report(arm))[1] == 1
-    with pytest.raises(RequestRefused, match="press again"):
+    with pytest.raises(RequestRefused, match="press it again"):
         await hand.jog()
     await hand.jog(new=True)
     await hand.jog(0)
@@ -214,7 +214,7 @@ async def test_a_closed_connection_stops_the_motion(arm: Server) -> None:
     await hand.jog(new=True)
     arm.services.hub.remove(arm.client)  # type: ignore[arg-type]
     told = await bob.event("RobotHold", lambda data: not data["held"])
-    assert "alice is not connected" in told["reason"]
+    assert "alice is no longer connected" in told["reason"]
     assert (await report(arm))[1] == 1
     assert arm.services.online.held.holder(OBJ) is None
     assert arm.services.online.moving == set()
@@ -408,7 +408,7 @@ async def test_a_protective_stop_is_acknowledged_by_name(arm: Server) -> None:
         await hand.jog(new=True)
     await acknowledge(arm, operator)
     assert (await report(arm))[3] == [["protective stop", "olga"]]
-    with pytest.raises(Arcor2Error, match="press again"):
+    with pytest.raises(Arcor2Error, match="press it again"):
         await hand.jog()  # the button that is still pressed moves nothing
     await hand.jog(new=True)
     with pytest.raises(RequestRefused, match="arm is held by alice"):

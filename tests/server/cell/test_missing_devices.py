@@ -202,7 +202,7 @@ async def test_each_client_chooses_its_streaming_rate(arm: Server) -> None:
     quick.got.clear()
     await until(lambda: len(joints(quick)) >= 3)
     assert all("time_ms" not in data for data in joints(quick))
-    with pytest.raises(RequestRefused, match="not streamed"):
+    with pytest.raises(RequestRefused, match="not subscribed"):
         await arm.ask("StreamRobot", what | {"send": False}, quick)
 
 

@@ -224,11 +224,11 @@ async def test_a_failed_start_gives_the_reason_and_can_be_repeated(server: Serve
 async def test_a_crash_takes_the_scene_offline_within_a_second(arm: Server) -> None:
     await arm.start()
     cell = arm.services.online
-    assert cell._host.host is not None
+    assert cell.host.host is not None
     call = asyncio.create_task(cell.call(OBJ, "pick", {"where": Pose(), "offset": 9.0}))
     await asyncio.sleep(0.05)
     began = own_time()
-    os.kill(cell._host.host.pid, signal.SIGKILL)
+    os.kill(cell.host.host.pid, signal.SIGKILL)
     stopped = await arm.client.state("stopped")
     assert own_time() - began < 1.0
     assert "SIGKILL" in stopped["message"]
@@ -435,8 +435,8 @@ async def test_a_single_action_can_be_cancelled(arm: Server) -> None:
 async def test_an_action_cut_off_by_a_crash_ends_with_an_error(arm: Server) -> None:
     await arm.start()
     await arm.ask("ExecuteAction", {"action_id": "act_long"})
-    assert arm.services.online._host.host is not None
-    arm.services.online._host.host.kill()
+    assert arm.services.online.host.host is not None
+    arm.services.online.host.host.kill()
     assert "SIGKILL" in (await arm.client.event("ActionResult"))["error"]
     assert arm.services.online.running_action is None
     assert arm.services.online.results == {}

@@ -221,7 +221,7 @@ async def test_requests_from_before_a_stop_do_not_start_after_it(server: Server)
 async def test_a_frozen_host_is_named(server: Server) -> None:
     await server.start()
     await trying(server, "screwdriver")
-    host = server.services.online._host.host
+    host = server.services.online.host.host
     assert host is not None
     os.kill(host.pid, signal.SIGSTOP)
     try:

@@ -183,4 +183,4 @@ def test_names_are_read_from_the_running_demo(tester: Running, tmp_path: Path) -
     assert (unknown.returncode, "the demo has no url; it has tester, reader" in unknown.stderr) == (9, True)
     gone = arcor2_hw_fake("fault", "reader", "heal", "--data-dir", str(tmp_path))
     assert gone.returncode == 7
-    assert "127.0.0.1:1 does not answer: nobody listens there" in gone.stderr
+    assert "127.0.0.1:1 does not answer: connection refused" in gone.stderr

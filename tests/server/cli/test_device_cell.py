@@ -73,7 +73,7 @@ def test_every_problem_is_reported(tmp_path: Path, scale: FakeProcess) -> None:
     )
     done = arcor2_hw("device", "check", file, "--json")
     assert done.returncode == 12, done.stdout
-    assert done.stderr == "arcor2-hw device check: not fit for work: printer, stranger, typo\n"
+    assert done.stderr == "arcor2-hw device check: not ready: printer, stranger, typo\n"
     found: dict[str, Any] = {one["name"]: one for one in json.loads(done.stdout)}
     assert list(found) == ["balance", "printer", "stranger", "typo"], "in the order of the file"
     assert found["balance"]["problem"] == ""
