@@ -32,7 +32,7 @@ app.command(
     "arcor2_server.cli.demo:demo",
     help="Start the demo cell and run its program.\n\n"
     "The cell tests printed circuit boards. All devices are simulated and use their real protocols: robot, two-axis "
-    "robot, tester, conveyor, I/O block with tower light, barcode reader, label printer, camera and planning service. The "
+    "robot, tester, conveyor, I/O block with tower light, barcode reader, label printer, camera, planning service. The "
     "program processes one order: it scans and tests the boards, labels the good ones, sorts all of them and reports "
     "the results. Afterwards, also after a fault, the server keeps running until Ctrl-C. `arcor2-hw fake fault` "
     "injects faults.",

@@ -101,7 +101,7 @@ class Demo:
             stop.cancel()
             for number in (signal.SIGINT, signal.SIGTERM):
                 loop.remove_signal_handler(number)
-            # The server first: it stops all motion while the devices are running. Then the world, which needs the fakes.
+            # The server first, so that it can stop the devices. Then the world, which needs the fakes.
             order = {"server": 0, "world": 1}
             for child in sorted(self._children, key=lambda child: order.get(child.name, 2)):
                 if child.name in order:
