@@ -1,4 +1,4 @@
-"""`arcor2-hw calibrate`: find the poses of cameras and robots, from files or on a running server."""
+"""`arcor2-hw calibrate`: compute the poses of cameras, robots and tools from files, or on a running server."""
 
 import math
 from pathlib import Path
@@ -7,12 +7,13 @@ from typing import Annotated, Any
 import msgspec
 from cyclopts import App, Parameter
 from msgspec import field
+from rich.console import Console
 from rich.table import Table
 
 from arcor2_hw.calibration.camera_results import CameraPose, HandEyeSample, IntrinsicsOptions, Mounting, PoseMethod
 from arcor2_hw.calibration.configuration import read_configuration
 from arcor2_hw.calibration.layout import CharucoBoard, Layout
-from arcor2_hw.calibration.results import RobotPose, TouchedOrientation
+from arcor2_hw.calibration.results import TouchedOrientation
 from arcor2_hw.collision.description import RobotSource, StoredFile
 from arcor2_hw.compute import calibration_tasks as t
 from arcor2_hw.data.base import Data
@@ -36,49 +37,50 @@ from arcor2_server.cli.tables import console
 app = App(
     name="calibrate",
     help=(
-        "Find out where cameras and robots stand, from pictures and touched points in files; `online` does it on a "
-        "running server."
+        "Calibrate the poses of cameras, robots and tools.\n\n"
+        "The input is pictures and touched points in files. `online` calibrates devices of a running server."
     ),
 )
 app.command(
-    "arcor2_server.cli.calibrate_online:app", name="online", help="On the scene that a running server has in operation."
+    "arcor2_server.cli.calibrate_online:app", name="online", help="Calibrate devices of the online scene of a server."
 )
 
 Lens = Annotated[
     Path,
-    Parameter(help="YAML or JSON: fx, fy, cx, cy in pixels, dist_coefs; `calibrate intrinsics -o` writes it."),
+    Parameter(help="YAML or JSON file with fx, fy, cx, cy in pixels and dist_coefs, as `calibrate intrinsics` writes."),
 ]
-AsJson = Annotated[bool, Parameter(help="Print the whole result as JSON.", negative="")]
-Save = Annotated[Path | None, Parameter(help="A folder: pictures of how well it fits are written there.")]
-Output = Annotated[Path | None, Parameter(name=["--output", "-o"], help="Write what was found to this file, as JSON.")]
+AsJson = Annotated[bool, Parameter(help="Print the complete result as JSON.", negative="")]
+Save = Annotated[Path | None, Parameter(help="Write pictures that show the quality of the result to this folder.")]
+Output = Annotated[Path | None, Parameter(name=["--output", "-o"], help="Write the result to this file as JSON.")]
 
 
 # ------------------------------------------------------------------------------------------------ camera
 @app.command
 def camera(
-    *pictures: Annotated[Path, Parameter(help="Pictures that the camera took from one and the same place.")],
+    *pictures: Annotated[Path, Parameter(help="Pictures taken by the camera from the same pose.")],
     lens: Lens,
-    markers: Annotated[Path, Parameter(help="Which markers stand where: marker_size, and by id a pose (YAML).")],
+    markers: Annotated[Path, Parameter(help="YAML file with marker_size and the pose of each marker by id.")],
     method: Annotated[
-        PoseMethod | None, Parameter(help="joint: all corners as one problem; averaged: one pose for each marker.")
+        PoseMethod | None,
+        Parameter(help="joint: solve for all corners together; averaged: average the poses from single markers."),
     ] = None,
     near: Annotated[
-        Path | None, Parameter(help="A pose (YAML) where the camera roughly is: chooses between two answers.")
+        Path | None, Parameter(help="YAML file with the approximate camera pose, to choose between two solutions.")
     ] = None,
-    above: Annotated[float | None, Parameter(help="The least height of the camera above the origin, m.")] = None,
+    above: Annotated[float | None, Parameter(help="Minimum height of the camera above the origin, m.")] = None,
     json: AsJson = False,
     save: Save = None,
     output: Output = None,
 ) -> int:
-    """Find where a camera stands, from a picture of markers whose places are known.
+    """Compute the pose of a camera from pictures of markers with known poses.
 
-    Tells the pose, how well it is known, and how well each marker fits. Refuses (status 19) rather than guess: a
-    picture that is not sharp, no marker, one marker seen from the front, a marker that is not where it is said to be.
+    Prints the pose, its standard deviation and the residual of each marker. Fails with status 19 if the result is not
+    reliable: a blurred picture, no marker, a single marker seen from the front, or a marker that is not at its pose.
     """
 
     async def work() -> None:
         if not pictures:
-            raise InvalidData("Name at least one picture.")
+            raise InvalidData("Specify at least one picture.")
         configuration = read_configuration(markers)
         options = configuration.options
         if method is not None:
@@ -93,21 +95,15 @@ def camera(
         if save is not None:
             drawn = await compute(t.DrawCameraPose(files[0], parameters, configuration.layout, found))
             write(save / f"{pictures[0].stem}-markers.png", drawn)
-        _give(output, found.pose)
-        if json:
-            show_json(found)
-        else:
-            _show_camera(found)
+        if out := _report(found, found.pose, output, json):
+            _show_camera(found, out)
 
     return calibrated("camera", work)
 
 
-def _show_camera(found: CameraPose) -> None:
-    out = console()
-    out.print(f"[bold]{found.verdict}[/bold]")
-    out.print(pose_table("the camera", found.pose))
-    deviation, angle = 1e3 * found.position_deviation, math.degrees(found.orientation_deviation)
-    out.print(f"known to {deviation:.2f} mm and {angle:.3f}° (standard deviation), residual {found.residual:.2f} px")
+def _show_camera(found: CameraPose, out: Console) -> None:
+    out.print(pose_table("camera", found.pose))
+    out.print(f"standard deviation {_deviation(found)}, residual {found.residual:.2f} px")
     columns = ("marker", "picture", "residual", "worst corner", "distance", "seen at", "used")
     table = Table(*columns, box=None, pad_edge=False)
     for one in found.markers:
@@ -118,7 +114,7 @@ def _show_camera(found: CameraPose) -> None:
             f"{one.largest:.2f} px",
             f"{one.distance:.3f} m",
             f"{math.degrees(one.angle):.0f}°",
-            "yes" if one.used else "[red]no: it is not where it is said to be",
+            "yes" if one.used else "[red]no: it is not at its stated pose",
         )
     out.print(table)
 
@@ -126,20 +122,20 @@ def _show_camera(found: CameraPose) -> None:
 # ------------------------------------------------------------------------------------------------ robot
 @app.command
 def robot(
-    *depth: Annotated[Path, Parameter(help="Depth pictures (PNG, 16 bit, mm) taken while the robot stood still.")],
-    model: Annotated[Path, Parameter(help="The robot's URDF: a file, a folder, or a zip archive with its meshes.")],
-    joints: Annotated[Path, Parameter(help="The joints meanwhile (YAML): a list of name and value, rad or m.")],
+    *depth: Annotated[Path, Parameter(help="Depth pictures (PNG, 16 bit, mm) taken while the robot did not move.")],
+    model: Annotated[Path, Parameter(help="URDF of the robot: a file, a folder, or a zip archive with its meshes.")],
+    joints: Annotated[Path, Parameter(help="YAML file with a list of joint names and values during the pictures.")],
     lens: Lens,
-    camera: Annotated[Path, Parameter(help="The pose of the camera (YAML), as `calibrate camera -o` writes it.")],
-    assumed: Annotated[Path, Parameter(help="Where the robot is taken to stand (YAML): a pose.")],
-    within: Annotated[float, Parameter(help="By how much that may be off, m.")] = 0.08,
-    turned: Annotated[float, Parameter(help="And turned, degrees.")] = 8.0,
+    camera: Annotated[Path, Parameter(help="YAML file with the camera pose, as `calibrate camera -o` writes.")],
+    assumed: Annotated[Path, Parameter(help="YAML file with the approximate pose of the robot.")],
+    within: Annotated[float, Parameter(help="Maximum position error of the approximate pose, m.")] = 0.08,
+    turned: Annotated[float, Parameter(help="Maximum angle error of the approximate pose, degrees.")] = 8.0,
     json: AsJson = False,
     output: Output = None,
 ) -> int:
-    """Find where a robot stands, from what a depth camera of known pose sees of it.
+    """Compute the pose of a robot from depth pictures of a camera with known pose.
 
-    Refuses (status 19) when the robot is not found, or the view leaves a direction open.
+    Fails with status 19 if the robot is not found, or if the view does not determine its pose.
     """
 
     async def work() -> None:
@@ -155,28 +151,19 @@ def robot(
                 math.radians(turned),
             )
         )
-        _give(output, found.pose)
-        if json:
-            show_json(found)
-        else:
-            _show_robot(found)
+        if out := _report(found, found.pose, output, json):
+            out.print(pose_table("robot", found.pose))
+            out.print(f"standard deviation {_deviation(found)}")
+            out.print(f"{found.fitness:.0%} of the visible surface matches, residual {1e3 * found.residual:.2f} mm")
+            turned_by = math.degrees(found.turned)
+            out.print(f"{1e3 * found.moved:.1f} mm and {turned_by:.2f}° from the approximate pose")
 
     return calibrated("robot", work)
 
 
-def _show_robot(found: RobotPose) -> None:
-    out = console()
-    out.print(f"[bold]{found.verdict}[/bold]")
-    out.print(pose_table("the robot", found.pose))
-    deviation, angle = 1e3 * found.position_deviation, math.degrees(found.orientation_deviation)
-    out.print(f"known to {deviation:.2f} mm and {angle:.3f}° (standard deviation)")
-    out.print(f"{found.fitness:.0%} of what can be seen of it is there, residual {1e3 * found.residual:.2f} mm")
-    out.print(f"{1e3 * found.moved:.1f} mm and {math.degrees(found.turned):.2f}° from where it was taken to stand")
-
-
 # ------------------------------------------------------------------------------------------------ hand-eye
 class Station(Data, frozen=True):
-    """One station of a hand-eye calibration: the file of a picture, and where the flange was meanwhile."""
+    """A station of a hand-eye calibration: the file of a picture, and the flange pose during the picture."""
 
     picture: str
     flange: Pose
@@ -186,11 +173,11 @@ class Station(Data, frozen=True):
 def hand_eye(
     stations: Annotated[
         Path,
-        Parameter(help="YAML: a list of picture (a file beside it) and flange (a pose in the base frame)."),
+        Parameter(help="YAML file with a list of picture (file in the same folder) and flange (pose in base frame)."),
     ],
     *,
     lens: Lens,
-    target: Annotated[Path, Parameter(help="The markers or boards (YAML), their poses in the target's own frame.")],
+    target: Annotated[Path, Parameter(help="YAML file with the markers or boards and their poses in the target.")],
     mounting: Annotated[
         Mounting, Parameter(help="eye_in_hand: the robot carries the camera; eye_to_hand: it carries the target.")
     ],
@@ -198,10 +185,10 @@ def hand_eye(
     save: Save = None,
     output: Output = None,
 ) -> int:
-    """Find where a camera sits on a robot's flange, or beside the robot, from pictures of one target.
+    """Compute the pose of a camera on the flange or next to the robot, from pictures of one target.
 
-    Ten stations or more are good, with the flange turned about two axes at least in between. Refuses (status 19) when
-    the turns do not determine the result.
+    Use at least ten stations and rotate the flange about at least two axes between them. Fails with status 19 if the
+    rotations do not determine the result.
     """
 
     async def work() -> None:
@@ -211,20 +198,15 @@ def hand_eye(
         found = await compute(t.FindHandEye(samples, read_as(lens, CameraParameters), seen, mounting))
         if save is not None:
             write(save / "hand-eye.png", found.picture)
-        _give(output, found.pose)
-        if json:
-            show_json(msgspec.structs.replace(found, picture=b""))
+        if (out := _report(msgspec.structs.replace(found, picture=b""), found.pose, output, json)) is None:
             return
-        out = console()
-        out.print(f"[bold]{found.verdict}[/bold]")
-        where = "the camera on the flange" if mounting == "eye_in_hand" else "the camera in the robot's base frame"
-        out.print(pose_table(where, found.pose))
-        deviation, angle = 1e3 * found.position_deviation, math.degrees(found.orientation_deviation)
-        out.print(f"known to {deviation:.2f} mm and {angle:.3f}°, residual {found.residual:.2f} px")
+        frame = "flange" if mounting == "eye_in_hand" else "robot base"
+        out.print(pose_table(f"camera in the {frame} frame", found.pose))
+        out.print(f"standard deviation {_deviation(found)}, residual {found.residual:.2f} px")
         table = Table("station", "corners", "residual", "worst", "", box=None, pad_edge=False)
         for one in found.samples:
             row = (str(one.corners), f"{one.residual:.2f} px", f"{one.largest:.2f} px")
-            table.add_row(listed[one.sample].picture, *row, "" if one.used else f"[red]left out: {one.problem}")
+            table.add_row(listed[one.sample].picture, *row, "" if one.used else f"[red]not used: {one.problem}")
         out.print(table)
 
     return calibrated("hand-eye", work)
@@ -233,14 +215,14 @@ def hand_eye(
 # ------------------------------------------------------------------------------------------------ intrinsics
 @app.command
 def intrinsics(
-    *pictures: Annotated[Path, Parameter(help="Pictures of a ChArUco board, 10 to 30, from all sides.")],
-    board: Annotated[Path, Parameter(help="The board (YAML): columns, rows, square and marker in m, dictionary.")],
-    coefficients: Annotated[int, Parameter(help="Numbers of the lens model: 4, 5, 8 or 12.")] = 5,
+    *pictures: Annotated[Path, Parameter(help="10 to 30 pictures of a ChArUco board from all sides.")],
+    board: Annotated[Path, Parameter(help="YAML file with columns, rows, square (m), marker (m) and dictionary.")],
+    coefficients: Annotated[int, Parameter(help="Number of distortion coefficients: 4, 5, 8 or 12.")] = 5,
     json: AsJson = False,
     save: Save = None,
     output: Output = None,
 ) -> int:
-    """Find focal lengths, centre and distortion of a camera's lens."""
+    """Compute focal lengths, principal point and distortion of a camera."""
 
     async def work() -> None:
         options = _lens_model(coefficients)
@@ -248,20 +230,16 @@ def intrinsics(
         found = await compute(t.FindIntrinsics(files, read_as(board, CharucoBoard), options))
         if save is not None:
             write(save / "intrinsics.png", found.picture)
-        _give(output, found.parameters)
-        if json:
-            show_json(msgspec.structs.replace(found, picture=b""))
+        if (out := _report(msgspec.structs.replace(found, picture=b""), found.parameters, output, json)) is None:
             return
-        out = console()
-        out.print(f"[bold]{found.verdict}[/bold]")
         names = ("fx", "fy", "cx", "cy")
         for name, deviation in zip(names, found.deviations, strict=True):
-            out.print(f"{name} {getattr(found.parameters, name):.2f} px, known to {deviation:.2f} px")
+            out.print(f"{name} {getattr(found.parameters, name):.2f} px, standard deviation {deviation:.2f} px")
         out.print(f"distortion {', '.join(f'{value:.5f}' for value in found.parameters.dist_coefs)}")
         out.print(f"residual {found.residual:.2f} px, {found.coverage:.0%} of the picture covered")
         for one in found.views:
             if not one.used:
-                out.print(f"[red]left out: {pictures[one.view]}: {one.problem}")
+                out.print(f"[red]not used: {pictures[one.view]}: {one.problem}")
 
     return calibrated("intrinsics", work)
 
@@ -275,7 +253,7 @@ def _lens_model(coefficients: int) -> IntrinsicsOptions:
 
 # ------------------------------------------------------------------------------------------------ touch
 class Touched(Data, frozen=True, forbid_unknown_fields=True):
-    """What was touched; which fields are needed depends on the method."""
+    """The touched points and flange poses. The method determines which fields are needed."""
 
     origin: Position | None = None
     on_x: Position | None = None
@@ -292,16 +270,16 @@ class Touched(Data, frozen=True, forbid_unknown_fields=True):
 
 @app.command
 def touch(
-    points: Annotated[Path, Parameter(help="YAML with what was touched, m; see the how-to on calibration.")],
+    points: Annotated[Path, Parameter(help="YAML file with the touched points, m; see the how-to on calibration.")],
     *,
     json: AsJson = False,
     output: Output = None,
 ) -> int:
-    """Find a frame from touched points, or a tool's tip or orientation from how the flange stood.
+    """Compute a frame from touched points, or the tip or orientation of a tool from flange poses.
 
-    By what is in the file: known and touched (3 points or more) or origin, on_x and in_plane give a frame; flanges (4
-    poses or more with the tip on one point) give the tip; orientations, or flange, tip, along_z and on_x, give the
-    tool's orientation.
+    The fields in the file select the method. Frame: known and touched (at least 3 points), or origin, on_x and
+    in_plane. Tool tip: flanges (at least 4 poses with the tip at the same point). Tool orientation: orientations, or
+    flange, tip, along_z and on_x.
     """
 
     async def work() -> None:
@@ -309,17 +287,13 @@ def touch(
         pose = getattr(found, "pose", None)
         if pose is None:
             pose = Pose(getattr(found, "position", Position()), getattr(found, "orientation", Orientation()))
-        _give(output, pose)
-        if json:
-            show_json(found)
+        if (out := _report(found, pose, output, json)) is None:
             return
-        out = console()
-        out.print(f"[bold]{found.verdict}[/bold]")
-        out.print(pose_table("found", pose))
+        out.print(pose_table("result", pose))
         angle = isinstance(found, TouchedOrientation)
         for number, residual in enumerate(found.residuals, 1):
-            off = f"{math.degrees(residual):.2f}°" if angle else f"{1e3 * residual:.2f} mm"
-            out.print(f"{number}: {off} off")
+            value = f"{math.degrees(residual):.2f}°" if angle else f"{1e3 * residual:.2f} mm"
+            out.print(f"{number}: residual {value}")
 
     return calibrated("touch", work)
 
@@ -345,6 +319,22 @@ def _touch_task(given: Touched, path: Path) -> Any:
     )
 
 
-def _give(output: Path | None, what: Any) -> None:
+def _report(found: Any, result: Any, output: Path | None, json: bool) -> Console | None:
+    """Write the result to a file if requested, and print the verdict; with `json`, print everything as JSON instead.
+
+    Returns:
+        The console for details, None for JSON.
+    """
     if output is not None:
-        write(output, msgspec.json.format(msgspec.json.encode(what)))
+        write(output, msgspec.json.format(msgspec.json.encode(result)))
+    if json:
+        show_json(found)
+        return None
+    out = console()
+    out.print(f"[bold]{found.verdict}[/bold]")
+    return out
+
+
+def _deviation(found: Any) -> str:
+    """Return the standard deviations of a pose."""
+    return f"{1e3 * found.position_deviation:.2f} mm and {math.degrees(found.orientation_deviation):.3f}°"

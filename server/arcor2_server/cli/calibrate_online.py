@@ -22,20 +22,21 @@ from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.server_connection import HERE, Failed, Server
 from arcor2_server.cli.tables import console
 
-app = App(name="online", help="Calibrate cameras and robots of the scene that a running server has in operation.")
+app = App(name="online", help="Calibrate devices of the online scene of a server.")
 
 USER: Final = "calibrate"
-"""Under which the command logs in: its locks show it."""
-ENDS_WITHIN: Final = 180.0
-"""Seconds: a robot may have to move first."""
-GREETING: Final = 5.0
+"""The user name of the command, which its locks show."""
+CALIBRATION_TIMEOUT: Final = 180.0
+"""Time limit for a calibration, s; the robot may have to move first."""
+GREETING_TIMEOUT: Final = 5.0
+"""Time limit for the event with the open document, s."""
 
 Name = Annotated[str, Parameter(help="Name of the object in the scene.")]
 
 
 @app.command
 def camera(name: Name, *, server: Server = HERE) -> int:
-    """Put a camera of the scene where the markers that it sees say that it stands."""
+    """Calibrate the pose of a camera of the scene from markers in its view."""
 
     async def work() -> None:
         async with server.client() as client:
@@ -50,11 +51,11 @@ def camera(name: Name, *, server: Server = HERE) -> int:
 def robot(
     name: Name,
     *,
-    camera: Annotated[str, Parameter(help="Name of the camera that sees it; the first of the scene otherwise.")] = "",
-    move: Annotated[bool, Parameter(help="Let the robot move to its calibration pose first, if it has one.")] = False,
+    camera: Annotated[str, Parameter(help="Name of the depth camera. The default is the first of the scene.")] = "",
+    move: Annotated[bool, Parameter(help="Move the robot to its calibration pose first, if it has one.")] = False,
     server: Server = HERE,
 ) -> int:
-    """Put a robot of the scene where a depth camera of the scene sees it."""
+    """Calibrate the pose of a robot of the scene with a depth camera of the scene."""
 
     async def work() -> None:
         async with server.client() as client:
@@ -73,27 +74,27 @@ def robot(
 
 @app.command
 def markers(
-    file: Annotated[Path, Parameter(help="Which markers stand where (YAML).")], *, server: Server = HERE
+    file: Annotated[Path, Parameter(help="YAML file with the poses of the markers.")], *, server: Server = HERE
 ) -> int:
-    """Tell a running server which markers stand where; it keeps that."""
+    """Store the poses of the markers on a server."""
 
     async def work() -> None:
         configuration = read_configuration(file)
         async with server.rest() as rest:
             await rest.request("PUT", "/api/calibration/markers", body=configuration)
-        console().print(f"{len(configuration.markers)} markers and {len(configuration.boards)} boards are set.")
+        console().print(f"Stored {len(configuration.markers)} markers and {len(configuration.boards)} boards.")
 
     return calibrated("online markers", work)
 
 
 @app.command
 def records(
-    name: Annotated[str, Parameter(help="Name of an object: only its calibrations.")] = "",
+    name: Annotated[str, Parameter(help="Show only calibrations of the object with this name.")] = "",
     *,
-    limit: Annotated[int, Parameter(help="How many, the newest ones.")] = 20,
+    limit: Annotated[int, Parameter(help="Maximum number of calibrations, newest first.")] = 20,
     server: Server = HERE,
 ) -> int:
-    """Show what was calibrated when, by whom, and how well."""
+    """List past calibrations with date, user and quality."""
 
     async def work() -> None:
         async with server.rest() as rest:
@@ -110,34 +111,43 @@ def records(
 def check(
     name: Name,
     *,
-    pose: Annotated[Path | None, Parameter(help="Pose to compare (YAML); else that of the scene that is open.")] = None,
-    record: Annotated[str, Parameter(help="Id of the calibration; else the newest of the object with a pose.")] = "",
-    distance: Annotated[float, Parameter(help="How far it may be off, m.")] = 0.002,
-    angle: Annotated[float, Parameter(help="How far it may be turned, rad.")] = 0.0035,
+    pose: Annotated[
+        Path | None, Parameter(help="YAML file with the pose to compare. The default is the pose in the open scene.")
+    ] = None,
+    record: Annotated[
+        str, Parameter(help="Id of the calibration. The default is the newest calibration with a pose.")
+    ] = "",
+    distance: Annotated[float, Parameter(help="Maximum position difference, m.")] = 0.002,
+    angle: Annotated[float, Parameter(help="Maximum angle difference, rad.")] = 0.0035,
     server: Server = HERE,
 ) -> int:
-    """Compare where an object is with what a calibration of it found; the status tells whether it still holds.
+    """Compare the pose of an object with the pose from a calibration. The exit status is 15 if they differ.
 
-    A pose is {position: {x, y, z}, orientation: {x, y, z, w}}, in m, in the frame that the record names.
+    A pose is {position: {x, y, z}, orientation: {x, y, z, w}}, in m, in the frame of the calibration.
     """
 
     async def work() -> None:
         given = None if pose is None else read_as(pose, Pose)
         async with server.client() as client:
             chosen = await _record(client, name, record)
-            present = given or await _present(client, chosen)
+            present = given or await _present_pose(client, chosen)
             body = {"pose": present, "distance_limit": distance, "angle_limit": angle}
             path = f"/api/calibrations/{quote(chosen.id, safe='')}/check"
-            on_progress: CalibrationCheck = await client.rest.request("PUT", path, CalibrationCheck, body=body)
-        if not on_progress.passed:
-            raise Failed(ExitStatus.DIFFERENT, on_progress.verdict)
-        console().print(escape(on_progress.verdict), soft_wrap=True)
+            result: CalibrationCheck = await client.rest.request("PUT", path, CalibrationCheck, body=body)
+        if not result.passed:
+            raise Failed(ExitStatus.DIFFERENT, result.verdict)
+        console().print(escape(result.verdict), soft_wrap=True)
 
     return calibrated("online check", work)
 
 
 async def _record(client: Client, name: str, key: str) -> CalibrationRecord:
-    """Return the record that is meant. NotFound; raise InvalidData for one without a pose, or of another object."""
+    """Return the calibration with an id, else the newest one of the object with a pose.
+
+    Raises:
+        NotFound: there is no such calibration.
+        InvalidData: it belongs to another object.
+    """
     if key:
         path = f"/api/calibrations/{quote(key, safe='')}"
         found: CalibrationRecord = await client.rest.request("GET", path, CalibrationRecord)
@@ -158,10 +168,13 @@ async def _record(client: Client, name: str, key: str) -> CalibrationRecord:
     raise NotFound("There is no calibration of {name!r} that found a pose.", name=name)
 
 
-async def _present(client: Client, record: CalibrationRecord) -> Pose:
-    """Return where the object of a record is in the open scene.
+async def _present_pose(client: Client, record: CalibrationRecord) -> Pose:
+    """Return the pose of the object of a calibration in the open scene.
 
-    Raise Conflict, NotFound or InvalidData if that is impossible.
+    Raises:
+        Conflict: no scene is open.
+        NotFound: the scene does not contain the object.
+        InvalidData: the calibration is not in world coordinates.
     """
     if record.parent != "world":
         raise InvalidData(
@@ -192,14 +205,14 @@ def _show(found: list[CalibrationRecord]) -> None:
         if not isinstance(one.before, Unset) and not isinstance(one.after, Unset):
             moved = f"{1e3 * one.before.position.distance_to(one.after.position):.1f} mm"
         table.add_row(one.date[:19], one.object_name, one.kind.value, one.person, residual, moved, one.verdict, one.id)
-    console().print(table if found else "Nothing was calibrated yet.")
+    console().print(table if found else "There are no calibrations.")
 
 
-# ------------------------------------------------------------------------------------------------ following
+# ------------------------------------------------------------------------------------------------ events
 async def _open_scene(client: Client) -> Scene:
-    """Return the scene that is open. Conflict when none is."""
+    """Return the open scene. Raise Conflict if no scene is open."""
     try:
-        async with asyncio.timeout(GREETING):
+        async with asyncio.timeout(GREETING_TIMEOUT):
             async for event in client.events():
                 match event.event:
                     case "OpenScene" | "OpenProject":
@@ -224,14 +237,14 @@ def _named(scene: Scene, name: str) -> SceneObject:
     )
 
 
-async def _calibrate(client: Client, found: SceneObject, process: str, begin: Callable[[], Awaitable[None]]) -> None:
-    """Lock an object, begin, follow to the end, and show what came out."""
+async def _calibrate(client: Client, found: SceneObject, process: str, start: Callable[[], Awaitable[None]]) -> None:
+    """Lock an object, start its calibration, wait for the end, and print the result."""
     await client.register_user(USER)
     await client.subscribe_events({"TaskState"})
     await client.write_lock(found.id)
     try:
-        await begin()
-        verdict, pose = await _followed(client, found, process)
+        await start()
+        verdict, pose = await _wait_for_end(client, found, process)
     finally:
         await client.write_unlock(found.id)
     out = console()
@@ -240,12 +253,12 @@ async def _calibrate(client: Client, found: SceneObject, process: str, begin: Ca
         out.print(pose_table(found.name, pose))
 
 
-async def _followed(client: Client, found: SceneObject, process: str) -> tuple[str, Pose | None]:
-    """Return the verdict of a calibration, and the pose that everybody is told of before. Failed when it failed."""
+async def _wait_for_end(client: Client, found: SceneObject, process: str) -> tuple[str, Pose | None]:
+    """Return the verdict of a calibration, and the new pose if it was published. Raise Failed if it failed."""
     title = f"Calibration of {found.name}"
     pose: Pose | None = None
     try:
-        async with asyncio.timeout(ENDS_WITHIN):
+        async with asyncio.timeout(CALIBRATION_TIMEOUT):
             with progress(title) as on_progress:
                 async for event in client.events():
                     if event.event == "TaskState" and event.data.title == title:
@@ -260,5 +273,5 @@ async def _followed(client: Client, found: SceneObject, process: str) -> tuple[s
                         if event.data.state == "finished":
                             return message, pose
     except TimeoutError:
-        raise DeviceTimeout("The calibration did not end within {ends_within:g} s.", ends_within=ENDS_WITHIN) from None
+        raise DeviceTimeout("The calibration did not end within {limit:g} s.", limit=CALIBRATION_TIMEOUT) from None
     raise ConnectionLost("The connection to {url} broke.", url=client.url)

@@ -1,4 +1,4 @@
-"""Shared by the calibration commands: input files, progress and output of results."""
+"""Input files, progress and output of the calibration commands."""
 
 import math
 import sys
@@ -26,12 +26,12 @@ from arcor2_server.log import setup as server_logging
 T = TypeVar("T")
 R = TypeVar("R")
 MAX_FILE: Final = 1 << 20
-"""Bytes of a file of numbers."""
+"""Maximum size of a YAML or JSON file, bytes."""
 
 
 # ------------------------------------------------------------------------------------------------ files
 def content_of(path: Path, largest: int) -> bytes:
-    """Return a file's bytes. NotFound, InvalidData naming the file."""
+    """Return the content of a file. Raise NotFound or InvalidData if it cannot be read."""
     try:
         if path.stat().st_size > largest:
             raise InvalidData("{path} is larger than {largest} bytes.", path=path, largest=largest)
@@ -43,12 +43,12 @@ def content_of(path: Path, largest: int) -> bytes:
 
 
 def picture_of(path: Path) -> bytes:
-    """Return a picture's file. Raise NotFound or InvalidData if that is impossible."""
+    """Return the content of a picture file. Raise NotFound or InvalidData if it cannot be read."""
     return content_of(path, MAX_PICTURE)
 
 
 def read_as(path: Path, kind: type[T]) -> T:
-    """Read YAML or JSON as a type. NotFound, InvalidData naming the file and what is wrong in it."""
+    """Read a YAML or JSON file as a type. Raise NotFound or InvalidData if it cannot be read."""
     content = yaml_of(content_of(path, MAX_FILE), str(path))
     try:
         return msgspec.convert(content, kind)
@@ -57,18 +57,18 @@ def read_as(path: Path, kind: type[T]) -> T:
 
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file, with the folders that lead to it. InvalidData naming the file."""
+    """Write a file and create its folders. Raise InvalidData if it cannot be written."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
     except OSError as error:
         raise InvalidData("{path} cannot be written: {reason}.", path=path, reason=error.strerror) from None
-    Console(stderr=True, highlight=False).print(f"written: {path}")
+    Console(stderr=True, highlight=False).print(f"Written: {path}")
 
 
 # ------------------------------------------------------------------------------------------------ computing
 def calibrated(command: str, work: Callable[[], Awaitable[Any]]) -> int:
-    """Run a command; a calibration that is refused has a status of its own."""
+    """Run a command. The exit status of a refused calibration is CALIBRATION_REFUSED."""
 
     async def working() -> Any:
         try:
@@ -81,7 +81,7 @@ def calibrated(command: str, work: Callable[[], Awaitable[Any]]) -> int:
 
 
 async def compute(task: Task[R]) -> R:
-    """Return the answer to a task, from a worker of its own, and show how far it is."""
+    """Return the result of a task. It runs in a worker process, and its progress is shown."""
     server_logging.set_up("error")
     worker = Compute(idle=60.0)
     try:
@@ -93,7 +93,7 @@ async def compute(task: Task[R]) -> R:
 
 @contextmanager
 def progress(what: str) -> Iterator[ProgressCallback]:
-    """Show on standard error how far something is, where that is a terminal."""
+    """Show a progress bar on standard error if it is a terminal."""
     console = Console(stderr=True)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
@@ -112,18 +112,18 @@ def show_json(result: Any) -> None:
 
 
 def pose_table(what: str, pose: Pose) -> Table:
-    """Return a pose as a technician reads it, and as it is typed in."""
+    """Return a table with the position, the rotation angles and the quaternion of a pose."""
     table = Table(what, "", box=None, pad_edge=False, show_header=True)
     x, y, z = (f"{1e3 * value:.2f}" for value in pose.position)
     table.add_row("position", f"x {x} mm   y {y} mm   z {z} mm")
     roll, pitch, yaw = (f"{math.degrees(value):.2f}" for value in angles(pose))
-    table.add_row("turned", f"about x {roll}°   then about y {pitch}°   then about z {yaw}° (fixed axes)")
+    table.add_row("rotation", f"about x {roll}°   then about y {pitch}°   then about z {yaw}° (fixed axes)")
     table.add_row("quaternion", "   ".join(f"{n} {v:.6f}" for n, v in zip("xyzw", pose.orientation, strict=True)))
     return table
 
 
 def angles(pose: Pose) -> tuple[float, float, float]:
-    """Return the turns about the fixed axes x, then y, then z, rad."""
+    """Return the rotation angles about the fixed axes x, then y, then z, rad."""
     x, y, z, w = pose.orientation
     pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
     roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))

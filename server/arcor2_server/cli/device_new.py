@@ -1,4 +1,4 @@
-"""`arcor2-hw device new`: create a driver, a fake, a test and a documentation page that pass the suite."""
+"""`arcor2-hw device new`: create a driver, a fake, a test and a documentation page from templates."""
 
 import enum
 import keyword
@@ -11,16 +11,17 @@ from typing import Annotated, Final, NamedTuple
 
 from cyclopts import Parameter
 
-from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.cli.starter_kinds import KINDS, NO_ACT, Base
 
-LONGEST_NAME: Final = 24
+MAX_NAME: Final = 24
+"""Maximum length of the name of a device."""
 STARTER: Final = files("arcor2_server.cli") / "starter"
-"""Where the templates lie."""
+"""The folder of the templates."""
 
 
 class Bus(enum.StrEnum):
-    """How it is spoken to."""
+    """Communication with the device."""
 
     MODBUS = "modbus"
     SERIAL = "serial"
@@ -30,9 +31,16 @@ class Bus(enum.StrEnum):
 
 
 class Wire(NamedTuple):
-    """What a bus brings into the texts.
+    """The parts of the templates that depend on the bus.
 
-    fields: settings as name, type, default (empty: none), description. address: the settings of a test, from `address`.
+    Args:
+        title: name of the protocol.
+        library: the library and its version.
+        extra: the optional dependency of arcor2-hw.
+        fields: the settings as name, type, default (empty: none) and description.
+        address: the settings in a test, as an expression with `address`.
+        absent: an address without a device.
+        check: the line that checks the settings.
     """
 
     title: str
@@ -79,7 +87,7 @@ WIRES: Final = {
         "HTTP",
         "httpx 0.28",
         "",
-        (("url", "str", "", "where the device is, as http://192.168.0.7"),),
+        (("url", "str", "", "URL of the device, such as http://192.168.0.7"),),
         'f"http://{address}"',
         "127.0.0.1:1",
         """        check_url("url", self.url, "http", "https")""",
@@ -87,46 +95,45 @@ WIRES: Final = {
 }
 
 RANGES: Final = {"baud_rate": "Annotated[int, Range(300, 921600)]"}
-"""Types of settings that have a range."""
-NO_SENSE: Final = {
-    Base.ROBOT: "a robot needs its model: see docs/how-to/add-a-robot.md, and start from the one most like yours "
-    "(drivers/arcor2_drivers/dobot_magician, universal_robots)",
-    Base.CAMERA: "a camera is reached by its maker's library, not by a bus: start from drivers/arcor2_drivers/oak_d",
+"""Types of settings with a range."""
+UNSUITABLE: Final = {
+    Base.ROBOT: "there is no template for robots; see docs/how-to/add-a-robot.md and start from a similar driver, such "
+    "as drivers/arcor2_drivers/dobot_magician or universal_robots",
+    Base.CAMERA: "there is no template for cameras; they need the library of the manufacturer. Start from "
+    "drivers/arcor2_drivers/oak_d",
 }
-CAN_HAS_ITS_OWN: Final = (
-    "what a CAN device is, its object dictionary says: start from drivers/arcor2_drivers/conveyor, which has CANopen's "
-    "SDO, PDO, heartbeat and EMCY"
+NO_CAN: Final = (
+    "there is no template for CAN; its object dictionary depends on the device. Start from "
+    "drivers/arcor2_drivers/conveyor, which uses SDO, PDO, heartbeat and EMCY of CANopen"
 )
-NOT_WRITTEN: Final = "there is no starter for this base yet: take --base generic, or the driver that is most like yours"
+NO_TEMPLATE: Final = "there is no template for this base; use --base generic, or start from a similar driver"
 
 
 def refusal(base: Base, bus: Bus) -> str:
-    """Return why there is nothing to write for a base on a bus; empty when there is."""
-    if base in NO_SENSE:
-        return NO_SENSE[base]
+    """Return why there is no template for a base on a bus; empty if there is one."""
+    if base in UNSUITABLE:
+        return UNSUITABLE[base]
     if bus not in WIRES:
-        return CAN_HAS_ITS_OWN
-    return "" if base in KINDS else NOT_WRITTEN
+        return NO_CAN
+    return "" if base in KINDS else NO_TEMPLATE
 
 
 def new(
     name: Annotated[
-        str, Parameter(help="Of the device, in lower case: it names the folder, the module and the class.")
+        str, Parameter(help="Name of the device in lower case. It is used for the folder, the module and the class.")
     ],
     *,
-    base: Annotated[Base, Parameter(help="What kind of device it is.")],
-    bus: Annotated[Bus, Parameter(help="How it is spoken to.")],
-    directory: Annotated[Path, Parameter(help="Where the folder of that name is made.")] = Path(),
+    base: Annotated[Base, Parameter(help="Kind of device.")],
+    bus: Annotated[Bus, Parameter(help="Communication with the device.")],
+    directory: Annotated[Path, Parameter(help="Folder in which the new folder is created.")] = Path(),
 ) -> int:
-    """Write the driver of a device of your own, with a fake, a test and a page; all of it passes the suite at once."""
+    """Create a driver for a new device with a fake, a test and a page. It passes the conformance suite."""
     module = name.replace("-", "_")
-    if not re.fullmatch(rf"[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}", module) or keyword.iskeyword(module):
-        told = f"take up to {LONGEST_NAME} lower-case letters, digits and _"
-        sys.stderr.write(f"arcor2-hw device new: {name!r} cannot name a module: {told}\n")
-        return ExitStatus.USAGE
+    if not re.fullmatch(rf"[a-z][a-z0-9_]{{0,{MAX_NAME - 1}}}", module) or keyword.iskeyword(module):
+        reason = f"invalid name {name!r}: use up to {MAX_NAME} lower-case letters, digits and _"
+        return fail("device new", reason, ExitStatus.USAGE)
     if reason := refusal(base, bus):
-        sys.stderr.write(f"arcor2-hw device new: {base} on {bus}: {reason}\n")
-        return ExitStatus.USAGE
+        return fail("device new", f"{base} on {bus}: {reason}", ExitStatus.USAGE)
     root = directory / name
     try:
         root.mkdir(parents=True)
@@ -134,17 +141,15 @@ def new(
             (root / path).parent.mkdir(parents=True, exist_ok=True)
             (root / path).write_text(text, encoding="utf-8")
     except FileExistsError:
-        sys.stderr.write(f"arcor2-hw device new: {root} is there already\n")
-        return ExitStatus.USAGE
+        return fail("device new", f"{root} already exists", ExitStatus.USAGE)
     except OSError as error:
-        sys.stderr.write(f"arcor2-hw device new: {root} cannot be written: {error.strerror}\n")
-        return ExitStatus.FAILED
-    sys.stdout.write(f"{root} is written. Try it:  cd {root} && python -m pytest\n")
+        return fail("device new", f"{root} cannot be written: {error.strerror}", ExitStatus.FAILED)
+    sys.stdout.write(f"Created {root}. Run its tests:  cd {root} && python -m pytest\n")
     return ExitStatus.OK
 
 
 def texts(name: str, base: Base, bus: Bus) -> dict[str, str]:
-    """Give the files of a new device by their path."""
+    """Return the files of a new device by path."""
     module = name.replace("-", "_")
     words = _words(name, module, base, bus)
     words["control"] = _fill("control.txt", words)
@@ -169,7 +174,7 @@ def _fill(template: str, words: dict[str, str]) -> str:
 
 
 def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
-    """Return what stands for what in the templates."""
+    """Return the values of the placeholders in the templates."""
     kind, wire = KINDS[base], WIRES[bus]
     class_name = "".join(part.capitalize() for part in module.split("_"))
     title = module.replace("_", " ")
@@ -187,7 +192,7 @@ def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
         [
             "@dataclasses.dataclass",
             f"class {class_name}Settings(Settings):",
-            '    """Where the device is.',
+            '    """Address of the device.',
             "",
             *(f"    :param {n}: {text}" for n, _, _, text in wire.fields),
             '    """',
@@ -246,7 +251,7 @@ def _words(name: str, module: str, base: Base, bus: Bus) -> dict[str, str]:
         "actions": kind.actions,
         "on_loss": kind.on_loss,
         "loss_case": "test_loss_reaction" if kind.run_long else "test_control_does_not_come_back",
-        "loss_sentence": "it stops when it has not heard from us for half a second.",
+        "loss_sentence": "it stops if it receives nothing from the driver for 0.5 s.",
         "not_run": not_run,
         "settings_table": "\n".join(
             ["| setting | default | meaning |", "|---|---|---|"]

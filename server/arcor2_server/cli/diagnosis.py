@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from arcor2_server.cli.exit_status import ExitStatus
-from arcor2_server.cli.export_files import Force, say
+from arcor2_server.cli.export_files import Force, print_line
 from arcor2_server.cli.server_connection import HERE, Failed, Server, run
 
 
@@ -24,6 +24,8 @@ def diagnosis(
             raise Failed(ExitStatus.CONFLICT, f"{output} already exists; use --force to replace it")
         async with server.rest() as rest:
             await rest.diagnosis(output)
-        say(f"{output}: {output.stat().st_size} bytes. It was not sent anywhere; README.txt in it lists its content.")
+        print_line(
+            f"{output}: {output.stat().st_size} bytes. It was not sent anywhere; README.txt in it lists its content."
+        )
 
     return run("diagnosis", work)

@@ -1,4 +1,4 @@
-"""The commands that `arcor2-hw scene` and `arcor2-hw project` have in common."""
+"""The common commands of `arcor2-hw scene` and `arcor2-hw project`."""
 
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -15,7 +15,7 @@ from arcor2_server.exchange.export import Exporter
 
 
 class DocumentKind(Struct, frozen=True):
-    """What differs between scenes and projects.
+    """The differences between scenes and projects.
 
     Args:
         name: the kind.
@@ -73,7 +73,7 @@ def document_commands(kind: DocumentKind) -> App:
     ) -> int:
         return run(
             f"{kind.name} import",
-            lambda: export_files.bring_in(file, kind.name, server, overwrite or [], name, dry_run),
+            lambda: export_files.import_file(file, kind.name, server, overwrite or [], name, dry_run),
         )
 
     def validate(*files: Annotated[Path, Parameter(help="Export files.")], as_json: export_files.Json = False) -> int:
@@ -96,18 +96,18 @@ def document_commands(kind: DocumentKind) -> App:
             import_document,
             "import",
             f"Import a {name} into a server, with {kind.content}.\n\n"
-            "What exists already and is equal stays as it is. If something differs, the command lists it and changes "
-            f"nothing, unless --overwrite allows it: {kind.parts}, or all.",
+            "Existing equal items are not changed. If items differ, the command lists them and changes nothing, unless "
+            f"--overwrite allows it: {kind.parts}, or all.",
         ),
         (
             validate,
             "validate",
-            f"Check export files{kind.packages} without a server. Every problem names the entry at fault.",
+            f"Check export files{kind.packages} without a server. Each problem names the entry in the file.",
         ),
         (
             diff,
             "diff",
-            f"Show the differences between two {name}s and what they need; the exit status tells if there are any.",
+            f"Show the differences between two {name}s and their contents. The exit status is 15 if there are any.",
         ),
     ):
         app.command(command, name=called, help=help_text)

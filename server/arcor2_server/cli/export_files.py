@@ -1,4 +1,4 @@
-"""Shared by `scene`, `project` and `object-type`: export, import, validation and comparison of export files."""
+"""Export, import, validation and comparison of export files for `scene`, `project` and `object-type`."""
 
 import asyncio
 import re
@@ -10,7 +10,6 @@ from typing import Annotated, Any, Final
 import msgspec
 from cyclopts import Parameter
 from msgspec.structs import replace
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
@@ -18,7 +17,7 @@ from arcor2_hw.analysis import SourceFile, installed_types
 from arcor2_hw.client.rest import Listed
 from arcor2_hw.data.base import Unset
 from arcor2_hw.exceptions import InvalidPackage
-from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.cli.server_connection import Failed, Server, printable
 from arcor2_server.cli.tables import console
 from arcor2_server.exchange import archive as archives
@@ -28,41 +27,35 @@ from arcor2_server.exchange.export import Exporter
 from arcor2_server.exchange.import_ import Importer, Part, renamed
 from arcor2_server.exchange.validation import Known, find_problems
 
-Output = Annotated[Path | None, Parameter(name=["--output", "-o"], help="The file; NAME.zip when not given.")]
-Force = Annotated[bool, Parameter(help="Replace the file when there is one.", negative=())]
-Json = Annotated[bool, Parameter(name="--json", help="Print JSON for programs.", negative=())]
+Output = Annotated[Path | None, Parameter(name=["--output", "-o"], help="The file. The default is NAME.zip.")]
+Force = Annotated[bool, Parameter(help="Replace an existing file.", negative=())]
+Json = Annotated[bool, Parameter(name="--json", help="Print JSON.", negative=())]
 Overwrite = Annotated[
-    list[Part] | None,
-    Parameter(negative=(), help="What may take the place of something else that is there; may be given repeatedly."),
+    list[Part] | None, Parameter(negative=(), help="Existing items that the import may replace. Repeatable.")
 ]
-DryRun = Annotated[bool, Parameter(help="Say what would be done, and do nothing.", negative=())]
+DryRun = Annotated[bool, Parameter(help="Show what the import would do, without changes.", negative=())]
 
 _MARKS: Final = {"added": "[green]+[/]", "removed": "[red]-[/]", "changed": "[yellow]~[/]"}
 _LINES: Final = {"+": "green", "-": "red", "@": "cyan"}
 
 
-def out() -> Console:
-    """Return where a command prints; a pipe gets whole lines."""
-    return console()
-
-
-def say(text: str) -> None:
-    """Print one line."""
-    out().print(escape(printable(text)), soft_wrap=True)
+def print_line(text: str) -> None:
+    """Print a line."""
+    console().print(escape(printable(text)), soft_wrap=True)
 
 
 def print_json(value: Any) -> None:
-    """Print JSON that people can read, too."""
+    """Print a value as indented JSON."""
     sys.stdout.write(msgspec.json.format(msgspec.json.encode(value), indent=2).decode() + "\n")
 
 
 def installed() -> list[SourceFile]:
-    """Return the sources of the object types that are installed here."""
+    """Return the sources of the installed object types."""
     return [one.file for one in installed_types() if one.file is not None]
 
 
 def show_list(entries: list[Listed], nothing: str, as_json: bool) -> None:
-    """Show a list of documents; `nothing` says that there are none."""
+    """Print a table of documents, or the text `nothing` if there are none."""
     if as_json:
         print_json(entries)
         return
@@ -70,12 +63,12 @@ def show_list(entries: list[Listed], nothing: str, as_json: bool) -> None:
     for entry in sorted(entries, key=lambda one: one.name):
         about = "" if isinstance(entry.description, Unset) else entry.description
         table.add_row(*(escape(printable(text)) for text in (entry.name, entry.modified, entry.id, about)))
-    out().print(table if entries else nothing)
+    console().print(table if entries else nothing)
 
 
 # ------------------------------------------------------------------------------------------------ files
 def read(path: Path, kind: Kind | None = None) -> Archive:
-    """Read an export file; every refusal names it."""
+    """Read an export file. Error messages contain its path."""
     try:
         archive = archives.read(path)
     except InvalidPackage as error:
@@ -83,18 +76,18 @@ def read(path: Path, kind: Kind | None = None) -> Archive:
     if kind is None or archive.kind == kind:
         return archive
     if kind == "scene" and archive.kind == "project":
-        # A project's file holds its scene, too.
-        kept = Archive("scene", archive.scene, types=archive.types, installed=archive.installed, assets=archive.assets)
-        return replace(kept, from_package=archive.from_package)
+        # The export of a project contains its scene.
+        scene = Archive("scene", archive.scene, types=archive.types, installed=archive.installed, assets=archive.assets)
+        return replace(scene, from_package=archive.from_package)
     article = "an" if archive.kind[0] == "o" else "a"
-    raise Failed(ExitStatus.USAGE, f"{path} holds {article} {archive.kind}: use arcor2-hw {archive.kind}")
+    raise Failed(ExitStatus.USAGE, f"{path} contains {article} {archive.kind}; use arcor2-hw {archive.kind}")
 
 
 def write(archive: Archive, output: Path | None, force: bool) -> None:
-    """Write an export file and say what is in it."""
+    """Write an export file and print its content."""
     path = output or Path(re.sub(r"[^\w.-]+", "_", archive.name).strip("._") + ".zip")
     if path.exists() and not force:
-        raise Failed(ExitStatus.CONFLICT, f"{path} is there already (--force would replace it)")
+        raise Failed(ExitStatus.CONFLICT, f"{path} already exists; use --force to replace it")
     archives.write(archive, path)
     parts = [f"{archive.kind} {archive.name}"]
     if archive.project is not None and archive.scene is not None:
@@ -105,14 +98,14 @@ def write(archive: Archive, output: Path | None, force: bool) -> None:
     ):
         if count:
             parts.append(f"{count} {one if count == 1 else many}")
-    say(f"{path}: {', '.join(parts)}")
+    print_line(f"{path}: {', '.join(parts)}")
     ours = {one.name for one in installed_types() if one.distribution == "arcor2-hw"}
     if foreign := [name for name in archive.installed if name not in ours]:
-        say(f"The other server must have installed: {', '.join(foreign)}")
+        print_line(f"These object types must be installed on the other server: {', '.join(foreign)}")
 
 
 # ------------------------------------------------------------------------------------------------ commands
-async def bring_in(
+async def import_file(
     path: Path, kind: Kind, server: Server, overwrite: Collection[Part], name: str | None, dry_run: bool
 ) -> None:
     """Import a file into a server."""
@@ -130,13 +123,13 @@ async def bring_in(
     words = {"new": "would be new", "replaced": "would be replaced", "same": "is the same"} if dry_run else {}
     for step in steps:
         notice = f", {step.notice}" if step.notice else ""
-        say(f"{step.kind} {step.name}: {words.get(step.verb, step.verb)}{notice}")
+        print_line(f"{step.kind} {step.name}: {words.get(step.verb, step.verb)}{notice}")
 
 
 async def validate(paths: list[Path], kind: Kind, as_json: bool) -> ExitStatus:
-    """Check files without a server; every problem names the entry at fault."""
+    """Check files without a server. Each problem names the entry in the file."""
     if not paths:
-        raise Failed(ExitStatus.USAGE, "give the files to check")
+        raise Failed(ExitStatus.USAGE, "specify the files to check")
     files = installed()
     worst = ExitStatus.OK
     reported: list[dict[str, Any]] = []
@@ -152,28 +145,27 @@ async def validate(paths: list[Path], kind: Kind, as_json: bool) -> ExitStatus:
             continue
         reported += [{"file": str(path), **msgspec.to_builtins(finding)} for finding in findings]
         if not as_json and not any(finding.level == "error" for finding in findings):
-            say(f"{path}: {archive.kind} {archive.name} is sound")
+            print_line(f"{path}: {archive.kind} {archive.name} has no problems")
     if as_json:
         print_json(reported)
     for one in reported:
         line = ": ".join(part for part in (one["file"], one["entry"], one["text"]) if part)
         if one["level"] == "error":
-            worst = ExitStatus.DOCUMENT_PROBLEMS
-            sys.stderr.write(f"arcor2-hw {kind} validate: {printable(line)}\n")
+            worst = fail(f"{kind} validate", printable(line), ExitStatus.DOCUMENT_PROBLEMS)
         elif not as_json:
-            say(f"note: {line}")
+            print_line(f"note: {line}")
     return worst
 
 
 def _is_file(wanted: str) -> bool:
-    """Return whether a file is meant, not a name on a server."""
+    """Return whether an argument is a file, not a name on a server."""
     return wanted.endswith(".zip") or Path(wanted).is_file()
 
 
 async def compare(
     old: str, new: str, kind: Kind, server: Server, export: Callable[[Exporter, str], Awaitable[Archive]], as_json: bool
 ) -> ExitStatus:
-    """Compare two exports, each a file or what a server has of that name."""
+    """Compare two exports, each a file or a document of the server."""
 
     async def side(wanted: str) -> Archive:
         if _is_file(wanted):
@@ -191,10 +183,9 @@ async def compare(
             _show(one, names)
     if not found:
         if not as_json:
-            say("There is no difference.")
+            print_line("No differences.")
         return ExitStatus.OK
-    sys.stderr.write(f"arcor2-hw {kind} diff: {old} and {new} differ in {len(found)} places\n")
-    return ExitStatus.DIFFERENT
+    return fail(f"{kind} diff", f"{old} and {new} differ in {len(found)} places", ExitStatus.DIFFERENT)
 
 
 def _show(one: Difference, names: dict[str, str]) -> None:
@@ -207,12 +198,12 @@ def _show(one: Difference, names: dict[str, str]) -> None:
     elif old or new:
         values = f" ({old or new})"
     entry = escape(printable(" › ".join(one.path) + values))
-    out().print(f"{_MARKS[one.change]} {entry}", soft_wrap=True)
+    console().print(f"{_MARKS[one.change]} {entry}", soft_wrap=True)
     for line in [] if isinstance(one.text, Unset) else one.text:
         style, shown = _LINES.get(line[:1], ""), escape(_indented(line))
-        out().print(f"    [{style}]{shown}[/]" if style else f"    {shown}", soft_wrap=True)
+        console().print(f"    [{style}]{shown}[/]" if style else f"    {shown}", soft_wrap=True)
 
 
 def _indented(line: str) -> str:
-    """Return a line of source as it can be shown: its spaces stay."""
+    """Return a line of source code without control characters; its spaces are unchanged."""
     return "".join(each if each.isprintable() else "�" for each in line.expandtabs(4))

@@ -15,7 +15,7 @@ from arcor2_server.cli.server_connection import HERE, Failed, Server, run
 from arcor2_server.exchange.archive import Archive
 from arcor2_server.exchange.export import Exporter
 
-app = App(name="object-type", help="Bring object types into a server, list, check and compare them, take them out.")
+app = App(name="object-type", help="Upload, list, check, compare and delete object types.")
 
 
 def _read(file: Path) -> str:
@@ -26,10 +26,10 @@ def _read(file: Path) -> str:
 
 
 def _class_in(source: str, file: Path, name: str | None) -> str:
-    """Return the name under which a file is added.
+    """Return the name under which a file is uploaded.
 
-    That is the given class, the class that the file is named after, or its only object type. A helper module, which
-    declares no object type, has the name of the file.
+    It is the given class, else the class that matches the file name, else its only object type. A helper module
+    without an object type has the name of the file.
     """
     try:
         names = [node.name for node in ast.parse(source).body if isinstance(node, ast.ClassDef)]
@@ -46,7 +46,7 @@ def _class_in(source: str, file: Path, name: str | None) -> str:
         found = [each for each in names if each == name]
     if len(found) != 1:
         listed = ", ".join(found or names) or "none"
-        raise Failed(ExitStatus.USAGE, f"say which class of {file} is meant with --name: {listed}")
+        raise Failed(ExitStatus.USAGE, f"select a class of {file} with --name: {listed}")
     return found[0]
 
 
@@ -55,7 +55,7 @@ def _analysis(name: str, source: str) -> TypeAnalysis:
 
 
 async def _in_order(given: dict[str, SourceFile], rest: Rest) -> list[SourceFile]:
-    """Give files each behind those it needs; Failed when one has a problem, with what the server has taken in too."""
+    """Return files after those that they import. Raise Failed if one has a problem with the types on the server."""
     library = Library(given.values())
     if any(library.analyse(name).problem for name in given):
         for entry in await rest.object_types():
@@ -75,17 +75,17 @@ async def _in_order(given: dict[str, SourceFile], rest: Rest) -> list[SourceFile
 @app.command
 def add(
     *files: Path,
-    name: Annotated[str | None, Parameter(help="The class, when a file declares several object types.")] = None,
+    name: Annotated[str | None, Parameter(help="The class, if a file defines several object types.")] = None,
     server: Server = HERE,
 ) -> int:
-    """Bring in object types from Python files, new or changed. The files are read, not imported.
+    """Upload new or changed object types from Python files. The files are read, not executed.
 
-    Bases, mixins and other modules that they import relatively are given with them, or were brought in before.
+    Upload bases, mixins and other modules that they import relatively before or together with them.
     """
 
     async def work() -> None:
         if not files or (name is not None and len(files) > 1):
-            raise Failed(ExitStatus.USAGE, "give the files of the object types; --name only with one file")
+            raise Failed(ExitStatus.USAGE, "specify the files of the object types; --name only with a single file")
         given: dict[str, SourceFile] = {}
         for file in files:
             source = _read(file)
@@ -95,11 +95,11 @@ def add(
             for one in await _in_order(given, client.rest):
                 source = one.source if isinstance(one.source, str) else one.source.decode()
                 await client.rest.put_object_type(one.name, source)
-                export_files.say(f"{one.name} added")
+                export_files.print_line(f"{one.name} uploaded")
             for meta in await client.get_object_types():
                 if meta.type in given and not isinstance(meta.shadows, Unset):
-                    export_files.say(
-                        f"{meta.type} takes the place of the installed type of {meta.shadows} until you remove it"
+                    export_files.print_line(
+                        f"{meta.type} replaces the installed type of {meta.shadows} until you remove it"
                     )
 
     return run("object-type add", work)
@@ -107,39 +107,39 @@ def add(
 
 @app.command(name="list")
 def list_types(*, as_json: export_files.Json = False, server: Server = HERE) -> int:
-    """Show the object types that were brought into a server."""
+    """List the uploaded object types of a server."""
 
     async def work() -> None:
         async with server.rest() as rest:
-            export_files.show_list(await rest.object_types(), "No object types were brought in.", as_json)
+            export_files.show_list(await rest.object_types(), "There are no uploaded object types.", as_json)
 
     return run("object-type list", work)
 
 
 @app.command
 def remove(name: str, /, *, server: Server = HERE) -> int:
-    """Take an object type out of a server."""
+    """Delete an uploaded object type."""
 
     async def work() -> None:
         async with server.rest() as rest:
             await rest.delete_object_type(name)
-        export_files.say(f"{name} removed")
+        export_files.print_line(f"{name} removed")
 
     return run("object-type remove", work)
 
 
 @app.command
 def export(
-    *names: Annotated[str, Parameter(help="Object types that were brought in.")],
+    *names: Annotated[str, Parameter(help="Names of uploaded object types.")],
     output: export_files.Output = None,
     force: export_files.Force = False,
     server: Server = HERE,
 ) -> int:
-    """Write object types into one file, with their bases, mixins, models and meshes."""
+    """Write object types to a file, with their bases, mixins, models and meshes."""
 
     async def work() -> None:
         if not names:
-            raise Failed(ExitStatus.USAGE, "give the names of the object types")
+            raise Failed(ExitStatus.USAGE, "specify the names of the object types")
         async with server.client() as client:
             archive = await Exporter(client).object_types(names)
         path = output or Path(f"{names[0]}.zip")
@@ -150,26 +150,27 @@ def export(
 
 @app.command(name="import")
 def import_types(
-    file: Annotated[Path, Parameter(help="What `arcor2-hw object-type export` wrote.")],
+    file: Annotated[Path, Parameter(help="A file that `arcor2-hw object-type export` wrote.")],
     /,
     *,
     overwrite: export_files.Overwrite = None,
     dry_run: export_files.DryRun = False,
     server: Server = HERE,
 ) -> int:
-    """Bring the object types of a file into a server, with their models and meshes.
+    """Import object types with their models and meshes from a file.
 
-    What is there already and the same is left alone. What differs is named and nothing is done, unless --overwrite
-    allows it: types (with their models), assets, or all.
+    Existing equal items are not changed. If items differ, the command lists them and changes nothing, unless
+    --overwrite allows it: types (with their models), assets, or all.
     """
     return run(
-        "object-type import", lambda: export_files.bring_in(file, "object-type", server, overwrite or [], None, dry_run)
+        "object-type import",
+        lambda: export_files.import_file(file, "object-type", server, overwrite or [], None, dry_run),
     )
 
 
 @app.command
 def validate(*files: Annotated[Path, Parameter(help="Export files.")], as_json: export_files.Json = False) -> int:
-    """Check export files without a server. For a Python file there is `arcor2-hw analyse`."""
+    """Check export files without a server. For Python files use `arcor2-hw analyse`."""
     return run("object-type validate", lambda: export_files.validate(list(files), "object-type", as_json))
 
 
@@ -180,11 +181,11 @@ async def _one(exporter: Exporter, name: str) -> Archive:
 @app.command
 def diff(
     old: Annotated[str, Parameter(help="An export file, or the name of an object type of the server.")],
-    new: Annotated[str, Parameter(help="Likewise: what it is compared with.")],
+    new: Annotated[str, Parameter(help="The file or object type to compare it with.")],
     /,
     *,
     as_json: export_files.Json = False,
     server: Server = HERE,
 ) -> int:
-    """Show what differs between two object types and what they need; the status tells whether anything does."""
+    """Show the differences between two object types and their contents. The exit status is 15 if there are any."""
     return run("object-type diff", lambda: export_files.compare(old, new, "object-type", server, _one, as_json))

@@ -9,7 +9,7 @@ app = document_commands(
         name="scene",
         saved=Rest.scenes,
         export=Exporter.scene,
-        content="all it needs: object types, models, meshes",
+        content="its object types, models and meshes",
         sources="A file that `arcor2-hw scene export` or `project export` wrote.",
         parts="scene, types (with their models), assets",
     )

@@ -1,11 +1,11 @@
-"""The kinds of device that `arcor2-hw device new` supports, with their parts of the templates."""
+"""The kinds of devices that `arcor2-hw device new` supports, and their parts of the templates."""
 
 import enum
 from typing import Final, NamedTuple
 
 
 class Base(enum.StrEnum):
-    """What kind of device it is."""
+    """Kind of device."""
 
     MACHINE = "machine"
     ROBOT = "robot"
@@ -20,9 +20,21 @@ class Base(enum.StrEnum):
 
 
 class Kind(NamedTuple):
-    """What a base brings into the texts.
+    """The parts of the templates that depend on the kind of device.
 
-    observe, ask, command, run_long: what the suite's bench calls; run_long is empty where nothing takes its time.
+    Args:
+        actions: names of the actions.
+        observe: a call that reads the state, for the bench of the conformance suite.
+        ask: a call that waits for a new state.
+        command: a call that needs control.
+        run_long: a call that takes some seconds; empty if no action does.
+        on_loss: state of the outputs after a connection loss.
+        words: the registers that are read.
+        writes: the commands in register 0.
+        does: description of the actions.
+        own_test: tests of this kind of device.
+        fake: name of the template of the fake.
+        rest_value: value of the fake at the start.
     """
 
     actions: str
@@ -39,11 +51,11 @@ class Kind(NamedTuple):
     rest_value: int = 0
 
 
-NO_ACT: Final = "the device does nothing that takes its time"
+NO_ACT: Final = "the device has no action that takes time"
 STATUS: Final = "state (0 idle, 1 busy)"
 MOTION_WRITES: Final = (
-    "1 go (with the target, then tenths of a mm a second), 2 stop, 3 reset, 4 home; register 2: ms of silence after "
-    "which it stops, 0 lets go"
+    "1 go (with target in 0.1 mm and speed in 0.1 mm/s), 2 stop, 3 reset, 4 home. Register 2: ms without a request "
+    "after which it stops; 0 releases control"
 )
 COMMON_WORDS: Final = "fault (0: none), owner (0 nobody, 1 the host, 2 the panel)"
 MOTION_WORDS: Final = f"{STATUS}, tenths of a mm, flags (1 homed, 2 part held), {COMMON_WORDS}"
@@ -56,8 +68,9 @@ KINDS: Final = {
         "process(8.0)",
         "none",
         f"state (PackML), tenths done, pieces done, {COMMON_WORDS}",
-        "command (PackML) and with a start the tenths to do; register 2: ms of silence after which it stops, 0 lets go",
-        "`process` does one piece of work: it resets the machine where necessary, starts it and waits for its end.",
+        "command (PackML), and the amount in tenths after START. Register 2: ms without a request after which it "
+        "stops; 0 releases control",
+        "`process` does one piece of work: it resets the machine if necessary, starts it and waits until it ends.",
         """def test_pieces_are_counted(bench):
     device = bench.controlled()
     assert device.process(0.4) == 1
@@ -80,9 +93,10 @@ def test_a_command_that_the_state_forbids_is_refused_naming_both(bench):
         "work(8.0)",
         "none",
         f"{STATUS}, tenths done, pieces done, {COMMON_WORDS}",
-        "1 go and the tenths to do, 2 stop, 3 reset; register 2: ms of silence after which it stops, 0 lets go",
-        "`work` does one piece of work and waits for its end.",
-        """def test_work_that_is_done_is_told(bench):
+        "1 go and the amount in tenths, 2 stop, 3 reset. Register 2: ms without a request after which it stops; 0 "
+        "releases control",
+        "`work` does one piece of work and waits until it ends.",
+        """def test_work_returns_the_amount(bench):
     device = bench.controlled()
     assert device.work(0.4) == 0.4
 """,
@@ -98,7 +112,7 @@ def test_a_command_that_the_state_forbids_is_refused_naming_both(bench):
         MOTION_WORDS,
         MOTION_WRITES,
         "`home` references it; `move_absolute` and `move_relative` move it, and are refused before homing.",
-        """def test_it_moves_to_where_it_was_told(bench):
+        """def test_it_moves_to_the_position(bench):
     device = bench.controlled()
     device.home()
     device.move_absolute(0.05, 0.5)
@@ -117,7 +131,7 @@ def test_a_command_that_the_state_forbids_is_refused_naming_both(bench):
         "hold",
         MOTION_WORDS,
         MOTION_WRITES,
-        "`grip` closes until something is held or the width is reached, and tells which; `release` opens.",
+        "`grip` closes until a part is gripped or the width is reached, and returns which; `release` opens.",
         """def test_a_part_is_held(bench):
     device = bench.controlled()
     device.activate()
@@ -137,10 +151,10 @@ def test_a_command_that_the_state_forbids_is_refused_naming_both(bench):
         "tare()",
         "",
         "none",
-        f"state (0 at rest, 1 moving), grams, tares done, {COMMON_WORDS}",
-        "4 tare, 5 zero; register 2: ms of silence after which control is given back, 0 gives it back",
-        "`weight` gives the weight when it stands, or at once; `tare` and `zero` take the present one as nothing.",
-        """def test_a_weight_and_what_is_left_of_it_after_taring(bench):
+        f"state (0 stable, 1 changing), grams, tares done, {COMMON_WORDS}",
+        "4 tare, 5 zero. Register 2: ms without a request after which control is released; 0 releases control",
+        "`weight` returns the weight, on request when it is stable; `tare` and `zero` set the present weight to zero.",
+        """def test_weight_before_and_after_taring(bench):
     device = bench.controlled()
     bench.do("put", grams=1250)
     assert device.weight() == 1.25
@@ -158,15 +172,15 @@ def test_a_command_that_the_state_forbids_is_refused_naming_both(bench):
         "scan(30.0)",
         "none",
         f"{STATUS}, the code, codes read, {COMMON_WORDS}",
-        "1 read a code, 2 stop; register 2: ms of silence after which it stops, 0 lets go",
-        "`scan` waits for one code; one that was shown before does not count.",
-        """def test_a_code_that_was_shown_before_does_not_count(bench):
+        "1 read a code, 2 stop. Register 2: ms without a request after which it stops; 0 releases control",
+        "`scan` waits for a code; codes from before the call do not count.",
+        """def test_a_code_from_before_the_scan_does_not_count(bench):
     device = bench.controlled()
     bench.do("show", code=4711)
     assert device.scan(0.1) == ""
 
 
-def test_a_code_that_is_shown_while_reading(bench):
+def test_a_code_during_the_scan_is_read(bench):
     device = bench.controlled()
     timer = threading.Timer(0.2, lambda: bench.do("show", code=4711))
     timer.start()
@@ -183,8 +197,9 @@ def test_a_code_that_is_shown_while_reading(bench):
         'print(40 * "x")',
         "none",
         f"{STATUS}, characters printed, labels printed, {COMMON_WORDS}",
-        "1 print, with a character a register, 2 stop; register 2: ms of silence after which it stops, 0 lets go",
-        "`print` prints a label of up to 40 plain characters and waits until it is out.",
+        "1 print, with one character per register, 2 stop. Register 2: ms without a request after which it stops; 0 "
+        "releases control",
+        "`print` prints a label of up to 40 ASCII characters and waits until it is printed.",
         """def test_a_label_is_printed_once(bench):
     device = bench.controlled()
     assert device.print("B-7") == "1"
@@ -200,9 +215,10 @@ def test_a_code_that_is_shown_while_reading(bench):
         'write("DO1", True)',
         "",
         "off",
-        f"state (0), inputs, outputs (a bit each), {COMMON_WORDS}",
-        "3 switch an output, with its number and 0 or 1; register 2: ms of silence after which all are off, 0 lets go",
-        "`read_point` tells a point, `write_point` switches an output; outputs are off when the device has lost us.",
+        f"state (0), inputs, outputs (one bit each), {COMMON_WORDS}",
+        "3 switch an output, with its number and 0 or 1. Register 2: ms without a request after which all outputs are "
+        "off; 0 releases control",
+        "`read_point` returns a point, `write_point` switches an output. Without a connection, all outputs are off.",
         """def test_points_are_read_and_switched(bench):
     device = bench.controlled()
     bench.do("set_input", number=3, on=True)
