@@ -20,11 +20,11 @@ API_VERSION: Final = "1.1.0"
 """Version of the protocol. Existing clients refuse another major version."""
 MIB: Final = 1024 * 1024
 DEVICE_FILES_NAME: Final = "device-files"
-"""Directory, in the data directory, of the files that the settings of devices may name."""
+"""Folder of the data directory with the files that settings of devices may name."""
 
 
 class LegacyListener(msgspec.Struct, frozen=True):
-    """A second port, without tokens and TLS; whoever connects there has this role, which is never programmer."""
+    """A second port for clients without tokens and TLS. They have this role, which cannot be programmer."""
 
     host: str
     port: int
@@ -32,63 +32,63 @@ class LegacyListener(msgspec.Struct, frozen=True):
 
     def __post_init__(self) -> None:
         if self.role >= Role.PROGRAMMER:
-            raise ValueError("clients without a token never get the role programmer")
+            raise ValueError("clients without a token cannot have the role programmer")
 
 
 class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
-    """Everything that can be set; times in seconds, sizes in bytes."""
+    """The settings of the server. Times are in s, sizes in bytes."""
 
     data_dir: Path
     host: str = "127.0.0.1"
     port: int = 6789
     insecure: bool = False
-    """Require no token, on any network."""
+    """Require no token, also from other machines."""
     fingerprint: str = ""
-    """SHA-256 of the certificate that the server shows; empty without TLS."""
+    """SHA-256 of the certificate; empty without TLS."""
     classic_ports: dict[str, int] = {}
-    """Further ports by the name of the service that the original has there; empty: all is on one port."""
+    """Additional ports by the name of the ARCOR2 service; empty: everything is on one port."""
     legacy: "LegacyListener | None" = None
-    """Where clients connect that can send no token, nor speak TLS."""
+    """Port for clients without tokens and TLS."""
     device_files: tuple[str, ...] = ()
-    """Directories in which the settings of devices may name files, besides those in the data directory."""
+    """Directories with files that settings of devices may name, in addition to those in the data directory."""
     database_url: str = ""
-    """SQLAlchemy URL of an asynchronous driver; empty: SQLite in the data directory."""
+    """SQLAlchemy URL with an asynchronous driver; empty: SQLite in the data directory."""
     cell: Cell | None = None
-    """Settings of devices at this place, laid over those of scenes and packages by the objects' names."""
+    """Settings of devices that override those of scenes and packages, by name of the object."""
     lock_timeout: float = 300.0
-    """Locks of a user who left are released after this time."""
+    """Time after which the locks of a disconnected user are released."""
     lock_retries: int = 13
     lock_retry_wait: float = 0.15
     streaming_period: float = 0.1
     scene_inflation: float = 0.01
     """Inflation of body sizes for safe line checks, m."""
     compute_idle: float = 120.0
-    """Time after which an idle compute worker ends to free its memory, s."""
+    """Time after which an idle compute worker is stopped to free its memory, s."""
     markers: CalibrationConfiguration | None = None
-    """Poses of the markers; None: as set over REST."""
+    """Poses of the markers; None: those set over REST."""
     history_limit: int = 1000
     """Number of undo steps in the journal."""
     allowed_hosts: frozenset[str] = frozenset()
-    """Names under which the server is reached, besides addresses, localhost and this machine's own names."""
+    """Host names of the server, in addition to addresses, localhost and the names of this machine."""
     trusted_proxies: tuple[str, ...] = ()
-    """Addresses and networks of reverse proxies, whose X-Forwarded-For and X-Forwarded-Proto are believed."""
+    """Addresses and networks of reverse proxies whose X-Forwarded-For and X-Forwarded-Proto are trusted."""
     default_role: Role = Role.PROGRAMMER
     """Role of clients if no token is required."""
     served_size: int = 16 * MIB
     drained_size: int = 32 * MIB
     requests_in_flight: int = 256
-    """Requests of one client that are worked on at once; further ones wait unread."""
+    """Maximum number of concurrent requests of a client; more are not read from its connection."""
     outgoing_bytes: int = 40 * MIB
     outgoing_messages: int = 20_000
     outgoing_age: float = 10.0
-    """A client that takes nothing for so long is closed, as is one with more than the two numbers above waiting."""
+    """Maximum age of queued messages. A client that exceeds it or one of the two limits above is disconnected."""
     ping_interval: float = 20.0
     connections: int = 0
-    """Connections that the server holds at most; 0: as many as the limit of open files allows, 4000 at most."""
+    """Maximum number of connections; 0: as many as the limit of open files allows, at most 4000."""
     connections_per_address: int = 200
-    """Connections from one address at most whose client is not, or not yet, admitted."""
+    """Maximum number of connections from one address whose client is not admitted."""
     request_timeout: float = 10.0
-    """Seconds for a TLS handshake, for the head of a request, and for a body or an answer that makes no progress."""
+    """Time limit for a TLS handshake, for the head of a request, and for a body or answer without progress."""
 
     def __post_init__(self) -> None:
         for proxy in self.trusted_proxies:
@@ -96,70 +96,77 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def documents_database(self) -> Path:
-        """Return the file of the documents when they are in SQLite."""
+        """The SQLite file of the documents, if no other database is used."""
         return self.data_dir / "documents.sqlite"
 
     @property
     def journal_database(self) -> Path:
-        """Return the file of the journal of the open document."""
+        """The file of the journal of the open document."""
         return self.data_dir / "journal.sqlite"
 
     @property
     def analysis_file(self) -> Path:
-        """Return the file that stores the analysis of object types for the next start; it may be deleted."""
+        """The cached analysis of object types. It may be deleted."""
         return self.data_dir / "analysis.msgpack"
 
     @property
     def history_dir(self) -> Path:
-        """Directory of the histories of closed documents."""
+        """The directory of the histories of closed documents."""
         return self.data_dir / "history"
 
     @property
     def problems_file(self) -> Path:
-        """Return the file that stores the problems of saved documents for the next start; it may be deleted."""
+        """The cached problems of saved documents. It may be deleted."""
         return self.data_dir / "problems.msgpack"
 
     @property
     def markers_file(self) -> Path:
-        """Return the file in which markers are kept that were set over REST."""
+        """The file of the markers that were set over REST."""
         return self.data_dir / "markers.json"
 
     @property
     def secrets_file(self) -> Path:
-        """Return the file of the secrets of devices."""
+        """The file of the secrets of devices."""
         return self.data_dir / "secrets.json"
 
     @property
     def assets_dir(self) -> Path:
-        """Return the directory of assets."""
+        """The directory of assets."""
         return self.data_dir / "assets"
 
     @property
     def arm_calibrations_file(self) -> Path:
-        """Give the file in which calibrations are kept that controllers told of their arms."""
+        """The file of the per-robot kinematic calibrations read from controllers."""
         return self.data_dir / "arm-calibrations.json"
 
     @property
     def device_files_dirs(self) -> tuple[Path, ...]:
-        """Return the directories in which the settings of devices may name files; the outbox is where results wait."""
+        """The directories with files that settings of devices may name. The outbox contains unsent results."""
         data = self.data_dir.absolute()
         return (data / DEVICE_FILES_NAME, data / "outbox", *map(Path, self.device_files))
 
     @property
     def prepared_dir(self) -> Path:
-        """Return the directory of meshes as clients show them; it may be emptied at any time."""
+        """The directory of meshes converted for display. It may be emptied."""
         return self.data_dir / "prepared"
 
     @property
     def packages_dir(self) -> Path:
-        """Return the directory of execution packages."""
+        """The directory of execution packages."""
         return self.data_dir / "packages"
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ, **given: Any) -> Self:
-        """Take what is not given from the environment (docs/reference/command-line.md names the variables).
+        """Return settings from arguments and, for missing ones, from environment variables.
 
-        Raises InvalidData naming the variable whose value makes no sense.
+        docs/reference/command-line.md lists the variables.
+
+        Args:
+            environment: the environment variables.
+            given: settings by name; None is ignored.
+
+        Raises:
+            InvalidData: the value of a variable is invalid.
         """
         values: dict[str, Any] = {}
         types = {field.name: field.type for field in msgspec.structs.fields(cls)}
@@ -208,11 +215,11 @@ _VARIABLES: Final = {
     "ARCOR2_HW_REQUEST_TIMEOUT": "request_timeout",
 }
 _LISTS: Final = {"allowed_hosts": ",", "trusted_proxies": ",", "device_files": os.pathsep}
-"""Settings that are lists, with the separator."""
+"""Separators of the settings that are lists."""
 
 
 def default_data_dir(environment: Mapping[str, str] = os.environ) -> Path:
-    """Return the user's data directory (XDG base directory specification) with our own folder in it."""
+    """Return the folder `arcor2-hw` in the user's data directory (XDG base directory specification)."""
     base = environment.get("XDG_DATA_HOME") or ""
     root = Path(base) if base.startswith("/") else Path.home() / ".local" / "share"
     return root / "arcor2-hw"

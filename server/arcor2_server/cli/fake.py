@@ -12,26 +12,27 @@ from typing import Annotated, Any, Final
 
 import msgspec
 from cyclopts import App, Parameter
-from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
-from arcor2_hw.exceptions import ConnectionLost, Refused
-from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_hw.exceptions import ConnectionLost, NotFound, Refused
+from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.cli.installed_fakes import InstalledFake, installed_fakes
+from arcor2_server.cli.tables import console
 from arcor2_server.demo.control import ask
 from arcor2_server.settings import default_data_dir
 
-app = App(name="fake", help="Simulated devices: list them, run one, let one fail while it runs.")
+app = App(name="fake", help="List and run simulated devices, and inject faults.")
 
-PIPE_WIDTH: Final = 240
-ENDS_WITHIN: Final = 5.0
-FAULT_WITHIN: Final = 30.0
-"""Seconds a fake may take for a command: switching some devices off and on takes that long."""
+END_TIMEOUT: Final = 5.0
+"""Time limit for a fake to end before it is killed, s."""
+COMMAND_TIMEOUT: Final = 30.0
+"""Time limit for a command, s; switching some devices off and on takes that long."""
 
 
 @app.command(name="list")
 def list_fakes() -> int:
-    """List the fakes that are installed on this machine; none is loaded for it."""
+    """List the simulated devices that are installed on this machine. None of them is loaded."""
     found = installed_fakes()
     if not found:
         sys.stdout.write("No fakes are installed.\n")
@@ -39,42 +40,43 @@ def list_fakes() -> int:
     table = Table("name", "wire", "module", "description", box=None, pad_edge=False)
     for fake in found:
         table.add_row(fake.name, fake.wire, fake.module, f"[red]{fake.problem}" if fake.problem else fake.description)
-    _console().print(table)
+    console().print(table)
     return ExitStatus.FAILED if any(fake.problem for fake in found) else ExitStatus.OK
 
 
 @app.command
 def run(
     name: Annotated[str, Parameter(help="Name of the fake, as `fake list` shows it.")],
-    *arguments: Annotated[str, Parameter(allow_leading_hyphen=True, help="Its own options, after --; try -- --help.")],
+    *arguments: Annotated[
+        str, Parameter(allow_leading_hyphen=True, help="Options of the fake after --; list them with -- --help.")
+    ],
 ) -> int:
-    """Run a fake in the foreground until Ctrl-C, saying where its wire and its control channel are."""
+    """Run a simulated device until Ctrl-C, and print the addresses of its interfaces and its control channel."""
     found = {fake.name: fake for fake in installed_fakes()}
     if name not in found:
-        sys.stderr.write(f"arcor2-hw fake run: there is no fake {name}; there are {', '.join(found) or 'none'}\n")
-        return ExitStatus.NOT_FOUND
+        reason = f"there is no fake {name}; installed: {', '.join(found) or 'none'}"
+        return fail("fake run", reason, ExitStatus.NOT_FOUND)
     if found[name].problem:
-        sys.stderr.write(f"arcor2-hw fake run: {found[name].problem}\n")
-        return ExitStatus.FAILED
+        return fail("fake run", found[name].problem, ExitStatus.FAILED)
     return _run(found[name], arguments)
 
 
 def _run(fake: InstalledFake, arguments: tuple[str, ...]) -> int:
-    # A session of its own: Ctrl-C reaches us alone, and we end it in order.
+    # In a new session: Ctrl-C reaches only this process, which stops the fake.
     process = subprocess.Popen(  # noqa: S603 - the module is one that an installed distribution names
         [sys.executable, "-m", fake.module, *arguments], stdout=subprocess.PIPE, text=True, start_new_session=True
     )
-    told = threading.Event()
+    terminated = threading.Event()
 
     def end(*_: object) -> None:
-        told.set()
+        terminated.set()
         process.terminate()
 
     before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         assert process.stdout is not None
         for line in process.stdout:
-            sys.stdout.write(_places(fake.name, line) if line.startswith("ready ") else line)
+            sys.stdout.write(_addresses(fake.name, line) if line.startswith("ready ") else line)
             sys.stdout.flush()
         status = process.wait()
     finally:
@@ -83,32 +85,32 @@ def _run(fake: InstalledFake, arguments: tuple[str, ...]) -> int:
         if process.poll() is None:
             process.terminate()
             with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(ENDS_WITHIN)
+                process.wait(END_TIMEOUT)
             process.kill()
             process.wait()
-    if status == 0 or told.is_set():
+    if status == 0 or terminated.is_set():
         return ExitStatus.OK
-    # The fake has said on standard error what is wrong.
+    # The fake has explained the failure on standard error.
     return ExitStatus.USAGE if status == ExitStatus.USAGE else ExitStatus.FAILED
 
 
-def _places(name: str, line: str) -> str:
-    """Return the ready line for people: each address on a line of its own."""
+def _addresses(name: str, line: str) -> str:
+    """Return the content of a ready line with each address on its own line."""
     ready: dict[str, Any] = msgspec.json.decode(line.removeprefix("ready "))
-    places = "".join(f"  {key} {value}\n" for key, value in ready.items() if key != "name" and value is not None)
-    return f"{name} is ready; Ctrl-C ends it\n{places}"
+    addresses = "".join(f"  {key} {value}\n" for key, value in ready.items() if key != "name" and value is not None)
+    return f"{name} is ready; press Ctrl-C to stop it\n{addresses}"
 
 
 @app.command
 def fault(
     target: Annotated[str, Parameter(help="HOST:PORT of a control channel, or a device of the running demo.")],
-    kind: Annotated[str, Parameter(help="What it is to do; not given, what it can do is listed.")] = "",
-    *values: Annotated[str, Parameter(help="What the command takes, as key=value; values in JSON, or plain text.")],
-    wire: Annotated[str | None, Parameter(help="Only this one of its wires.")] = None,
-    seconds: Annotated[float | None, Parameter(help="How long, s.")] = None,
+    kind: Annotated[str, Parameter(help="The command. Without it, all commands of the fake are listed.")] = "",
+    *values: Annotated[str, Parameter(help="Arguments of the command as key=value, with JSON or plain text values.")],
+    wire: Annotated[str | None, Parameter(help="Only this interface of the fake.")] = None,
+    seconds: Annotated[float | None, Parameter(help="Duration of the fault, s.")] = None,
     data_dir: Annotated[Path | None, Parameter(help="Data directory of the demo.")] = None,
 ) -> int:
-    """Let a running fake fail, or mend it (`heal`); its answer is printed.
+    """Inject a fault into a running simulated device, or end it with `heal`, and print the answer.
 
     Examples: `fake fault tester silence`, `fake fault belt emergency code=9024`, `fake fault tester heal`.
     """
@@ -121,15 +123,15 @@ def fault(
         arguments = _arguments(values)
         arguments |= {} if wire is None else {"wire": wire}
         arguments |= {} if seconds is None else {"seconds": seconds}
-        answer = asyncio.run(ask(address, kind, within=FAULT_WITHIN, **arguments))
-    except _Unknown as error:
-        return _say(error, ExitStatus.NOT_FOUND)
+        answer = asyncio.run(ask(address, kind, within=COMMAND_TIMEOUT, **arguments))
+    except NotFound as error:
+        return fail("fake fault", error, ExitStatus.NOT_FOUND)
     except ValueError as error:
-        return _say(error, ExitStatus.USAGE)
+        return fail("fake fault", error, ExitStatus.USAGE)
     except ConnectionLost as error:
-        return _say(error, ExitStatus.NO_SERVER)
+        return fail("fake fault", error, ExitStatus.NO_SERVER)
     except Refused as error:
-        return _say(error, ExitStatus.FAILED)
+        return fail("fake fault", error, ExitStatus.FAILED)
     if answer is None:
         sys.stdout.write(f"{target}: {kind} done\n")
     else:
@@ -137,16 +139,8 @@ def fault(
     return ExitStatus.OK
 
 
-class _Unknown(Exception):
-    """What was named is no fake that runs."""
-
-
-def _say(error: Exception, status: ExitStatus) -> int:
-    sys.stderr.write(f"arcor2-hw fake fault: {error}\n")
-    return status
-
-
 def _address(target: str, directory: Path) -> str:
+    """Return the address of a control channel. Raise NotFound if there is no such fake."""
     host, separator, port = target.rpartition(":")
     if separator and host and port.isdigit():
         return target
@@ -154,12 +148,16 @@ def _address(target: str, directory: Path) -> str:
     try:
         running = msgspec.json.decode(file.read_bytes(), type=dict[str, Any])
     except OSError:
-        raise _Unknown(f"{target} is no HOST:PORT, and no demo runs in {directory} (see --data-dir)") from None
+        raise NotFound(
+            "{target} is not HOST:PORT, and no demo is running in {directory} (see --data-dir)",
+            target=target,
+            directory=directory,
+        ) from None
     except msgspec.DecodeError as error:
-        raise _Unknown(f"{file} cannot be read: {error}") from None
+        raise NotFound("{file} cannot be read: {reason}", file=file, reason=error) from None
     fakes = {name: entry for name, entry in running.items() if isinstance(entry, dict) and "control" in entry}
     if target not in fakes:
-        raise _Unknown(f"the demo has no {target}; it has {', '.join(fakes)}")
+        raise NotFound("the demo has no {target}; it has {fakes}", target=target, fakes=", ".join(fakes))
     return str(fakes[target]["control"])
 
 
@@ -177,15 +175,8 @@ def _arguments(values: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _list_commands(target: str, commands: list[dict[str, Any]]) -> None:
-    table = Table("command", "takes", "does", title=f"what {target} can do", box=None, pad_edge=False)
+    table = Table("command", "arguments", "description", title=f"Commands of {target}", box=None, pad_edge=False)
     table.title_justify = "left"
     for command in commands:
-        # Square brackets are rich's markup.
-        table.add_row(command["name"], " ".join(command["takes"]).replace("[", r"\["), command["text"])
-    _console().print(table)
-
-
-def _console() -> Console:
-    # A pipe has no width: without one, rich would fold columns to 80 characters.
-    console = Console(highlight=False)
-    return console if console.is_terminal else Console(highlight=False, width=PIPE_WIDTH)
+        table.add_row(command["name"], escape(" ".join(command["takes"])), command["text"])
+    console().print(table)

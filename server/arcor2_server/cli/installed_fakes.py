@@ -1,4 +1,4 @@
-"""The fakes of installed distributions, found by entry point and read as source without importing them."""
+"""Finds the simulated devices of installed distributions by entry point, without importing them."""
 
 import ast
 import importlib.util
@@ -9,11 +9,11 @@ from typing import Final
 from msgspec import Struct
 
 GROUP: Final = "arcor2_hw.fakes"
-"""The entry point group in which a distribution names its fakes: `tester = "package.module"`, run by `python -m`."""
+"""The entry point group of fakes: `tester = "package.module"`. The module is run with `python -m`."""
 
 
 class InstalledFake(Struct, frozen=True):
-    """A fake: what `python -m` runs, and what its source says of it; `problem` when there is none to be read."""
+    """A fake: its module, its description, and the problem if its source code cannot be read."""
 
     name: str
     module: str
@@ -23,7 +23,7 @@ class InstalledFake(Struct, frozen=True):
 
 
 def installed_fakes() -> list[InstalledFake]:
-    """Return the fakes of all installed distributions, by name; of two with one name the first."""
+    """Return the fakes of all installed distributions, sorted by name. Of two with the same name the first is used."""
     found: dict[str, InstalledFake] = {}
     for point in entry_points(group=GROUP):
         found.setdefault(point.name, _read(point))
@@ -31,7 +31,7 @@ def installed_fakes() -> list[InstalledFake]:
 
 
 def _read(point: EntryPoint) -> InstalledFake:
-    """Read a fake's source: its description is the docstring's first line, its wire a constant WIRE."""
+    """Read a fake without importing it: its constant WIRE and the first line of its docstring."""
     file = _source(point.value)
     if file is None:
         return InstalledFake(point.name, point.value, problem=f"the module {point.value} is not installed")
@@ -56,7 +56,7 @@ def _read(point: EntryPoint) -> InstalledFake:
 
 
 def _source(dotted: str) -> Path | None:
-    """Find a module's file; only the finder of the top-level package is asked, and no package is imported."""
+    """Return the file of a module, None if it is missing. No package is imported."""
     top, *rest = dotted.split(".")
     try:
         spec = importlib.util.find_spec(top)

@@ -1,11 +1,9 @@
-"""`arcor2-hw package`: list packages, and run one while showing its progress."""
+"""`arcor2-hw package`: list packages and past runs, and run a package while showing its progress."""
 
-import sys
 from datetime import datetime
 from typing import Annotated
 
 from cyclopts import App, Parameter
-from rich.console import Console
 from rich.table import Table
 
 from arcor2_hw.client import RequestFailed
@@ -13,15 +11,16 @@ from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Run
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.exceptions import ConnectionLost, NotFound
-from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.cli.server_connection import HERE, Failed, Server, run
+from arcor2_server.cli.tables import console
 
-app = App(name="package", help="List the packages of a running server, run one, or show what was run.")
+app = App(name="package", help="List and run packages, and show past runs.")
 
 
 @app.command(name="list")
 def list_packages(*, server: Server = HERE) -> int:
-    """Show the packages of a running server."""
+    """List the packages of a running server."""
 
     async def work() -> None:
         async with server.client() as client:
@@ -41,22 +40,21 @@ def _show(summaries: list[PackageSummary]) -> None:
             meta.built,
             "never" if isinstance(meta.executed, Unset) else meta.executed,
         )
-    Console().print(table if summaries else "There are no packages: build one from a project first.")
+    console().print(table if summaries else "There are no packages. Build one from a project first.")
 
 
 @app.command(name="runs")
 def list_runs(
-    package: Annotated[str, Parameter(help="Id of a package: only its runs.")] = "",
+    package: Annotated[str, Parameter(help="Id of a package: show only its runs.")] = "",
     *,
-    limit: Annotated[int, Parameter(help="How many, the newest ones.")] = 20,
+    limit: Annotated[int, Parameter(help="Maximum number of runs, newest first.")] = 20,
     server: Server = HERE,
 ) -> int:
-    """Show who ran what, and how it ended."""
+    """List past runs with user, start and outcome."""
 
     async def work() -> None:
         async with server.client() as client:
-            told = await client.list_runs(limit=limit, package_id=package or UNSET)
-            _show_runs(told.runs)
+            _show_runs((await client.list_runs(limit=limit, package_id=package or UNSET)).runs)
 
     return run("package runs", work)
 
@@ -78,7 +76,7 @@ def _show_runs(runs: list[Run]) -> None:
             "" if isinstance(last, Unset) else last.name or last.id,
             "" if isinstance(error, Unset) else error,
         )
-    Console().print(table if runs else "Nothing was run yet.")
+    console().print(table if runs else "There are no runs.")
 
 
 def _seconds(start: str, end: str) -> float:
@@ -87,21 +85,23 @@ def _seconds(start: str, end: str) -> float:
 
 @app.command(name="run")
 def run_package(
-    package: Annotated[str, Parameter(help="Id of the package, or its name: then the newest one of that name.")],
+    package: Annotated[
+        str, Parameter(help="Id or name of the package. Of several with the same name, the newest is run.")
+    ],
     *,
     paused: Annotated[bool, Parameter(help="Pause before the first action.")] = False,
     server: Server = HERE,
 ) -> int:
-    """Run a package on a running server and follow it to its end."""
+    """Run a package on a running server, and show its progress until it ends."""
     try:
         return run("package run", lambda: _run(server, package, paused))
     except KeyboardInterrupt:
-        sys.stderr.write("arcor2-hw package run: no longer followed; the program goes on, stop it with StopPackage\n")
-        return ExitStatus.INTERRUPTED
+        reason = "interrupted; the program continues, stop it in the editor"
+        return fail("package run", reason, ExitStatus.INTERRUPTED)
 
 
 async def _run(server: Server, wanted: str, paused: bool) -> ExitStatus:
-    console = Console(highlight=False)
+    out = console()
     async with server.client() as client:
         summaries = await client.list_packages()
         named = sorted(
@@ -122,18 +122,17 @@ async def _run(server: Server, wanted: str, paused: bool) -> ExitStatus:
                 case "PackageInfo":
                     actions = {a.id: a.name for point in event.data.project.action_points for a in point.actions}
                 case "ActionStateBefore" if not isinstance(event.data.action_id, Unset):
-                    console.print(actions.get(event.data.action_id, event.data.action_id))
+                    out.print(actions.get(event.data.action_id, event.data.action_id))
                 case "ActionStateAfter" if not isinstance(event.data.results, Unset):
-                    console.print(f"  -> {', '.join(event.data.results)}")
+                    out.print(f"  -> {', '.join(event.data.results)}")
                 case "ProjectException":
                     problem = event.data.message
                 case "PackageState" if event.data.package_id == chosen:
-                    console.print(f"[dim]{event.data.state}[/dim]")
+                    out.print(f"[dim]{event.data.state}[/dim]")
                     if event.data.state is PackageStateEnum.STOPPED:
                         break
         else:
             raise ConnectionLost("The connection to {url} broke: the program may go on.", url=client.url)
         if problem:
-            sys.stderr.write(f"arcor2-hw package run: {problem}\n")
-            return ExitStatus.PROGRAM_FAILED
+            return fail("package run", problem, ExitStatus.PROGRAM_FAILED)
     return ExitStatus.OK

@@ -1,4 +1,4 @@
-"""Generates docs/reference/roles.md: the role that each request, event and route needs."""
+"""Generates docs/reference/roles.md: the role that each request, event and REST route needs."""
 
 from collections.abc import Iterable
 from typing import Any, cast
@@ -40,7 +40,7 @@ def _routes(app: Litestar) -> Iterable[tuple[str, Role]]:
 
 
 def page(app: Litestar) -> str:
-    """Return the page."""
+    """Return the Markdown page."""
     lines = _HEAD.splitlines()
     lines += _table("Requests", ((name, rpc.role) for name, rpc in RPCS.items()))
     lines += _table("Events", ((name, event.role) for name, event in EVENTS.items()))

@@ -31,7 +31,7 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, StorageError
 from arcor2_server.access.admission import is_local, is_loopback
 from arcor2_server.access.tokens import TokenFile
-from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, ServerSettings
 from arcor2_server.websocket.classic_ports import ports_from_environment
@@ -39,17 +39,17 @@ from arcor2_server.websocket.classic_ports import ports_from_environment
 log = structlog.get_logger(__name__)
 
 LegacyRole = Literal["operator", "standard_user", "advanced_user", "technician"]
-"""Never programmer."""
+"""The roles of clients without a token; programmer is not allowed."""
 
-PREPARED_AFTER = 0.5
-"""Time from readiness until what the first scene needs is prepared, s: clients that wait for the server go first."""
+PREPARE_AFTER = 0.5
+"""Delay after the start before a spare cell host is started, s, so that waiting clients are served first."""
 
-COLLECTION = (700, 10, 10)
-"""The interpreter's default thresholds, which `main` raises for the imports."""
+GC_THRESHOLD = (700, 10, 10)
+"""The default thresholds of the interpreter, which `main` raises for the imports."""
 
 
 class CannotServe(Exception):
-    """The server cannot start, for a reason that a person can do something about."""
+    """The server cannot start for a reason that the user can fix."""
 
     def __init__(self, status: ExitStatus, reason: str) -> None:
         super().__init__(reason)
@@ -72,52 +72,51 @@ def serve(
     openapi: Annotated[bool, Parameter(negative="")] = False,
     log_level: str = "info",
 ) -> int:
-    """Serve the websocket and REST interfaces until SIGTERM or Ctrl-C.
-
-    Prints `ready <url>` on standard output when requests are accepted.
+    """Run the server until Ctrl-C or SIGTERM.
 
     Parameters
     ----------
     host
-        Address to listen on (127.0.0.1): other machines reach the server only on an address of the network.
+        Address to listen on. The default 127.0.0.1 is only reachable from this machine.
     port
-        Port to listen on (6789); 0 takes any free one, which `ready` then tells.
+        Port to listen on (6789); 0 selects a free port, which `ready` shows.
     data_dir
-        Where scenes, projects and packages are kept ($XDG_DATA_HOME/arcor2-hw); created when missing.
+        Data directory for scenes, projects and packages ($XDG_DATA_HOME/arcor2-hw). It is created if missing.
     cell
-        A cell.yaml whose settings of devices win over those of scenes and packages, by the objects' names.
+        A cell.yaml with settings of devices. They override the settings of objects with the same names.
     markers
-        Which markers stand where, by which cameras are calibrated; else as cell.yaml says, or as was told over REST.
+        File with the poses of the markers for calibration. The default is the poses in cell.yaml or those set over
+        REST.
     tls
-        Files of a certificate chain and its key, in PEM, to speak TLS with.
+        PEM files of a certificate chain and its key for TLS.
     self_signed
-        Speak TLS with a certificate made here, whose fingerprint is shown; other machines are always served so unless
-        --tls gives a certificate.
+        Use TLS with a self-signed certificate, whose fingerprint is shown. This is the default if other machines can
+        connect.
     insecure
-        Ask nobody for a token and speak no TLS unless told to: for a network that nobody else reaches.
+        Require no token, and use TLS only if requested. Use this only in an isolated network.
     legacy_listen
-        A second HOST:PORT, without TLS, for clients that can send no token.
+        A second HOST:PORT without TLS for clients that cannot send a token.
     legacy_role
-        What those clients may do.
+        Role of these clients.
     classic_ports
-        Listen also on the port that each service of the original ARCOR2 has, as its ARCOR2_* variables say.
+        Also listen on the ports of the services of the original ARCOR2, as set by its ARCOR2_* variables.
     openapi
-        Print the OpenAPI document of the REST interfaces and end.
+        Print the OpenAPI document of the REST interface and exit.
     log_level
-        What is logged on standard error: debug, info, warning or error.
+        Level of the log on standard error: debug, info, warning or error.
     """
     if openapi:
         return _print_openapi()
-    # Whatever the server and its children create is for their user alone.
+    # Only the user may read the files of the server and its processes.
     os.umask(0o077)
-    # Start-up makes much that stays and little that goes: collecting would only look at it again and again.
+    # The start creates mostly permanent objects; collecting garbage would only take time.
     gc.disable()
     try:
         here = None if cell is None else read_cell(cell)
         seen = _markers(markers, cell, here)
     except Arcor2Error as error:
-        sys.stderr.write(f"arcor2-hw serve: {' '.join(str(error).split())}\n")
-        return ExitStatus.NOT_FOUND if isinstance(error, NotFound) else ExitStatus.CELL_UNUSABLE
+        status = ExitStatus.NOT_FOUND if isinstance(error, NotFound) else ExitStatus.CELL_UNUSABLE
+        return fail("serve", " ".join(str(error).split()), status)
     try:
         legacy = None if legacy_listen is None else _legacy(legacy_listen, legacy_role)
         settings = ServerSettings.from_environment(
@@ -132,8 +131,7 @@ def serve(
         )
         server_logging.set_up(log_level)
     except (InvalidData, KeyError) as error:
-        sys.stderr.write(f"arcor2-hw serve: {error}\n")
-        return ExitStatus.USAGE
+        return fail("serve", error, ExitStatus.USAGE)
     try:
         with (
             data_directory(settings.data_dir),
@@ -147,40 +145,42 @@ def serve(
             with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
                 runner.run(run(settings, [listener, *classic_listeners], legacy_listener, certificate))
     except CannotServe as error:
-        sys.stderr.write(f"arcor2-hw serve: {error}\n")
-        return error.status
+        return fail("serve", error, error.status)
     except StorageError as error:
-        sys.stderr.write(f"arcor2-hw serve: {error}\n")
-        return ExitStatus.DATABASE_UNUSABLE
+        return fail("serve", error, ExitStatus.DATABASE_UNUSABLE)
     return ExitStatus.OK
 
 
 def _markers(given: Path | None, path: Path | None, cell: Cell | None) -> CalibrationConfiguration | None:
-    """Return which markers stand where: as a file of their own says, else as cell.yaml does.
+    """Return the poses of the markers from their file, else from cell.yaml.
 
-    Raise NotFound or InvalidData if that is impossible.
+    Raises:
+        NotFound: the file does not exist.
+        InvalidData: the file is damaged.
     """
     if given is not None:
         return read_configuration(given)
     if cell is None or path is None or isinstance(cell.calibration, Unset):
         return None
-    # Read again with an eye on keys that are there twice, of which YAML takes the last.
+    # Read the file again to report duplicate keys, of which YAML uses the last.
     return configuration_of(yaml_of(path.read_bytes(), str(path))["calibration"], f"{path}: calibration")
 
 
 def check_access(settings: ServerSettings) -> None:
-    """Refuse to be reached by other machines while nobody needs a token.
+    """Check that other machines cannot connect without a token.
 
-    Raise CannotServe or StorageError if that is impossible.
+    Raises:
+        CannotServe: other machines can connect, and no token is required.
+        StorageError: the tokens cannot be read.
     """
     tokens = TokenFile(settings.data_dir)
     if is_local(settings) or settings.insecure or tokens.all() or tokens.unusable:
         return
     raise CannotServe(
         ExitStatus.NO_TOKENS,
-        f"other machines reach {settings.host}{' by a proxy' if settings.trusted_proxies else ''}, "
-        "and there is no token yet: "
-        "make one with `arcor2-hw token add NAME --role programmer`, or say --insecure",
+        f"other machines can connect to {settings.host}{' through a proxy' if settings.trusted_proxies else ''}, "
+        "but there is no token yet. "
+        "Create one with `arcor2-hw token add NAME --role programmer`, or use --insecure",
     )
 
 
@@ -201,12 +201,12 @@ def _print_openapi() -> int:
 def _bind_classic(
     settings: ServerSettings, sockets: contextlib.ExitStack
 ) -> tuple[ServerSettings, list[socket.socket]]:
-    """Bind the classic ports, and have the real ones in the settings."""
+    """Bind the classic ports; return the settings with the bound port numbers, and the sockets."""
     listeners, ports = [], {}
     for service, port in settings.classic_ports.items():
         ports[service] = port
         if port == settings.port and port:
-            continue  # all is served there
+            continue  # the main port
         listener = sockets.enter_context(contextlib.closing(listen(settings.host, port)))
         listeners.append(listener)
         ports[service] = listener.getsockname()[1]
@@ -217,26 +217,27 @@ def _bind_classic(
 def _bind_legacy(
     settings: ServerSettings, sockets: contextlib.ExitStack
 ) -> tuple[ServerSettings, socket.socket | None]:
-    """Bind the second listener, and have its real port in the settings."""
+    """Bind the legacy port; return the settings with the bound port number, and the socket."""
     if settings.legacy is None:
         return settings, None
     listener = sockets.enter_context(contextlib.closing(listen(settings.legacy.host, settings.legacy.port)))
     legacy = msgspec.structs.replace(settings.legacy, port=listener.getsockname()[1])
     role = legacy.role.name.lower()
-    log.warning("clients without a token are let in", host=legacy.host, port=legacy.port, role=role)
+    log.warning("clients without a token are admitted", host=legacy.host, port=legacy.port, role=role)
     return msgspec.structs.replace(settings, legacy=legacy), listener
 
 
 def _certificate(
     settings: ServerSettings, given: tuple[Path, Path] | None, self_signed: bool
 ) -> tuple[ServerSettings, tuple[Path, Path] | None]:
-    """Return the files of certificate and key, None for no TLS, and settings that know the fingerprint.
+    """Return the settings with the fingerprint, and the files of certificate and key; None without TLS.
 
-    CannotServe when they cannot be used.
+    Raises:
+        CannotServe: the certificate cannot be used.
     """
     if given is None and not self_signed and (settings.insecure or is_loopback(settings.host)):
         return settings, None
-    from arcor2_server.access import certificate  # only here: it costs time that a server without TLS does not have
+    from arcor2_server.access import certificate  # slow to import, and not needed without TLS
 
     try:
         files = given or certificate.self_signed(settings.data_dir, settings.host)
@@ -253,9 +254,11 @@ async def run(
     legacy: socket.socket | None = None,
     certificate: tuple[Path, Path] | None = None,
 ) -> None:
-    """Serve at sockets that are bound, by TLS on all but `legacy` where there is a certificate; the first is told.
+    """Run the server on bound sockets. With a certificate it uses TLS on all sockets except `legacy`.
 
-    StorageError when the data cannot be used.
+    Raises:
+        CannotServe: another program has taken the port.
+        StorageError: the data cannot be used.
     """
     from arcor2_server.access.connection_limits import ConnectionLimits
     from arcor2_server.app import create_app, running_server
@@ -267,9 +270,9 @@ async def run(
 
         def when_ready() -> None:
             gc.freeze()
-            gc.set_threshold(*COLLECTION)
+            gc.set_threshold(*GC_THRESHOLD)
             gc.enable()
-            loop.call_later(PREPARED_AFTER, prepare)
+            loop.call_later(PREPARE_AFTER, prepare)
 
         def prepare() -> None:
             running.hosts.prepare()
@@ -283,7 +286,7 @@ async def run(
         try:
             await server.serve(sockets=listeners)
         except OSError as error:
-            # Between our bind and this, another program began to listen there.
+            # Another program has taken the port after it was bound.
             if error.errno != errno.EADDRINUSE:
                 raise
             raise _no_port(settings.host, listeners[0].getsockname()[1], error) from error
@@ -291,9 +294,10 @@ async def run(
 
 @contextlib.contextmanager
 def data_directory(directory: Path) -> Generator[IO[bytes], None, None]:
-    """Make sure that the directory is there, can be written, and is ours alone.
+    """Create the data directory if it is missing, and lock it.
 
-    Raise CannotServe if that is impossible.
+    Raises:
+        CannotServe: the directory cannot be written, or another server uses it.
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -312,9 +316,10 @@ def data_directory(directory: Path) -> Generator[IO[bytes], None, None]:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Return a socket that is bound; uvicorn listens at it once everything is up.
+    """Return a bound socket. Uvicorn listens on it when the server is ready.
 
-    Raise CannotServe if that is impossible.
+    Raises:
+        CannotServe: the address cannot be used.
     """
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
@@ -334,5 +339,5 @@ def listen(host: str, port: int) -> socket.socket:
 
 def _no_port(host: str, port: int, error: OSError) -> CannotServe:
     if error.errno == errno.EADDRINUSE:
-        return CannotServe(ExitStatus.PORT_TAKEN, f"port {port} of {host} is taken by another program")
+        return CannotServe(ExitStatus.PORT_TAKEN, f"port {port} of {host} is used by another program")
     return CannotServe(ExitStatus.PORT_TAKEN, f"cannot listen on port {port} of {host}: {error.strerror}")

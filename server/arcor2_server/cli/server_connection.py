@@ -1,8 +1,7 @@
-"""How commands connect to a server, and their exit status if that fails."""
+"""The connection of commands to a server, and their exit status for errors."""
 
 import asyncio
 import ssl
-import sys
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,13 +21,13 @@ from arcor2_hw.exceptions import (
     NotConnected,
     NotFound,
 )
-from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus, fail
 
 DEFAULT_URL: Final = "ws://127.0.0.1:6789"
 
 
 class Failed(Exception):
-    """A command that ends with a status of its own and one line."""
+    """The command failed with an exit status and a message of one line."""
 
     def __init__(self, status: ExitStatus, line: str) -> None:
         super().__init__(line)
@@ -38,20 +37,21 @@ class Failed(Exception):
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Server:
-    """Where the server is, and how it lets us in."""
+    """The address of the server and the credentials."""
 
-    url: Annotated[str, Parameter(help="Where the server listens.", env_var="ARCOR2_HW_URL")] = DEFAULT_URL
+    url: Annotated[str, Parameter(help="URL of the server.", env_var="ARCOR2_HW_URL")] = DEFAULT_URL
     token: Annotated[
-        str | None, Parameter(help="What `arcor2-hw token add` gave; better in the variable ARCOR2_HW_TOKEN.")
+        str | None,
+        Parameter(help="Token from `arcor2-hw token add`. Prefer the variable ARCOR2_HW_TOKEN, which `ps` hides."),
     ] = None
-    ca: Annotated[Path | None, Parameter(help="Certificate to trust, when the server made its own.")] = None
+    ca: Annotated[Path | None, Parameter(help="Certificate to trust, for a self-signed server certificate.")] = None
 
     def client(self) -> Client:
-        """Create a client that gives up at the first loss. Raises Failed when the certificate cannot be used."""
+        """Create a client that does not reconnect. Raise Failed if the certificate cannot be used."""
         return Client(self.url, token=self.token, tls=self._tls(), reconnect=False)
 
     def rest(self) -> Rest:
-        """Create a client for HTTP alone. Raises Failed when the certificate cannot be used."""
+        """Create a client for REST requests. Raise Failed if the certificate cannot be used."""
         return Rest(self.url, token=self.token, tls=self._tls())
 
     def _tls(self) -> ssl.SSLContext | None:
@@ -75,29 +75,25 @@ _STATUSES: Final[tuple[tuple[tuple[type[Arcor2Error], ...], ExitStatus], ...]] =
 
 
 def status_of(error: Arcor2Error) -> ExitStatus:
-    """Return the status for an error."""
+    """Return the exit status for an error."""
     return next((status for kinds, status in _STATUSES if isinstance(error, kinds)), ExitStatus.FAILED)
 
 
 def printable(text: str) -> str:
-    """Return a text on one line without what would command a terminal: it may come out of somebody else's file."""
+    """Return a text on one line without control characters, which a file from another user could contain."""
     return "".join(each if each.isprintable() else "�" for each in " ".join(text.split()))
 
 
 def run(command: str, work: Callable[[], Awaitable[Any]]) -> int:
-    """Run a command to its end: what it returns as a status, else OK; for an error its status and one line."""
-
-    def fail(error: Exception, status: ExitStatus) -> ExitStatus:
-        sys.stderr.write(f"arcor2-hw {command}: {printable(str(error))}\n")
-        return status
+    """Run a command and print errors; return the status that it returns, else OK, or the status for its error."""
 
     async def working() -> Any:
         return await work()
 
     try:
-        given = asyncio.run(working())
+        status = asyncio.run(working())
     except Failed as error:
-        return fail(error, error.status)
+        return fail(command, printable(str(error)), error.status)
     except Arcor2Error as error:
-        return fail(error, status_of(error))
-    return given if isinstance(given, ExitStatus) else ExitStatus.OK
+        return fail(command, printable(str(error)), status_of(error))
+    return status if isinstance(status, ExitStatus) else ExitStatus.OK

@@ -1,20 +1,20 @@
-"""`arcor2-hw token`: manage the tokens for a server and their roles."""
+"""`arcor2-hw token`: manage the access tokens of a server."""
 
 import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import App, Parameter, validators
-from rich.console import Console
 from rich.table import Table
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, NotFound, StorageError
 from arcor2_server.access.tokens import TokenFile
-from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.exit_status import ExitStatus, fail
+from arcor2_server.cli.tables import console
 from arcor2_server.settings import default_data_dir
 
-app = App(name="token", help="Say who may connect to a server, and in which role. A running server follows at once.")
+app = App(name="token", help="Manage the access tokens of a server. Changes take effect immediately.")
 
 RoleName = Literal["operator", "standard_user", "advanced_user", "technician", "programmer"]
 DataDir = Annotated[Path | None, Parameter(help="Data directory of the server ($XDG_DATA_HOME/arcor2-hw).")]
@@ -25,10 +25,9 @@ def _file(data_dir: Path | None) -> TokenFile:
 
 
 def _failed(error: Arcor2Error) -> int:
-    sys.stderr.write(f"arcor2-hw token: {error}\n")
     if isinstance(error, StorageError):
-        return ExitStatus.DATA_UNUSABLE
-    return ExitStatus.NOT_FOUND if isinstance(error, NotFound) else ExitStatus.USAGE
+        return fail("token", error, ExitStatus.DATA_UNUSABLE)
+    return fail("token", error, ExitStatus.NOT_FOUND if isinstance(error, NotFound) else ExitStatus.USAGE)
 
 
 @app.command
@@ -39,16 +38,16 @@ def add(
     days: Annotated[int | None, Parameter(validator=validators.Number(gte=1, lte=3650))] = None,
     data_dir: DataDir = None,
 ) -> int:
-    """Create a token and print it, once: it is nowhere kept in clear.
+    """Create a token and print it. It cannot be shown again, since only its hash is stored.
 
     Parameters
     ----------
     name
-        The person or device that it is for.
+        The user or device of the token.
     role
-        What its owner may do.
+        The role of its owner.
     days
-        After so many days it is not valid any more; without it, it stays valid until it is revoked.
+        Number of days for which it is valid. The default is until it is revoked.
     """
     try:
         _, secret = _file(data_dir).add(name, Role[role.upper()], days)
@@ -60,46 +59,46 @@ def add(
 
 @app.command(name="list")
 def list_tokens(*, data_dir: DataDir = None) -> int:
-    """List the tokens; what they are cannot be shown again."""
+    """List the tokens without their secrets."""
     try:
         file = _file(data_dir)
         tokens = file.all()
     except Arcor2Error as error:
         return _failed(error)
     if file.damage:
-        sys.stderr.write(f"arcor2-hw token: {file.damage}\n")
+        fail("token", file.damage, ExitStatus.DATA_UNUSABLE)
         if file.unusable:
             return ExitStatus.DATA_UNUSABLE
     if not tokens:
-        sys.stdout.write("There is no token: the server serves this machine alone, and asks nobody.\n")
+        sys.stdout.write("There are no tokens. The server accepts clients of this machine only, without a token.\n")
         return ExitStatus.OK
-    table = Table("id", "name", "role", "made", "valid until", box=None, pad_edge=False)
+    table = Table("id", "name", "role", "created", "valid until", box=None, pad_edge=False)
     for token in tokens:
-        until = "it is revoked" if token.expires is None else token.expires[:16]
+        until = "revoked" if token.expires is None else token.expires[:16]
         table.add_row(
             token.id,
             token.name,
             token.role.name.lower(),
             token.created[:16],
-            f"[red]{until}, over" if token.expired else until,
+            f"[red]{until}, expired" if token.expired else until,
         )
-    Console(highlight=False).print(table)
+    console().print(table)
     return ExitStatus.OK
 
 
 @app.command
 def revoke(which: str, *, data_dir: DataDir = None) -> int:
-    """Create a token, named by its id or its owner, worth nothing; who is connected by it is disconnected.
+    """Revoke tokens by id or name, and disconnect their clients.
 
     Parameters
     ----------
     which
-        The id or the name that `arcor2-hw token list` shows.
+        The id or name that `arcor2-hw token list` shows.
     """
     try:
-        gone = _file(data_dir).revoke(which)
+        revoked = _file(data_dir).revoke(which)
     except Arcor2Error as error:
         return _failed(error)
-    for token in gone:
+    for token in revoked:
         sys.stdout.write(f"revoked: {token.id} of {token.name}\n")
     return ExitStatus.OK

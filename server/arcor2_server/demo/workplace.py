@@ -1,4 +1,4 @@
-"""The demo workplace: read from workplace.toml and created through the protocol, as a client would."""
+"""The demo cell: its description in workplace.toml, and its creation through the protocol as a client."""
 
 import contextlib
 from importlib.resources import files
@@ -11,7 +11,6 @@ from msgspec import UNSET, Struct, field
 from arcor2_hw.client import Client, RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.events import Event
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectAction, ObjectModel
 from arcor2_hw.data.parameter import Parameter
@@ -24,7 +23,7 @@ Scalar = bool | int | float | str
 
 
 class Object(Struct, frozen=True, forbid_unknown_fields=True):
-    """An object of the scene. `rotation` is a rotation vector, rad; a setting "$name" is filled in at start."""
+    """An object of the scene. `rotation` is a rotation vector, rad. A setting "$name" is replaced at the start."""
 
     name: str
     type: str
@@ -34,7 +33,7 @@ class Object(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):
-    """A box that nothing may run into; edges in m."""
+    """A box-shaped collision object; position and size in m."""
 
     name: str
     position: Vector3
@@ -51,9 +50,10 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Step(Struct, frozen=True, forbid_unknown_fields=True):
-    """An action: on a point, by an object.
+    """An action.
 
-    A parameter "@point" is that point's pose, "$name" a project parameter, "#result" the result of an earlier step.
+    A parameter "@point" is the pose of an action point, "$name" a project parameter, "#result" the result of an
+    earlier step.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Step(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Link(Struct, frozen=True, forbid_unknown_fields=True):
-    """A step of the logic, `when` the named result has the value."""
+    """A connection of the logic. With `result`, it is followed if the result has the value."""
 
     start: str
     end: str
@@ -88,18 +88,18 @@ class Workplace(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def load(file: Path | None = None) -> Workplace:
-    """Read a workplace; without a file the one that comes with the product."""
-    given = files(__package__) / "workplace.toml" if file is None else file
-    return msgspec.toml.decode(given.read_bytes(), type=Workplace)
+    """Read the description of a cell; the default is the demo cell."""
+    source = files(__package__) / "workplace.toml" if file is None else file
+    return msgspec.toml.decode(source.read_bytes(), type=Workplace)
 
 
 def markers_file() -> Any:
-    """Return the file that says where the markers lie that the camera sees."""
+    """Return the file with the poses of the markers in the view of the camera."""
     return files(__package__) / "markers.yaml"
 
 
 def layout_file() -> Any:
-    """Return the file that tells the small world where things physically stand."""
+    """Return the file with the positions in the simulated world."""
     return files(__package__) / "layout.json"
 
 
@@ -115,7 +115,7 @@ def _pose(position: Vector3, rotation: Vector3) -> Pose:
 
 
 class Creation:
-    """Makes the scene and the project where they are missing, and keeps addresses and constants up to date."""
+    """Creates scene and project if they are missing, and updates addresses and project parameters."""
 
     def __init__(self, client: Client, workplace: Workplace, addresses: dict[str, Scalar]) -> None:
         self._client = client
@@ -123,17 +123,17 @@ class Creation:
         self._addresses = addresses
 
     async def close_all(self) -> None:
-        """Close what the server reopened from a run that was cut off; edits that nobody saved are let go."""
-        with contextlib.suppress(RequestFailed):  # none is open
-            await self._client.call("CloseProject", rpc.CloseProjectArgs(force=True))
-            await self._client.next_event("ProjectClosed")  # with it goes what was told of the document before
+        """Close the document that the server opened after an interrupted run. Unsaved changes are lost."""
+        with contextlib.suppress(RequestFailed):  # no project is open
+            await self._client.close_project(force=True)
+            await self._client.next_event("ProjectClosed")  # discards earlier events of the document
         with contextlib.suppress(RequestFailed):
-            await self._client.call("CloseScene", rpc.CloseSceneArgs(force=True))
+            await self._client.close_scene(force=True)
             await self._client.next_event("SceneClosed")
 
     # ------------------------------------------------------------------------------------------------ scene
     def _settings(self, obj: Object, kinds: dict[str, str]) -> list[Parameter]:
-        """Return an object's settings; `kinds` are the types that its object type declares for them."""
+        """Return the settings of an object. `kinds` are the parameter types declared by its object type."""
         settings = []
         for name, value in obj.settings.items():
             if isinstance(value, str) and value.startswith("$"):
@@ -142,10 +142,10 @@ class Creation:
         return settings
 
     async def open_scene(self) -> Scene:
-        """Open the scene, made where it is missing, with the objects' addresses of this run; saved."""
-        known = {entry.name: entry.id for entry in await self._client.call("ListScenes")}
+        """Open or create the scene, set the addresses of the devices, and save it."""
+        known = {entry.name: entry.id for entry in await self._client.list_scenes()}
         if self._workplace.scene in known:
-            await self._client.call("OpenScene", rpc.IdArgs(known[self._workplace.scene]))
+            await self._client.open_scene(known[self._workplace.scene])
         else:
             await self._client.call("NewScene", rpc.NewSceneArgs(self._workplace.scene, self._workplace.description))
         event = await self._client.next_event("OpenScene")
@@ -153,7 +153,7 @@ class Creation:
         present = {obj.name: obj for obj in scene.objects}
         declared = {
             meta.type: {setting.name: setting.type for setting in meta.settings}
-            for meta in await self._client.call("GetObjectTypes")
+            for meta in await self._client.get_object_types()
         }
         for obj in self._workplace.objects:
             settings = self._settings(obj, declared.get(obj.type, {}))
@@ -164,9 +164,9 @@ class Creation:
                     "AddObjectToScene", rpc.AddObjectToSceneArgs(obj.name, obj.type, pose, settings)
                 )
             elif found.parameters != settings:
-                await self._client.call("WriteLock", rpc.WriteLockArgs(found.id))
+                await self._client.write_lock(found.id)
                 await self._client.call("UpdateObjectParameters", rpc.UpdateObjectParametersArgs(found.id, settings))
-                await self._client.call("WriteUnlock", rpc.WriteUnlockArgs(found.id))
+                await self._client.write_unlock(found.id)
         for box in self._workplace.obstacles:
             if box.name not in present:
                 model = ObjectModel(Model3dType.BOX, box=Box(box.name, *box.size))
@@ -174,16 +174,15 @@ class Creation:
                     "AddVirtualCollisionObjectToScene",
                     rpc.AddVirtualCollisionObjectToSceneArgs(box.name, _pose(box.position, (0.0, 0.0, 0.0)), model),
                 )
-        await self._client.call("SaveScene")
-        saved: Scene = await self._client.call("GetScene", rpc.IdArgs(scene.id))
-        return saved
+        await self._client.save_scene()
+        return await self._client.get_scene(scene.id)
 
     # ------------------------------------------------------------------------------------------------ project
     async def open_project(self, scene: Scene, constants: dict[str, Scalar]) -> Project:
-        """Open the project in the open scene, made where it is missing, with these constants; saved."""
-        known = {entry.name: entry.id for entry in await self._client.call("ListProjects")}
+        """Open or create the project of the open scene, set its project parameters, and save it."""
+        known = {entry.name: entry.id for entry in await self._client.list_projects()}
         if self._workplace.project in known:
-            await self._client.call("OpenProject", rpc.IdArgs(known[self._workplace.project]))
+            await self._client.open_project(known[self._workplace.project])
         else:
             await self._client.call(
                 "NewProject", rpc.NewProjectArgs(scene.id, self._workplace.project, self._workplace.description)
@@ -196,12 +195,8 @@ class Creation:
         else:
             changed = await self._set_constants(project, constants)
         if changed:
-            await self._client.call("SaveProject")
-        saved: Project = await self._client.call("GetProject", rpc.IdArgs(project.id))
-        return saved
-
-    async def _added(self, name: str) -> Event:
-        return await self._client.next_event(name)
+            await self._client.save_project()
+        return await self._client.get_project(project.id)
 
     async def _set_constants(self, project: Project, constants: dict[str, Scalar]) -> bool:
         changed = False
@@ -209,7 +204,7 @@ class Creation:
             wanted = constants.get(parameter.name)
             if wanted is None or parameter.value == _json(wanted):
                 continue
-            await self._client.call("WriteLock", rpc.WriteLockArgs(parameter.id))
+            await self._client.write_lock(parameter.id)
             await self._client.call(
                 "UpdateProjectParameter", rpc.UpdateProjectParameterArgs(parameter.id, value=_json(wanted))
             )
@@ -223,7 +218,7 @@ class Creation:
             await self._client.call(
                 "AddProjectParameter", rpc.AddProjectParameterArgs(name, _KINDS[type(value)], _json(value))
             )
-            parameters[name] = (await self._added("ProjectParameterChanged")).data.id
+            parameters[name] = (await self._client.next_event("ProjectParameterChanged")).data.id
         points: dict[str, str] = {}
         orientations: dict[str, str] = {}
         for point in self._workplace.points:
@@ -231,20 +226,20 @@ class Creation:
             await self._client.call(
                 "AddActionPoint", rpc.AddActionPointArgs(point.name, Position(*point.position), parent)
             )
-            points[point.name] = (await self._added("ActionPointChanged")).data.id
-            await self._client.call("WriteLock", rpc.WriteLockArgs(points[point.name]))
+            points[point.name] = (await self._client.next_event("ActionPointChanged")).data.id
+            await self._client.write_lock(points[point.name])
             await self._client.call(
                 "AddActionPointOrientation",
                 rpc.AddActionPointOrientationArgs(
                     points[point.name], Orientation.from_rotation_vector(*point.rotation)
                 ),
             )
-            orientations[point.name] = (await self._added("OrientationChanged")).data.id
-            await self._client.call("WriteUnlock", rpc.WriteUnlockArgs(points[point.name]))
+            orientations[point.name] = (await self._client.next_event("OrientationChanged")).data.id
+            await self._client.write_unlock(points[point.name])
         actions: dict[str, Action] = {}
         results: dict[str, str] = {}
         declared = {
-            obj.type: {action.name: action for action in await self._client.call("GetActions", rpc.TypeArgs(obj.type))}
+            obj.type: {action.name: action for action in await self._client.get_actions(obj.type)}
             for obj in self._workplace.objects
         }
         for step in self._workplace.steps:
@@ -259,7 +254,7 @@ class Creation:
                     points[step.point], step.name, f"{obj.id}/{step.action}", given, [Flow(outputs=step.results)]
                 ),
             )
-            added: Action = (await self._added("ActionChanged")).data
+            added: Action = (await self._client.next_event("ActionChanged")).data
             actions[step.name] = added
             results |= {result: f"{added.id}/default/{number}" for number, result in enumerate(step.results)}
         for link in self._workplace.logic:
@@ -288,10 +283,8 @@ class Creation:
                 action=step.action,
                 other_name=name,
             )
-        if isinstance(value, str) and value.startswith("@"):
-            return ActionParameter(name, meta.type, _json(orientations[value[1:]]))
-        if isinstance(value, str) and value.startswith("$"):
-            return ActionParameter(name, "project_parameter", _json(parameters[value[1:]]))
-        if isinstance(value, str) and value.startswith("#"):
-            return ActionParameter(name, "link", _json(results[value[1:]]))
+        references = {"@": (meta.type, orientations), "$": ("project_parameter", parameters), "#": ("link", results)}
+        if isinstance(value, str) and value[:1] in references:
+            kind, ids = references[value[0]]
+            return ActionParameter(name, kind, _json(ids[value[1:]]))
         return ActionParameter(name, meta.type, _json(value))

@@ -206,7 +206,7 @@ def test_an_exported_project_is_imported_and_builds_on_an_empty_server(cli: Any,
     assert (again.status, "--force" in again.err) == (ExitStatus.CONFLICT, True)
     assert cli("project", "export", "open it", "--force", at=place.first).status == 0
     assert Path("open_it.zip").read_bytes() == first
-    assert cli("project", "validate", "open_it.zip") == (0, "open_it.zip: project open it is sound\n", "")
+    assert cli("project", "validate", "open_it.zip") == (0, "open_it.zip: project open it has no problems\n", "")
 
     dry = cli("project", "import", "open_it.zip", "--dry-run", at=place.second)
     assert dry.status == 0
@@ -226,7 +226,7 @@ def test_an_exported_project_is_imported_and_builds_on_an_empty_server(cli: Any,
     once_more = cli("project", "import", "open_it.zip", at=place.second)
     assert {line.partition(": ")[2] for line in once_more.out.splitlines()} == {"same"}
     same = cli("project", "diff", "open_it.zip", "open it", at=place.second)
-    assert same == (0, "There is no difference.\n", "")
+    assert same == (0, "No differences.\n", "")
 
 
 async def _picture(client: Client) -> Any:
@@ -377,7 +377,7 @@ def test_a_copy_gets_its_own_name_and_id(cli: Any, place: Place) -> None:
     listed = {one["name"]: one["id"] for one in json.loads(cli("scene", "list", "--json", at=place.second).out)}
     # A project's file holds its scene, too.
     cli("project", "export", "open it", at=place.first)
-    assert cli("scene", "diff", "open_it.zip", "bench.zip") == (0, "There is no difference.\n", "")
+    assert cli("scene", "diff", "open_it.zip", "bench.zip") == (0, "No differences.\n", "")
     assert listed.keys() >= {"bench", "bench two"}
     assert listed["bench"] != listed["bench two"]
     taken = cli("scene", "import", "bench.zip", "--name", "bench two", at=place.second)
@@ -602,7 +602,7 @@ def test_failures_have_an_exit_status(cli: Any, place: Place, exported: Path, tm
         (("project", "import", "missing.zip", "--url", place.first), ExitStatus.NOT_FOUND, "missing.zip"),
         (("project", "validate", "none.zip"), ExitStatus.DOCUMENT_PROBLEMS, "none.zip"),
         (("project", "validate", "half.zip"), ExitStatus.DOCUMENT_PROBLEMS, "no usable zip"),
-        (("project", "validate"), ExitStatus.USAGE, "give the files"),
+        (("project", "validate"), ExitStatus.USAGE, "specify the files"),
         (("scene", "list", "--ca", "none.zip", "--url", place.first), ExitStatus.CERTIFICATE_UNUSABLE, "none.zip"),
         (("scene", "export", "bench", "-o", "no/where.zip", "--url", place.first), ExitStatus.FAILED, "written"),
     ):

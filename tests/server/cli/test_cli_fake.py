@@ -114,7 +114,7 @@ def test_a_fake_of_another_distribution_is_listed(
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_fake_in_the_foreground_prints_its_address_and_ends_cleanly(number: signal.Signals) -> None:
     running = Running("conveyor", "--", "--node", "7")
-    assert running.said == "conveyor is ready; Ctrl-C ends it\n"
+    assert running.said == "conveyor is ready; press Ctrl-C to stop it\n"
     assert running.at["node"] == "7"
     assert re.fullmatch(r"127\.0\.0\.1:\d+", running.at["can"])
     assert running.end(number) == 0
@@ -123,7 +123,7 @@ def test_a_fake_in_the_foreground_prints_its_address_and_ends_cleanly(number: si
 def test_run_reports_errors() -> None:
     unknown = arcor2_hw_fake("run", "toaster")
     assert unknown.returncode == 9
-    assert unknown.stderr.startswith("arcor2-hw fake run: there is no fake toaster; there are ")
+    assert unknown.stderr.startswith("arcor2-hw fake run: there is no fake toaster; installed: ")
     assert arcor2_hw_fake("run", "conveyor", "--", "--node", "700").returncode == 2
     assert arcor2_hw_fake("run", "conveyor", "--", "--host", "203.0.113.1").returncode == 1
 
@@ -176,7 +176,7 @@ def test_names_are_read_from_the_running_demo(tester: Running, tmp_path: Path) -
         "reader": {"control": "127.0.0.1:1"},
     }
     nothing = arcor2_hw_fake("fault", "tester", "heal", "--data-dir", str(tmp_path))
-    assert (nothing.returncode, "no demo runs" in nothing.stderr) == (9, True)
+    assert (nothing.returncode, "no demo is running" in nothing.stderr) == (9, True)
     (tmp_path / "demo.json").write_text(json.dumps(where))
     assert arcor2_hw_fake("fault", "tester", "heal", "--data-dir", str(tmp_path)).returncode == 0
     unknown = arcor2_hw_fake("fault", "url", "heal", "--data-dir", str(tmp_path))

@@ -73,7 +73,7 @@ def test_related_types_are_uploaded_together_and_separately(
     helper = sources / "gains.py"
     helper.write_text("SLOW = 0.1\n")
     arm.write_text(f"{arm.read_text()}\n\nfrom .gains import SLOW\n")
-    assert object_type(server, "add", helper).stdout == "gains added\n"
+    assert object_type(server, "add", helper).stdout == "gains uploaded\n"
     lonely = object_type(server, "add", arm)
     assert lonely.returncode == ExitStatus.ANALYSIS_PROBLEMS
     assert "arm_m1.py:3: the imported module abstract_arm does not exist" in lonely.stderr
@@ -97,7 +97,7 @@ def test_related_types_are_uploaded_together_and_separately(
     flow = sources / "flow_actions.py"
     flow.write_text("from arcor2_hw.objects import Generic\n\n\nclass FlowActions(Generic):\n    _ABSTRACT = False\n")
     notice = object_type(server, "add", flow).stdout
-    assert "FlowActions takes the place of the installed type of arcor2-hw" in notice
+    assert "FlowActions replaces the installed type of arcor2-hw" in notice
     assert "until you remove it" in notice
     exported = sources / "flow.zip"
     assert object_type(server, "export", "FlowActions", "--output", exported).returncode == 0
@@ -117,7 +117,7 @@ def test_invalid_types_are_refused(sources: Path, object_type: Cli) -> None:
     cases = (
         ((two,), ExitStatus.USAGE, "--name: A, B"),
         ((two, "--name", "C"), ExitStatus.USAGE, "--name: A, B"),
-        ((), ExitStatus.USAGE, "give the files"),
+        ((), ExitStatus.USAGE, "specify the files"),
         ((two, wrong, "--name", "A"), ExitStatus.USAGE, "only with one file"),
         ((wrong,), ExitStatus.ANALYSIS_PROBLEMS, "wrong.py:1"),
         ((sources / "nothing.py",), ExitStatus.NOT_FOUND, "nothing.py"),

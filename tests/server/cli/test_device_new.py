@@ -114,11 +114,11 @@ def test_the_drivers_are_typed(tmp_path: Path, pytestconfig: pytest.Config) -> N
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["arm", "--base", "robot", "--bus", "modbus"], "a robot needs its model"),
-        (["eye", "--base", "camera", "--bus", "serial"], "a camera is reached by its maker's library"),
+        (["arm", "--base", "robot", "--bus", "modbus"], "no template for robots"),
+        (["eye", "--base", "camera", "--bus", "serial"], "no template for cameras"),
         (["belt", "--base", "machine", "--bus", "can"], "object dictionary"),
-        (["Press!", "--base", "machine", "--bus", "modbus"], "cannot name a module"),
-        (["class", "--base", "machine", "--bus", "modbus"], "cannot name a module"),
+        (["Press!", "--base", "machine", "--bus", "modbus"], "invalid name"),
+        (["class", "--base", "machine", "--bus", "modbus"], "invalid name"),
         (["press", "--base", "lamp", "--bus", "modbus"], "lamp"),
     ],
 )
@@ -141,7 +141,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
     again = [*COMMAND, "device", "new", "scanner", "--base", "machine", "--bus", "tcp", "--directory", str(tmp_path)]
     done = subprocess.run(again, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert "is there already" in done.stderr
+    assert "already exists" in done.stderr
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 

@@ -255,7 +255,7 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
     assert "failed" in newest
     assert "acp_nowhere" in newest
     assert "stopped" in older
-    assert await package_command(server, "runs", "pkg_none") == ["Nothing was run yet."]
+    assert await package_command(server, "runs", "pkg_none") == ["There are no runs."]
 
 
 async def package_command(server: ServerProcess, *arguments: str) -> list[str]:
