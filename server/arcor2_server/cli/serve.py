@@ -63,7 +63,7 @@ def serve(
     data_dir: Path | None = None,
     cell: Path | None = None,
     markers: Annotated[Path | None, Parameter(env_var="ARCOR2_HW_MARKERS")] = None,
-    tls: tuple[Path, Path] | None = None,
+    tls: Annotated[tuple[Path, Path] | None, Parameter(negative="")] = None,
     self_signed: bool = False,
     insecure: bool = False,
     legacy_listen: str | None = None,
