@@ -126,9 +126,7 @@ def test_a_driver_that_imports_server_code_is_refused(line: str, driver: Package
         files_of(inputs)
 
 
-def test_links_out_of_a_driver_folder_are_not_followed(
-    driver: PackageType, inputs: BuildInput, tmp_path: Path
-) -> None:
+def test_links_out_of_a_driver_folder_are_not_followed(driver: PackageType, inputs: BuildInput, tmp_path: Path) -> None:
     assert driver.folder is not None
     (tmp_path / "secret").write_text("secret")
     (driver.folder / "innocent.txt").symlink_to(tmp_path / "secret")
