@@ -59,12 +59,12 @@ def test_refused_results_are_stored_separately_and_named(fake: FakeProcess, erp:
 def test_results_that_wait_too_long_raise_an_alarm(
     fake: FakeProcess, make: Callable[..., ErpService], order: str
 ) -> None:
-    erp = make(fake.ready["url"], waiting_alarm=0.4)
+    erp = make(fake.ready["url"], waiting_alarm=1.0)
     erp.connect()
     fake.control.do("fail", status=503, count=-1, path="/results")
     erp.report_result(order, "S-1", True)
     assert erp.alarms() == []
-    time.sleep(0.5)
+    time.sleep(1.5)
     (alarm,) = erp.alarms()
     assert alarm.code == "results_wait"
     assert "503" in alarm.text

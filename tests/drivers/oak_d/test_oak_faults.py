@@ -1,5 +1,6 @@
 """Faults of the OAK-D: each is a typed error that names the camera, and the driver recovers."""
 
+import contextlib
 import subprocess
 import sys
 import threading
@@ -65,9 +66,15 @@ def test_a_frozen_picture_is_stale(fake: FakeProcess, camera: OakD) -> None:
     wait(lambda: fresh(camera))
 
 
+def next_frame(camera: OakD) -> None:
+    """Wait for a frame that shows what was changed before the call."""
+    with contextlib.suppress(DeviceFault):
+        camera.trigger()
+
+
 def test_invalid_pictures_are_errors(fake: FakeProcess, camera: OakD) -> None:
     fake.control.do("lens_covered")
-    time.sleep(0.1)
+    next_frame(camera)
     with pytest.raises(DeviceFault, match=r"^camera at .*: the image is black") as covered:
         camera.color_image()
     assert covered.value.fault_code == "dark"
@@ -75,13 +82,13 @@ def test_invalid_pictures_are_errors(fake: FakeProcess, camera: OakD) -> None:
         camera.depth_image()
     fake.control.do("heal")
     fake.control.do("overexposed")
-    time.sleep(0.1)
+    next_frame(camera)
     with pytest.raises(Overexposed, match=r"^camera at .* of the image is white"):
         camera.color_image()
     assert camera.depth_image().size == (640, 360)
     fake.control.do("heal")
     fake.control.do("depth_off")
-    time.sleep(0.1)
+    next_frame(camera)
     assert camera.color_image().size == (640, 360)
     frame = camera.trigger()
     assert frame.depth is None

@@ -235,7 +235,7 @@ def test_one_motion_at_a_time(ready: UR5e, fake: FakeUr) -> None:
 
 def test_manual_mode_limits_the_tcp_speed(ready: UR5e, fake: FakeUr) -> None:
     fake.do("operational_mode", mode="MANUAL")
-    time.sleep(0.55)  # the mode is read twice a second
+    time.sleep(1.5)  # the mode is read twice a second
     speeds = []
     for move in (
         lambda: ready.move_to_joints(turned(ready, 0.08), 1.0),
