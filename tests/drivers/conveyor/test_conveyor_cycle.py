@@ -122,7 +122,7 @@ def test_a_fault_ends_the_move_with_its_text_and_is_reset(fake: FakeProcess, bel
     belt.run(0.3)
     fake.control.do("follow_error")
     fake.control.wait_until(lambda t: t["state"] == "fault")
-    with pytest.raises(DeviceFault, match="refused in state Fault: fault 8611h, following error; see that"):
+    with pytest.raises(DeviceFault, match="refused in state Fault: fault 8611h, following error; check that"):
         belt.run(0.1)
     assert belt.health is Health.FAILURE
     (alarm,) = belt.alarms()

@@ -23,7 +23,7 @@ def test_a_node_removed_during_a_connection_is_named(
         plc.read("level")
     assert plc.read_digital("door") is True
     plc.disconnect()
-    with pytest.raises(DeviceFault, match=r"level \(ns=2;s=Cell.Level\) is not there"):
+    with pytest.raises(DeviceFault, match=r"level \(ns=2;s=Cell.Level\) does not exist"):
         plc.connect()
 
 
