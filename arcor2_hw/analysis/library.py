@@ -12,7 +12,7 @@ from arcor2_hw.analysis.enumerations import enumerations_of
 from arcor2_hw.analysis.hierarchy import Hierarchy, is_known_library
 from arcor2_hw.analysis.keywords import keyword_only
 from arcor2_hw.analysis.module import ClassInfo, Import, Module, Value, garbage_collection_disabled
-from arcor2_hw.analysis.presentation import of_type
+from arcor2_hw.analysis.presentation import display_name, of_type
 from arcor2_hw.analysis.robots import robot_meta
 from arcor2_hw.analysis.settings import SettingsReader
 from arcor2_hw.analysis.source import Broken, Problem, SourceFile, Stamp, sendable, stamp_of
@@ -304,7 +304,7 @@ class Library:
             settings=settings,
         )
         category, icon = of_type(info, hierarchy)
-        meta = msgspec.structs.replace(meta, category=category, icon=icon)
+        meta = msgspec.structs.replace(meta, display_name=display_name(info, hierarchy), category=category, icon=icon)
         direct = hierarchy.bases(info)
         actions = tuple(self._all_actions(info, bases))
         return TypeAnalysis(

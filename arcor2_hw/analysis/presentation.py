@@ -1,4 +1,4 @@
-"""Category and icon of a type and its actions in the editor."""
+"""Display name of a type, category and icon of a type and its actions in the editor."""
 
 import ast
 import re
@@ -34,7 +34,17 @@ def of_type(info: ClassInfo, hierarchy: Hierarchy) -> Presentation:
         except Broken:
             return None
 
-    return Presentation(_category(text("category")), _icon(text("icon")))
+    return Presentation(_title(text("category")), _icon(text("icon")))
+
+
+def display_name(info: ClassInfo, hierarchy: Hierarchy) -> str | Unset:
+    """Return the class attribute `display_name` of the type itself; an invalid value is ignored."""
+    if "display_name" not in info.members:
+        return UNSET
+    try:
+        return _title(hierarchy.attribute(info, "display_name"))
+    except Broken:
+        return UNSET
 
 
 def of_action(node: FunctionNode, owner: ClassInfo, inherited: Presentation, hierarchy: Hierarchy) -> Presentation:
@@ -49,7 +59,7 @@ def of_action(node: FunctionNode, owner: ClassInfo, inherited: Presentation, hie
         for keyword in decorator.keywords:
             if keyword.arg in ("category", "icon"):
                 given[keyword.arg] = constant(keyword.value, owner.module, owner, resolver)
-        category, icon = _category(given.get("category")), _icon(given.get("icon"))
+        category, icon = _title(given.get("category")), _icon(given.get("icon"))
         for name, value in (("category", category), ("icon", icon)):
             if name in given and isinstance(value, Unset):
                 raise owner.problem(f"{node.name}: {given[name]!r:.60} is not a valid {name}", decorator)
@@ -60,7 +70,7 @@ def of_action(node: FunctionNode, owner: ClassInfo, inherited: Presentation, hie
     return inherited
 
 
-def _category(value: object) -> str | Unset:
+def _title(value: object) -> str | Unset:
     if not isinstance(value, str) or not value.strip() or len(value) > _LONGEST or not value.isprintable():
         return UNSET
     return sendable(value.strip())

@@ -529,6 +529,7 @@ class Requests(ABC):
         problem: str | Unset = UNSET,
         settings: Sequence[ParameterMeta] = (),
         modified: str | Unset = UNSET,
+        display_name: str | Unset = UNSET,
         category: str | Unset = UNSET,
         icon: str | Unset = UNSET,
         shadows: str | Unset = UNSET,

@@ -167,8 +167,9 @@ def find_action(actions: Iterable[ObjectAction], name: str) -> ObjectAction | No
 
 
 class ObjectTypeMeta(Data, frozen=True):
-    """Metadata of an object type; category, icon and shadows are not in ARCOR2.
+    """Metadata of an object type; display_name, category, icon and shadows are not in ARCOR2.
 
+    display_name: name for users; omitted when the type declares none.
     built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
     installed type of the same name that this uploaded type replaces.
     """
@@ -185,6 +186,7 @@ class ObjectTypeMeta(Data, frozen=True):
     problem: str | Unset = UNSET
     settings: list[ParameterMeta] = field(default_factory=list)
     modified: Timestamp | Unset = UNSET
+    display_name: str | Unset = UNSET
     category: str | Unset = UNSET
     icon: str | Unset = UNSET
     shadows: str | Unset = UNSET

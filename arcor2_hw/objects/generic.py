@@ -29,6 +29,7 @@ class Generic(abc.ABC):
         own_process: Whether instances run in their own process, so that their computations do not delay other devices.
         DYNAMIC_PARAMS: {parameter: (method that returns its values, names of the parameters it needs)}.
         CANCEL_MAPPING: {action: method that cancels it}.
+        display_name: Name of the type in the editor, such as "Luxonis OAK-D"; not inherited. Default: the class name.
         category: Category in the editor.
         icon: Icon in the editor.
     """
@@ -39,6 +40,7 @@ class Generic(abc.ABC):
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
     loss_ends_program: ClassVar[bool] = True
     own_process: ClassVar[bool] = False
+    display_name: ClassVar[str] = ""
     category: ClassVar[str] = ""
     icon: ClassVar[str] = ""
 

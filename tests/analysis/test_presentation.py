@@ -31,6 +31,7 @@ class OvenSettings(Settings):
 
 class Oven(Generic):
     _ABSTRACT = False
+    display_name = "Oven 3000"
     category = HEADING
     icon = "oven"
 
@@ -89,6 +90,7 @@ def library() -> Library:
 def test_category_and_icon_come_from_the_class(library: Library) -> None:
     oven, grill = library.analyse("Oven"), library.analyse("GrillOven")
     assert (oven.meta.category, oven.meta.icon) == ("Heat", "oven")
+    assert (oven.meta.display_name, grill.meta.display_name) == ("Oven 3000", UNSET)
     assert (grill.meta.category, grill.meta.icon) == ("Heat", "grill")
     shown = {action.name: (action.category, action.icon) for action in grill.actions}
     assert shown == {"heat": ("Heat", "grill"), "open": ("Door", "door-open"), "close": (UNSET, UNSET)}

@@ -10,7 +10,7 @@ from arcor2_hw.data import rpc
 
 TYPES = ("shelf", "old_feeder")
 """Uploaded object types, by the names of their files."""
-TEXTS = {"description", "problem", "modified"}
+TEXTS = {"description", "display_name", "problem", "modified"}
 
 
 def without_texts(value: Any) -> Any:

@@ -19,6 +19,7 @@ class CounterActions(Generic):
     category = "Program"
     icon = "counter"
     _ABSTRACT = False
+    display_name = "Counters"
 
     def __init__(self, obj_id: str, name: str, settings: CounterSettings | None = None) -> None:
         super().__init__(obj_id, name, settings)

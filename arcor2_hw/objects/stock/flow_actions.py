@@ -14,6 +14,7 @@ class FlowActions(Generic):
     category = "Program"
     icon = "flow"
     _ABSTRACT = False
+    display_name = "Program flow"
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"wait": "cancel"}
 
     def __init__(self, obj_id: str, name: str, settings: Settings | None = None) -> None:

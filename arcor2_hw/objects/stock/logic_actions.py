@@ -10,6 +10,7 @@ class LogicActions(Generic):
     category = "Program"
     icon = "logic"
     _ABSTRACT = False
+    display_name = "Logic"
 
     # ------------------------------------------------------------------------------------ numbers
     @action

@@ -21,6 +21,7 @@ class RandomActions(Generic):
     category = "Program"
     icon = "random"
     _ABSTRACT = False
+    display_name = "Random numbers"
 
     def __init__(self, obj_id: str, name: str, settings: RandomSettings | None = None) -> None:
         super().__init__(obj_id, name, settings)

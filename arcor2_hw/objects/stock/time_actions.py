@@ -15,6 +15,7 @@ class TimeActions(Generic):
     category = "Program"
     icon = "time"
     _ABSTRACT = False
+    display_name = "Time"
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"sleep": "cancel"}
 
     def __init__(self, obj_id: str, name: str, settings: Settings | None = None) -> None:

@@ -49,6 +49,7 @@ class YuMi(Hands, Connected, MultiArmRobot):
     """ABB YuMi (IRB 14000): two arms of seven axes, 0.5 kg each, 559 mm."""
 
     _ABSTRACT = False
+    display_name = "ABB YuMi"
     robot_type = RobotType.ARTICULATED
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(FROZEN_AFTER + LONGEST_WATCHDOG + BRAKES_WITHIN)
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {

@@ -27,6 +27,7 @@ class BarcodeReader(LineDevice, Reader):
     """A fixed-mount barcode reader on a serial line or TCP."""
 
     _ABSTRACT = False
+    display_name = "Barcode reader"
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(1.0)  # by the timeout of the reader
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"scan": "stop", "code_present": "stop"}
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {

@@ -28,6 +28,7 @@ class Bin(Connected, GenericWithPose):
     """
 
     _ABSTRACT = False
+    display_name = "Bin"
     category = "Containers"
     icon = "bin"
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()  # there is no device

@@ -25,6 +25,7 @@ class Blister(Connected, GenericWithPose):
     """
 
     _ABSTRACT = False
+    display_name = "Blister"
     category = "Containers"
     icon = "blister"
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()  # there is no device

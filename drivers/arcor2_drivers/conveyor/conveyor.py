@@ -27,6 +27,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
     """A belt conveyor with a servo drive (CANopen, CiA 402)."""
 
     _ABSTRACT = False
+    display_name = "Conveyor"
     states: ClassVar[frozenset[MachineState]] = STATES
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(
         LONGEST_HEARTBEAT / 1000.0 + NOTICES + LONGEST_RAMP

@@ -43,6 +43,7 @@ class DobotMagician(HoldsParts, SingleArm):
     """Dobot Magician: four axes, 0.5 kg, 320 mm, with suction cup or gripper."""
 
     _ABSTRACT = False
+    display_name = "Dobot Magician"
     robot_type: ClassVar[RobotType] = RobotType.ARTICULATED
     urdf_package_name = "dobot_magician.zip"
     # The arm has no watchdog: it completes a motion that was started. There is never a second one in its queue.

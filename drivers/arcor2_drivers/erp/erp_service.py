@@ -48,6 +48,7 @@ class ErpService(Connected, Generic):
     """A production planning service (ERP): orders in, results out, each exactly once."""
 
     _ABSTRACT = False
+    display_name = "ERP service"
     category = "Services"
     icon = "service"
     loss_reaction: ClassVar[LossReaction] = LossReaction.continues()  # it also plans for other stations

@@ -26,6 +26,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
     """A station that contacts a printed circuit board, runs a test program and reports pass or fail."""
 
     _ABSTRACT = False
+    display_name = "Functional tester"
     states: ClassVar[frozenset[MachineState]] = STATES
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(LONGEST_WATCHDOG / 1000.0 + ABORTS_WITHIN)
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"test": "stop", "open_door": "stop", "close_door": "stop"}

@@ -47,6 +47,7 @@ class ZplPrinter(LineDevice, Printer):
     """A label printer that speaks ZPL, on a serial line or TCP."""
 
     _ABSTRACT = False
+    display_name = "ZPL label printer"
     loss_reaction: ClassVar[LossReaction] = LossReaction.continues()  # it finishes what it has received
     ALARMS: ClassVar[Mapping[str, AlarmText]] = _ALARMS
     poll_period = STATUS_PERIOD

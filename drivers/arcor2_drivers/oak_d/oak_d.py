@@ -42,6 +42,7 @@ class OakD(ImageStream, Camera):
     """An OAK-D camera: colour with depth in the same view, over USB, Ethernet or a network source."""
 
     _ABSTRACT = False
+    display_name = "Luxonis OAK-D"
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()  # it has no moving parts
 
     def __init__(

@@ -27,6 +27,7 @@ class OpcUaPlc(PointActions, Connected, IOBlock):
     """A PLC over OPC UA: named points, and jobs that are run by a handshake."""
 
     _ABSTRACT = False
+    display_name = "OPC UA PLC"
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(LONGEST_PATIENCE + STOP_TIME)
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"run_job": "stop", "wait_for": "stop"}
 

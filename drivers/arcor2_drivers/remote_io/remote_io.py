@@ -20,6 +20,7 @@ class RemoteIO(PointActions, Block, IOBlock):
     """A remote I/O block on Modbus: named digital and analogue points."""
 
     _ABSTRACT = False
+    display_name = "Remote I/O"
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"wait_for": "stop", "pulse": "stop"}
 
     def __init__(self, obj_id: str, name: str, settings: RemoteIOSettings | None = None) -> None:

@@ -46,6 +46,7 @@ class TowerLight(Block, Generic):
     """A tower light at the outputs of a remote I/O block."""
 
     _ABSTRACT = False
+    display_name = "Tower light"
     category = "Signals"
     icon = "light"
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"buzz": "stop"}

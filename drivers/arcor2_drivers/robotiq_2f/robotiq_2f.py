@@ -43,6 +43,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
     """A Robotiq 2F-85 or 2F-140 adaptive gripper, on a robot's URCap or on Modbus RTU."""
 
     _ABSTRACT = False
+    display_name = "Robotiq 2F gripper"
     # The gripper finishes its motion, then holds: spindle and spring are self-locking.
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"activate": "stop", "grip": "stop", "release": "stop"}

@@ -46,6 +46,7 @@ class MtSicsScale(LineDevice, Scale):
     """A scale with MT-SICS commands, on a serial line or TCP."""
 
     _ABSTRACT = False
+    display_name = "Mettler Toledo scale"
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"weight": "stop", "weight_within": "stop"}
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {

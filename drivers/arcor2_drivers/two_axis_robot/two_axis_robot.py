@@ -26,6 +26,7 @@ class TwoAxisRobot(SingleArm):
     """A planar arm of two Dynamixel servos for fine manipulation."""
 
     _ABSTRACT = False
+    display_name = "Two-axis robot"
     robot_type = RobotType.SCARA
     urdf_package_name = "two_axis_robot.zip"
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(FROZEN_AFTER + LONGEST_WATCHDOG + 0.1)

@@ -8,6 +8,7 @@ class UR5e(UniversalRobot):
     """Universal Robots UR5e: six axes, 5 kg, 850 mm."""
 
     _ABSTRACT = False
+    display_name = "Universal Robots UR5e"
     urdf_package_name = "ur5e.zip"
     model = UR5E
 
@@ -16,6 +17,7 @@ class UR3e(UniversalRobot):
     """Universal Robots UR3e: six axes, 3 kg, 500 mm."""
 
     _ABSTRACT = False
+    display_name = "Universal Robots UR3e"
     urdf_package_name = "ur3e.zip"
     model = UR3E
 
@@ -24,5 +26,6 @@ class UR10e(UniversalRobot):
     """Universal Robots UR10e: six axes, 12.5 kg, 1300 mm."""
 
     _ABSTRACT = False
+    display_name = "Universal Robots UR10e"
     urdf_package_name = "ur10e.zip"
     model = UR10E

@@ -36,6 +36,7 @@ class SuctionGripper(Connected, Suction):
     """A vacuum gripper on the outputs of a robot or I/O block."""
 
     _ABSTRACT = False
+    display_name = "Suction gripper"
     loss_reaction: ClassVar[LossReaction] = LossReaction.holds()
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"grip": "stop", "release": "stop", "blow_off": "stop"}
     ALARMS: ClassVar = {PART_LOST: AlarmText("The gripped part was lost.", "Find the part, then acknowledge.")}

@@ -41,7 +41,7 @@ DIFFERENT = {
 }
 """Deliberate differences by the number of the request; docs/protocol.md has them."""
 
-ADDED = ("category", "icon")
+ADDED = ("category", "display_name", "icon")
 """Fields that we add to what is recorded; clients pass over what they do not know."""
 
 Messages = dict[str, list[dict[str, Any]]]
