@@ -5,7 +5,15 @@ import inspect
 from pathlib import Path
 from typing import Final
 
-from arcor2_hw.analysis import InstalledType, Library, SourceFile, TypeAnalysis, installed_types
+from arcor2_hw.analysis import (
+    InstalledType,
+    Library,
+    SourceFile,
+    TypeAnalysis,
+    installed_types,
+    templates,
+    translations,
+)
 from arcor2_hw.analysis.library import NO_DESCRIPTION
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
@@ -50,6 +58,21 @@ def faults(file: SourceFile) -> list[str]:
     if unnamed := own - set(claims.actions_of(file.name)):
         wrong.append(f"quality.yaml: actions does not name {', '.join(sorted(unnamed))} of {file.name}")
     return wrong
+
+
+def texts(file: SourceFile) -> set[str]:
+    """Return the texts of a driver that can be translated: of all object types and messages in its folder."""
+    folder = Path(file.path).parent
+    kinds = [each.file for each in drivers() if each.folder == str(folder) and each.file is not None] or [file]
+    library = Library(kinds)
+    found = {template.key for template in templates.templates(templates.sources(folder))}
+    return found.union(*(translations.texts_of(library.analyse(each.name)) for each in kinds))
+
+
+def translation_faults(file: SourceFile) -> list[str]:
+    """Return a sentence for each fault of the translations of a driver."""
+    folder = Path(file.path).parent
+    return translations.faults(folder, texts(file)) if (folder / translations.FOLDER).is_dir() else []
 
 
 def _is_base(origin: str) -> bool:

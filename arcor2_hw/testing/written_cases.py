@@ -15,6 +15,11 @@ class WrittenCases:
         assert not wrong, "; ".join(wrong)
         assert not arcor2_bench.object_type.abstract()
 
+    def test_translations_match(self, arcor2_bench: Bench) -> None:
+        """Translations are valid JSON, translate texts of the driver, and contain the fields of their templates."""
+        wrong = declarations.translation_faults(declarations.source_of(arcor2_bench.object_type))
+        assert not wrong, "; ".join(wrong)
+
     def test_types_complete(self, arcor2_bench: Bench) -> None:
         """Every public method has a type hint for each parameter and for the result."""
         lacking = capabilities.unhinted(arcor2_bench.object_type)

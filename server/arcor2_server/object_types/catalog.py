@@ -48,6 +48,10 @@ class TypeCatalog:
         self._known = Known()
 
     # ------------------------------------------------------------------------------------------------ look-ups
+    def installed_folders(self) -> list[Path]:
+        """Return the folders of installed types, sorted."""
+        return sorted({Path(each.folder) for each in self._installed.values() if each.folder})
+
     @property
     def digest(self) -> str:
         """A digest of all types, robots and actions, which does not depend on the process."""

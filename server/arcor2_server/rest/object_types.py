@@ -1,5 +1,6 @@
 """Object types over REST (protocol, sections 9.1 and 13)."""
 
+import asyncio
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,8 +11,10 @@ from arcor2_hw.data.base import Data, Timestamp, Unset, is_valid_name
 from arcor2_hw.data.object_type import Model3dType, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
+from arcor2_server.object_types import translations
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.rest.general import SERVER
 from arcor2_server.rest.models import MetaModel3d
 from arcor2_server.rest.operations import operation
 from arcor2_server.rest.scenes import STORAGE, IdDesc
@@ -46,6 +49,11 @@ class ObjectTypeOperations:
     _storage: Storage
     _types: ObjectTypes
     _type_notifications: TypeNotifications
+
+    @operation("GET", "/api/translations/{language}", SERVER, Role.OPERATOR, plain=True, open=True)
+    async def translations(self, language: str) -> dict[str, str]:
+        """Return the translations of messages and of texts of installed types into a language, by English text."""
+        return await asyncio.to_thread(translations.into, language, self._types.installed_folders())
 
     @operation("GET", "/object-types", STORAGE, Role.OPERATOR)
     async def list_object_types(self) -> list[IdDesc]:

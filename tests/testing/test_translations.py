@@ -1,0 +1,81 @@
+"""Checks of the translations of a driver, and of the templates that they translate."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from arcor2_hw.analysis.templates import LIBRARY, sources, templates
+from arcor2_hw.analysis.translations import FOLDER, faults, is_language
+from arcor2_hw.testing import declarations
+
+ROOT = LIBRARY.parent
+DRIVER = '''
+from arcor2_hw.exceptions import DeviceTimeout, Refused
+from arcor2_hw.messages import Message
+
+
+class Jammed(Refused):
+    """It is jammed."""
+
+
+def problems(self, open):
+    yield DeviceTimeout("{device} did not answer within {limit:.1f} s.", "detail", device=self.who, limit=1)
+    yield Jammed("Remove the {x}." if open else "Open it.")
+    yield Message.of("{count} parts", count=2)
+    yield ValueError("not a message")
+    yield Refused(str(self))
+'''
+
+
+def keys(folder: Path) -> set[str]:
+    (folder / "driver.py").write_text(DRIVER)
+    return {each.key for each in templates(sources(folder))}
+
+
+def test_templates_are_found_in_errors_and_messages(tmp_path: Path) -> None:
+    expected = {"{device} did not answer within {limit} s.", "Remove the {x}.", "Open it.", "{count} parts"}
+    assert keys(tmp_path) == expected
+
+
+def test_every_template_gets_the_values_of_its_fields() -> None:
+    files = [path for folder in ("arcor2_hw", "server", "drivers") for path in sources(ROOT / folder)]
+    found = templates(files)
+    assert len(found) > 1000
+    assert [each for each in found if not each.fields <= each.values] == []
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ('{"{count} parts": "{count} dílů", "Open it.": "Otevřete."}', ""),
+        ('{"{count} parts": "díly"}', "differ in {count}"),
+        ('{"{count} parts": "{count} {kusy}"}', "differ in {kusy}"),
+        ('{"{count} parts": "{count"}', "malformed"),
+        ('{"{count} parts": " "}', "is empty"),
+        ('{"{count} pieces": "{count} dílů"}', "has no text '{count} pieces'"),
+        ('{"{count} parts": 3}', "not a JSON object of texts"),
+        ("{", "not a JSON object of texts"),
+    ],
+)
+def test_faults_of_translations_are_named(tmp_path: Path, content: str, problem: str) -> None:
+    file = tmp_path / FOLDER / "cs.json"
+    file.parent.mkdir()
+    file.write_text(content)
+    found = faults(tmp_path, keys(tmp_path))
+    assert len(found) == bool(problem)
+    assert problem in "".join(found)
+
+
+def test_a_file_is_named_by_its_language(tmp_path: Path) -> None:
+    (tmp_path / FOLDER).mkdir()
+    (tmp_path / FOLDER / "czech.json").write_text(json.dumps({}))
+    assert "not named by a language" in faults(tmp_path, ())[0]
+    assert [name for name in ("cs", "pt-BR", "CS", "../cs", "czech") if is_language(name)] == ["cs", "pt-BR"]
+
+
+def test_texts_of_the_type_are_known_too() -> None:
+    scale = next(each for each in declarations.drivers() if each.name == "MtSicsScale")
+    assert scale.file is not None
+    known = declarations.texts(scale.file)
+    assert {"Mettler Toledo scale", "tare"} <= known
