@@ -338,7 +338,7 @@ async def test_devices_are_added_by_a_form_and_meshes_with_their_unit(opened: Op
         await tool(screen, texts.ADD)
         panel = screen.page.get_by_role("complementary")
         await panel.get_by_label("Search").fill("scale")
-        await panel.get_by_role("button", name="MtSicsScale").click()
+        await panel.get_by_role("button", name="Mettler Toledo scale").click()
         submit = panel.locator("form button[type=submit]")
         await submit.click()
         await expect(panel.get_by_role("alert")).to_contain_text("Required: ")

@@ -5,6 +5,7 @@
  */
 
 import { i18n, type Messages } from "@lingui/core";
+import { loadTranslations } from "./serverMessages";
 
 const CATALOGUES: Readonly<Record<string, () => Promise<{ messages: Messages }>>> = {
   en: () => import("./en.po"),
@@ -21,7 +22,7 @@ export function preferredLanguage(languages: readonly string[] = navigator.langu
 export async function loadCatalogue(language: string): Promise<void> {
   const load = CATALOGUES[language] ?? CATALOGUES[FALLBACK];
   if (!load) return;
-  const { messages } = await load();
+  const [{ messages }] = await Promise.all([load(), loadTranslations(language).catch(() => {})]);
   i18n.loadAndActivate({ locale: language, messages });
   document.documentElement.lang = language;
 }

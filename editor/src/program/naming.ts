@@ -1,5 +1,6 @@
-/** Free names. */
+/** Free names, and names as words. */
 
+import { translate } from "../i18n/serverMessages";
 import type { OpenDocument } from "../store/state";
 
 /** Return a name, with the first number that makes it unique. */
@@ -12,9 +13,9 @@ export function freeName(base: string, taken: Iterable<string>): string {
   }
 }
 
-/** Return the name of an action or parameter as words. */
+/** Return the name of an action or parameter as words in the user's language. */
 export function words(name: string): string {
-  return name.replaceAll("_", " ");
+  return translate({ text: name.replaceAll("_", " ") });
 }
 
 export function actionNames(doc: OpenDocument): string[] {

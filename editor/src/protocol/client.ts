@@ -5,6 +5,7 @@
  */
 
 import { t } from "@lingui/core/macro";
+import { inUserLanguage, type ServerMessage } from "../i18n/serverMessages";
 import { ConnectionLost, DeadlineExceeded, Refused } from "./errors";
 import type { Requests, ServerEvent } from "./types";
 
@@ -45,9 +46,9 @@ interface Answer {
   response: string;
   result: boolean;
   messages?: string[];
-  /** Key and values of the message, so that it can be translated. */
-  key?: string;
-  values?: Record<string, string | number>;
+  /** What is needed to translate the message. */
+  key?: ServerMessage["key"];
+  values?: ServerMessage["values"];
   data?: unknown;
   code?: string;
 }
@@ -212,7 +213,7 @@ export class ProtocolClient {
       return;
     }
     if ("event" in message) {
-      this.onEvent(message);
+      this.onEvent({ ...message, data: inUserLanguage(message.data) } as ServerEvent);
       return;
     }
     const waiting = this.waiting.get(message.id);

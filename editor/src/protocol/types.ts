@@ -69,6 +69,8 @@ export interface ActionResultData {
   action_id: string;
   results?: string[];
   error?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Data of the event ActionStateAfter. */
@@ -769,6 +771,21 @@ export interface Mesh {
   focus_points?: Pose[];
 }
 
+/**
+ * A text for users, with what is needed to translate it. `str(message)` is the text.
+ *
+ * Attributes:
+ *     text: The English text.
+ *     key: The template of the text with plain `{name}` fields. It is the key of translations.
+ *     values: The values of the fields, by name: formatted texts, or messages that are part of this one. Without
+ *         values, `key` is the text itself.
+ */
+export interface Message {
+  text: string;
+  key: string;
+  values: Record<string, string | Message>;
+}
+
 /** Kinds of collision model. */
 export type Model3dType = "None" | "Box" | "Cylinder" | "Sphere" | "Mesh";
 
@@ -855,6 +872,8 @@ export interface NewSceneArgs {
 export interface NotificationData {
   message: string;
   level: NotificationLevel;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Values of Level in Notification. */
@@ -928,11 +947,14 @@ export interface ObjectStateData {
   reason?: string;
   overlaid?: string[];
   answering?: boolean;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /**
- * Metadata of an object type; category, icon and shadows are not in ARCOR2.
+ * Metadata of an object type; display_name, category, icon and shadows are not in ARCOR2.
  *
+ * display_name: name for users; omitted when the type declares none.
  * built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
  * installed type of the same name that this uploaded type replaces.
  */
@@ -949,6 +971,7 @@ export interface ObjectTypeMeta {
   problem?: string;
   settings: ParameterMeta[];
   modified?: string;
+  display_name?: string;
   category?: string;
   icon?: string;
   shadows?: string;
@@ -1072,6 +1095,8 @@ export interface ProcessStateData {
   id: string;
   state: ProcessStateEnum;
   message?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Values of StateEnum in ProcessState. */
@@ -1108,6 +1133,8 @@ export interface ProjectExceptionData {
   type: string;
   handled: boolean;
   action_id?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** A named group of actions with logic of its own. */
@@ -1356,6 +1383,8 @@ export interface RobotHoldData {
   held: boolean;
   reason?: string;
   arm_id?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Data of the event RobotJoints; `time_ms` as in RobotEef. */
@@ -1382,6 +1411,8 @@ export interface RobotMoveToActionPointJointsData {
   safe: boolean;
   message?: string;
   arm_id?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Data of the event RobotMoveToActionPointOrientation. */
@@ -1394,6 +1425,8 @@ export interface RobotMoveToActionPointOrientationData {
   linear: boolean;
   message?: string;
   arm_id?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Data of the event RobotMoveToJoints. */
@@ -1404,6 +1437,8 @@ export interface RobotMoveToJointsData {
   safe: boolean;
   message?: string;
   arm_id?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Data of the event RobotMoveToPose. */
@@ -1416,6 +1451,8 @@ export interface RobotMoveToPoseData {
   linear: boolean;
   message?: string;
   arm_id?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Types of robot. */
@@ -1493,6 +1530,8 @@ export interface SceneObjectOverride {
 export interface SceneStateData {
   state: SceneStateEnum;
   message?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Values of StateEnum in SceneState. */
@@ -1650,6 +1689,8 @@ export interface TaskStateData {
   started_by?: string;
   progress?: number;
   message?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /**

@@ -1,6 +1,7 @@
 /** Assets of the server: meshes and robot models. */
 
 import { t } from "@lingui/core/macro";
+import { type ServerMessage, translate } from "../i18n/serverMessages";
 import { remembered } from "./localStorage";
 
 /** Return an asset as binary glTF, prepared by the server; reject with the server's sentence. */
@@ -28,6 +29,6 @@ export async function uploadAsset(file: File): Promise<string> {
 
 /** Return the reason given by the server, or a general one. */
 export async function refusedWith(response: Response, otherwise: string): Promise<string> {
-  const { message } = (await response.json().catch(() => ({}))) as { message?: string };
-  return message ?? `${otherwise} (${response.status}).`;
+  const body = (await response.json().catch(() => ({}))) as Omit<ServerMessage, "text"> & { message?: string };
+  return body.message === undefined ? `${otherwise} (${response.status}).` : translate({ ...body, text: body.message });
 }

@@ -1,5 +1,6 @@
 /** Load the lists of the home screen, the object types and their actions. */
 
+import { translatedAction, translatedType } from "../store/objectTypeTexts";
 import { now, store } from "../store/store";
 import { call } from "./connection";
 
@@ -7,7 +8,7 @@ export async function loadTypes(): Promise<void> {
   const [types, robots] = await Promise.all([call("GetObjectTypes"), call("GetRobotMeta")]);
   store.setState({
     types: {
-      byName: Object.fromEntries(types.map((type) => [type.type, type])),
+      byName: Object.fromEntries(types.map((type) => [type.type, translatedType(type)])),
       robots: Object.fromEntries(robots.map((robot) => [robot.type, robot])),
       actions: {},
     },
@@ -30,5 +31,7 @@ export async function loadLists(): Promise<void> {
 export async function loadActions(type: string): Promise<void> {
   if (type in now().types.actions) return;
   const actions = await call("GetActions", { type });
-  store.setState((state) => ({ types: { ...state.types, actions: { ...state.types.actions, [type]: actions } } }));
+  store.setState((state) => ({
+    types: { ...state.types, actions: { ...state.types.actions, [type]: actions.map(translatedAction) } },
+  }));
 }

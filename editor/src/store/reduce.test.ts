@@ -223,7 +223,7 @@ describe("operation", () => {
 });
 
 test("a type that is gone takes its actions along", () => {
-  const type = { type: "UR5e" } as never;
+  const type = { type: "UR5e", settings: [] } as never;
   let state = after({ event: "ChangedObjectTypes", change_type: "add", data: [type] });
   state = { ...state, types: { ...state.types, actions: { UR5e: [] } } };
   state = { ...state, ...reduce(state, { event: "ChangedObjectTypes", change_type: "update", data: [type] }, NOW) };

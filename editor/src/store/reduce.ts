@@ -1,9 +1,9 @@
 /** The reducer: return the changes that an event makes to the state. A pure function of state, event and time. */
 
 import { t } from "@lingui/core/macro";
-import { translate } from "../i18n/serverMessages";
 import type { Run, ServerEvent, TaskStateData } from "../protocol/types";
 import { changed, opened } from "./document";
+import { translatedType } from "./objectTypeTexts";
 import { put, without } from "./records";
 import { NO_PROGRAM, type Notice, OFFLINE, type State } from "./state";
 
@@ -92,7 +92,7 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
     }
     case "ChangedObjectTypes": {
       const names = event.data.map((type) => type.type);
-      const given = Object.fromEntries(event.data.map((type) => [type.type, type]));
+      const given = Object.fromEntries(event.data.map((type) => [type.type, translatedType(type)]));
       const byName =
         event.change_type === "remove" ? without(state.types.byName, ...names) : { ...state.types.byName, ...given };
       return { types: { ...state.types, byName, actions: without(state.types.actions, ...names) } };
@@ -112,7 +112,7 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
       return viewState(state, event.data);
     case "Notification": {
       const level = event.data.level === "Info" ? "info" : event.data.level === "Warn" ? "warn" : "error";
-      return notice(state, level, translate({ ...event.data, text: event.data.message }), time);
+      return notice(state, level, event.data.message, time);
     }
     case "TaskState":
       return { tasks: put(state.tasks, event.data.id, event.data), ...over(state, event.data, time) };

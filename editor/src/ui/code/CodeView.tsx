@@ -3,6 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { useCallback, useEffect, useMemo, useState } from "react";
 import * as documents from "../../commands/documents";
+import { refusedWith } from "../../session/assets";
 import { remembered } from "../../session/localStorage";
 import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
@@ -18,10 +19,7 @@ async function scriptOf(projectId: string): Promise<Code> {
   const token = remembered("token");
   const headers: HeadersInit = token ? { Authorization: `Bearer ${token}` } : {};
   const response = await fetch(`/project/publish?projectId=${encodeURIComponent(projectId)}`, { headers });
-  if (!response.ok) {
-    const messageLog = (await response.json().catch(() => null)) as { message?: string } | null;
-    return { problem: messageLog?.message ?? t`The program cannot be loaded (${response.status}).` };
-  }
+  if (!response.ok) return { problem: await refusedWith(response, t`The program cannot be loaded`) };
   const source = await textOfZip(await response.arrayBuffer(), "script.py");
   return source === undefined ? { problem: t`The package has no script.` } : { source };
 }

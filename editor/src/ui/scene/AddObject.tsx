@@ -27,7 +27,7 @@ export function AddObject({ type, why, onBack }: { type: ObjectTypeMeta; why: st
       <Button look="plain" onPress={onBack}>
         {t`← All types`}
       </Button>
-      <h3>{type.type}</h3>
+      <h3>{type.display_name ?? type.type}</h3>
       <p className="quiet small description">{type.description}</p>
       {type.has_pose && <p className="quiet small">{t`The object is added at the view center.`}</p>}
       <Field label={t`Name`} value={name} onChange={setName} autoComplete="off" />

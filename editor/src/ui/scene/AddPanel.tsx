@@ -31,10 +31,11 @@ export default function AddPanel() {
   const wanted = search.trim().toLowerCase();
   const found = Object.values(types).filter(
     (each) =>
-      isDevice(each) && `${each.type} ${each.category ?? ""} ${each.description}`.toLowerCase().includes(wanted),
+      isDevice(each) &&
+      `${each.type} ${each.display_name} ${each.category ?? ""} ${each.description}`.toLowerCase().includes(wanted),
   );
   const groups = new Map<string, ObjectTypeMeta[]>();
-  for (const each of found.sort((a, b) => a.type.localeCompare(b.type))) {
+  for (const each of found.sort((a, b) => shownName(a).localeCompare(shownName(b)))) {
     const group = each.category ?? t`Other`;
     groups.set(group, [...(groups.get(group) ?? []), each]);
   }
@@ -72,15 +73,15 @@ export default function AddPanel() {
                         ? notify(
                             "info",
                             each.problem
-                              ? t`${each.type} cannot be used: ${each.problem}`
-                              : t`${each.type} cannot be used.`,
+                              ? t`${shownName(each)} cannot be used: ${each.problem}`
+                              : t`${shownName(each)} cannot be used.`,
                           )
                         : setChosen(each.type)
                     }
                   >
                     <Icon name={CATEGORY_ICONS[group] ?? "box"} />
                     <span>
-                      <strong>{each.type}</strong>
+                      <strong>{shownName(each)}</strong>
                       <span className={`small ${each.disabled ? "error" : "quiet"}`}>
                         {each.disabled ? each.problem : first(each.description)}
                       </span>
@@ -103,6 +104,8 @@ export default function AddPanel() {
 function isDevice({ abstract, base, disabled, problem }: ObjectTypeMeta): boolean {
   return base !== "VirtualCollisionObject" && (!abstract || (disabled && problem !== undefined));
 }
+
+const shownName = (type: ObjectTypeMeta) => type.display_name ?? type.type;
 
 /** Return the first sentence. */
 function first(text: string): string {

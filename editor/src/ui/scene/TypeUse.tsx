@@ -44,7 +44,7 @@ export function TypeUse({ type, onDeleted }: { type: ObjectTypeMeta; onDeleted: 
       <RefusedText>{refused}</RefusedText>
       {sure && (
         <Confirm
-          title={t`Delete ${type.type}?`}
+          title={t`Delete ${type.display_name ?? type.type}?`}
           yes={t`Delete`}
           onClose={() => setSure(false)}
           onYes={() => void ask(deleteType(type.type)).then((done) => done && onDeleted())}

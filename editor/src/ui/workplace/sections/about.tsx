@@ -2,6 +2,7 @@
 
 import { msg, t } from "@lingui/core/macro";
 import { Suspense } from "react";
+import { words } from "../../../program/naming";
 import { theEngine } from "../../../session/engine";
 import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
@@ -15,6 +16,7 @@ const Holder = lazyComponent(() => import("./Holder"));
 const Body: Section["Body"] = ({ selection: { kind, id } }) => {
   const holder = useEditor((state) => heldBy(state, id));
   const type = useEditor((state) => state.doc?.objects[id]?.type ?? "");
+  const typeName = useEditor((state) => state.types.byName[type]?.display_name ?? type);
   const description = useEditor((state) => state.types.byName[type]?.description ?? "");
   const action = useEditor((state) => state.doc?.actions[id]);
   const by = useEditor((state) => (action ? nameOf(state, action.type.split("/")[0] ?? "") : ""));
@@ -22,7 +24,7 @@ const Body: Section["Body"] = ({ selection: { kind, id } }) => {
   return (
     <>
       <p>
-        {action ? `${by}: ${words(action.type.split("/")[1] ?? "")}` : type || kindName(kind)}
+        {action ? `${by}: ${words(action.type.split("/")[1] ?? "")}` : typeName || kindName(kind)}
         {state && <span className={`tag ${TONE[state.state] ?? ""}`}>{state.state}</span>}
       </p>
       {state?.reason && <p className="small">{state.reason}</p>}
@@ -46,10 +48,5 @@ export const TONE: Record<string, string> = {
   failed: "bad",
   connecting: "warn",
 };
-
-/** Return the name of an action as words. */
-function words(name: string): string {
-  return name.replaceAll("_", " ");
-}
 
 export const about: Section = { id: "about", title: msg`About`, applies: () => true, Body };
