@@ -1,6 +1,6 @@
 """All errors: each has a stable code, a message for the operator and a detail for the technician."""
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from arcor2_hw.messages import Message
 
@@ -27,6 +27,19 @@ class Arcor2Error(Exception):
         super().__init__(message.text)
         self.message = message
         self.detail = detail
+
+    def with_message(self, message: Message) -> Self:
+        """Return an error like this one with another message."""
+        error = type(self).__new__(type(self))  # its constructor may want other arguments
+        vars(error).update(vars(self))
+        error.args = (message.text,)
+        error.message = message
+        return error
+
+
+def message_of(error: BaseException) -> Message:
+    """Return the message of any error; the name of its class if it has none."""
+    return error.message if isinstance(error, Arcor2Error) else Message.of(str(error) or type(error).__name__)
 
 
 # ------------------------------------------------------------------------------------------------ devices

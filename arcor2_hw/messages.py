@@ -1,25 +1,34 @@
 """Messages for users: the English text, and the template and values from which clients translate it."""
 
 from string import Formatter
-from typing import Final
+from typing import Any, Final
 
 from msgspec import Struct
 
 _FORMATTER: Final = Formatter()
 
 
-class Message(Struct, frozen=True):
+def key_of(template: str) -> str:
+    """Return a template with plain fields: without conversions and format specifications."""
+    return "".join(
+        literal.replace("{", "{{").replace("}", "}}") + ("" if name is None else f"{{{name}}}")
+        for literal, name, _, _ in _FORMATTER.parse(template)
+    )
+
+
+class Message(Struct, frozen=True, omit_defaults=True):
     """A text for users, with what is needed to translate it. `str(message)` is the text.
 
     Attributes:
         text: The English text.
         key: The template of the text with plain `{name}` fields. It is the key of translations.
-        values: The formatted texts of the fields, by name. Without values, `key` is the text itself.
+        values: The values of the fields, by name: formatted texts, or messages that are part of this one. Without
+            values, `key` is the text itself.
     """
 
     text: str
     key: str
-    values: dict[str, str] = {}
+    values: dict[str, "str | Message"] = {}
 
     def __str__(self) -> str:
         return self.text
@@ -30,20 +39,26 @@ class Message(Struct, frozen=True):
 
         Args:
             template: A `str.format` template with named fields. Without values it is the text; braces have no meaning.
-            values: Values of the fields, by name.
+            values: Values of the fields, by name. An error or a message is translated as part of this one.
 
         Raises:
             KeyError: A field of the template has no value.
         """
         if not values:
             return cls(template, template)
-        text, key, formatted = [], [], {}
+        text = []
+        used: dict[str, str | Message] = {}
         for literal, name, spec, conversion in _FORMATTER.parse(template):
             text.append(literal)
-            key.append(literal.replace("{", "{{").replace("}", "}}"))
             if name is not None:
-                value = _FORMATTER.convert_field(values[name], conversion)
-                formatted[name] = format(value, spec or "")
-                text.append(formatted[name])
-                key.append(f"{{{name}}}")
-        return cls("".join(text), "".join(key), formatted)
+                part = values[name]
+                formatted = format(_FORMATTER.convert_field(part, conversion), spec or "")
+                inner = part if isinstance(part, Message) else getattr(part, "message", None)
+                whole = isinstance(inner, Message) and inner.text == formatted
+                used[name] = inner if whole else formatted  # type: ignore[assignment]
+                text.append(formatted)
+        return cls("".join(text), key_of(template), used)
+
+    def translation(self) -> dict[str, Any]:
+        """Return the fields `key` and `values` that are sent next to the text; empty if the text itself is the key."""
+        return {"key": self.key, "values": self.values} if self.values else {}

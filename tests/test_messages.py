@@ -31,6 +31,19 @@ def test_braces_in_values_have_no_meaning() -> None:
     assert (made.text, made.values) == ("{a}: {b", {"name": "{a}", "reason": "{b"})
 
 
+def test_an_error_or_message_as_value_stays_translatable() -> None:
+    inner = InvalidData("{name} is unknown.", name="x")
+    made = Message.of("{device}: {reason}", device="ict1", reason=inner)
+    assert made == Message("ict1: x is unknown.", "{device}: {reason}", {"device": "ict1", "reason": inner.message})
+    assert Message.of("{reason!r}", reason=inner).values == {"reason": repr(inner)}
+
+
+def test_translation_contains_what_is_sent_next_to_the_text() -> None:
+    made = Message.of("{name} is unknown.", name="x")
+    assert made.translation() == {"key": "{name} is unknown.", "values": {"name": "x"}}
+    assert Message.of("It is unknown.").translation() == {}
+
+
 def test_a_missing_value_is_an_error() -> None:
     with pytest.raises(KeyError, match="limit"):
         Message.of("{robot}: {limit}", robot="ur5e")
@@ -70,4 +83,5 @@ def test_pickling_preserves_the_message() -> None:
 def test_a_script_error_prepends_the_line(values: dict[str, str]) -> None:
     error = NotUnderstood(3, "{name} is unknown." if values else "{} is unknown.", **values)
     assert str(error) == f"script.py, line 3: {'a' if values else '{}'} is unknown."
-    assert error.message.values == {"line": "3"} | values
+    assert error.message.key == "script.py, line {line}: {problem}"
+    assert error.message.values["problem"] == Message.of("{name} is unknown." if values else "{} is unknown.", **values)

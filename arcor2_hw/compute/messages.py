@@ -12,6 +12,7 @@ from msgspec import Struct
 from arcor2_hw import framing
 from arcor2_hw.collision.description import WorldItem
 from arcor2_hw.compute.tasks import AnyTask
+from arcor2_hw.messages import Message
 
 MAX_MESSAGE: Final = 512 * 1024 * 1024
 """Maximum size of a message, bytes. The images of a camera calibration are sent together."""
@@ -74,7 +75,7 @@ class Failed(Struct, frozen=True, tag=True):
     """
 
     codes: list[str]
-    message: str
+    message: Message
     detail: str = ""
     reason: str = ""
 

@@ -19,6 +19,7 @@ from arcor2_hw.compute.task import NotInstalled, Task
 from arcor2_hw.compute.worker_state import WorkerState
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.framing import PREFIX_SIZE
+from arcor2_hw.messages import Message
 
 NICENESS: Final = 5
 """Scheduling priority below that of devices and the server."""
@@ -94,7 +95,7 @@ def _answer(work: m.Work, state: WorkerState) -> m.Done | m.Failed:
         sys.excepthook(type(error), error, error.__traceback__)
         return m.Failed(
             ["compute", "error"],
-            "The computation failed with an internal error. See the log of the server.",
+            Message.of("The computation failed with an internal error. See the log of the server."),
             repr(error),
         )
     finally:
@@ -111,7 +112,7 @@ def function_of(task: Task[Any]) -> Callable[[Any, WorkerState], Any]:
 def failed(error: Arcor2Error) -> m.Failed:
     """Return an error as a message."""
     codes = [kind.code for kind in type(error).__mro__ if issubclass(kind, Arcor2Error)]
-    return m.Failed(list(dict.fromkeys(codes)), str(error), error.detail, str(getattr(error, "reason", "")))
+    return m.Failed(list(dict.fromkeys(codes)), error.message, error.detail, str(getattr(error, "reason", "")))
 
 
 def _messages(sock: socket.socket) -> Iterator[m.ToWorker]:

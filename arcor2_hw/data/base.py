@@ -8,11 +8,23 @@ from typing import Annotated
 
 from msgspec import UNSET, Meta, Struct, UnsetType
 
-__all__ = ["UNSET", "Data", "MutableData", "Timestamp", "Unset", "is_valid_name", "new_id", "now"]
+from arcor2_hw.messages import Message
+
+__all__ = ["UNSET", "Data", "MutableData", "Timestamp", "TranslatableData", "Unset", "is_valid_name", "new_id", "now"]
 
 
 class Data(Struct, frozen=True):
     """Base of all protocol data: immutable; an unset optional field is omitted, null is rejected."""
+
+
+class TranslatableData(Data, frozen=True, kw_only=True):
+    """Base of data with a text for users, which clients translate by `key` and `values` (see Message).
+
+    Both are omitted when the text is the key itself.
+    """
+
+    key: str | UnsetType = UNSET
+    values: dict[str, str | Message] | UnsetType = UNSET
 
 
 class MutableData(Struct, dict=True):

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from msgspec import Meta, field
 
-from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from arcor2_hw.data.base import UNSET, Data, Timestamp, TranslatableData, Unset
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 
@@ -111,7 +111,7 @@ class TaskProgress(enum.StrEnum):
     CANCELLED = "cancelled"
 
 
-class TaskStateData(Data, frozen=True):
+class TaskStateData(TranslatableData, frozen=True):
     """Data of the event TaskState.
 
     title: sentence for users. started_by: name of a user or token, omitted when it was started automatically. progress:

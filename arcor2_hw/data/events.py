@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from msgspec import Struct, field
 
-from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.editor import (
     HistoryChangedData,
@@ -65,7 +65,7 @@ class ActionExecutionData(Data, frozen=True):
     action_id: str = ""
 
 
-class ActionResultData(Data, frozen=True):
+class ActionResultData(TranslatableData, frozen=True):
     """Data of the event ActionResult."""
 
     action_id: str
@@ -81,7 +81,7 @@ class ProcessStateEnum(enum.StrEnum):
     FAILED = "failed"
 
 
-class ProcessStateData(Data, frozen=True):
+class ProcessStateData(TranslatableData, frozen=True):
     """Data of the event ProcessState."""
 
     id: str
@@ -134,7 +134,7 @@ class MoveEventType(enum.StrEnum):
     FAILED = "failed"
 
 
-class RobotMoveToActionPointJointsData(Data, frozen=True):
+class RobotMoveToActionPointJointsData(TranslatableData, frozen=True):
     """Data of the event RobotMoveToActionPointJoints."""
 
     move_event_type: MoveEventType
@@ -145,7 +145,7 @@ class RobotMoveToActionPointJointsData(Data, frozen=True):
     arm_id: str | Unset = UNSET
 
 
-class RobotMoveToActionPointOrientationData(Data, frozen=True):
+class RobotMoveToActionPointOrientationData(TranslatableData, frozen=True):
     """Data of the event RobotMoveToActionPointOrientation."""
 
     move_event_type: MoveEventType
@@ -158,7 +158,7 @@ class RobotMoveToActionPointOrientationData(Data, frozen=True):
     arm_id: str | Unset = UNSET
 
 
-class RobotMoveToJointsData(Data, frozen=True):
+class RobotMoveToJointsData(TranslatableData, frozen=True):
     """Data of the event RobotMoveToJoints."""
 
     move_event_type: MoveEventType
@@ -169,7 +169,7 @@ class RobotMoveToJointsData(Data, frozen=True):
     arm_id: str | Unset = UNSET
 
 
-class RobotMoveToPoseData(Data, frozen=True):
+class RobotMoveToPoseData(TranslatableData, frozen=True):
     """Data of the event RobotMoveToPose."""
 
     move_event_type: MoveEventType
@@ -197,7 +197,7 @@ class SceneStateEnum(enum.StrEnum):
     STOPPING = "stopping"
 
 
-class SceneStateData(Data, frozen=True):
+class SceneStateData(TranslatableData, frozen=True):
     """Data of the event SceneState."""
 
     state: SceneStateEnum
@@ -244,7 +244,7 @@ class NotificationLevel(enum.StrEnum):
     ERROR = "Error"
 
 
-class NotificationData(Data, frozen=True):
+class NotificationData(TranslatableData, frozen=True):
     """Data of the event Notification."""
 
     message: str
@@ -268,7 +268,7 @@ class PackageStateData(Data, frozen=True):
     package_id: str | Unset = UNSET
 
 
-class ProjectExceptionData(Data, frozen=True):
+class ProjectExceptionData(TranslatableData, frozen=True):
     """Data of the event ProjectException; action_id (not in ARCOR2): the action that failed."""
 
     message: str
@@ -277,7 +277,7 @@ class ProjectExceptionData(Data, frozen=True):
     action_id: str | Unset = UNSET
 
 
-class ObjectStateData(Data, frozen=True):
+class ObjectStateData(TranslatableData, frozen=True):
     """Data of the event ObjectState: the connection of an object of the online scene or the running program.
 
     reason: why it is lost or failed, or why all connections ended. overlaid: settings from the server's cell file.

@@ -4,7 +4,7 @@ import enum
 
 from msgspec import field
 
-from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
 from arcor2_hw.data.device import Alarm, Health
 
 
@@ -15,7 +15,7 @@ class HoldKind(enum.StrEnum):
     HAND_TEACHING = "hand_teaching"
 
 
-class RobotHoldData(Data, frozen=True):
+class RobotHoldData(TranslatableData, frozen=True):
     """Data of the event RobotHold: a user started to hold a robot, or the hold ended and the robot is at standstill.
 
     reason: why it ended, unless the user released the button.

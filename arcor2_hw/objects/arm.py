@@ -85,7 +85,12 @@ def joint_values(
     """
     values = {joint.name: joint.value for joint in joints}
     if len(values) != len(joints) or values.keys() != limits.keys():
-        raise wrong(f"The joints of {arm} are {', '.join(limits)}; received: {', '.join(values)}.")
+        raise wrong(
+            "The joints of {arm} are {joints}; received: {received}.",
+            arm=arm,
+            joints=", ".join(limits),
+            received=", ".join(values),
+        )
     for name, (low, high) in limits.items():
         if not low - slack <= values[name] <= high + slack:
             raise OutOfRange(

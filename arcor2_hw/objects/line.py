@@ -172,8 +172,8 @@ class Line:
         """Return a new error like the one that broke the line."""
         loss = self.loss
         if isinstance(loss, DeviceFault):
-            return type(loss)(str(loss), loss.detail, loss.fault_code)
-        return None if loss is None else type(loss)(str(loss), loss.detail)
+            return type(loss)(loss.message, loss.detail, loss.fault_code)
+        return None if loss is None else type(loss)(loss.message, loss.detail)
 
     def _required(self) -> "_Port":
         port = self._open

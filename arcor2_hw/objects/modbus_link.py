@@ -264,7 +264,7 @@ class ModbusLink:
     def _request(self, send: "Callable[[Client], ModbusPDU]", what: str, timeout: float) -> "ModbusPDU":
         with self._one_request:
             if not self._usable:
-                raise ConnectionLost(str(self._loss), self._loss.detail) if self._loss else self._not_connected()
+                raise ConnectionLost(self._loss.message, self._loss.detail) if self._loss else self._not_connected()
             if self._client is None:
                 if (drain := self._drained_at - time.monotonic()) > 0.0:
                     time.sleep(drain)

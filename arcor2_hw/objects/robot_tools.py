@@ -118,7 +118,9 @@ def _load(
         nominal = RobotModel.load(package, settings)
         return nominal if calibration is None else calibrated_model(nominal, calibration)
     except Arcor2Error as error:
-        raise type(error)(f"The model of {robot.name} cannot be used: {error}", error.detail) from error
+        raise type(error)(
+            "The model of {robot} cannot be used: {reason}", error.detail, robot=robot.name, reason=error
+        ) from error
 
 
 def package_of(robot: Robot) -> Path | None:

@@ -390,7 +390,7 @@ class SafeMoves:
         except KinematicsError as error:
             if isinstance(error, self._robot.KinematicsException):
                 raise
-            raise self._robot.KinematicsException(str(error), error.detail or error.code) from error
+            raise self._robot.KinematicsException(error.message, error.detail or error.code) from error
 
     def _tools(self) -> RobotTools:
         """Return the models of this thread. Load them again if settings, package or calibration have changed."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import msgspec
 
 from arcor2_hw.actions.json_values import encode as encode_json
-from arcor2_hw.exceptions import Arcor2Error, Cancelled
+from arcor2_hw.exceptions import Arcor2Error, Cancelled, message_of
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.clock import Clock
@@ -21,9 +21,8 @@ Post = Callable[[m.ToServer], None]
 
 def error_data(error: BaseException, object_id: str = "") -> m.ErrorData:
     """Convert an error to the form that is sent to the server."""
-    code = error.code if isinstance(error, Arcor2Error) else "error"
-    detail = error.detail if isinstance(error, Arcor2Error) else ""
-    return m.ErrorData(code, type(error).__name__, str(error) or type(error).__name__, detail, object_id)
+    code, detail = (error.code, error.detail) if isinstance(error, Arcor2Error) else ("error", "")
+    return m.ErrorData(code, type(error).__name__, message_of(error), detail, object_id)
 
 
 class Calls:

@@ -151,7 +151,7 @@ class Cell:
             return self._devices[object_id]
         except KeyError:
             if (error := self._absent.get(object_id)) is not None:
-                raise NotConnected(str(error), error.detail) from None
+                raise NotConnected(error.message, error.detail) from None
             raise NotFound("the scene has no object {object_id}", object_id=object_id) from None
 
     def find(self, name: str) -> Generic:

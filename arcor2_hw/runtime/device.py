@@ -14,7 +14,9 @@ from arcor2_hw.exceptions import (
     DeviceError,
     InvalidData,
     NotConnected,
+    message_of,
 )
+from arcor2_hw.messages import Message
 from arcor2_hw.objects import CollisionObject, Generic, HoldsParts, Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import Observing, listening
@@ -311,25 +313,26 @@ def describe(device: Device, error: BaseException) -> Arcor2Error:
     """Return an error whose message names the device, its type and address. Errors of our classes keep their class."""
     where = f"{device.name} ({device.recipe.cls.__name__})"
     address = device.recipe.address
-    text = str(error) or type(error).__name__
+    message = message_of(error)
     if isinstance(error, Arcor2NotImplemented):
-        return DeviceError("{place}: not implemented: {text}", place=where, text=text)
-    prefix = "" if text.startswith(device.name) else f"{where}: "
-    suffix = (
-        f" [{address}]" if address and not any(part.split(" ", 1)[-1] in text for part in address.split(", ")) else ""
-    )
-    if isinstance(error, Arcor2Error):
-        if not prefix and not suffix:
-            return error
-        named = type(error).__new__(type(error))  # the constructor may have other parameters
-        named.args = (f"{prefix}{text}{suffix}",)
-        vars(named).update(vars(error))
-        named.__cause__ = error
-        return named
-    kind = "" if text == type(error).__name__ else f"{type(error).__name__}: "
-    wrapped = DeviceError("{prefix}{type}{text}{suffix}", prefix=prefix, type=kind, text=text, suffix=suffix)
-    wrapped.__cause__ = error
-    return wrapped
+        return DeviceError("{device}: not implemented: {method}", device=where, method=message)
+    if not isinstance(error, Arcor2Error) and message.text != type(error).__name__:
+        message = Message.of("{type}: {reason}", type=type(error).__name__, reason=message)
+    named = message.text.startswith(device.name) or str(error).startswith(device.name)
+    if address and not any(part.split(" ", 1)[-1] in message.text for part in address.split(", ")):
+        message = Message.of(
+            "{problem} [{address}]" if named else "{device}: {problem} [{address}]",
+            device=where,
+            problem=message,
+            address=address,
+        )
+    elif not named:
+        message = Message.of("{device}: {problem}", device=where, problem=message)
+    elif isinstance(error, Arcor2Error):
+        return error
+    described = error.with_message(message) if isinstance(error, Arcor2Error) else DeviceError(message)
+    described.__cause__ = error
+    return described
 
 
 def until(deadline: float) -> float:

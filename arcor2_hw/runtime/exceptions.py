@@ -5,7 +5,7 @@ import sys
 import msgspec
 
 from arcor2_hw.data.events import Event, ProjectExceptionData
-from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.exceptions import Arcor2Error, message_of
 from arcor2_hw.runtime.program import current
 
 
@@ -15,8 +15,9 @@ def print_exception(error: BaseException) -> None:
     if program is not None:
         program.exception(error)
         return
+    message = message_of(error)
     data = ProjectExceptionData(
-        str(error) or type(error).__name__, type(error).__name__, isinstance(error, Arcor2Error)
+        message.text, type(error).__name__, isinstance(error, Arcor2Error), **message.translation()
     )
     sys.stdout.write(msgspec.json.encode(Event("ProjectException", data=data)).decode() + "\n")
     sys.stdout.flush()

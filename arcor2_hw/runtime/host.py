@@ -157,7 +157,7 @@ class Host:
     def _skip_object(self, fault: SceneFault) -> None:
         """Continue without an object that could not be created or connected."""
         self._cell.mark_absent(fault)
-        self._watch.report(fault.object_id, Connection.FAILED, str(fault.error))
+        self._watch.report(fault.object_id, Connection.FAILED, fault.error.message)
 
     def _retry(self, message: m.RetryObject) -> None:
         """Create and connect an object again. Runs on its own thread, because loading the type may take long."""

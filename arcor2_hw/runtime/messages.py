@@ -18,6 +18,7 @@ from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.framing import PREFIX_SIZE as PREFIX_SIZE
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime.message_parts import AddedBody as AddedBody
 from arcor2_hw.runtime.message_parts import DeviceStop as DeviceStop
 from arcor2_hw.runtime.message_parts import HeldPart as HeldPart
@@ -35,7 +36,7 @@ class ErrorData(Struct, frozen=True):
 
     code: str
     type: str
-    message: str
+    message: Message
     detail: str = ""
     object_id: str = ""
 
@@ -333,7 +334,7 @@ class DeviceChanged(ToServer, frozen=True):
     health: Health
     alarms: list[Alarm] = field(default_factory=list)
     control_owner: str | None = None
-    reason: str = ""
+    reason: Message | None = None
     in_the_way: bool = True
     held: list[HeldPart] = field(default_factory=list)
 

@@ -21,7 +21,7 @@ from arcor2_hw.data.events import (
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import Project, ProjectRobotJoints
 from arcor2_hw.data.secret import ObjectSecrets
-from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, InvalidData, NotFound, ProgramStopped
+from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, InvalidData, NotFound, ProgramStopped, message_of
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.pacing import Gate
@@ -254,13 +254,15 @@ class Program:
 
     def _report_exception(self, error: BaseException) -> None:
         self.error = error
-        text = str(error) or type(error).__name__
+        message = message_of(error)
         if self._error_source is not None and self._error_source[0] is error:
-            text = str(describe(self._error_source[1], error))
+            message = describe(self._error_source[1], error).message
         action_id: str | msgspec.UnsetType = msgspec.UNSET
         if self._failed is not None and self._failed[0] is error and self._failed[1].id is not None:
             action_id = self._failed[1].id
-        data = ProjectExceptionData(text, type(error).__name__, isinstance(error, Arcor2Error), action_id)
+        data = ProjectExceptionData(
+            message.text, type(error).__name__, isinstance(error, Arcor2Error), action_id, **message.translation()
+        )
         self.channel.event("ProjectException", _encode(Event("ProjectException", data=data)))
 
 

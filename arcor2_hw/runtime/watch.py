@@ -8,6 +8,7 @@ from typing import Any, Final
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.exceptions import DeviceTimeout
+from arcor2_hw.messages import Message
 from arcor2_hw.objects import CollisionObject, Generic, Robot
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import Device
@@ -72,7 +73,7 @@ class Watch:
         if instance is not None and not device.closing:
             self._compare(device, instance, None)
 
-    def report(self, object_id: str, connection: Connection, reason: str = "") -> None:
+    def report(self, object_id: str, connection: Connection, reason: Message | None = None) -> None:
         """Report the connection of an object that has no instance."""
         health = Health.FAILURE if connection is Connection.FAILED else Health.NORMAL
         with self._lock:
@@ -104,18 +105,19 @@ class Watch:
                     queried = (before.health, before.alarms, before.control_owner)
             connection = _value_or(lambda: instance.connection, Connection.FAILED)
             reason = _value_or(device.connection_reason, "") if connection in _WITH_REASON else ""
+            why = Message.of(reason) if reason else None
             was = Connection.OFFLINE if before is None else before.connection
             if before is not None and connection is was:
-                reason = before.reason  # keep the reason of the loss; later attempts to connect may fail for others
+                why = before.reason  # keep the reason of the loss; later attempts to connect may fail for others
             in_the_way = _value_or(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
             held = _value_or(lambda: _held_parts(instance), [])
-            found = DeviceChanged(device.id, connection, *queried, reason, in_the_way, held)
+            found = DeviceChanged(device.id, connection, *queried, why, in_the_way, held)
             if found == before:
                 return
             self._reported[device.id] = found
             self._post(found)
         if connection is not was and (connection is Connection.LOST or (connection is Connection.FAILED and device.up)):
-            self._lost(device, reason)
+            self._lost(device, "" if why is None else why.text)
 
 
 def _held_parts(instance: Generic) -> list[HeldPart]:

@@ -213,7 +213,7 @@ def bench_of(entry: CellDevice) -> type[Bench]:
     try:
         kind = base.object_type if hasattr(base, "object_type") else find_type(entry.type)
     except Arcor2Error as error:
-        raise type(error)(f"{entry.name}: {error}") from error
+        raise type(error)("{name}: {reason}", name=entry.name, reason=error) from error
     if kind.__name__ != entry.type:
         raise InvalidData(
             "{name}: the bench {bench} is for {type}, not for {entry_type}",

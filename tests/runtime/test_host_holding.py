@@ -139,11 +139,11 @@ def test_an_expired_hold_stops_and_does_not_start_again(holder: Holder) -> None:
     holder.granted(0.15, new=True)
     ended = holder.ended()
     assert ended.error is not None
-    assert "not renewed in time" in ended.error.message
-    assert "arm" in ended.error.message
+    assert "not renewed in time" in ended.error.message.text
+    assert "arm" in ended.error.message.text
     (stop,) = holder.told("stop")
     assert 0.15 <= stop[1] - began < 0.5  # the machine may be busy; the figure is in the benchmarks
-    assert "has ended" in holder.refused().message
+    assert "has ended" in holder.refused().message.text
     assert len(holder.told("jog")) == 1
     holder.granted(new=True)
     holder.lease(0.0)
@@ -162,14 +162,14 @@ def test_a_late_lease_is_refused(holder: Holder) -> None:
     for number in late:
         error = holder.host.answer(number)
         assert isinstance(error, m.ErrorData)
-        assert "had expired" in error.message
+        assert "had expired" in error.message.text
     assert holder.told("jog") == []
 
 
 def test_a_second_hold_of_a_robot_is_refused(holder: Holder) -> None:
     holder.granted(new=True)
     holder.hold += 1
-    assert "already moving" in holder.refused().message
+    assert "already moving" in holder.refused().message.text
     holder.hold -= 1
     holder.lease(0.0)
     holder.ended()
@@ -190,7 +190,7 @@ def test_motion_starts_after_slow_control_only_if_the_hold_continues(holder: Hol
     holder.host.call(OBJ, "forget")
     holder.host.call(OBJ, "set", key="taking", value=0.6)
     holder.host.call(OBJ, "lose_control")
-    assert "not renewed" in holder.refused(0.2, new=True).message
+    assert "not renewed" in holder.refused(0.2, new=True).message.text
     holder.ended()
     assert holder.told("jog") == []
 
@@ -211,19 +211,19 @@ def test_a_stop_ends_the_hold(holder: Holder) -> None:
     assert holder.host.answer(77) is None
     ended = holder.ended()
     assert ended.error is not None
-    assert "was stopped" in ended.error.message
-    assert holder.refused().message
+    assert "was stopped" in ended.error.message.text
+    assert holder.refused().message.text
 
 
 def test_an_error_of_the_driver_ends_the_hold(holder: Holder) -> None:
     holder.granted(new=True)
     holder.host.call(OBJ, "set_fault", fault="protective stop of 192.0.2.1")
-    assert "protective stop" in holder.refused().message
+    assert "protective stop" in holder.refused().message.text
     ended = holder.ended()
     assert ended.error is not None
     assert (ended.error.code, ended.error.object_id) == ("safety_stop", OBJ)
     assert holder.told("stop")
-    assert "protective stop" in holder.refused(new=True).message
+    assert "protective stop" in holder.refused(new=True).message.text
     holder.ended()
 
 
@@ -247,7 +247,7 @@ def test_a_joint_slows_down_before_its_limit_and_stops_there(holder: Holder) -> 
     assert holder.granted(joints=[Joint("turn", -0.25)]) == 1.0
     holder.host.call(OBJ, "set", key="at", value=0.995)
     error = holder.refused(joints=[Joint("turn", 0.25)])
-    assert "the joint turn is at its upper limit" in error.message
+    assert "the joint turn is at its upper limit" in error.message.text
     holder.ended()
     assert holder.granted(new=True, joints=[Joint("turn", -0.25)]) == 1.0
     holder.lease(0.0)
@@ -261,7 +261,7 @@ def test_a_twist_slows_down_before_a_joint_limit(holder: Holder) -> None:
     assert holder.granted() < 0.9  # by the way that the joint has made since the last lease
     time.sleep(0.1)
     holder.host.call(OBJ, "set", key="at", value=0.999)
-    assert "turn is at its upper limit" in holder.refused().message
+    assert "turn is at its upper limit" in holder.refused().message.text
     holder.ended()
     assert holder.granted(new=True) < 0.1  # which way it leads is not known yet
     holder.host.call(OBJ, "set", key="at", value=0.9)
@@ -278,7 +278,7 @@ def test_a_twist_slows_down_before_a_joint_limit(holder: Holder) -> None:
     ],
 )
 def test_unknown_joints_and_end_effectors_are_refused(holder: Holder, more: Any, text: str) -> None:
-    assert text in holder.refused(new=True, **more).message
+    assert text in holder.refused(new=True, **more).message.text
     holder.ended()
     assert holder.told("jog") == []
 
@@ -328,7 +328,7 @@ def test_one_of_several_arms_is_held(host: HostProcess) -> None:
     assert 0.45 < holder.granted(joints=[Joint("left_turn", 1.0)], arm_id="left") <= 0.5
     holder.lease(0.0, arm_id="left")
     holder.ended()
-    assert "Select one of claw, cup." in holder.refused(new=True, arm_id="right").message
+    assert "Select one of claw, cup." in holder.refused(new=True, arm_id="right").message.text
     holder.ended()
     assert holder.granted(new=True, arm_id="right", end_effector_id="cup") == 1.0
     holder.lease(0.0, arm_id="right")

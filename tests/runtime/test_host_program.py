@@ -336,7 +336,7 @@ def test_an_unknown_breakpoint_fails_the_start(run: Run) -> None:
     run.start('arm.slow(0.0, an="a1")', breakpoints=("acp_none",))
     ended = run.host.expect_state("stopped")
     assert ended.error is not None
-    assert "acp_none" in ended.error.message
+    assert "acp_none" in ended.error.message.text
     assert run.host.events() == ["ProjectException", "stopped"]
 
 

@@ -152,8 +152,8 @@ def test_a_safe_move_avoids_the_current_obstacles(scene: HostProcess) -> None:
     error = go(scene, ACROSS)
     assert isinstance(error, m.ErrorData)
     assert error.code == "kinematics"
-    assert "arm/" in error.message
-    assert "wall" in error.message
+    assert "arm/" in error.message.text
+    assert "wall" in error.message.text
 
 
 def test_a_move_is_refused_if_the_joints_of_another_robot_are_unknown(scene: HostProcess) -> None:
@@ -162,7 +162,7 @@ def test_a_move_is_refused_if_the_joints_of_another_robot_are_unknown(scene: Hos
     error = go(scene, READY)
     assert isinstance(error, m.ErrorData)
     assert error.code == "refused"
-    assert "The position of other is unknown" in error.message
+    assert "The position of other is unknown" in error.message.text
     assert go(scene, READY, safe=False) is None
 
 
@@ -189,7 +189,7 @@ def collision(answer: Any, *names: str) -> None:
     assert isinstance(answer, m.ErrorData), answer
     assert answer.code == "kinematics"
     for name in names:
-        assert name in answer.message
+        assert name in answer.message.text
 
 
 def test_an_added_body_is_an_obstacle_until_it_is_removed(scene: HostProcess, tmp_path: Path) -> None:
@@ -243,7 +243,7 @@ def test_a_move_stops_before_a_body_added_to_its_path(host: HostProcess) -> None
         error = host.answer(move)
         assert isinstance(error, m.ErrorData), error
         assert error.code == "path_blocked"
-        assert f"{name} came into its path" in error.message
+        assert f"{name} came into its path" in error.message.text
         assert 0.2 < pan(host) < 1.2
         host.send(m.RemoveBodies(["crate"]))
         assert go(host, READY, safe=False) is None
@@ -278,7 +278,7 @@ def test_a_held_body_collides_where_the_arm_does_not(scene: HostProcess) -> None
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_arm", link="claw"))
     error = line(scene, beside)
     assert isinstance(error, m.ErrorData)
-    assert "claw, which is not a link of arm" in error.message
+    assert "claw, which is not a link of arm" in error.message.text
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_of_another_scene", link="tcp"))
     assert line(scene, beside) is None
     scene.send(box("rod", TIP + beside, 0.03, 0.03, 0.3))
@@ -384,8 +384,8 @@ def test_a_robot_with_several_arms_is_an_obstacle_if_all_joints_are_known(host: 
     error = go(host, MEETING)
     assert isinstance(error, m.ErrorData)
     assert error.code == "refused"
-    assert "The position of pair is unknown" in error.message
-    assert "wrist_1_joint" in error.message
+    assert "The position of pair is unknown" in error.message.text
+    assert "wrist_1_joint" in error.message.text
 
 
 # ---------------------------------------------------------------------------------------------------- the very arm
@@ -417,4 +417,4 @@ def test_the_kinematic_calibration_of_the_controller_is_used(host: HostProcess) 
     host.send(m.Calibrate("obj_arm", calibration(0.2)))
     error = host.call("obj_arm", "get_end_effector_pose", end_effector="tcp")
     assert isinstance(error, m.ErrorData)
-    assert "another robot" in error.message
+    assert "another robot" in error.message.text

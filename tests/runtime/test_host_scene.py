@@ -94,8 +94,8 @@ def test_arguments_are_decoded_by_type_hints_and_results_returned(host: HostProc
     assert host.call("obj_a", "echo", value=2, pose=pose, joints=[{"name": "j", "value": 1}]) == [2.0, pose]
     wrong = host.call("obj_a", "echo", value="text", pose=pose, joints=[])
     assert (wrong.code, wrong.object_id) == ("invalid_data", "obj_a")
-    assert "value" in wrong.message
-    assert "a" in wrong.message
+    assert "value" in wrong.message.text
+    assert "a" in wrong.message.text
     assert host.call("obj_a", "echo", value=1).code == "invalid_data"
     assert host.call("obj_a", "_open").code == "invalid_data"
     assert host.call("obj_none", "quick").code == "not_found"
@@ -111,11 +111,11 @@ def test_a_hanging_call_fails_in_time_without_delaying_other_devices(host: HostP
     error = host.answer(hang)
     assert own_time() - began < 0.8
     assert error.code == "device_timeout"
-    assert all(part in error.message for part in ("a", "hang", "0.3 s"))
-    assert "hang" in host.answer(waiting).message
+    assert all(part in error.message.text for part in ("a", "hang", "0.3 s"))
+    assert "hang" in host.answer(waiting).message.text
     refused = host.call("obj_a", "quick")
     assert refused.code == "device_timeout"
-    assert "still busy with hang" in refused.message
+    assert "still busy with hang" in refused.message.text
     deadline = time.monotonic() + 5
     while host.call("obj_a", "quick") != "quick":  # the device is back: no answer is mixed up
         assert time.monotonic() < deadline
@@ -192,8 +192,8 @@ def test_one_failed_device_closes_the_others(host: HostProcess, tmp_path: Path, 
     host.send(open_scene([type_code("Device", DEVICE)], *objects))
     error = host.expect(m.SceneFailed).error
     assert error.object_id == "obj_bad"
-    assert "bad" in error.message
-    assert words in error.message
+    assert "bad" in error.message.text
+    assert words in error.message.text
     assert host.gone() == 0
     assert (tmp_path / "notes").read_text().splitlines() == ["good connected", "good disconnected"]
 
@@ -203,7 +203,7 @@ def test_a_device_that_hangs_while_connecting_is_named(host: HostProcess) -> Non
     host.send(open_scene([type_code("Device", source)], scene_object("slow", "Device", connect_takes=30)))
     error = host.expect(m.SceneFailed, within=5).error
     assert error.code == "device_timeout"
-    assert "slow" in error.message
+    assert "slow" in error.message.text
 
 
 @pytest.mark.parametrize(
@@ -214,7 +214,7 @@ def test_an_invalid_setting_is_named(host: HostProcess, settings: dict[str, obje
     host.send(open_scene([type_code("Device", DEVICE)], scene_object("a", "Device", **settings)))
     error = host.expect(m.SceneFailed).error
     assert (error.code, error.object_id) == ("invalid_data", "obj_a")
-    assert words in error.message
+    assert words in error.message.text
 
 
 def test_overrides_replace_parameters(host: HostProcess, tmp_path: Path) -> None:
@@ -238,7 +238,7 @@ def test_a_missing_secret_is_named(host: HostProcess) -> None:
     host.send(open_scene([type_code("Device", DEVICE)], scene_object("a", "Device", file=new_reference())))
     error = host.expect(m.SceneFailed).error
     assert error.object_id == "obj_a"
-    assert error.message == (
+    assert error.message.text == (
         "a: the secret setting file is not stored on this server. Enter it in the settings of a, or in the cell file."
     )
 
@@ -247,14 +247,14 @@ def test_a_secret_for_another_address_is_withheld(host: HostProcess) -> None:
     message = open_scene([type_code("Device", DEVICE)], scene_object("a", "Device", file=new_reference()))
     host.send(msgspec.structs.replace(message, secrets={"obj_a": ObjectSecrets(problem="Enter the file again.")}))
     error = host.expect(m.SceneFailed).error
-    assert (error.object_id, error.code, error.message) == ("obj_a", "address_changed", "Enter the file again.")
+    assert (error.object_id, error.code, error.message.text) == ("obj_a", "address_changed", "Enter the file again.")
 
 
 def test_a_source_that_cannot_be_imported_is_named(host: HostProcess) -> None:
     host.send(open_scene([type_code("Device", "def broken(:\n")], scene_object("a", "Device")))
     error = host.expect(m.SceneFailed).error
-    assert "Device" in error.message
-    assert "SyntaxError" in error.message
+    assert "Device" in error.message.text
+    assert "SyntaxError" in error.message.text
 
 
 def test_types_of_the_older_convention_work(host: HostProcess, tmp_path: Path) -> None:
@@ -309,7 +309,7 @@ def test_the_host_stops_devices_and_exits_on_sigterm(host: HostProcess, tmp_path
 def test_prints_and_warnings_of_drivers_do_not_break_the_host(host: HostProcess) -> None:
     _open(host, "a")
     left = host.call("obj_a", "leave")
-    assert "SystemExit" in left.message
+    assert "SystemExit" in left.message.text
     # More than a pipe holds, so that the test has to read meanwhile; no newline at the end of the second one.
     number = host.begin("obj_a", "shout", size=300_000)
     text = ""

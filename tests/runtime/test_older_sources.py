@@ -207,8 +207,8 @@ def test_analysis_and_import_name_missing_older_modules(host: HostProcess, line:
     assert problem.line == 2
     host.send(open_scene([m.TypeCode("Odd", module="odd", source=source)], scene_object("odd", "Odd")))
     error = host.expect(m.SceneFailed).error
-    assert words in error.message
-    assert "Odd" in error.message
+    assert words in error.message.text
+    assert "Odd" in error.message.text
 
 
 def test_a_source_may_handle_the_import_error_of_a_missing_module(host: HostProcess) -> None:
@@ -254,9 +254,9 @@ def test_an_older_robot_behind_a_rest_service(host: HostProcess, arm_service: Ar
     assert set(asked) == {"pose", "avoidCollisions"}
     refused = host.call("obj_arm", "inverse_kinematics", end_effector_id="default", pose=target)
     assert (refused.code, refused.type) == ("rest_refused", "RestHttpException")
-    assert refused.message.endswith("/ik: Out of reach.")
-    assert "arm" in refused.message
-    assert host.call("obj_arm", "home").message.endswith("404 Not Found")
+    assert refused.message.text.endswith("/ik: Out of reach.")
+    assert "arm" in refused.message.text
+    assert host.call("obj_arm", "home").message.text.endswith("404 Not Found")
     logged = host.expect(m.LogLine, within=0.1) if not any(isinstance(s, m.LogLine) for s in host.seen) else None
     lines = [s.text for s in [*host.seen, logged] if isinstance(s, m.LogLine)]
     assert any("arm started" in line for line in lines)
@@ -270,16 +270,16 @@ def test_the_error_of_a_constructor_is_reported(host: HostProcess, arm_service: 
     arm = scene_object("arm", "ArmM1", pose=True, url=arm_service.url)
     host.send(open_scene(codes("KinematicsMixin", "AbstractArm", "ArmM1"), arm))
     error = host.expect(m.SceneFailed).error
-    assert "Somebody uses the arm." in error.message
-    assert "arm" in error.message
-    assert arm_service.url in error.message
+    assert "Somebody uses the arm." in error.message.text
+    assert "arm" in error.message.text
+    assert arm_service.url in error.message.text
 
 
 def test_an_unreachable_service_is_named(host: HostProcess) -> None:
     arm = scene_object("arm", "ArmM1", pose=True, url="http://127.0.0.1:1")
     host.send(open_scene(codes("KinematicsMixin", "AbstractArm", "ArmM1"), arm))
     error = host.expect(m.SceneFailed).error
-    assert (error.code, "GET http://127.0.0.1:1/state/started" in error.message) == ("rest", True)
+    assert (error.code, "GET http://127.0.0.1:1/state/started" in error.message.text) == ("rest", True)
 
 
 def test_an_older_machine_with_settings_dynamic_values_and_cancel(
@@ -291,7 +291,7 @@ def test_an_older_machine_with_settings_dynamic_values_and_cancel(
     assert set(host.call("obj_bench", "programs", group="b")) == {"b1", "b2"}
     assert host.call("obj_bench", "test", group="a", program="fast", level=2) == [True, 4.5]
     refused = host.call("obj_bench", "test", group="a", program="none", level=1)
-    assert (refused.type, "no such program" in refused.message) == ("BenchException", True)
+    assert (refused.type, "no such program" in refused.message.text) == ("BenchException", True)
     waiting = host.begin("obj_bench", "wait", seconds=60.0)
     host.send(m.Call(1000, "obj_bench", "wait", cancel=True))
     assert host.answer(1000) is None

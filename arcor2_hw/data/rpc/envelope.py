@@ -4,7 +4,7 @@ from typing import Any
 
 from msgspec import Raw, Struct
 
-from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
 from arcor2_hw.data.role import Role
 
 
@@ -27,7 +27,7 @@ class Rpc(Struct, frozen=True):
 class Request(Data, frozen=True):
     """The envelope of a request; `args` is decoded when the request is known.
 
-    `codes`: whether a refusal contains its reason.
+    `codes`: whether a refusal contains its reason and what is needed to translate its message.
     """
 
     id: int
@@ -37,8 +37,8 @@ class Request(Data, frozen=True):
     codes: bool = False
 
 
-class Response(Data, frozen=True):
-    """The envelope of an answer. `code`: the reason of a refusal, if requested."""
+class Response(TranslatableData, frozen=True):
+    """The envelope of an answer. `code`, `key`, `values`: reason and translation of a refusal, if requested."""
 
     id: int
     response: str

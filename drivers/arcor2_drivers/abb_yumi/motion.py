@@ -300,9 +300,9 @@ class Motion:
             return Cancelled("The move of {name} was stopped.", name=self._arms.name)
         if isinstance(error, CommandRefused):
             if error.status is Status.WATCHDOG:
-                return ConnectionLost(str(error), error.detail)
+                return ConnectionLost(error.message, error.detail)
             if error.status is Status.STOPPED:
-                return Cancelled(str(error), error.detail)
+                return Cancelled(error.message, error.detail)
             return error
         return self._control.explained(error)
 

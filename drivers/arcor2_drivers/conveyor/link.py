@@ -301,4 +301,4 @@ class CanLink:
 
 def _again(error: DeviceError) -> DeviceError:
     """Return a new error of the same kind: one object raised in several threads mixes their tracebacks."""
-    return type(error)(str(error), error.detail)
+    return type(error)(error.message, error.detail)

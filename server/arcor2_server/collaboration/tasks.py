@@ -12,6 +12,7 @@ from arcor2_hw.data.base import new_id, now
 from arcor2_hw.data.editor import TaskKind, TaskProgress, TaskStateData
 from arcor2_hw.data.events import Event
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.throttle import Throttle
 from arcor2_server.events import EventHub, encode, make_event
 
@@ -32,21 +33,23 @@ class Task:
         share = UNSET if progress is None else min(max(progress, 0.0), 1.0)
         self._tasks._update(self, replace(self.state, progress=share, message=message or self.state.message))
 
-    def finish(self, message: str = "") -> None:
+    def finish(self, message: str | Message | None = None) -> None:
         """End the task as finished."""
         self._end(TaskProgress.FINISHED, message)
 
-    def fail(self, message: str) -> None:
+    def fail(self, message: str | Message) -> None:
         """End the task as failed; `message` is the reason."""
         self._end(TaskProgress.FAILED, message)
 
-    def cancel(self, message: str = "") -> None:
+    def cancel(self, message: str | Message | None = None) -> None:
         """End the task as cancelled."""
         self._end(TaskProgress.CANCELLED, message)
 
-    def _end(self, how: TaskProgress, message: str) -> None:
+    def _end(self, how: TaskProgress, message: str | Message | None) -> None:
         progress: Any = 1.0 if how is TaskProgress.FINISHED else self.state.progress
-        self._tasks._update(self, replace(self.state, state=how, progress=progress, message=message or UNSET))
+        translation = message.translation() if isinstance(message, Message) else {}
+        text = str(message) if message else UNSET
+        self._tasks._update(self, replace(self.state, state=how, progress=progress, message=text, **translation))
 
 
 class Tasks:
@@ -74,7 +77,7 @@ class Tasks:
             task.cancel()
             raise
         except BaseException as error:
-            task.fail(str(error) if isinstance(error, Arcor2Error) else "An error inside the server.")
+            task.fail(error.message if isinstance(error, Arcor2Error) else "An error inside the server.")
             raise
         task.finish()
 

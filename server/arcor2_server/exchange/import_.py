@@ -18,6 +18,7 @@ from arcor2_hw.data.object_type import Models, ObjectTypeMeta, ObjectTypeSource
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, Conflict, DeviceTimeout, InvalidPackage
+from arcor2_hw.messages import Message
 from arcor2_server.exchange.archive import Archive, AssetFile, with_needed
 from arcor2_server.exchange.export import Exporter
 from arcor2_server.exchange.rollback import Rollback
@@ -200,7 +201,8 @@ class Importer:
                 except BaseException as error:
                     outcome = await rollback.run()
                     if isinstance(error, Arcor2Error) and outcome:
-                        Arcor2Error.__init__(error, f"{error} {outcome}", error.detail)
+                        message = Message.of("{problem} {outcome}", problem=error, outcome=outcome)
+                        raise error.with_message(message) from error
                     raise
         finally:
             self._work.clear()

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import msgspec
 import structlog
+from msgspec.structs import replace
 
 from arcor2_hw.data import events as e
 from arcor2_hw.data.base import UNSET, Unset
@@ -15,6 +16,7 @@ from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.events import Event, MainScreen, ProjectExceptionData
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import Arcor2Error, NotFound
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
@@ -223,7 +225,7 @@ class Execution(PackageLibrary):
             host = await self._host.take()
             message = await self._messages.complete(message, self._shared_of)
         except Arcor2Error as error:
-            self._fail(str(error), type(error).__name__)
+            self._fail(error.message, type(error).__name__)
             self._ended()
             return
         if self.state is S.STOPPING:  # stopped while its host was starting
@@ -350,7 +352,9 @@ class Execution(PackageLibrary):
             self.last_error = message.error
             if message.error is not None and self._exception is not None:  # the published text names the device
                 published = self._exception
-                self.last_error = msgspec.structs.replace(message.error, type=published.type, message=published.message)
+                key, values = published.key or published.message, published.values or {}
+                text = Message(published.message, key, values)
+                self.last_error = replace(message.error, type=published.type, message=text)
             self._ended()
             self._spawn(host.wait_or_kill(), "end of the program's host")
         elif self.state is not S.STOPPING:
@@ -361,18 +365,19 @@ class Execution(PackageLibrary):
     def _host_ended(self, reason: str) -> None:
         """Report that the host has ended before the program."""
         if self.state is not S.STOPPING:
-            self._fail(f"Connection to the program lost: {reason}.", "ConnectionLost")
+            self._fail(Message.of("Connection to the program lost: {reason}.", reason=reason), "ConnectionLost")
         self._ended(lost=True)
 
-    def _fail(self, message: str, kind: str) -> None:
+    def _fail(self, message: Message, kind: str) -> None:
         self.last_error = m.ErrorData("error", kind, message)
-        self._hub.broadcast(make_event("ProjectException", ProjectExceptionData(message, kind)))
+        data = ProjectExceptionData(message.text, kind, **message.translation())
+        self._hub.broadcast(make_event("ProjectException", data))
 
     def _ended(self, *, lost: bool = False) -> None:
         self._host.host = None
         self._store_end(lost)
         self.streams.clear()
-        self.board.clear("" if self.last_error is None else self.last_error.message)
+        self.board.clear(None if self.last_error is None else self.last_error.message)
         self._host.package_info = self._before = None
         if self._killing is not None:
             self._killing.cancel()
@@ -393,7 +398,7 @@ class Execution(PackageLibrary):
         self._runs.end(
             self._run_number,
             end,
-            error="" if error is None else error.message,
+            error="" if error is None else error.message.text,
             error_type="" if error is None else error.type,
             stopped_by=self._stopped_by or "",
         )

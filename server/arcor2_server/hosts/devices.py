@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 import msgspec
 import structlog
+from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET, Data
 from arcor2_hw.data.cell import Cell, overlay, strangers
@@ -13,6 +14,7 @@ from arcor2_hw.data.operation import ObjectHealthData
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import HIDDEN
 from arcor2_hw.exceptions import NotFound
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
@@ -101,12 +103,12 @@ class DeviceBoard:
         for state in self.states():
             self._publish(state)
 
-    def clear(self, reason: str = "") -> None:
+    def clear(self, reason: Message | None = None) -> None:
         """Remove all devices, and publish those that were connected as offline with a reason."""
         before, self._reports = self._reports, {}
         for report in before.values():
             if report.connection is not Connection.OFFLINE:
-                self._publish(ObjectStateData(report.object_id, Connection.OFFLINE, reason or UNSET))
+                self._publish(_state(report.object_id, Connection.OFFLINE, reason))
         if any(_obstacles(report) != _obstacles(None) for report in before.values()):
             self._notify_obstacles()
         self._objects.clear()
@@ -156,9 +158,8 @@ class DeviceBoard:
         """Raise RequestRefused, with name and reason, if an object failed to connect."""
         report, known = self._reports.get(object_id), self._objects.get(object_id)
         if report is not None and known is not None and report.connection is Connection.FAILED:
-            raise RequestRefused(
-                "{name} is not connected: {reason}.", name=known.name, reason=report.reason or "the connection failed"
-            )
+            reason = report.reason or Message.of("the connection failed")
+            raise RequestRefused("{name} is not connected: {reason}.", name=known.name, reason=reason)
 
     def states(self) -> list[ObjectStateData]:
         """Return the connection of every object, in the order of the scene."""
@@ -176,11 +177,9 @@ class DeviceBoard:
         return self._reports.get(object_id) or DeviceChanged(object_id, Connection.OFFLINE, Health.NORMAL)
 
     def _state(self, report: DeviceChanged) -> ObjectStateData:
+        state = _state(report.object_id, report.connection, report.reason)
         overlaid = self._overlaid.get(report.object_id)
-        answering = UNSET if self.answering else False
-        return ObjectStateData(
-            report.object_id, report.connection, report.reason or UNSET, overlaid or UNSET, answering
-        )
+        return replace(state, overlaid=overlaid or UNSET, answering=UNSET if self.answering else False)
 
     def statuses(self) -> list[DeviceStatus]:
         """Return the states of all objects, in the order of the scene."""
@@ -194,12 +193,18 @@ class DeviceBoard:
                 report.alarms,
                 report.control_owner,
                 self.answering,
-                report.reason,
+                str(report.reason or ""),
                 list(self._overlaid.get(obj.id, ())),
             )
             for obj in self._objects.values()
             for report in (self._report(obj.id),)
         ]
+
+
+def _state(object_id: str, connection: Connection, reason: Message | None) -> ObjectStateData:
+    if reason is None:
+        return ObjectStateData(object_id, connection)
+    return ObjectStateData(object_id, connection, reason.text, **reason.translation())
 
 
 def _obstacles(report: DeviceChanged | None) -> tuple[bool, list[HeldPart]]:

@@ -79,7 +79,7 @@ class HostSession:
                     "device",
                     id=message.object_id,
                     connection=message.connection.value,
-                    reason=message.reason,
+                    reason="" if message.reason is None else message.reason.text,
                     health=message.health.value,
                     alarms=[alarm.text for alarm in message.alarms],
                     control=message.control_owner,

@@ -14,6 +14,7 @@ from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import Action, ActionParameter, ActionParameterType, parse_link
 from arcor2_hw.data.project_index import ProjectLookup
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, InvalidData
+from arcor2_hw.messages import Message
 from arcor2_server.errors import RequestRefused
 
 log = structlog.get_logger(__name__)
@@ -123,23 +124,23 @@ class ActionScene(Protocol):
     ) -> bytes:
         """Call a method of an object; return the result as JSON."""
 
-    def action_ended(self, action: RunningAction, results: list[str] | None, error: str | None) -> None:
+    def action_ended(self, action: RunningAction, results: list[str] | None, error: Message | None) -> None:
         """Handle the end of an action."""
 
 
 async def execute(scene: ActionScene, prepared: PreparedAction, running: RunningAction) -> None:
     """Call the method of an action and report its end."""
     results: list[str] | None = None
-    error: str | None = None
+    error: Message | None = None
     try:
         raw = await scene.call(
             prepared.object_id, prepared.method, prepared.arguments, control=True, requested_at=running.requested_at
         )
         results = split_results(raw, prepared.returns)
     except Arcor2Error as caught:
-        error = str(caught)
-        log.info("action failed", action=prepared.action_id, reason=error, detail=caught.detail)
+        error = caught.message
+        log.info("action failed", action=prepared.action_id, reason=error.text, detail=caught.detail)
     except msgspec.MsgspecError as caught:
-        error = f"The results of the action do not have the declared types: {caught}"
+        error = Message.of("The results of the action do not have the declared types: {reason}", reason=caught)
     finally:
         scene.action_ended(running, results, error)

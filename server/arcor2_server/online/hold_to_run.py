@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import msgspec
 import structlog
+from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.events import HandTeachingModeData, NotificationData, NotificationLevel
@@ -19,6 +20,7 @@ from arcor2_hw.data.operation import HoldKind, RobotHoldData
 from arcor2_hw.data.rpc import HoldHandTeachingArgs, JogRobotArgs
 from arcor2_hw.data.rpc.operation import LONGEST_LEASE_MS
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.errors import RequestRefused
@@ -74,14 +76,15 @@ class _Press:
         self.number = number
         self.started = False
         self.over = False
-        self.reason = ""
-        """Why the server ended it; empty if it did not, or after a release of the button."""
+        self.reason: Message | None = None
+        """Why the server ended it; None if it did not, or after a release of the button."""
         self.allowed: asyncio.Future[None] = loop.create_future()
         self.ended: asyncio.Future[None] = loop.create_future()
 
-    def state(self, held: bool, reason: str = "") -> RobotHoldData:
+    def state(self, held: bool, reason: Message | None = None) -> RobotHoldData:
         """Return the data of the event RobotHold."""
-        return RobotHoldData(self.robot_id, self.kind, self.user, held, reason or UNSET, self.arm_id)
+        data = RobotHoldData(self.robot_id, self.kind, self.user, held, arm_id=self.arm_id)
+        return data if reason is None else replace(data, reason=reason.text, **reason.translation())
 
 
 class _Scale(Data, frozen=True):
@@ -166,7 +169,7 @@ class HoldToRun:
         if press is None or press.client is not client or press.press != args.hold or press.kind is not kind:
             press = await self._start(client, user, args, kind, until, allow)
         elif not self._locks.holds(user, args.robot_id):
-            self._end(press, f"{user} no longer holds the lock")
+            self._end(press, Message.of("{user} no longer holds the lock", user=user))
             self._require_lock(user, args.robot_id)
         else:
             await asyncio.shield(press.allowed)
@@ -174,7 +177,8 @@ class HoldToRun:
 
     async def _send_lease(self, press: _Press, until: float, motion: Mapping[str, Any]) -> float:
         if press.over:
-            raise RequestRefused("The motion was stopped: {reason}.", reason=press.reason or "the button was released")
+            reason = press.reason or Message.of("the button was released")
+            raise RequestRefused("The motion was stopped: {reason}.", reason=reason)
         try:
             raw = await self._host.require_online().lease(
                 press.robot_id,
@@ -186,7 +190,7 @@ class HoldToRun:
             )
         except Arcor2Error:
             if not (press.started or press.over):  # the host may not know the hold
-                press.reason = "it could not start"
+                press.reason = Message.of("it could not start")
                 await self._release(press, quietly=True)
             raise
         if not press.started and not press.over:
@@ -208,7 +212,7 @@ class HoldToRun:
         name = self._robots.robot(robot_id).name
         self._require_unspent(client, args.hold)
         if (former := self._held.get(robot_id)) is not None and former.client is client:
-            self._end(former, "" if former.press < args.hold else "another button was pressed")
+            self._end(former, None if former.press < args.hold else Message.of("another button was pressed"))
             await asyncio.wait({former.ended}, timeout=until - loop.time())
             if loop.time() >= until:
                 raise RequestRefused("{name} is still stopping. Try again when it has stopped.", name=name)
@@ -222,7 +226,7 @@ class HoldToRun:
             if press.over:
                 raise RequestRefused("The motion was stopped: {reason}.", reason=press.reason)
         except BaseException as error:
-            self._finish(press, "")
+            self._finish(press, None)
             refusal = error if isinstance(error, Arcor2Error) else RequestRefused("The motion could not start.")
             press.allowed.set_exception(refusal)
             press.allowed.exception()  # marks it as retrieved, in case nothing awaits it
@@ -252,7 +256,7 @@ class HoldToRun:
             return
         await self._release(press)
 
-    def _end(self, press: _Press, reason: str) -> None:
+    def _end(self, press: _Press, reason: Message | None) -> None:
         """Start stopping the robot, with a reason for the user."""
         if not press.over:
             press.over, press.reason = True, press.reason or reason
@@ -273,9 +277,9 @@ class HoldToRun:
         """Finish the hold of a robot that has stopped."""
         press = self._held.get(message.object_id)
         if press is not None and press.number == message.hold:
-            self._finish(press, "" if message.error is None else message.error.message)
+            self._finish(press, None if message.error is None else message.error.message)
 
-    def _finish(self, press: _Press, reason: str) -> None:
+    def _finish(self, press: _Press, reason: Message | None) -> None:
         if press.ended.done():
             return
         press.over = True
@@ -290,9 +294,9 @@ class HoldToRun:
         if press.started:
             self._publish(press, False, press.reason)
 
-    def _publish(self, press: _Press, held: bool, reason: str = "") -> None:
-        hub = self._hub
-        log.info("held robot", robot=press.robot_id, kind=press.kind.value, user=press.user, held=held, reason=reason)
+    def _publish(self, press: _Press, held: bool, reason: Message | None = None) -> None:
+        hub, why = self._hub, str(reason or "")
+        log.info("held robot", robot=press.robot_id, kind=press.kind.value, user=press.user, held=held, reason=why)
         hub.broadcast(make_event("RobotHold", press.state(held, reason)))
         if press.kind is HoldKind.HAND_TEACHING:
             data = HandTeachingModeData(press.robot_id, held, press.arm_id)
@@ -301,24 +305,27 @@ class HoldToRun:
     def teaching_ended(self, message: m.HandTeachingEnded) -> None:
         """Publish that hand teaching mode ended without a request."""
         hub = self._hub
-        log.warning("hand teaching ended", robot=message.object_id, reason=message.error.message)
+        log.warning("hand teaching ended", robot=message.object_id, reason=message.error.message.text)
         data = HandTeachingModeData(message.object_id, False, message.arm_id or UNSET)
         hub.broadcast(make_event("HandTeachingMode", data))
-        hub.broadcast(make_event("Notification", NotificationData(message.error.message, NotificationLevel.WARN)))
+        why = message.error.message
+        notification = NotificationData(why.text, NotificationLevel.WARN, **why.translation())
+        hub.broadcast(make_event("Notification", notification))
 
     def forget(self, client: Connection) -> None:
         """Release the robots of a client that disconnected."""
         self._delays.pop(client, None)
         self._spent.pop(client, None)
         for press in [press for press in self._held.values() if press.client is client]:
-            self._end(press, f"{press.user} is no longer connected")
+            self._end(press, Message.of("{user} is no longer connected", user=press.user))
 
     def stop(self, by: str) -> None:
         """End all holds because a user sent StopAll."""
+        reason = Message.of("{user} stopped all motion", user=by) if by else Message.of("all motion was stopped")
         for press in list(self._held.values()):
-            self._end(press, f"{by} stopped all motion" if by else "all motion was stopped")
+            self._end(press, reason)
 
-    def offline(self, reason: str) -> None:
+    def offline(self, reason: Message | None) -> None:
         """Finish all holds after the scene went offline. The host has stopped the robots."""
         for press in list(self._held.values()):
-            self._finish(press, reason or "the scene is offline")
+            self._finish(press, reason or Message.of("the scene is offline"))

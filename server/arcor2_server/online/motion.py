@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import structlog
+from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.events import MoveEventType
@@ -117,17 +118,17 @@ class RobotMotion:
         requested_at: float,
     ) -> None:
         """Move a robot and publish the end or failure. The caller has added the robot to `OnlineScene.moving`."""
-        phase, problem = MoveEventType.END, ""
+        data = event_data(MoveEventType.END, UNSET)
         try:
             await self._online.call(robot_id, method, arguments, control=True, requested_at=requested_at)
         except asyncio.CancelledError:
             raise
         except Arcor2Error as error:
-            phase, problem = MoveEventType.FAILED, str(error)
-            log.info("motion failed", robot=robot_id, reason=problem, detail=error.detail)
+            data = replace(event_data(MoveEventType.FAILED, str(error)), **error.message.translation())
+            log.info("motion failed", robot=robot_id, reason=str(error), detail=error.detail)
         finally:
             self._online.moving.discard(robot_id)
-        self._hub.broadcast(make_event(event, event_data(phase, problem or UNSET)))
+        self._hub.broadcast(make_event(event, data))
 
     def require_robot_online(self, robot_id: str) -> OnlineScene:
         """Return the online scene with the robot.

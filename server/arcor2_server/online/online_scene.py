@@ -12,6 +12,7 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.collaboration.locks import PROJECT, SCENE, SERVER, Locks
 from arcor2_server.collaboration.tasks import Tasks
@@ -120,13 +121,16 @@ class OnlineScene:
             self.task.connected(self.board.states())
         self._robot_calibrations.read_connected()
 
-    def _publish(self, state: SceneStateEnum, message: str = "") -> None:
+    def _publish(self, state: SceneStateEnum, message: Message | None = None) -> None:
         self.state = state
         self.host.online = state is SceneStateEnum.STARTED
         scene = self._session.scene
         self.task.entered(state, "" if scene is None else scene.name, message)
-        log.info("scene", state=state.value, reason=message)
-        self._hub.broadcast(make_event("SceneState", SceneStateData(state, message or UNSET)))
+        log.info("scene", state=state.value, reason=str(message or ""))
+        data = SceneStateData(state)
+        if message is not None:
+            data = SceneStateData(state, message.text, **message.translation())
+        self._hub.broadcast(make_event("SceneState", data))
         self._robot_calibrations.read_connected()
 
     # -------------------------------------------------------------------------------- going online
@@ -167,13 +171,14 @@ class OnlineScene:
         try:
             problem = await self._go_online(scene, keep_going)
         except Arcor2Error as error:
-            problem = str(error)
+            problem = error.message
         except Exception as error:
             log.exception("scene start failed")
-            problem = f"An error inside the server: {error}"
+            problem = Message.of("An error inside the server: {reason}", reason=error)
         if problem is None:
             failed = self.board.failed()
-            self._done(SceneStateEnum.STARTED, f"Not connected: {', '.join(failed)}." if failed else "")
+            missing = Message.of("Not connected: {names}.", names=", ".join(failed)) if failed else None
+            self._done(SceneStateEnum.STARTED, missing)
             self.host.prepare()
             return
         self._publish(SceneStateEnum.STOPPING, problem)
@@ -182,7 +187,7 @@ class OnlineScene:
             await host.close()
         self._gone_offline(problem)
 
-    async def _go_online(self, scene: Scene, keep_going: bool) -> str | None:
+    async def _go_online(self, scene: Scene, keep_going: bool) -> Message | None:
         """Start a host and connect the devices; return the reason for a failure, None on success."""
         self.board.show(scene.objects, {})
         message, overlaid = await self._opening.prepare(scene, keep_going)
@@ -195,20 +200,20 @@ class OnlineScene:
                 error = await self._answer
         except TimeoutError:
             host.kill()
-            return f"The scene was not online within {START_WITHIN:g} s."
+            return Message.of("The scene was not online within {limit:g} s.", limit=START_WITHIN)
         if error is None:
             return None
         if error.detail:
-            log.warning("scene start failed", reason=error.message, detail=error.detail)
+            log.warning("scene start failed", reason=error.message.text, detail=error.detail)
         return error.message
 
-    def _done(self, state: SceneStateEnum, message: str = "") -> None:
+    def _done(self, state: SceneStateEnum, message: Message | None = None) -> None:
         self._task = None
         self._answer = None
         self._locks.release(SERVER, SCENE, PROJECT)
         self._publish(state, message)
 
-    def _gone_offline(self, message: str = "") -> None:
+    def _gone_offline(self, message: Message | None = None) -> None:
         self.host.host = None
         self.board.clear(message)
         self.results.clear()
@@ -247,18 +252,18 @@ class OnlineScene:
     async def _stop(self) -> None:
         self._publish(SceneStateEnum.STOPPING)
         host = self.host.host
-        problem = ""
+        problem: Message | None = None
         if host is not None:
             self._answer = asyncio.get_running_loop().create_future()
             host.send(m.CloseScene())
             try:
                 async with asyncio.timeout(STOP_WITHIN):
                     error = await self._answer
-                problem = "" if error is None else error.message
+                problem = None if error is None else error.message
             except ConnectionLost as lost:
-                problem = str(lost)
+                problem = lost.message
             except TimeoutError:
-                problem = "The devices could not be closed in time."
+                problem = Message.of("The devices could not be closed in time.")
                 host.kill()
             await host.wait_or_kill()
         self._gone_offline(problem)
@@ -295,7 +300,7 @@ class OnlineScene:
         if self._answer is not None and not self._answer.done():
             self._answer.set_exception(ConnectionLost(reason[:1].upper() + reason[1:] + "."))
         elif self.online:
-            message = f"Connection to the devices lost: {reason}."
+            message = Message.of("Connection to the devices lost: {reason}.", reason=reason)
             self._publish(SceneStateEnum.STOPPING, message)
             self._gone_offline(message)
 
@@ -357,11 +362,13 @@ class OnlineScene:
         self._background.add(task)
         task.add_done_callback(self._background.discard)
 
-    def action_ended(self, action: RunningAction, results: list[str] | None, error: str | None) -> None:
+    def action_ended(self, action: RunningAction, results: list[str] | None, error: Message | None) -> None:
         """Store the results of the running action, and publish its end unless it was cancelled."""
         self.running_action = None
         if results is not None and self.online:
             self.results[action.action_id] = results
         if not action.cancelled:
-            data = ActionResultData(action.action_id, results or UNSET, error or UNSET)
+            data = ActionResultData(action.action_id, results or UNSET)
+            if error is not None:
+                data = ActionResultData(action.action_id, results or UNSET, error.text, **error.translation())
             self._hub.broadcast(Event("ActionResult", data=data))

@@ -3,6 +3,7 @@
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ObjectStateData, SceneStateEnum
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.tasks import Task, Tasks
 
 _CONNECTED = frozenset({Connection.ONLINE, Connection.BACK})
@@ -18,7 +19,7 @@ class SceneTask:
         self.requested_by = ""
         """The user who last started or stopped the scene."""
 
-    def entered(self, state: SceneStateEnum, scene: str, message: str) -> None:
+    def entered(self, state: SceneStateEnum, scene: str, message: Message | None) -> None:
         """Start or end the task after the scene has entered a state; `message` is the reason."""
         task = self._task
         match state:
@@ -27,7 +28,7 @@ class SceneTask:
                 self._task = self._tasks.begin(TaskKind.SCENE_START, f"Starting the scene {scene}", self.requested_by)
             case SceneStateEnum.STOPPING:
                 if task is not None:  # the start failed
-                    task.fail(message or "The scene could not be started.")
+                    task.fail(message or Message.of("The scene could not be started."))
                 self._starting = False
                 self._task = self._tasks.begin(TaskKind.SCENE_STOP, f"Stopping the scene {scene}", self.requested_by)
             case SceneStateEnum.STARTED | SceneStateEnum.STOPPED if task is not None:

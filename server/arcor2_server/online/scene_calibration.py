@@ -10,13 +10,14 @@ from msgspec.structs import replace
 
 from arcor2_hw.calibration.records import CalibrationInput, CalibrationKind, CalibrationRecord
 from arcor2_hw.collision.description import RobotSource
-from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.base import Unset
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ChangeType, ProcessStateData, ProcessStateEnum
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.compute.process import ProgressCallback
@@ -239,8 +240,11 @@ class SceneCalibration:
     ) -> None:
         """Run a calibration in the background; call `end` afterwards in any case."""
 
-        def publish(state: ProcessStateEnum, message: str = "") -> None:
-            self._hub.broadcast(make_event("ProcessState", ProcessStateData(process, state, message or UNSET)))
+        def publish(state: ProcessStateEnum, message: Message | None = None) -> None:
+            data = ProcessStateData(process, state)
+            if message is not None:
+                data = ProcessStateData(process, state, message.text, **message.translation())
+            self._hub.broadcast(make_event("ProcessState", data))
 
         async def run() -> None:
             verdict = ""
@@ -253,12 +257,13 @@ class SceneCalibration:
                     task.at(1.0, verdict)
             except Arcor2Error as error:
                 log.info("calibration failed", process=process, object=obj.name, reason=str(error), detail=error.detail)
-                publish(ProcessStateEnum.FAILED, str(error))
+                publish(ProcessStateEnum.FAILED, error.message)
             except Exception as error:
                 log.exception("calibration failed", process=process, object=obj.name)
-                publish(ProcessStateEnum.FAILED, f"An error inside the server: {error}")
+                message = Message.of("An error inside the server: {reason}", reason=error)
+                publish(ProcessStateEnum.FAILED, message)
             else:
-                publish(ProcessStateEnum.FINISHED, verdict)
+                publish(ProcessStateEnum.FINISHED, Message.of(verdict) if verdict else None)
             finally:
                 self._running.discard(obj.id)
                 end()

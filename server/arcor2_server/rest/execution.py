@@ -216,7 +216,7 @@ class ExecutionOperations:
         state = _STATES.get(execution.state, ExecutionState.PENDING)
         error: str | Unset = UNSET
         if state is ExecutionState.COMPLETED and execution.last_error is not None:
-            state, error = ExecutionState.FAULTED, execution.last_error.message
+            state, error = ExecutionState.FAULTED, execution.last_error.message.text
         points: Any = UNSET
         if (before := execution.action_in_progress) is not None:
             points = msgspec.json.decode(before, type=_Before).data.action_point_ids

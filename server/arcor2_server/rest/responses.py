@@ -6,7 +6,7 @@ import msgspec
 from litestar import MediaType, Request, Response
 from litestar.exceptions import HTTPException
 
-from arcor2_hw.data.base import Data
+from arcor2_hw.data.base import TranslatableData
 from arcor2_hw.exceptions import (
     Arcor2Error,
     Conflict,
@@ -23,8 +23,8 @@ SERVICE: Final = "service"
 _encode = msgspec.json.Encoder().encode
 
 
-class WebApiError(Data, frozen=True):
-    """Body of the response to a refused REST request (openapi/storage.json)."""
+class WebApiError(TranslatableData, frozen=True):
+    """Body of the response to a refused REST request (openapi/storage.json), with the translation of its message."""
 
     service: str
     message: str
@@ -75,7 +75,9 @@ def refusal(service: str, error: Arcor2Error) -> Response[bytes]:
     otherwise = (503, "General") if error.code in _UNAVAILABLE else (409, _STATES.get(service, "General"))
     otherwise = _BY_REASON.get(getattr(error, "reason", "")) or _BY_CODE.get(error.code, otherwise)
     status, name = next((found for kind, found in _STATUS.items() if isinstance(error, kind)), otherwise)
-    return _json_response(WebApiError(service, _printable(str(error)), name, _printable(error.detail)), status)
+    text, detail = _printable(str(error)), _printable(error.detail)
+    translation = error.message.translation() if text == str(error) else {}
+    return _json_response(WebApiError(service, text, name, detail, **translation), status)
 
 
 def http_refusal(request: Request[Any, Any, Any], error: HTTPException) -> Response[bytes]:

@@ -39,7 +39,7 @@ def receiving(request: Request[Any, Any, Any], tasks: Tasks, title: str, shown_f
         task.cancel()
         raise
     except Arcor2Error as error:
-        task.fail(str(error))
+        task.fail(error.message)
         raise
     except HTTPException as error:  # for example, the body is too large
         task.fail(error.detail)

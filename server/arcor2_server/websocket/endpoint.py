@@ -11,12 +11,14 @@ import msgspec
 import structlog
 from litestar import WebSocket
 from msgspec import UNSET, Struct
+from msgspec.structs import replace
 
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS, Request, Response, Rpc
 from arcor2_hw.data.texts import SHORTEST, check_texts
 from arcor2_hw.exceptions import Arcor2Error, StorageError, TextTooLong
+from arcor2_hw.messages import Message
 from arcor2_server.access.admission import Access, AccessRefused, address_of
 from arcor2_server.collaboration.users import Users
 from arcor2_server.errors import RequestRefused
@@ -311,17 +313,16 @@ class Endpoint:
         except RequestRefused as error:
             # A refusal with data means that a part of the request was done, so its events are sent.
             partly_done = error.data is not UNSET
-            text = _shortened(str(error))
-            self._answer(client, request, context if partly_done else None, False, error.data, text, error.code)
+            self._answer(client, request, context if partly_done else None, error.data, error)
             self._note("refused", client, rpc, args, dry_run=context.dry_run)
             return
         except Arcor2Error as error:
             if error.detail:
                 log.info("request refused", request=rpc.name, reason=_shortened(str(error)), detail=error.detail)
-            self._refuse(client, request, str(error), error.code)
+            self._refuse(client, request, error.message, error.code)
             self._note("refused", client, rpc, args, dry_run=context.dry_run)
             return
-        self._answer(client, request, context, True, UNSET if data is None else data)
+        self._answer(client, request, context, UNSET if data is None else data)
         self._note("done", client, rpc, args, dry_run=context.dry_run)
 
     def _note(self, outcome: str, client: Client, rpc: Rpc, args: Any, *, dry_run: bool = False) -> None:
@@ -341,38 +342,47 @@ class Endpoint:
         client: Client,
         request: Request,
         context: Context | None,
-        result: bool,
         data: Any,
-        message: str = "",
-        code: str = "",
+        error: RequestRefused | None = None,
     ) -> None:
-        messages = [message] if message else UNSET
-        sent_code = code if code and request.codes else UNSET
-        response = encode(Response(request.id, request.request, result, messages, data, sent_code))
+        response = Response(request.id, request.request, error is None, data=data)
+        if error is not None:
+            response = replace(response, messages=[_shortened(str(error))])
+            if request.codes:
+                response = replace(response, code=error.code, **_translation(error.message))
+        answer = encode(response)
         if context is None:
-            client.put(response)
+            client.put(answer)
             return
         broadcast = self._hub.broadcast
         for event in context.events_before:
             broadcast(event)
-        client.put(response)
+        client.put(answer)
         for event in context.events_to_caller:
             self._hub.send(client, event)
         for event in context.events_after:
             broadcast(event)
 
-    def _refuse(self, client: Client, request: "Request | _Head", message: str, code: str = "") -> None:
+    def _refuse(self, client: Client, request: "Request | _Head", message: str | Message, code: str = "") -> None:
         name = request.request if len(request.request) <= LONGEST_NAME else UNREADABLE
-        message = _shortened(message)
+        text = _shortened(str(message))
         if log.is_enabled_for(logging.DEBUG):
-            log.debug("refused", client=client.number, request=name, message=message)
+            log.debug("refused", client=client.number, request=name, message=text)
         try:
-            sent_code = code if code and isinstance(request, Request) and request.codes else UNSET
-            answer = encode(Response(request.id, name, False, [message], UNSET, sent_code))
+            response = Response(request.id, name, False, [text])
+            if isinstance(request, Request) and request.codes:
+                translation = _translation(message) if isinstance(message, Message) else {}
+                response = replace(response, code=code or UNSET, **translation)
+            answer = encode(response)
         except UnicodeEncodeError:
             # A name with half a surrogate pair can be read but not sent back.
-            answer = encode(Response(request.id, UNREADABLE, False, [ascii(message)]))
+            answer = encode(Response(request.id, UNREADABLE, False, [ascii(text)]))
         client.put(answer)
+
+
+def _translation(message: Message) -> dict[str, Any]:
+    """Return key and values of a message that is not shortened."""
+    return message.translation() if len(message.text) <= LONGEST_REASON else {}
 
 
 def _shortened(message: str) -> str:

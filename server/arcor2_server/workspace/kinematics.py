@@ -7,7 +7,7 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.rpc import ForwardKinematicsArgs, InverseKinematicsArgs
 from arcor2_hw.data.scene import SceneObject
-from arcor2_hw.exceptions import Arcor2Error, KinematicsError
+from arcor2_hw.exceptions import KinematicsError
 from arcor2_server.compute.workers import Compute
 from arcor2_server.hosts.session import HostSession
 from arcor2_server.object_types.registry import ObjectTypes
@@ -64,9 +64,7 @@ class Kinematics:
         try:
             return await self._compute.run(task, world=self._scene_collisions.world([robot, *known], joints))
         except KinematicsError as error:
-            # Changes only the message, so that the code and the reason of the error remain.
-            Arcor2Error.__init__(error, self._scene_collisions.with_names(str(error)), error.detail)
-            raise
+            raise error.with_message(self._scene_collisions.named(error.message)) from error
 
     async def forward(self, robot: SceneObject, args: ForwardKinematicsArgs) -> Pose:
         """Return the pose for joints. Raise RequestRefused without a model, InvalidData for wrong joints."""

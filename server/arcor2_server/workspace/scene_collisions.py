@@ -25,6 +25,7 @@ from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Conflict
 from arcor2_hw.kinematics.primitives import primitive_of
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime.messages import HeldPart
 from arcor2_server.compute.workers import Compute
 from arcor2_server.documents import Session
@@ -170,6 +171,14 @@ class SceneCollisions:
         for obj in sorted(scene.objects, key=lambda obj: len(obj.id), reverse=True):
             text = text.replace(obj.id, obj.name)
         return text
+
+    def named(self, message: Message) -> Message:
+        """Replace the ids of objects in a message of the worker and in its values by their names."""
+        values = {
+            name: self.with_names(value) if isinstance(value, str) else self.named(value)
+            for name, value in message.values.items()
+        }
+        return Message(self.with_names(message.text), message.key, values)
 
     # ------------------------------------------------------------------------------------------------ lines
     async def hit(self, start: Position, end: Position) -> Hit | None:

@@ -248,3 +248,18 @@ async def test_an_oversized_name_is_refused_without_events(services: Server) -> 
         ann.say(id=2, request="RegisterUser", args={"user_name": "x" * 200})
         assert (await ann.heard(3))[2]["result"]
         assert len(bob.protocol.sent) == 1
+
+
+async def test_a_refusal_contains_what_is_needed_to_translate_it_if_codes_are_requested(services: Server) -> None:
+    async def handler(context: object, args: object) -> None:
+        raise RequestRefused("The scene {name!r} is open.", name="s1")
+
+    async with connecting(services) as connect:
+        handle(connect, "SaveScene", handler)
+        ann = connect()
+        ann.say(id=1, request="SaveScene", codes=True)
+        ann.say(id=2, request="SaveScene")
+        first, second = [each for each in await ann.heard(3) if each.get("response") == "SaveScene"]
+        assert first["messages"] == second["messages"] == ["The scene 's1' is open."]
+        assert (first["key"], first["values"]) == ("The scene {name} is open.", {"name": "'s1'"})
+        assert second.keys().isdisjoint({"code", "key", "values"})

@@ -11,14 +11,23 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
 from tests.protocol import PROTOCOL
 
+TRANSLATION = {"key", "values"}
 ADDED = {
-    "ObjectTypeMeta": {"category", "icon", "shadows"},
+    "ObjectTypeMeta": {"category", "display_name", "icon", "shadows"},
     "ParameterMeta": {"address", "former_names", "secret"},
     "ObjectAction": {"category", "former_names", "icon"},
     "RobotEef.Data": {"time_ms"},
     "RobotFeatures": {"jog", "acknowledge_stop", "kinematic_calibration"},
     "RobotJoints.Data": {"time_ms"},
-    "ProjectException.Data": {"action_id"},
+    "ActionResult.Data": TRANSLATION,
+    "Notification.Data": TRANSLATION,
+    "ProcessState.Data": TRANSLATION,
+    "ProjectException.Data": {"action_id"} | TRANSLATION,
+    "RobotMoveToActionPointJoints.Data": TRANSLATION,
+    "RobotMoveToActionPointOrientation.Data": TRANSLATION,
+    "RobotMoveToJoints.Data": TRANSLATION,
+    "RobotMoveToPose.Data": TRANSLATION,
+    "SceneState.Data": TRANSLATION,
     "RemoveActionArgs": {"with_steps"},
     "RunPackage.Request.Args": {"shared_breakpoints"},
     "TemporaryPackage.Request.Args": {"shared_breakpoints"},

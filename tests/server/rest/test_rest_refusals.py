@@ -6,6 +6,7 @@ import pytest
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.compute import messages as m
 from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, ComputeTimeout, NotInstalled
+from arcor2_hw.compute.worker import failed
 from arcor2_hw.exceptions import Arcor2Error, KinematicsError
 from arcor2_server.compute.process import error_of
 from arcor2_server.rest.responses import refusal
@@ -36,3 +37,19 @@ def test_error_types_are_kept_across_processes() -> None:
     error = error_of(m.Failed(["out_of_reach", "kinematics", "device", "error"], "Too far.", "at 3 m"))
     assert isinstance(error, KinematicsError)
     assert (error.code, error.detail) == ("out_of_reach", "at 3 m")
+
+
+def test_the_answer_contains_what_is_needed_to_translate_it() -> None:
+    inner = KinematicsError("{x:.1f} m is too far.", x=3)
+    said = msgspec.json.decode(
+        refusal("Calibration", Arcor2Error("{name}: {reason}", name="arm", reason=inner)).content
+    )
+    reason = {"text": "3.0 m is too far.", "key": "{x} m is too far.", "values": {"x": "3.0"}}
+    assert (said["message"], said["key"]) == ("arm: 3.0 m is too far.", "{name}: {reason}")
+    assert said["values"] == {"name": "arm", "reason": reason}
+    assert "key" not in msgspec.json.decode(refusal("Calibration", Arcor2Error("No marker.")).content)
+
+
+def test_key_and_values_cross_the_process_border() -> None:
+    error = KinematicsError("{x:.1f} m is too far.", x=3)
+    assert error_of(failed(error)).message == error.message

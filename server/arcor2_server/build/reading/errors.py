@@ -3,6 +3,7 @@
 import ast
 
 from arcor2_hw.exceptions import InvalidProject
+from arcor2_hw.messages import Message
 
 
 class NotUnderstood(InvalidProject):
@@ -11,8 +12,8 @@ class NotUnderstood(InvalidProject):
     code = "script_not_understood"
 
     def __init__(self, line: int, message: str, detail: str = "", **values: object) -> None:
-        template = message if values else message.replace("{", "{{").replace("}", "}}")
-        super().__init__("script.py, line {line}: " + template, detail, line=line, **values)
+        problem = Message.of(message, **values)
+        super().__init__("script.py, line {line}: {problem}", detail, line=line, problem=problem)
         self.line = line
 
 
