@@ -248,7 +248,7 @@ def _lens_model(coefficients: int) -> IntrinsicsOptions:
     try:
         return msgspec.convert({"coefficients": coefficients}, IntrinsicsOptions)
     except msgspec.ValidationError:
-        raise Failed(ExitStatus.USAGE, f"a lens has 4, 5, 8 or 12 coefficients, not {coefficients}") from None
+        raise Failed(ExitStatus.USAGE, f"--coefficients must be 4, 5, 8 or 12, not {coefficients}") from None
 
 
 # ------------------------------------------------------------------------------------------------ touch
@@ -313,7 +313,7 @@ def _touch_task(given: Touched, path: Path) -> Any:
         case Touched(origin=Position() as origin, on_x=Position() as x):
             return t.FrameByAxes(origin, x, given.in_plane)
     raise InvalidData(
-        "{path} names no method: it needs known and touched, or origin, on_x and in_plane, or flanges, or "
+        "{path} lacks the fields of a method: known and touched, or origin, on_x and in_plane, or flanges, or "
         "orientations, or flange, tip, along_z and on_x.",
         path=path,
     )

@@ -153,7 +153,7 @@ async def _record(client: Client, name: str, key: str) -> CalibrationRecord:
         found: CalibrationRecord = await client.rest.request("GET", path, CalibrationRecord)
         if found.object_name != name:
             raise InvalidData(
-                "The calibration {key} is one of {object_name}, not of {name}.",
+                "The calibration {key} belongs to {object_name}, not to {name}.",
                 key=key,
                 object_name=found.object_name,
                 name=name,
@@ -165,7 +165,7 @@ async def _record(client: Client, name: str, key: str) -> CalibrationRecord:
     for one in listed:
         if one.object_name == name and not isinstance(one.after, Unset):
             return one
-    raise NotFound("There is no calibration of {name!r} that found a pose.", name=name)
+    raise NotFound("{name!r} has no calibration with a pose.", name=name)
 
 
 async def _present_pose(client: Client, record: CalibrationRecord) -> Pose:
@@ -178,7 +178,7 @@ async def _present_pose(client: Client, record: CalibrationRecord) -> Pose:
     """
     if record.parent != "world":
         raise InvalidData(
-            "The calibration {id} is stated in {parent}: give a pose in that with --pose.",
+            "The calibration {id} is in the frame of {parent}. Specify a pose in this frame with --pose.",
             id=record.id,
             parent=record.parent,
         )
@@ -222,7 +222,7 @@ async def _open_scene(client: Client) -> Scene:
                         break
     except TimeoutError:
         pass
-    raise Conflict("No scene is open on the server: open one, and start it.")
+    raise Conflict("No scene is open on the server. Open and start one.")
 
 
 def _named(scene: Scene, name: str) -> SceneObject:

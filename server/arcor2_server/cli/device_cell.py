@@ -45,7 +45,7 @@ async def _exported(server: Server, wanted: str | None) -> Cell:
             raise NotFound("the server at {url} has no scene {wanted}", url=client.url, wanted=wanted)
         if len(named) > 1:
             raise NotFound(
-                "say which scene with --scene: {named}", named=", ".join(sorted(scene.name for scene in named))
+                "select a scene with --scene: {named}", named=", ".join(sorted(scene.name for scene in named))
             )
         scene = await client.get_scene(named[0].id)
         types = await client.get_object_types()

@@ -21,10 +21,10 @@ class DocumentKind(Struct, frozen=True):
         name: the kind.
         saved: returns the saved documents of a server.
         export: returns the export of a document by name or id.
-        content: what an export holds besides the document.
+        content: the content of an export in addition to the document.
         sources: the files that can be imported.
         parts: the parts that an import may overwrite.
-        packages: what can be validated besides export files, with a leading comma.
+        packages: files that can be validated in addition to export files, with a leading comma.
     """
 
     name: Literal["scene", "project"]

@@ -132,7 +132,7 @@ async def _run(server: Server, wanted: str, paused: bool) -> ExitStatus:
                     if event.data.state is PackageStateEnum.STOPPED:
                         break
         else:
-            raise ConnectionLost("The connection to {url} broke: the program may go on.", url=client.url)
+            raise ConnectionLost("The connection to {url} broke. The program may still be running.", url=client.url)
         if problem:
             return fail("package run", problem, ExitStatus.PROGRAM_FAILED)
     return ExitStatus.OK

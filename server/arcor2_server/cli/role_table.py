@@ -12,7 +12,7 @@ from arcor2_server.access.route_options import OPEN, ROLE
 
 _HEAD = """# Roles
 
-The least role that each request, event and route needs; whoever has a role may do what the ones before it may.
+The minimum role for each request, event and route. Each role includes the permissions of the roles before it.
 This page is generated from the declarations in the source:
 `python -m arcor2_server.cli.role_table > docs/reference/roles.md`.
 """

@@ -57,7 +57,7 @@ MOTION_WRITES: Final = (
     "1 go (with target in 0.1 mm and speed in 0.1 mm/s), 2 stop, 3 reset, 4 home. Register 2: ms without a request "
     "after which it stops; 0 releases control"
 )
-COMMON_WORDS: Final = "fault (0: none), owner (0 nobody, 1 the host, 2 the panel)"
+COMMON_WORDS: Final = "fault (0: none), owner (0 none, 1 the host, 2 the panel)"
 MOTION_WORDS: Final = f"{STATUS}, tenths of a mm, flags (1 homed, 2 part held), {COMMON_WORDS}"
 KINDS: Final = {
     Base.MACHINE: Kind(

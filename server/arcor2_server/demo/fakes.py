@@ -110,4 +110,4 @@ def free_loopback_address(ports: tuple[int, ...] = _UR_PORTS) -> str:
             except OSError:
                 continue
             return address
-    raise ChildFailed("No loopback address has the ports of a UR controller free.")
+    raise ChildFailed("The ports of a UR controller are in use on all tried loopback addresses.")

@@ -65,7 +65,7 @@ class Child:
             raise
         await self._process.wait()
         raise ChildFailed(
-            "{name} did not start: {last_words}", name=self.name, last_words=self._last_words() or "it said nothing"
+            "{name} did not start: {last_words}", name=self.name, last_words=self._last_words() or "it printed no error"
         )
 
     async def start_json(self) -> dict[str, Any]:

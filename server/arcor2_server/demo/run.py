@@ -171,7 +171,7 @@ class Demo:
             found = [starts.create_task(child.start_json()) for child in children]
             serving = starts.create_task(server.start())
         ready = [task.result() for task in found]
-        return {fake.name: (fake, said) for fake, said in zip(wanted, ready, strict=True)}, serving.result()
+        return {fake.name: (fake, addresses) for fake, addresses in zip(wanted, ready, strict=True)}, serving.result()
 
     async def _cycle(self, client: Client, settings: dict[str, Scalar], outcome: Outcome) -> None:
         workplace = load()
@@ -214,7 +214,7 @@ class Demo:
                 event: Event = await client.next_event(timeout=BOARD_TIMEOUT)
             except DeviceTimeout:
                 raise ProgramFailed(
-                    "The program stands still: nothing happened for {board_timeout:g} s.", board_timeout=BOARD_TIMEOUT
+                    "The program is stuck: there was no event for {board_timeout:g} s.", board_timeout=BOARD_TIMEOUT
                 ) from None
             match event.event:
                 case "ActionStateBefore" if event.data.action_id in actions:
