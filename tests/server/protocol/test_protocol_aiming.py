@@ -59,8 +59,8 @@ def test_fit_distributes_touching_errors() -> None:
     [
         ([(0, 0, 0), (1, 0, 0)], "at least 3"),
         ([(0, 0, 0), (1, 0, 0), (2, 0, 0.001)], "one line"),
-        ([(1, 1, 1)] * 4, "one line, or in one place"),
-        ([(0, 0, 0), (1, 0, 0), (0, math.inf, 0)], "is nowhere"),
+        ([(1, 1, 1)] * 4, "one line or in one place"),
+        ([(0, 0, 0), (1, 0, 0), (0, math.inf, 0)], "not a finite number"),
     ],
 )
 def test_fit_refuses_degenerate_points(points: list[tuple[float, float, float]], why: str) -> None:
