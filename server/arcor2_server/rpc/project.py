@@ -25,6 +25,7 @@ from arcor2_server.collaboration.locks import PROJECT, Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks import project_problems
+from arcor2_server.documents.document import reduce_to
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.notifications import TypeNotifications
@@ -34,11 +35,6 @@ from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.rpc.scene import SceneRequests
 from arcor2_server.storage import Storage
-
-
-def _bare(project: BareProject) -> BareProject:
-    """Return a project without its content."""
-    return BareProject(**{name: getattr(project, name) for name in BareProject.__struct_fields__})
 
 
 def _id_parameter(name: str, value: str) -> ProjectParameter:
@@ -204,7 +200,9 @@ class ProjectRequests:
         project = await storage.project(project_id)
         if not context.dry_run:
             changed = replace(project, **fields, **({"logic": []} if without_logic else {}))
-            context.emit_first("ProjectChanged", _bare(await storage.put_project(changed)), ChangeType.UPDATE_BASE)
+            context.emit_first(
+                "ProjectChanged", reduce_to(BareProject, await storage.put_project(changed)), ChangeType.UPDATE_BASE
+            )
 
     @rpc("CopyProject")
     async def copy_project(self, context: Context, args: CopyProjectArgs) -> None:
@@ -226,7 +224,7 @@ class ProjectRequests:
             saved = await storage.put_project(copied)
             with contextlib.suppress(NotFound):  # a project with logic, or without a stored script
                 await storage.put_project_source(key, await storage.project_source(source.id))
-            context.emit_first("ProjectChanged", _bare(saved), ChangeType.UPDATE_BASE)
+            context.emit_first("ProjectChanged", reduce_to(BareProject, saved), ChangeType.UPDATE_BASE)
 
     @rpc("DeleteProject")
     async def delete_project(self, context: Context, args: IdArgs) -> None:
@@ -238,4 +236,4 @@ class ProjectRequests:
             if context.dry_run:
                 return
             await storage.delete_project(args.id)
-            context.emit("ProjectChanged", _bare(project), ChangeType.REMOVE)
+            context.emit("ProjectChanged", reduce_to(BareProject, project), ChangeType.REMOVE)

@@ -20,17 +20,13 @@ from arcor2_server.collaboration.locks import SCENE, Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.dependents import Dependents
+from arcor2_server.documents.document import reduce_to
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.storage import Storage
-
-
-def _bare(scene: BareScene) -> BareScene:
-    """Return a scene without its objects."""
-    return BareScene(**{name: getattr(scene, name) for name in BareScene.__struct_fields__})
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +132,7 @@ class SceneRequests:
         scene = await self._storage.scene(scene_id)
         if not context.dry_run:
             saved = await self._storage.put_scene(replace(scene, **fields))
-            context.emit_first("SceneChanged", _bare(saved), ChangeType.UPDATE_BASE)
+            context.emit_first("SceneChanged", reduce_to(BareScene, saved), ChangeType.UPDATE_BASE)
 
     @rpc("CopyScene")
     async def copy_scene(self, context: Context, args: CopySceneArgs) -> None:
@@ -147,7 +143,9 @@ class SceneRequests:
             source = await storage.scene(args.source_id)
             copied = replace(source, id=new_id("scn"), name=args.target_name, created=UNSET, modified=UNSET)
             if not context.dry_run:
-                context.emit_first("SceneChanged", _bare(await storage.put_scene(copied)), ChangeType.UPDATE_BASE)
+                context.emit_first(
+                    "SceneChanged", reduce_to(BareScene, await storage.put_scene(copied)), ChangeType.UPDATE_BASE
+                )
 
     @rpc("DeleteScene")
     async def delete_scene(self, context: Context, args: IdArgs) -> None:
@@ -165,7 +163,7 @@ class SceneRequests:
             if context.dry_run:
                 return
             await self._storage.delete_scene(args.id)
-            context.emit("SceneChanged", _bare(scene), ChangeType.REMOVE)
+            context.emit("SceneChanged", reduce_to(BareScene, scene), ChangeType.REMOVE)
             if removed := await self._dependents.delete_unused_types({obj.type for obj in scene.objects}):
                 context.emit("ChangedObjectTypes", removed, ChangeType.REMOVE)
 
