@@ -104,35 +104,6 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
         return None
 
 
-def is_bench(path: Path) -> bool:
-    """Return whether the file requests the complete suite, even if the rest of it is invalid."""
-    return _Declared.of(path).conformance == Conformance.BENCH
-
-
-class _Declared(msgspec.Struct):
-    """The key that decides whether a problem of the file is a failure."""
-
-    conformance: str = Conformance.PENDING.value
-
-    @classmethod
-    def of(cls, path: Path) -> "_Declared":
-        try:
-            return msgspec.yaml.decode(_read(path), type=cls)
-        except (InvalidData, NotFound, msgspec.DecodeError):
-            return cls()
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise NotFound("there is no {file} in {name}", file=FILE, name=path.parent.name) from None
-    except OSError as error:
-        raise InvalidData(
-            "{name}/{file} cannot be read: {reason}", name=path.parent.name, file=FILE, reason=error.strerror
-        ) from None
-
-
 def read(path: Path) -> Quality:
     """Read a quality.yaml.
 
@@ -141,6 +112,12 @@ def read(path: Path) -> Quality:
         InvalidData: It is invalid; the message names folder, key and error.
     """
     try:
-        return msgspec.yaml.decode(_read(path), type=Quality)
+        return msgspec.yaml.decode(path.read_bytes(), type=Quality)
+    except FileNotFoundError:
+        raise NotFound("there is no {file} in {name}", file=FILE, name=path.parent.name) from None
+    except OSError as error:
+        raise InvalidData(
+            "{name}/{file} cannot be read: {reason}", name=path.parent.name, file=FILE, reason=error.strerror
+        ) from None
     except msgspec.DecodeError as error:  # also raised for a wrong value
         raise InvalidData("{name}/{file}: {reason}", name=path.parent.name, file=FILE, reason=error) from None
