@@ -119,12 +119,7 @@ def chart_of(dictionary: int, number: int) -> Chart:
 
 
 def measure(
-    picture: npt.NDArray[np.float32],
-    first: tuple[float, float],
-    lens: Lens,
-    chart: Chart,
-    number: int,
-    corners: Array,
+    picture: npt.NDArray[np.float32], first: tuple[float, float], lens: Lens, chart: Chart, number: int, corners: Array
 ) -> Measured | None:
     """Measure a marker whose corners are known to one or two pixels; return None when its edges are not found there.
 

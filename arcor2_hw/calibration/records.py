@@ -11,11 +11,7 @@ __all__ = ["CalibrationCheck", "CalibrationInput", "CalibrationKind", "Calibrati
 
 
 def check_against(
-    record: CalibrationRecord,
-    measured: Pose,
-    *,
-    distance_limit: float = 0.002,
-    angle_limit: float = math.radians(0.2),
+    record: CalibrationRecord, measured: Pose, *, distance_limit: float = 0.002, angle_limit: float = math.radians(0.2)
 ) -> CalibrationCheck:
     """Compare a measured pose, or a reference pose, with the pose of the record.
 

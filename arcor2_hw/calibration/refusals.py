@@ -39,11 +39,7 @@ class CalibrationRefused(Arcor2Error):
     code = "calibration_refused"
 
     def __init__(
-        self,
-        message: str | Message = "",
-        detail: str = "",
-        reason: Reason = Reason.NOT_CONVERGED,
-        **values: object,
+        self, message: str | Message = "", detail: str = "", reason: Reason = Reason.NOT_CONVERGED, **values: object
     ) -> None:
         super().__init__(message, detail, **values)
         self.reason = reason

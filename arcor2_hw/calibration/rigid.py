@@ -60,10 +60,7 @@ def moved(matrix: Array, step: Array) -> Array:
 
 def apart(a: Array, b: Array) -> tuple[float, float]:
     """Return the difference of two motions: m, rad."""
-    return (
-        float(np.linalg.norm(a[:3, 3] - b[:3, 3])),
-        float(np.linalg.norm(rotation_vector(a[:3, :3].T @ b[:3, :3]))),
-    )
+    return (float(np.linalg.norm(a[:3, 3] - b[:3, 3])), float(np.linalg.norm(rotation_vector(a[:3, :3].T @ b[:3, :3]))))
 
 
 def mean_rotation(rotations: Array, weights: Array) -> Array:

@@ -17,13 +17,7 @@ from arcor2_hw.client.stream import EventStream
 from arcor2_hw.client.wire import Message, Unanswered, Unsent, Wire
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import Event
-from arcor2_hw.data.rpc import (
-    RPCS,
-    AuthenticateArgs,
-    RegisterForRobotEventArgs,
-    RegisterUserArgs,
-    SubscribeEventsArgs,
-)
+from arcor2_hw.data.rpc import RPCS, AuthenticateArgs, RegisterForRobotEventArgs, RegisterUserArgs, SubscribeEventsArgs
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, InvalidData, NotConnected
 
 __all__ = ["Client", "RequestFailed"]

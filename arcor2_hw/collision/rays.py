@@ -5,13 +5,7 @@ from typing import Final
 import numpy as np
 
 from arcor2_hw.collision import lines
-from arcor2_hw.kinematics.shapes import (
-    Array,
-    Hull,
-    Shape,
-    TriangleMesh,
-    coal_geometry,
-)
+from arcor2_hw.kinematics.shapes import Array, Hull, Shape, TriangleMesh, coal_geometry
 
 _TINY: Final = 1e-12
 _CONTACTS: Final = 1000

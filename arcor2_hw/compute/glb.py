@@ -53,11 +53,7 @@ class _Content:
         self._accessors: list[dict[str, Any]] = []
 
     def document(self) -> dict[str, Any]:
-        return {
-            "buffers": [{"byteLength": len(self.data)}],
-            "bufferViews": self._views,
-            "accessors": self._accessors,
-        }
+        return {"buffers": [{"byteLength": len(self.data)}], "bufferViews": self._views, "accessors": self._accessors}
 
     def primitive(self, mesh: "DisplayMesh") -> dict[str, Any]:
         positions = np.ascontiguousarray(mesh.positions, dtype="<f4")

@@ -5,13 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
-from arcor2_hw.collision.description import (
-    MeshShape,
-    RobotSource,
-    WorldBody,
-    WorldItem,
-    WorldRobot,
-)
+from arcor2_hw.collision.description import MeshShape, RobotSource, WorldBody, WorldItem, WorldRobot
 from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_hw.kinematics import model, shapes

@@ -140,10 +140,7 @@ class Pose(MutableData):
 
     def __mul__(self, other: "Pose") -> "Pose":
         """Compose two poses: a_from_b * b_from_c = a_from_c."""
-        return Pose(
-            self.position + other.position.rotated(self.orientation),
-            self.orientation * other.orientation,
-        )
+        return Pose(self.position + other.position.rotated(self.orientation), self.orientation * other.orientation)
 
     def inverted(self) -> "Pose":
         """Return the inverse motion: b_from_a for a_from_b."""

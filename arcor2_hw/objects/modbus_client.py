@@ -137,13 +137,7 @@ class SerialClient(_Exchange, ModbusSerialClient):
 
     def __init__(self, port: str, baudrate: int, parity: str, stopbits: int, timeout: float) -> None:
         super().__init__(
-            port,
-            framer=FramerType.RTU,
-            baudrate=baudrate,
-            parity=parity,
-            stopbits=stopbits,
-            timeout=timeout,
-            retries=0,
+            port, framer=FramerType.RTU, baudrate=baudrate, parity=parity, stopbits=stopbits, timeout=timeout, retries=0
         )
         self._silence = max(SILENCE * BITS_PER_CHARACTER / baudrate, SHORTEST_SILENCE)
         self._last_byte = 0.0

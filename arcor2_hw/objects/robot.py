@@ -146,11 +146,7 @@ class Robot(GenericWithPose):
         raise Arcor2NotImplemented("stop")
 
     def inverse_kinematics(
-        self,
-        end_effector_id: str,
-        pose: Pose,
-        start_joints: list[Joint] | None = None,
-        avoid_collisions: bool = True,
+        self, end_effector_id: str, pose: Pose, start_joints: list[Joint] | None = None, avoid_collisions: bool = True
     ) -> list[Joint]:
         """Compute joint values that reach a pose in the world, nearest to `start_joints`.
 

@@ -95,11 +95,7 @@ class UrdfRobot(Robot):
         return self.safe_moves.forward(end_effector_id, joints)
 
     def inverse_kinematics(
-        self,
-        end_effector_id: str,
-        pose: Pose,
-        start_joints: list[Joint] | None = None,
-        avoid_collisions: bool = True,
+        self, end_effector_id: str, pose: Pose, start_joints: list[Joint] | None = None, avoid_collisions: bool = True
     ) -> list[Joint]:
         """Compute joint values that reach a pose in the world, nearest to `start_joints`.
 

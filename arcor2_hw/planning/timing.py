@@ -125,9 +125,7 @@ def _segment(start: Array, goal: Array, limits: MotionLimits) -> tuple[float, Ca
 
 # ------------------------------------------------------------------------------------------------ waypoints
 def smooth(
-    way: Sequence[Array],
-    limits: MotionLimits,
-    is_free: Callable[[Array, Array], bool] | None = None,
+    way: Sequence[Array], limits: MotionLimits, is_free: Callable[[Array, Array], bool] | None = None
 ) -> Trajectory:
     """Return a trajectory through waypoints that rounds corners where that is free, and stops where it is not.
 

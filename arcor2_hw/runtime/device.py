@@ -282,11 +282,7 @@ class Device:
         return job, interrupted
 
     def _stop(
-        self,
-        stop: Callable[[], Any] | None,
-        cancel: Callable[[], Any] | None,
-        interrupted: Job | None,
-        moment: float,
+        self, stop: Callable[[], Any] | None, cancel: Callable[[], Any] | None, interrupted: Job | None, moment: float
     ) -> None:
         """Call `stop`, and `cancel` if the interrupted call still runs.
 

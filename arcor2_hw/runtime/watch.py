@@ -34,10 +34,7 @@ class Watch:
     """
 
     def __init__(
-        self,
-        cell: Cell,
-        post: Callable[[DeviceChanged], None],
-        lost: Callable[[Device, str], None] = lambda *_: None,
+        self, cell: Cell, post: Callable[[DeviceChanged], None], lost: Callable[[Device, str], None] = lambda *_: None
     ) -> None:
         self._cell = cell
         self._post = post

@@ -33,11 +33,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="run the conformance suite on every device of this cell.yaml, with `--pyargs arcor2_hw.testing`; "
         "repeatable",
     )
-    group.addoption(
-        "--real",
-        action="store_true",
-        help="use real devices, but only those named by --real-device",
-    )
+    group.addoption("--real", action="store_true", help="use real devices, but only those named by --real-device")
     group.addoption(
         "--real-device",
         action="append",
@@ -47,9 +43,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "type of its bench; repeatable",
     )
     group.addoption(
-        "--report",
-        metavar="FILE",
-        help="write the results of the conformance suite, as evidence for level gold",
+        "--report", metavar="FILE", help="write the results of the conformance suite, as evidence for level gold"
     )
     group.addoption(
         "--phases",

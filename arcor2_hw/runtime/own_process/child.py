@@ -112,9 +112,7 @@ class DeviceServer(Peer):
         with self._calls.running():
             if message.epoch != self._epoch:
                 raise Cancelled(
-                    "{name}: {method} was stopped before it started",
-                    name=self._instance.name,
-                    method=header.name,
+                    "{name}: {method} was stopped before it started", name=self._instance.name, method=header.name
                 )
             if self._connected:
                 value = self.perform(message)
