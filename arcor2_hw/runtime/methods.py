@@ -13,22 +13,9 @@ NO_STOP: Final = (Robot.stop, MultiArmRobot.stop)
 
 OBSERVING: Final = frozenset(
     {
-        "alarms",
-        "connection",
-        "control_owner",
-        "forward_kinematics",
-        "get_arm_ids",
-        "get_end_effector_pose",
-        "get_end_effectors_ids",
-        "get_hand_teaching_mode",
-        "grippers",
-        "health",
-        "joint_limits",
-        "max_tcp_speed",
-        "move_in_progress",
-        "robot_joints",
-        "state",
-        "suctions",
+        *("alarms", "connection", "control_owner", "health", "state", "move_in_progress", "robot_joints"),
+        *("joint_limits", "max_tcp_speed", "forward_kinematics", "get_hand_teaching_mode", "grippers", "suctions"),
+        *("get_arm_ids", "get_end_effectors_ids", "get_end_effector_pose"),
     }
 )
 """Methods of a robot that run on its watch lane, so that they return while an action runs."""

@@ -17,25 +17,9 @@ STOPPABLE_FROM: Final = 1.0
 """Duration above which an action has to be stoppable, s."""
 READS: Final = frozenset(
     {
-        "alarms",
-        "counters",
-        "get_arm_ids",
-        "get_end_effectors_ids",
-        "get_hand_teaching_mode",
-        "identify",
-        "is_referenced",
-        "joint_limits",
-        "kinematic_calibration",
-        "machine_state",
-        "max_tcp_speed",
-        "permissives",
-        "points",
-        "state",
-        "status",
-        "stop_reason",
-        "unit_mode",
-        "vacuum",
-        "wrench",
+        *("alarms", "counters", "identify", "machine_state", "permissives", "points", "state", "status", "stop_reason"),
+        *("unit_mode", "vacuum", "wrench", "joint_limits", "max_tcp_speed", "is_referenced", "kinematic_calibration"),
+        *("get_arm_ids", "get_end_effectors_ids", "get_hand_teaching_mode"),
     }
 )
 """Methods of the bases that only read, without arguments or control, so that they can be tried on any device."""
