@@ -3,7 +3,6 @@
 The clock of this process, and that of the driver, end the lease even if the client, the network or the server hangs.
 """
 
-import contextlib
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -11,7 +10,7 @@ from typing import Any, Final
 
 from arcor2_hw.actions.json_values import encode as encode_json
 from arcor2_hw.data.operation import HoldKind
-from arcor2_hw.exceptions import Arcor2Error, Cancelled, DeviceTimeout, Refused
+from arcor2_hw.exceptions import Arcor2Error, Cancelled, Refused
 from arcor2_hw.objects import Robot
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.calls import Calls, Post, error_data
@@ -126,13 +125,12 @@ class Holds:
                 notify=lambda done: self._answer_leases(hold, done, numbers),
             )
             within = DRIVER_TIMEOUT + (0.0 if hold.driver_started else CONTROL_DEADLINE)
-        lane = hold.device.lane
-        try:
-            lane.submit(job)
-        except DeviceTimeout as error:
-            job.finish(None, error)
-            return
-        self._clock.after(within, lambda: lane.expire(job, within))
+        self._run(hold.device, job, within)
+
+    def _run(self, device: Device, job: Job, within: float) -> None:
+        """Run a call on the lane of a device with a time limit, s."""
+        if device.lane.submit_or_fail(job):
+            self._clock.after(within, lambda: device.lane.expire(job, within))
 
     def _pass_to_driver(self, hold: _Hold) -> float:
         """Call the driver and return the scale of the velocity. Runs on the lane of the device."""
@@ -185,12 +183,10 @@ class Holds:
         if hold is not None and hold.kind is HoldKind.HAND_TEACHING:
             self.end(hold, error)
             return
-        robot, lane = device.instance, device.lane
+        robot = device.instance
         if isinstance(robot, Robot):
             job = Job(SET_MODE, lambda: robot.set_hand_teaching_mode(False, **arm))
-            with contextlib.suppress(DeviceTimeout):  # the lane hangs, but the arm has left the mode anyway
-                lane.submit(job)
-                self._clock.after(DRIVER_TIMEOUT, lambda: lane.expire(job, DRIVER_TIMEOUT))
+            self._run(device, job, DRIVER_TIMEOUT)
         self._post(m.HandTeachingEnded(device.id, error_data(error, device.id), arm.get("arm_id")))
 
     def end(self, hold: _Hold, error: Arcor2Error | None) -> None:
@@ -211,7 +207,7 @@ class Holds:
 
     def _end_hand_teaching(self, hold: _Hold) -> None:
         """Switch hand teaching off after the calls in progress. If that fails, stop the robot."""
-        device, lane = hold.device, hold.device.lane
+        device = hold.device
         robot = device.instance
         assert isinstance(robot, Robot)
 
@@ -223,12 +219,7 @@ class Holds:
                 self._calls.stop(device, lambda _, other: self._report_end(hold, problem if other else None))
 
         job = Job(SET_MODE, lambda: robot.set_hand_teaching_mode(False, **hold.arm), notify=done)
-        try:
-            lane.submit(job)
-        except DeviceTimeout as error:
-            job.finish(None, error)
-            return
-        self._clock.after(DRIVER_TIMEOUT, lambda: lane.expire(job, DRIVER_TIMEOUT))
+        self._run(device, job, DRIVER_TIMEOUT)
 
     def _report_end(self, hold: _Hold, problem: BaseException | None) -> None:
         device = hold.device

@@ -146,19 +146,7 @@ class Jog:
     # -------------------------------------------------------------------------------- limits of joints
     def _joint_scale(self, joint: Joint, rate: float, valid_for: float) -> float:
         """Return the fraction of a velocity that keeps a joint within its limits. Raises OutOfRange at a limit."""
-        limits = self._limits.get(joint.name)
-        if limits is None or rate == 0.0:
-            return 1.0
-        left = limits[1] - joint.value if rate > 0.0 else joint.value - limits[0]
-        if left <= AT_LIMIT:
-            side = "upper" if rate > 0.0 else "lower"
-            raise OutOfRange(
-                "{name}: the joint {joint_name} is at its {side} limit",
-                name=self._robot.name,
-                joint_name=joint.name,
-                side=side,
-            )
-        return min(1.0, left / (abs(rate) * (valid_for + STOPPING_TIME)))
+        return 1.0 if rate == 0.0 else min(1.0, self._largest_scale(joint, rate, valid_for))
 
     def _twist_scale(self, twist: Twist, joints: list[Joint], valid_for: float, scale: float) -> float:
         """Return the scale that keeps all joints within their limits, from their motion since the last lease."""
@@ -183,12 +171,16 @@ class Jog:
         return math.inf if limits is None else min(limits[1] - joint.value, joint.value - limits[0])
 
     def _largest_scale(self, joint: Joint, rate: float, valid_for: float) -> float:
-        """Return the largest scale of a velocity that keeps a joint within its limits; it may exceed 1."""
+        """Return the largest scale of a velocity that keeps a joint within its limits. Raises OutOfRange at a limit."""
         limits = self._limits.get(joint.name)
         if limits is None:
             return math.inf
-        self._joint_scale(joint, rate, valid_for)
         left = limits[1] - joint.value if rate > 0.0 else joint.value - limits[0]
+        if left <= AT_LIMIT:
+            side, name = "upper" if rate > 0.0 else "lower", joint.name
+            raise OutOfRange(
+                "{robot}: the joint {joint} is at its {side} limit", robot=self._robot.name, joint=name, side=side
+            )
         return left / (abs(rate) * (valid_for + STOPPING_TIME))
 
     # -------------------------------------------------------------------------------- speed of the end effector

@@ -141,6 +141,15 @@ class Lane:
         job.epoch = self._epoch
         self._queue.put(job)
 
+    def submit_or_fail(self, job: Job) -> bool:
+        """Queue a call, or end it with an error if the lane hangs. Return whether it was queued."""
+        try:
+            self.submit(job)
+        except DeviceTimeout as error:
+            job.finish(None, error)
+            return False
+        return True
+
     def expire(self, job: Job, deadline: float) -> None:
         """End a call whose deadline has passed, and all queued calls."""
         if job is not self._current:

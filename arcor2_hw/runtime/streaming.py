@@ -10,7 +10,7 @@ import msgspec
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.events import Event, RobotEefData, RobotJointsData
 from arcor2_hw.data.robot import EefPose
-from arcor2_hw.exceptions import Arcor2Error, DeviceTimeout
+from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.objects import MultiArmRobot, Robot
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.clock import Clock
@@ -63,10 +63,7 @@ class Streams:
             return
         job = Job("stream", self._read_and_send, (robot, joints, eef, rate))
         self._pending[key] = job
-        try:
-            device.watch_lane.submit(job)
-        except DeviceTimeout as error:  # another query hangs on the lane
-            job.finish(None, error)
+        device.watch_lane.submit_or_fail(job)
 
     def _read_and_send(self, robot: Robot, joints: bool, eef: bool, rate: float) -> None:
         # A read error sends no event: clients see the age of the last one.

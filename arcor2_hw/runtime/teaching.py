@@ -51,10 +51,7 @@ class Teaching:
                 self.set(device, arm, False)
             elif pending is None or pending.ended:
                 job = self._pending[key] = Job("hand teaching", self._check, (device, arm))
-                try:
-                    device.watch_lane.submit(job)
-                except Arcor2Error as error:  # the lane hangs
-                    job.finish(None, error)
+                device.watch_lane.submit_or_fail(job)
 
     def _check(self, device: Device, arm: Mapping[str, Any]) -> None:
         robot = device.require()

@@ -7,7 +7,6 @@ from typing import Any, Final
 
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.object_type import ObjectModel
-from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_hw.messages import Message
 from arcor2_hw.objects import CollisionObject, Generic, Robot
 from arcor2_hw.runtime.cell import Cell
@@ -59,10 +58,7 @@ class Watch:
                 continue
             job = Job("watch", self._observe, (device, device.instance))
             self._pending[device.id] = job
-            try:
-                device.watch_lane.submit(job)
-            except DeviceTimeout as error:
-                job.finish(None, error)
+            device.watch_lane.submit_or_fail(job)
 
     def check_connection(self, device: Device) -> None:
         """Check only the connection, without I/O. Runs on the thread that observes the connection."""

@@ -82,6 +82,9 @@ class DeviceProcess(Peer):
     def end(self) -> None:
         """End the process of a disconnected device, and kill it if it does not exit. Further calls do nothing."""
         self._ending = True
+        self._end_process()
+
+    def _end_process(self) -> None:
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         try:
@@ -91,17 +94,10 @@ class DeviceProcess(Peer):
             self._process.wait()
 
     def _run(self) -> None:
-        """Read messages until the process ends, then report the device as failed."""
+        """Read until the process ends, then report the device as failed."""
         self.receive()
-        if not self._ending:
-            with contextlib.suppress(OSError):
-                self._socket.shutdown(
-                    socket.SHUT_RDWR
-                )  # the process may still run if it closed its end or sent an invalid message
-            try:
-                self._process.wait(EXIT_WAIT)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
+        if not self._ending:  # the process may still run if it closed its end or sent an invalid message
+            self._end_process()
         code = self._process.wait()
         self._socket.close()
         self._end_reason = f"{self._name}: the process of the device {_exit_description(code)}"
