@@ -21,7 +21,7 @@ LONGEST_FRAME: Final = 4096
 """Maximum number of bytes of one read. A frame has at most 260."""
 GRAIN: Final = 0.002
 """Tolerance of the time limit of a TCP answer, s. The socket option is set again only for a larger difference."""
-WAKE_WITHIN: Final = 0.05
+WAKE_TIMEOUT: Final = 0.05
 """Time in which a thread that waits for a serial port notices that it is being closed, s."""
 BITS_PER_CHARACTER: Final = 11
 """Start bit, eight data bits, parity or second stop bit, stop bit (Modbus over serial line 1.02, 2.5.1)."""
@@ -160,7 +160,7 @@ class SerialClient(_Exchange, ModbusSerialClient):
             waiting.register(port.fileno(), select.POLLIN)
         except (AttributeError, io.UnsupportedOperation):  # a port without a file descriptor
             return bytes(super().recv(size))
-        while not waiting.poll(1e3 * min(max(self.deadline - time.monotonic(), 0.0), WAKE_WITHIN)):
+        while not waiting.poll(1e3 * min(max(self.deadline - time.monotonic(), 0.0), WAKE_TIMEOUT)):
             if self._ended:
                 raise ConnectionException("the connection was closed")
             if time.monotonic() >= self.deadline:

@@ -19,9 +19,9 @@ FIRST_PAUSE: Final = 0.1
 """Pause before the first attempt, s. A device that reset a connection accepts the next one at once."""
 LONGEST_PAUSE: Final = 2.0
 """Longest pause between attempts, s, so that a device is online soon after it was switched on."""
-STEADY: Final = 0.5
+STABLE_AFTER: Final = 0.5
 """Time after which a connection counts as stable, s. The next pause then starts from FIRST_PAUSE again."""
-BREATH: Final = 0.005
+WATCH_PAUSE: Final = 0.005
 """Pause between two calls of a `watch` that returns, s."""
 STOP_WITHIN: Final = 0.9
 """Time that `stop` waits for the thread, s, because `disconnect` must return within 1 s."""
@@ -200,9 +200,9 @@ class Observing:
                 since = time.monotonic()
                 loss = self._attempt(lambda: self._watch(stopping))
                 if loss is None:
-                    stopping.wait(BREATH)  # a watch that returns at once must not use a whole processor core
+                    stopping.wait(WATCH_PAUSE)  # a watch that returns at once must not use a whole processor core
                     continue
-                if time.monotonic() - since >= STEADY:
+                if time.monotonic() - since >= STABLE_AFTER:
                     self._pause = FIRST_PAUSE
                 self._reconnect(stopping, loss)
         finally:

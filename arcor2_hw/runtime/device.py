@@ -23,7 +23,7 @@ from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.objects.surroundings import Surroundings
 from arcor2_hw.runtime.creation import Recipe
 from arcor2_hw.runtime.lane import Job, Lane
-from arcor2_hw.runtime.methods import OBSERVING, OVERTAKES_WITHIN, overrides, stop_of
+from arcor2_hw.runtime.methods import OBSERVING, STOP_RACE_TIME, overrides, stop_of
 from arcor2_hw.runtime.own_process.process import START_TIMEOUT, DeviceProcess
 from arcor2_hw.runtime.values import decode_arguments
 
@@ -293,7 +293,7 @@ class Device:
             if stop is not None:
                 stop()
                 job = self.lane.current
-                if job is not None and job.since > moment - OVERTAKES_WITHIN and not job.wait(OVERTAKES_WITHIN / 2):
+                if job is not None and job.since > moment - STOP_RACE_TIME and not job.wait(STOP_RACE_TIME / 2):
                     stop()
         finally:
             if cancel is not None and self.lane.current is interrupted:

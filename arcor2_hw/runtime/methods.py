@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from arcor2_hw.objects import Axis, Generic, MultiArmRobot, Robot
 
-OVERTAKES_WITHIN: Final = 0.1
+STOP_RACE_TIME: Final = 0.1
 """Time after the start of a call in which its command may not have reached the device yet, s."""
 
 NO_STOP: Final = (Robot.stop, MultiArmRobot.stop)
@@ -20,7 +20,7 @@ OBSERVING: Final = frozenset(
 )
 """Methods of a robot that run on its watch lane, so that they return while an action runs."""
 
-PLAIN: Final = frozenset(
+WITHOUT_IO: Final = frozenset(
     {"id", "name", "settings", "pose", "collision_model", "enabled", "connection", "health", "move_in_progress"}
 )
 """Properties of the base classes that do no I/O. They are read on any thread."""

@@ -11,7 +11,7 @@ from arcor2_hw.exceptions import InvalidData, ProgramFinished, ProgramStopped
 from arcor2_hw.objects import Generic
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device
 from arcor2_hw.runtime.lane import on_any_lane
-from arcor2_hw.runtime.methods import PLAIN
+from arcor2_hw.runtime.methods import WITHOUT_IO
 from arcor2_hw.runtime.program import Program
 
 _DEVICE = "_arcor2_device"
@@ -112,7 +112,7 @@ class Proxy:
         device: Device = self.__dict__[_DEVICE]
         program: Program = self.__dict__[_PROGRAM]
         instance = device.require()
-        if isinstance(inspect.getattr_static(type(instance), name, None), property) and name not in PLAIN:
+        if isinstance(inspect.getattr_static(type(instance), name, None), property) and name not in WITHOUT_IO:
             return _plain_call(device, program, name, getattr)(instance, name)
         value = getattr(instance, name)
         if not isinstance(value, types.MethodType) or value.__self__ is not instance:

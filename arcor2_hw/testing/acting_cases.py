@@ -7,11 +7,11 @@ from typing import Final
 
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, NotInControl, Refused
 from arcor2_hw.runtime.lane import Job
-from arcor2_hw.runtime.methods import OVERTAKES_WITHIN
+from arcor2_hw.runtime.methods import STOP_RACE_TIME
 from arcor2_hw.testing.bench import Bench, needs
-from arcor2_hw.testing.connecting_cases import DISCONNECTS_WITHIN
+from arcor2_hw.testing.connecting_cases import DISCONNECT_TIMEOUT
 from arcor2_hw.testing.life import SLACK, raised, stays, timed, wait_until
-from arcor2_hw.testing.steps import STARTS_WITHIN, WATCHED, on_lanes, start_action, stop_of
+from arcor2_hw.testing.steps import START_TIMEOUT, WATCHED, on_lanes, start_action, stop_of
 
 ASK_TIMEOUT: Final = 20.0
 """Time limit of `ask` of a bench, s. For some devices it is a motion."""
@@ -82,7 +82,7 @@ class ActingCases:
         """disconnect() during an action takes at most 1 s, and the action ends with a typed error."""
         device = arcor2_bench.controlled()
         act = start_action(arcor2_bench, device)
-        timed(device.disconnect, DISCONNECTS_WITHIN, "disconnecting during an action")
+        timed(device.disconnect, DISCONNECT_TIMEOUT, "disconnecting during an action")
         error = act.outcome(arcor2_bench.call_within, "the disconnected action")
         assert isinstance(error, DeviceError), f"the disconnected action ended with {error!r}"
 
@@ -92,7 +92,7 @@ class ActingCases:
         device = arcor2_bench.controlled()
         held = on_lanes(device)
         try:
-            for phase in (arcor2_phases.uniform(OVERTAKES_WITHIN, 0.6) for _ in range(3)):
+            for phase in (arcor2_phases.uniform(STOP_RACE_TIME, 0.6) for _ in range(3)):
                 act = Job("act", lambda: arcor2_bench.run_long(device))
                 held.lane.submit(act)
                 time.sleep(phase)
@@ -120,7 +120,7 @@ class ActingCases:
         try:
             act = Job("act", lambda: arcor2_bench.run_long(device))
             held.lane.submit(act)
-            wait_until(lambda: arcor2_bench.running() or act.ended, STARTS_WITHIN, "run_long")
+            wait_until(lambda: arcor2_bench.running() or act.ended, START_TIMEOUT, "run_long")
             stop, _ = held.begin_stop() or (None, None)
             assert stop is not None, "a device with run_long must have a stop()"
             assert stop.wait(arcor2_bench.stops_within + SLACK), "stop did not return"

@@ -8,7 +8,7 @@ from arcor2_hw.testing.bench import Bench, knows_control, needs
 from arcor2_hw.testing.life import held, left_behind, named, raised, timed
 from arcor2_hw.testing.steps import GONE
 
-DISCONNECTS_WITHIN: Final = 1.0
+DISCONNECT_TIMEOUT: Final = 1.0
 """Time limit of disconnect, s, in any state of the wire."""
 
 
@@ -40,7 +40,7 @@ class ConnectingCases:
         for _ in range(2):
             device.connect(arcor2_bench.connect_timeout)
             for what in ("disconnect", "a second disconnect"):
-                timed(device.disconnect, DISCONNECTS_WITHIN, what)
+                timed(device.disconnect, DISCONNECT_TIMEOUT, what)
                 assert device.connection is Connection.OFFLINE, f"after {what} it is {device.connection}"
 
     def test_nothing_is_left_behind(self, arcor2_bench: Bench) -> None:

@@ -6,9 +6,9 @@ import time
 from arcor2_hw.data.device import LossKind
 from arcor2_hw.exceptions import DeviceError, NotInControl
 from arcor2_hw.testing.bench import Bench, needs
-from arcor2_hw.testing.connecting_cases import DISCONNECTS_WITHIN
+from arcor2_hw.testing.connecting_cases import DISCONNECT_TIMEOUT
 from arcor2_hw.testing.life import SLACK, named, raised, stays, timed, wait_until
-from arcor2_hw.testing.steps import GONE, STARTS_WITHIN, WATCHED, back, lose, observed, seen_again, start_action
+from arcor2_hw.testing.steps import GONE, START_TIMEOUT, WATCHED, back, lose, observed, seen_again, start_action
 
 
 class LossCases:
@@ -21,7 +21,7 @@ class LossCases:
         arcor2_bench.cut()
         error = raised(lambda: arcor2_bench.ask(device), *GONE, within=arcor2_bench.call_within, what="the call")
         named(error, device.name, arcor2_bench.address, "a call of a silent device")
-        timed(device.disconnect, DISCONNECTS_WITHIN, "disconnecting from a silent device")
+        timed(device.disconnect, DISCONNECT_TIMEOUT, "disconnecting from a silent device")
 
     @needs("cut", "heal", "observe")
     def test_stale_is_an_error(self, arcor2_bench: Bench) -> None:
@@ -82,7 +82,7 @@ class LossCases:
         reaction = arcor2_bench.object_type.loss_reaction
         process = subprocess.Popen(arcor2_bench.orphan())  # noqa: S603 - the command line of the bench
         try:
-            wait_until(arcor2_bench.running, STARTS_WITHIN, "the action of the process to be killed")
+            wait_until(arcor2_bench.running, START_TIMEOUT, "the action of the process to be killed")
         finally:
             process.kill()
             process.wait()

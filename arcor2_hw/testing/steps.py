@@ -15,7 +15,7 @@ from arcor2_hw.testing.life import POLL, BackgroundCall, wait_until
 
 WATCHED: Final = 0.5
 """Time in which nothing may start to move again, s."""
-STARTS_WITHIN: Final = 15.0
+START_TIMEOUT: Final = 15.0
 """Time limit until a long action runs at the device, s. A process that imports a vendor library needs some time."""
 GONE: Final = (NotConnected, ConnectionLost, DeviceTimeout, Stale)
 """Errors that a call of a silent device may raise."""
@@ -25,7 +25,7 @@ UP: Final = (Connection.ONLINE, Connection.BACK)
 def start_action(bench: Bench, device: Generic) -> BackgroundCall:
     """Start `run_long` and wait until the action runs at the device."""
     act = BackgroundCall(lambda: bench.run_long(device))
-    wait_until(lambda: bench.running() or act.over, STARTS_WITHIN, "run_long")
+    wait_until(lambda: bench.running() or act.over, START_TIMEOUT, "run_long")
     assert not act.over, f"run_long ended at once: {act.error!r}"
     return act
 

@@ -21,7 +21,7 @@ from arcor2_hw.exceptions import Cancelled, InvalidData
 from arcor2_hw.objects import Axis, Generic
 from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.runtime.creation import prepare_for_sources
-from arcor2_hw.runtime.methods import OBSERVING, OVERTAKES_WITHIN, stop_of
+from arcor2_hw.runtime.methods import OBSERVING, STOP_RACE_TIME, stop_of
 from arcor2_hw.runtime.own_process import state
 from arcor2_hw.runtime.own_process.peer import Header, Kind, Message, Peer
 
@@ -147,8 +147,8 @@ class DeviceServer(Peer):
         """
         moment = time.monotonic()
         value = self.perform(message)
-        deadline = time.monotonic() + OVERTAKES_WITHIN / 2
-        started = self._calls.since(moment - OVERTAKES_WITHIN)
+        deadline = time.monotonic() + STOP_RACE_TIME / 2
+        started = self._calls.since(moment - STOP_RACE_TIME)
         if not all(ended.wait(max(0.0, deadline - time.monotonic())) for ended in started):
             value = self.perform(message)
         return value

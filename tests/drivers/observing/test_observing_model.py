@@ -211,7 +211,7 @@ def test_a_watch_that_returns_does_not_spin() -> None:
     life.start(1.0)
     time.sleep(0.2)
     life.stop()
-    assert 1 <= len(calls) <= 1 + 0.2 / observing.BREATH + 10
+    assert 1 <= len(calls) <= 1 + 0.2 / observing.WATCH_PAUSE + 10
 
 
 def test_an_error_in_the_drivers_watch_is_a_loss(quick: None, caplog: pytest.LogCaptureFixture) -> None:
