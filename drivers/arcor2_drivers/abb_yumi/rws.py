@@ -120,11 +120,7 @@ class Rws:
                 )
             try:
                 answer = client.request(
-                    method,
-                    path,
-                    params={**query, "json": "1"},
-                    data=body,
-                    timeout=max(until - time.monotonic(), 0.01),
+                    method, path, params={**query, "json": "1"}, data=body, timeout=max(until - time.monotonic(), 0.01)
                 )
             except httpx.ConnectError as e:
                 raise NotConnected(

@@ -52,11 +52,7 @@ class YuMi(Hands, Connected, MultiArmRobot):
     display_name = "ABB YuMi"
     robot_type = RobotType.ARTICULATED
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(FROZEN_AFTER + LONGEST_WATCHDOG + BRAKES_WITHIN)
-    CANCEL_MAPPING: ClassVar[dict[str, str]] = {
-        "move": "stop",
-        "move_to": "stop",
-        "move_both": "stop",
-    }
+    CANCEL_MAPPING: ClassVar[dict[str, str]] = {"move": "stop", "move_to": "stop", "move_both": "stop"}
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: YumiSettings) -> None:
         super().__init__(obj_id, name, pose, settings)

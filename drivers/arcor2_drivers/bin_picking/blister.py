@@ -183,9 +183,7 @@ class Blister(Connected, GenericWithPose):
         half = math.radians(given.turn) / 2.0
         local = Pose(
             Position(
-                given.origin_x + column * given.column_pitch,
-                given.origin_y + row * given.row_pitch,
-                given.origin_z,
+                given.origin_x + column * given.column_pitch, given.origin_y + row * given.row_pitch, given.origin_z
             ),
             Orientation(0.0, 0.0, math.sin(half), math.cos(half)),
         )

@@ -104,7 +104,6 @@ def of_mesh(mesh: Any, box: bool) -> Model:
         raise BadModel("part_mesh has triangles without area")
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(
-        o3d.core.Tensor.from_numpy(vertices.astype(np.float32)),
-        o3d.core.Tensor.from_numpy(triangles.astype(np.uint32)),
+        o3d.core.Tensor.from_numpy(vertices.astype(np.float32)), o3d.core.Tensor.from_numpy(triangles.astype(np.uint32))
     )
     return Model(cloud, scene, used, box, low, high)

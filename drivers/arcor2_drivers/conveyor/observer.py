@@ -144,13 +144,7 @@ class Observer(StateObserver[State]):
         self.consumer = read(cia402.CONSUMER_HEARTBEAT)
         values = [
             read(entry)
-            for entry in (
-                cia402.STATUSWORD,
-                cia402.MODE_DISPLAY,
-                cia402.POSITION,
-                cia402.VELOCITY,
-                cia402.ERROR_CODE,
-            )
+            for entry in (cia402.STATUSWORD, cia402.MODE_DISPLAY, cia402.POSITION, cia402.VELOCITY, cia402.ERROR_CODE)
         ]
         try:
             return State.of(*values)

@@ -223,11 +223,7 @@ class DobotMagician(HoldsParts, SingleArm):
         self._control.stop()
 
     def inverse_kinematics(
-        self,
-        end_effector_id: str,
-        pose: Pose,
-        start_joints: list[Joint] | None = None,
-        avoid_collisions: bool = True,
+        self, end_effector_id: str, pose: Pose, start_joints: list[Joint] | None = None, avoid_collisions: bool = True
     ) -> list[Joint]:
         """Return the joints for a pose in the world; there is at most one solution.
 

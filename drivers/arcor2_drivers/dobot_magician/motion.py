@@ -8,14 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.exceptions import (
-    ConnectionLost,
-    DeviceError,
-    DeviceFault,
-    DeviceTimeout,
-    NotInControl,
-    Refused,
-)
+from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotInControl, Refused
 from arcor2_hw.objects import Robot
 from arcor2_hw.objects.arm import StopGuard, exclusive_motion, named_joints
 from arcor2_hw.objects.safe_moves import SafeMoves

@@ -62,9 +62,7 @@ class Tester(ModbusDevice[Inputs]):
         left = self._leave_alone_until - time.monotonic()
         if left > 0.0:
             raise NotConnected(
-                "{device} is not contacted for {left:.1f} s, so that its watchdog expires",
-                device=self.who,
-                left=left,
+                "{device} is not contacted for {left:.1f} s, so that its watchdog expires", device=self.who, left=left
             )
         self._life = (-1, 0.0)
         return super().open_link(timeout)

@@ -196,9 +196,7 @@ class ImageStream(Connected):
                 self._store(shot)
             elif present - self._received_at > self._config.frame_timeout:
                 raise DeviceTimeout(
-                    "{device} has sent no image for {age:.1f} s",
-                    device=self.who,
-                    age=present - self._received_at,
+                    "{device} has sent no image for {age:.1f} s", device=self.who, age=present - self._received_at
                 )
             if present - checked_at > CHECK_PERIOD:
                 checked_at = present

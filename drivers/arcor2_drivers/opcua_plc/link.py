@@ -85,12 +85,7 @@ class Link:
     """
 
     def __init__(
-        self,
-        who: str,
-        settings: OpcUaPlcSettings,
-        nodes: Mapping[str, str],
-        watched: Sequence[str],
-        changed: Changed,
+        self, who: str, settings: OpcUaPlcSettings, nodes: Mapping[str, str], watched: Sequence[str], changed: Changed
     ) -> None:
         self._who, self._settings, self._watched, self._changed = who, settings, watched, changed
         self.nodes = {name: ua.NodeId.from_string(text) for name, text in nodes.items()}

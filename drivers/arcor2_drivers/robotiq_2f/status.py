@@ -103,10 +103,7 @@ FAULTS: Final = {
     ),
     0x07: Fault("the gripper is not activated", "activate the gripper", Severity.WARNING, Health.CHECK_FUNCTION),
     0x08: Fault(
-        "the maximum operating temperature is exceeded",
-        "let the gripper cool down",
-        Severity.WARNING,
-        Health.OFF_SPEC,
+        "the maximum operating temperature is exceeded", "let the gripper cool down", Severity.WARNING, Health.OFF_SPEC
     ),
     0x09: Fault(
         "no communication for at least 1 s", "check the cable and the host", Severity.INFO, Health.CHECK_FUNCTION

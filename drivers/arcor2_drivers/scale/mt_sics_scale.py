@@ -9,15 +9,7 @@ from typing import ClassVar, Final
 from arcor2_hw.actions import action
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Health, Identity, LossReaction, Reading, Severity
-from arcor2_hw.exceptions import (
-    DeviceError,
-    DeviceFault,
-    DeviceTimeout,
-    NotFound,
-    OutOfRange,
-    Refused,
-    Stale,
-)
+from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused, Stale
 from arcor2_hw.objects import Scale
 from arcor2_hw.objects.connected import AlarmText
 from arcor2_hw.objects.line_device import LineDevice

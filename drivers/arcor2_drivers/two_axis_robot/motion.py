@@ -12,15 +12,7 @@ from arcor2_hw.data.robot import Joint, MoveEnd
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotInControl, OutOfRange, Refused
 from arcor2_hw.keep_alive import RunningTime
 from arcor2_hw.objects import Robot
-from arcor2_hw.objects.arm import (
-    TCP,
-    StopGuard,
-    check_jog,
-    exclusive_motion,
-    jog_axes,
-    joint_values,
-    named_joints,
-)
+from arcor2_hw.objects.arm import TCP, StopGuard, check_jog, exclusive_motion, jog_axes, joint_values, named_joints
 from arcor2_hw.objects.safe_moves import SafeMoves
 from arcor2_hw.objects.settings import within
 from arcor2_hw.objects.single_arm import MotionLog, move_around_obstacles

@@ -135,11 +135,7 @@ class TwoAxisRobot(SingleArm):
         return self._motion.world(self._motion.values(joints))
 
     def inverse_kinematics(
-        self,
-        end_effector_id: str,
-        pose: Pose,
-        start_joints: list[Joint] | None = None,
-        avoid_collisions: bool = True,
+        self, end_effector_id: str, pose: Pose, start_joints: list[Joint] | None = None, avoid_collisions: bool = True
     ) -> list[Joint]:
         """Return the joints for a position, with the elbow on the side nearest to `start_joints`.
 

@@ -95,10 +95,7 @@ def _push(limit: Limit) -> list[str]:
         terms = (f"{force.format(i)} * {value:.9g}" for i, value in enumerate(limit.direction))
         return f"norm({' + '.join(terms)})"
 
-    return [
-        f"push = {along('(force[{0}] - rest[{0}])')}",
-        f"pressed = {along('force[{0}]')} > {along('rest[{0}]')}",
-    ]
+    return [f"push = {along('(force[{0}] - rest[{0}])')}", f"pressed = {along('force[{0}]')} > {along('rest[{0}]')}"]
 
 
 def motion_program(

@@ -278,11 +278,7 @@ class UniversalRobot(MoveActions, DigitalGripper, SingleArm):
         return tcp_speed(self.model, self._observer.sample().q, joint_velocities, tool.tcp)
 
     def inverse_kinematics(
-        self,
-        end_effector_id: str,
-        pose: Pose,
-        start_joints: list[Joint] | None = None,
-        avoid_collisions: bool = True,
+        self, end_effector_id: str, pose: Pose, start_joints: list[Joint] | None = None, avoid_collisions: bool = True
     ) -> list[Joint]:
         """Return joints for a pose in the world, nearest to `start_joints`, by the controller's calibration.
 
