@@ -3,7 +3,7 @@
 from typing import Any
 
 from tests.server.document_picture import Picture
-from tests.server.session.desk import Desk, Person
+from tests.server.session.session_server import Person, SessionServer
 
 Flat = dict[tuple[str, str], Any]
 
@@ -22,9 +22,9 @@ def flat(picture: Picture) -> Flat:
 class Client:
     """A connection with what it knows."""
 
-    def __init__(self, desk: Desk, name: str) -> None:
+    def __init__(self, server: SessionServer, name: str) -> None:
         self.name = name
-        self.person = Person(desk)
+        self.person = Person(server)
         self.picture = Picture()
         self.events = 0
 

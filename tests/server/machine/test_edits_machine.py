@@ -23,7 +23,7 @@ from tests.server.crash_copy import copy_at_one_moment
 from tests.server.document_picture import Picture
 from tests.server.machine.client import Client, Flat, flat
 from tests.server.machine.requests import EDITS, SCENE_EDITS, Draw, Request
-from tests.server.session.desk import Refused, open_desk
+from tests.server.session.session_server import Refused, open_server
 from tests.server.session.work import Work
 
 NAMES = ("alice", "bob", "carol")
@@ -61,9 +61,9 @@ class Edits(RuleBasedStateMachine):
         self._opened()
 
     async def _open(self) -> None:
-        self.context = open_desk(self.directory, history_limit=LIMIT)
-        self.desk = await self.context.__aenter__()
-        projects = await self.desk.services.storage.projects()
+        self.context = open_server(self.directory, history_limit=LIMIT)
+        self.server = await self.context.__aenter__()
+        projects = await self.server.services.storage.projects()
         self.project_id, self.scene_id = projects[0].id, projects[0].scene_id
 
     async def _close(self) -> None:
@@ -73,14 +73,14 @@ class Edits(RuleBasedStateMachine):
         await self.context.__aexit__(None, None, None)
 
     def teardown(self) -> None:
-        if hasattr(self, "desk"):
+        if hasattr(self, "server"):
             self.runner.run(self._close())
         self.runner.close()
         shutil.rmtree(self.directory, ignore_errors=True)
 
     @property
     def session(self) -> Any:
-        return self.desk.session
+        return self.server.session
 
     def there_is(self) -> Flat:
         return flat(Picture.of(self.session.scene, self.session.project))
@@ -219,7 +219,7 @@ class Edits(RuleBasedStateMachine):
         if read:
             self.ask(self.who(number), "ReadUnlock" if give_back else "ReadLock", object_id=item)
         elif give_back:
-            for held in self.desk.services.locks.write_locked_by(self.who(number)):
+            for held in self.server.services.locks.write_locked_by(self.who(number)):
                 self.ask(self.who(number), "WriteUnlock", object_id=held)
         else:
             self.ask(self.who(number), "WriteLock", object_id=item, lock_tree=tree)
@@ -230,7 +230,7 @@ class Edits(RuleBasedStateMachine):
         client = self.clients.pop(self.who(number))
         self.runner.run(client.person.leave())
 
-    @precondition(lambda self: hasattr(self, "desk"))
+    @precondition(lambda self: hasattr(self, "server"))
     @rule(number=users)
     def join(self, number: int) -> None:
         name = NAMES[number]
@@ -238,7 +238,7 @@ class Edits(RuleBasedStateMachine):
             return
 
         async def come() -> None:
-            self.clients[name] = Client(self.desk, name)
+            self.clients[name] = Client(self.server, name)
             await self._ask(name, "RegisterUser", user_name=name)
 
         self.runner.run(come())
@@ -247,24 +247,24 @@ class Edits(RuleBasedStateMachine):
     @rule(number=users)
     def lock_time_out(self, number: int) -> None:
         """The locks of one who left are given back after a while."""
-        if NAMES[number] not in self.clients and NAMES[number] in self.desk.services.users._releases:
-            self.desk.services.users._releases[NAMES[number]].cancel()
-            self.desk.services.users._release(NAMES[number])
+        if NAMES[number] not in self.clients and NAMES[number] in self.server.services.users._releases:
+            self.server.services.users._releases[NAMES[number]].cancel()
+            self.server.services.users._release(NAMES[number])
 
     # ------------------------------------------------------------------------------------------ whole documents
     def give_locks_back(self) -> None:
         for number in range(len(NAMES)):
             self.lock_time_out(number)
         for who in sorted(self.clients):
-            for held in self.desk.services.locks.write_locked_by(who):
+            for held in self.server.services.locks.write_locked_by(who):
                 assert not isinstance(self.ask(who, "WriteUnlock", object_id=held), Refused)
-            for held in list(self.desk.services.locks._reads.get(who, ())):
+            for held in list(self.server.services.locks._reads.get(who, ())):
                 self.ask(who, "ReadUnlock", object_id=held)
-        assert self.desk.services.locks.locked_roots() == []
+        assert self.server.services.locks.locked_roots() == []
 
     def stored(self) -> Flat:
         async def read() -> Picture:
-            storage = self.desk.services.storage
+            storage = self.server.services.storage
             project = None if self.session.project is None else await storage.project(self.session.project.id)
             return Picture.of(await storage.scene(self.session.scene.id), project)
 
@@ -311,14 +311,14 @@ class Edits(RuleBasedStateMachine):
         self.runner.run(self._open())
         assert (self.there_is(), self.session.has_changes) == (there_was, changed)
         assert list(self.session.history) == history
-        assert self.desk.services.locks.locked_roots() == []
+        assert self.server.services.locks.locked_roots() == []
         for name in present:
             self.join(NAMES.index(name))
 
     # ------------------------------------------------------------------------------------------ what always holds
     @invariant()
     def everybody_knows_what_there_is(self) -> None:
-        if not hasattr(self, "desk"):
+        if not hasattr(self, "server"):
             return
         there_is = self.there_is()
         self.look()
@@ -328,9 +328,9 @@ class Edits(RuleBasedStateMachine):
 
     @invariant()
     def everybody_knows_who_locked_what(self) -> None:
-        if not hasattr(self, "desk") or self.session.project is None:
+        if not hasattr(self, "server") or self.session.project is None:
             return
-        locks = self.desk.services.locks
+        locks = self.server.services.locks
         for client in self.clients.values():
             for key, owner in client.picture.locks.items():
                 if owner != client.name and key != self.session.project.id and self._is_there(key):
@@ -344,9 +344,9 @@ class Edits(RuleBasedStateMachine):
 
     @invariant()
     def what_there_is_holds_together(self) -> None:
-        if not hasattr(self, "desk") or (project := self.session.project) is None:
+        if not hasattr(self, "server") or (project := self.session.project) is None:
             return
-        document, types = self.session.document, self.desk.types
+        document, types = self.session.document, self.server.types
 
         def meta_of(action: Action) -> Any:
             return action_meta(action, document, types)
@@ -358,8 +358,8 @@ class Edits(RuleBasedStateMachine):
 
 
 async def _template(directory: Path) -> None:
-    async with open_desk(directory) as desk:
-        alice = await desk.person("alice")
+    async with open_server(directory) as server:
+        alice = await server.person("alice")
         await Work(alice).project("base")
         await alice.ask("SaveProject")
         await alice.ask("CloseProject")

@@ -17,7 +17,7 @@ from arcor2_server.app import Server, running_server
 from arcor2_server.app.application import endpoints
 from arcor2_server.settings import ServerSettings
 from tests.server.protocol import devices
-from tests.server.session.desk import Person, Refused
+from tests.server.session.session_server import Person, Refused
 
 PATIENCE = 40.0
 """Seconds; the machine may be busy."""
@@ -92,7 +92,7 @@ class Actor(Person):
     """A client whose messages can be looked at before they are taken, and which looks at each itself."""
 
     def _came(self, message: dict[str, Any]) -> None:
-        stage: Any = self.desk
+        stage: Any = self.server
         stage.faults += [f"{fault} in {message}" for fault in faults(message)]
         super()._came(message)
 

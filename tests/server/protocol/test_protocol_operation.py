@@ -11,7 +11,7 @@ from arcor2_hw.data.rpc import RPCS
 from tests.server.protocol.stage import Actor, happens, open_stage, refused, until
 from tests.server.protocol.test_protocol_states import enter, outcome
 from tests.server.protocol.test_protocol_temporary import project
-from tests.server.session.desk import Refused
+from tests.server.session.session_server import Refused
 
 HOLD = {"robot_id": "nobody", "hold": 1, "sent_ms": 1.0, "valid_ms": 100}
 ASKED: dict[str, dict[str, Any] | None] = {

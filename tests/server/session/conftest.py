@@ -1,39 +1,39 @@
-"""A desk for each test."""
+"""A server for each test."""
 
 from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
 
-from tests.server.session.desk import Desk, Person, open_desk
+from tests.server.session.session_server import Person, SessionServer, open_server
 
 
 @pytest.fixture
-async def desk(tmp_path: Path) -> AsyncIterator[Desk]:
+async def server(tmp_path: Path) -> AsyncIterator[SessionServer]:
     """A server without a socket."""
-    async with open_desk(tmp_path) as opened:
+    async with open_server(tmp_path) as opened:
         yield opened
 
 
 @pytest.fixture
-async def alice(desk: Desk) -> Person:
+async def alice(server: SessionServer) -> Person:
     """Somebody who is logged in."""
-    return await desk.person("alice")
+    return await server.person("alice")
 
 
 @pytest.fixture
-async def bob(desk: Desk) -> Person:
+async def bob(server: SessionServer) -> Person:
     """Somebody else who is logged in."""
-    return await desk.person("bob")
+    return await server.person("bob")
 
 
 @pytest.fixture
-async def crowd(desk: Desk) -> list[Person]:
+async def crowd(server: SessionServer) -> list[Person]:
     """Eight more people who are logged in."""
-    return [await desk.person(f"user{number}") for number in range(8)]
+    return [await server.person(f"user{number}") for number in range(8)]
 
 
 @pytest.fixture
-async def stranger(desk: Desk) -> Person:
+async def stranger(server: SessionServer) -> Person:
     """Somebody who is not logged in."""
-    return await desk.person()
+    return await server.person()

@@ -4,23 +4,23 @@ import asyncio
 import sys
 from pathlib import Path
 
-from tests.server.session.desk import open_desk
+from tests.server.session.session_server import open_server
 
 USERS = 8
 
 
 async def main(directory: Path) -> None:
-    async with open_desk(directory) as desk:
-        people = [await desk.person(f"user{number}") for number in range(USERS)]
+    async with open_server(directory) as server:
+        people = [await server.person(f"user{number}") for number in range(USERS)]
         first = people[0]
         await first.ask("NewScene", name="scene")
         await first.ask("AddObjectToScene", name="time", type="TimeActions")
         await first.ask("SaveScene")
-        scene = desk.session.require_scene()
+        scene = server.session.require_scene()
         await first.ask("NewProject", scene_id=scene.id, name="project")
         for number in range(USERS):
             await first.ask("AddActionPoint", name=f"p{number}", position={"x": 0, "y": 0, "z": 0})
-        points = [point.id for point in desk.session.require_project().action_points]
+        points = [point.id for point in server.session.require_project().action_points]
 
         async def add(number: int) -> None:
             for count in range(1_000_000):

@@ -6,22 +6,22 @@ import pytest
 
 from arcor2_hw.data.events import SceneStateEnum
 from tests.server.document_picture import Picture
-from tests.server.session.desk import Desk, Person, Refused
+from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import ORIGIN, URL, Work
 
 TURNED = {"x": 0.0, "y": 0.0, "z": 1.0, "w": 0.0}
 
 
-def shown(desk: Desk) -> dict[str, Any]:
-    return Picture.of(desk.session.scene, desk.session.project).shown()
+def shown(server: SessionServer) -> dict[str, Any]:
+    return Picture.of(server.session.scene, server.session.project).shown()
 
 
 class Watcher:
     """Somebody who sees nothing but the ordinary events, and must know what the server knows."""
 
-    def __init__(self, desk: Desk, person: Person) -> None:
-        self.desk, self.person = desk, person
-        self.picture = Picture.of(desk.session.scene, desk.session.project)
+    def __init__(self, server: SessionServer, person: Person) -> None:
+        self.server, self.person = server, person
+        self.picture = Picture.of(server.session.scene, server.session.project)
         person.take()
 
     def look(self) -> list[str]:
@@ -29,19 +29,19 @@ class Watcher:
         for event in self.person.events():
             names.append("/".join(filter(None, (event["event"], event.get("change_type")))))
             self.picture.see(event)
-        assert self.picture.shown() == shown(self.desk)
+        assert self.picture.shown() == shown(self.server)
         return names
 
 
 async def rich_project(work: Work) -> dict[str, str]:
     """Two objects with points, orientations, joints, actions, logic, a parameter and an override."""
-    ask, desk = work.person.ask, work.person.desk
+    ask, server = work.person.ask, work.person.server
     await work.project()
     ids = {"robot": work.object("robot"), "base": await work.add_point("base", work.object("scale"))}
     ids["below"] = await work.add_point("below", ids["base"])
     ids["free"] = await work.add_point("free")
     ids["ori"] = await work.add_orientation(ids["below"])
-    desk.cell.state = SceneStateEnum.STARTED
+    server.cell.state = SceneStateEnum.STARTED
     await work.person.lock(ids["below"])
     await ask(
         "AddActionPointJointsUsingRobot",
@@ -51,8 +51,8 @@ async def rich_project(work: Work) -> dict[str, str]:
         end_effector_id="default",
     )
     await ask("WriteUnlock", object_id=ids["below"])
-    desk.cell.state = SceneStateEnum.STOPPED
-    ids["joints"] = str(desk.session.document.named("joints", "j", ids["below"]))
+    server.cell.state = SceneStateEnum.STOPPED
+    ids["joints"] = str(server.session.document.named("joints", "j", ids["below"]))
     ids["one"] = await work.add_action(ids["free"], "one")
     ids["dice"] = await work.add_action(
         ids["free"], "dice", "rnd/random_bool", {"name": "probability", "type": "double", "value": "0.5"},
@@ -61,9 +61,9 @@ async def rich_project(work: Work) -> dict[str, str]:
     await ask("AddLogicItem", start="START", end=ids["dice"])
     condition = {"what": f"{ids['dice']}/default/0", "value": "true"}
     await ask("AddLogicItem", start=ids["dice"], end=ids["one"], condition=condition)
-    ids["step"] = desk.session.document.outgoing(ids["dice"])[0].id
+    ids["step"] = server.session.document.outgoing(ids["dice"])[0].id
     await ask("AddProjectParameter", name="speed", type="integer", value="1")
-    ids["speed"] = str(desk.session.document.named("parameter", "speed"))
+    ids["speed"] = str(server.session.document.named("parameter", "speed"))
     await work.person.lock(ids["robot"])
     await ask("AddOverride", id=ids["robot"], override=URL)
     await ask("WriteUnlock", object_id=ids["robot"])
@@ -162,12 +162,12 @@ async def make(person: Person, edit: Edit, ids: dict[str, str]) -> None:
     if lock:
         await person.lock(filled(lock, ids), tree=tree)
     await person.ask(request, **filled(args, ids))
-    if lock and person.desk.services.locks.write_locked_by("alice"):
+    if lock and person.server.services.locks.write_locked_by("alice"):
         await person.ask("WriteUnlock", object_id=filled(lock, ids))
 
 
 async def refused(person: Person, request: str = "Undo", **args: Any) -> str:
-    session = person.desk.session
+    session = person.server.session
     before, revision = session.project, session.revision
     person.take()
     with pytest.raises(Refused) as error:

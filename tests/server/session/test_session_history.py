@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from arcor2_hw.data.events import SceneStateEnum
-from tests.server.session.desk import Desk, Person, Refused, open_desk
 from tests.server.session.edits import EDITS, TURNED, Edit, Watcher, make, refused, rich_project, shown
+from tests.server.session.session_server import Person, Refused, SessionServer, open_server
 from tests.server.session.work import ORIGIN, URL, Work
 
 ELSEWHERE = {"position": {"x": 0.1, "y": 0.2, "z": 0.3}, "orientation": TURNED}
@@ -19,74 +19,80 @@ def work(alice: Person) -> Work:
     return Work(alice)
 
 
-async def test_every_edit_of_a_project_can_be_undone(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_every_edit_of_a_project_can_be_undone(
+    server: SessionServer, alice: Person, bob: Person, work: Work
+) -> None:
     ids = await rich_project(work)
-    ids["project"] = desk.session.require_project().id
+    ids["project"] = server.session.require_project().id
     await alice.ask("SaveProject")
-    saved, watcher = shown(desk), Watcher(desk, bob)
+    saved, watcher = shown(server), Watcher(server, bob)
     for name, edit in EDITS.items():
         await make(alice, edit, ids)
-        after = shown(desk)
+        after = shown(server)
         assert after != saved, name
         watcher.look()
-        assert desk.session.has_changes
+        assert server.session.has_changes
         alice.take()
         answer = await alice.ask("Undo")
         assert answer["request"] == name
-        assert answer["revision"] == desk.session.revision
+        assert answer["revision"] == server.session.revision
         first, *events = alice.take()
         assert "response" in first  # the answer comes first
         assert events, name
         assert not [event for event in events if "Locked" in event["event"]]
         watcher.look()
-        assert shown(desk) == saved, name
-        assert not desk.session.has_changes, name
+        assert shown(server) == saved, name
+        assert not server.session.has_changes, name
         assert (await alice.ask("Redo"))["request"] == name
         watcher.look()
-        assert shown(desk) == after, name
-        assert desk.session.has_changes
+        assert shown(server) == after, name
+        assert server.session.has_changes
         await alice.ask("Undo")
         watcher.look()
-        assert shown(desk) == saved, name
-        assert desk.services.locks.locked_roots() == [], name
+        assert shown(server) == saved, name
+        assert server.services.locks.locked_roots() == [], name
 
 
-async def test_all_edits_can_be_undone_and_redone_in_a_row(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_all_edits_can_be_undone_and_redone_in_a_row(
+    server: SessionServer, alice: Person, bob: Person, work: Work
+) -> None:
     await work.project()
-    watcher, states = Watcher(desk, bob), [shown(desk)]
-    numbered = desk.session.revision
+    watcher, states = Watcher(server, bob), [shown(server)]
+    numbered = server.session.revision
     ids = {"a": await work.add_point("a")}
-    states.append(shown(desk))
+    states.append(shown(server))
     ids["b"] = await work.add_point("b", ids["a"])
-    states.append(shown(desk))
+    states.append(shown(server))
     await work.add_action(ids["b"], "act")
-    states.append(shown(desk))
+    states.append(shown(server))
     await alice.ask("AddLogicItem", start="START", end=work.action("act").id)
-    states.append(shown(desk))
+    states.append(shown(server))
     for state in reversed(states[:-1]):
         await alice.ask("Undo")
         watcher.look()
-        assert shown(desk) == state
+        assert shown(server) == state
     with pytest.raises(Refused, match="nothing"):
         await alice.ask("Undo")
     for state in states[1:]:
         await alice.ask("Redo")
         watcher.look()
-        assert shown(desk) == state
+        assert shown(server) == state
     with pytest.raises(Refused, match="nothing"):
         await alice.ask("Redo")
     await alice.ask("RestoreRevision", revision=numbered)
     watcher.look()
-    assert shown(desk) == states[0]
+    assert shown(server) == states[0]
     await alice.ask("Undo")
     watcher.look()
-    assert shown(desk) == states[-1]
+    assert shown(server) == states[-1]
 
 
-async def test_every_edit_of_a_scene_can_be_undone(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_every_edit_of_a_scene_can_be_undone(
+    server: SessionServer, alice: Person, bob: Person, work: Work
+) -> None:
     scene = await work.scene()
     robot = work.object("robot")
-    saved, watcher = shown(desk), Watcher(desk, bob)
+    saved, watcher = shown(server), Watcher(server, bob)
     ids = {"robot": robot, "scene": scene}
     edits: list[Edit] = [
         ("AddObjectToScene", {"name": "other", "type": "TimeActions"}, "", False),
@@ -100,40 +106,42 @@ async def test_every_edit_of_a_scene_can_be_undone(desk: Desk, alice: Person, bo
     for edit in edits:
         await make(alice, edit, ids)
         watcher.look()
-        assert desk.session.has_changes
+        assert server.session.has_changes
         assert (await alice.ask("Undo"))["request"] == edit[0]
         watcher.look()
-        assert shown(desk) == saved, edit[0]
-        assert not desk.session.has_changes
+        assert shown(server) == saved, edit[0]
+        assert not server.session.has_changes
     await alice.ask("CloseScene")
 
 
-async def test_undo_while_online_moves_the_live_object_but_no_robot(desk: Desk, alice: Person, work: Work) -> None:
+async def test_undo_while_online_moves_the_live_object_but_no_robot(
+    server: SessionServer, alice: Person, work: Work
+) -> None:
     await work.scene()
     scale, robot = work.object("scale"), work.object("robot")
     for obj in (robot, scale):
         await alice.lock(obj)
         await alice.ask("UpdateObjectPose", object_id=obj, pose=ELSEWHERE)
     await alice.ask("AddObjectToScene", name="other", type="TimeActions")
-    desk.cell.state = SceneStateEnum.STARTED
+    server.cell.state = SceneStateEnum.STARTED
     with pytest.raises(Refused, match="online"):
         await alice.ask("Undo")
-    number = desk.session.revision - 1
+    number = server.session.revision - 1
     await alice.ask("Undo", dry_run=True, number=number)
-    assert desk.cell.moved == []
+    assert server.cell.moved == []
     await alice.ask("Undo", number=number)
-    assert [obj for obj, _ in desk.cell.moved] == [scale]
-    assert desk.session.document.scene_object(scale).pose == desk.cell.moved[0][1]
+    assert [obj for obj, _ in server.cell.moved] == [scale]
+    assert server.session.document.scene_object(scale).pose == server.cell.moved[0][1]
     with pytest.raises(Refused, match="robot"):
         await alice.ask("Undo", number=number - 1)
-    desk.cell.state = SceneStateEnum.STOPPED
+    server.cell.state = SceneStateEnum.STOPPED
     await alice.ask("Undo")
     await alice.ask("Undo")
-    assert not desk.session.has_changes
+    assert not server.session.has_changes
 
 
 # ------------------------------------------------------------------------------------------------ history
-async def test_the_history_lists_users_and_edits(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_the_history_lists_users_and_edits(server: SessionServer, alice: Person, bob: Person, work: Work) -> None:
     await work.project("p")
     p = work.point("p")
     await bob.ask("AddActionPoint", name="b", position=ORIGIN)
@@ -157,82 +165,84 @@ async def test_the_history_lists_users_and_edits(desk: Desk, alice: Person, bob:
         await bob.ask("History", limit=1001)
 
 
-async def test_a_revision_can_be_restored_across_users(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_a_revision_can_be_restored_across_users(
+    server: SessionServer, alice: Person, bob: Person, work: Work
+) -> None:
     ids = await rich_project(work)
-    ids["project"] = desk.session.require_project().id
+    ids["project"] = server.session.require_project().id
     await alice.ask("SaveProject")
-    saved, revision, watcher = shown(desk), desk.session.revision, Watcher(desk, bob)
+    saved, revision, watcher = shown(server), server.session.revision, Watcher(server, bob)
     for name in ("AddActionPoint", "UpdateActionPointParent", "RemoveLogicItem", "DeleteOverride", "RenameAction"):
         await make(alice, EDITS[name], ids)
     await Work(bob).add_action(ids["base"], "bobs")
-    after = shown(desk)
+    after = shown(server)
     watcher.look()
-    assert await alice.ask("RestoreRevision", dry_run=True, revision=revision) == {"revision": desk.session.revision}
-    assert shown(desk) == after
+    assert await alice.ask("RestoreRevision", dry_run=True, revision=revision) == {"revision": server.session.revision}
+    assert shown(server) == after
     answer = await alice.ask("RestoreRevision", revision=revision)
-    assert answer == {"revision": desk.session.revision}
+    assert answer == {"revision": server.session.revision}
     watcher.look()
-    assert shown(desk) == saved
-    assert not desk.session.has_changes
+    assert shown(server) == saved
+    assert not server.session.has_changes
     assert (await alice.ask("History", limit=1))["edits"][0]["of"] == revision
     assert "nothing" not in await refused(alice, "RestoreRevision", revision=revision)
     await alice.ask("Undo")
     watcher.look()
-    assert shown(desk) == after
-    for wrong in (-1, desk.session.revision + 1):
+    assert shown(server) == after
+    for wrong in (-1, server.session.revision + 1):
         assert "can be restored" in await refused(alice, "RestoreRevision", revision=wrong)
 
 
 async def test_undo_works_after_saving_and_after_a_restart(tmp_path: Path) -> None:
-    async with open_desk(tmp_path) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path) as server:
+        alice = await server.person("alice")
         work = Work(alice)
         await work.project("a", "b")
         await alice.ask("SaveProject")
         await work.add_point("c")
         await alice.ask("Undo")
-        assert not desk.session.has_changes
-        history = list(desk.session.history)
-    async with open_desk(tmp_path) as desk:
-        alice, bob = await desk.person("alice"), await desk.person("bob")
-        assert list(desk.session.history) == history
-        assert not desk.session.has_changes
+        assert not server.session.has_changes
+        history = list(server.session.history)
+    async with open_server(tmp_path) as server:
+        alice, bob = await server.person("alice"), await server.person("bob")
+        assert list(server.session.history) == history
+        assert not server.session.has_changes
         told = await alice.ask("History")
         assert (told["undo"], told["redo"]) == (2, 4)
         assert "undo" not in await bob.ask("History")
         await alice.ask("Redo")
-        assert desk.session.has_changes
+        assert server.session.has_changes
         await alice.ask("Undo")
         await alice.ask("Undo")
-        assert [point.name for point in desk.session.require_project().action_points] == ["a"]
-        assert desk.session.has_changes
-    async with open_desk(tmp_path) as desk:
-        assert desk.session.has_changes
-        alice = await desk.person("alice")
+        assert [point.name for point in server.session.require_project().action_points] == ["a"]
+        assert server.session.has_changes
+    async with open_server(tmp_path) as server:
+        assert server.session.has_changes
+        alice = await server.person("alice")
         await alice.ask("Redo")
-        assert not desk.session.has_changes
+        assert not server.session.has_changes
         await alice.ask("CloseProject")
 
 
 async def test_a_reverted_change_counts_as_saved_after_a_restart(tmp_path: Path) -> None:
-    async with open_desk(tmp_path, history_limit=4) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path, history_limit=4) as server:
+        alice = await server.person("alice")
         await Work(alice).project("p")
         await alice.ask("SaveProject")
         await Work(alice).add_point("q")
         for _ in range(4):  # the journal begins anew at a document that is not the saved one
             await alice.ask("Undo")
             await alice.ask("Redo")
-    async with open_desk(tmp_path, history_limit=4) as desk:
-        assert desk.session.has_changes
-        alice = await desk.person("alice")
+    async with open_server(tmp_path, history_limit=4) as server:
+        assert server.session.has_changes
+        alice = await server.person("alice")
         await alice.ask("Undo")
-        assert not desk.session.has_changes
+        assert not server.session.has_changes
 
 
 async def test_the_history_limit_bounds_undo(tmp_path: Path) -> None:
-    async with open_desk(tmp_path, history_limit=5) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path, history_limit=5) as server:
+        alice = await server.person("alice")
         work = Work(alice)
         await work.project(*(f"p{number}" for number in range(8)))
         told = await alice.ask("History")
@@ -243,14 +253,14 @@ async def test_the_history_limit_bounds_undo(tmp_path: Path) -> None:
         # Each undo is an edit too: two of the five that are kept are still to be undone, until they drop out.
         while "undo" in await alice.ask("History"):
             await alice.ask("Undo")
-        assert len(desk.session.history) == 5
+        assert len(server.session.history) == 5
         assert "nothing" in await refused(alice)
 
 
 @pytest.mark.parametrize("version", [1, 2])
 async def test_a_journal_of_an_earlier_format_is_converted(tmp_path: Path, version: int) -> None:
-    async with open_desk(tmp_path) as desk:
-        await Work(await desk.person("alice")).project("p")
+    async with open_server(tmp_path) as server:
+        await Work(await server.person("alice")).project("p")
     connection = sqlite3.connect(tmp_path / "journal.sqlite")
     columns = ["edit.sum", "base.sum"] + (["edit.request", "edit.how", "edit.target"] if version == 1 else [])
     for table, column in (name.split(".") for name in columns):
@@ -260,25 +270,25 @@ async def test_a_journal_of_an_earlier_format_is_converted(tmp_path: Path, versi
     connection.commit()
     connection.close()
     (tmp_path / "journal.position").unlink()
-    async with open_desk(tmp_path) as desk:
-        assert desk.services.damage.notices == []
-        alice = await desk.person("alice")
-        assert [point.name for point in desk.session.require_project().action_points] == ["p"]
+    async with open_server(tmp_path) as server:
+        assert server.services.damage.notices == []
+        alice = await server.person("alice")
+        assert [point.name for point in server.session.require_project().action_points] == ["p"]
         await alice.ask("Undo")
-        assert not desk.session.require_project().action_points
-    async with open_desk(tmp_path) as desk:
-        assert not desk.session.require_project().action_points
-        assert desk.services.damage.notices == []
+        assert not server.session.require_project().action_points
+    async with open_server(tmp_path) as server:
+        assert not server.session.require_project().action_points
+        assert server.services.damage.notices == []
 
 
 async def test_an_undo_that_cannot_be_stored_is_reverted(
-    desk: Desk, alice: Person, work: Work, monkeypatch: pytest.MonkeyPatch
+    server: SessionServer, alice: Person, work: Work, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from arcor2_server.documents import journal_file
 
     await work.project("p")
     await alice.ask("SaveProject")
-    before, told = shown(desk), await alice.ask("History")
+    before, told = shown(server), await alice.ask("History")
 
     def full(connection: sqlite3.Connection, job: object, serial: int) -> None:
         raise sqlite3.OperationalError("database or disk is full")
@@ -286,15 +296,15 @@ async def test_an_undo_that_cannot_be_stored_is_reverted(
     with monkeypatch.context() as patch:
         patch.setattr(journal_file, "write_job", full)
         assert "disk is full" in await refused(alice)
-    assert shown(desk) == before
-    assert not desk.session.has_changes
+    assert shown(server) == before
+    assert not server.session.has_changes
     assert await alice.ask("History") == told
     await alice.ask("Undo")
-    assert desk.session.has_changes
+    assert server.session.has_changes
 
 
 async def test_a_failed_save_keeps_unsaved_changes(
-    desk: Desk, alice: Person, work: Work, monkeypatch: pytest.MonkeyPatch
+    server: SessionServer, alice: Person, work: Work, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from arcor2_hw.exceptions import StorageError
 
@@ -306,12 +316,12 @@ async def test_a_failed_save_keeps_unsaved_changes(
         raise StorageError("no")
 
     with monkeypatch.context() as patch:
-        patch.setattr(desk.services.storage, "put_project", failing)
+        patch.setattr(server.services.storage, "put_project", failing)
         with pytest.raises(Refused):
             await alice.ask("SaveProject")
-    assert desk.session.has_changes
+    assert server.session.has_changes
     await alice.ask("Undo")
-    assert not desk.session.has_changes
+    assert not server.session.has_changes
 
 
 async def test_older_clients_are_notified_of_undo(alice: Person) -> None:

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from arcor2_hw.exceptions import StorageError
 from arcor2_server.documents import journal_file
 from arcor2_server.documents.changes import Kind
-from tests.server.session.desk import Desk, Person, Refused, open_desk
+from tests.server.session.session_server import Person, Refused, SessionServer, open_server
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 
@@ -23,7 +23,7 @@ async def open_project(alice: Person, points: int = 1) -> None:
     await alice.ask("NewScene", name="scene")
     await alice.ask("AddObjectToScene", name="time", type="TimeActions")
     await alice.ask("SaveScene")
-    await alice.ask("NewProject", scene_id=alice.desk.session.require_scene().id, name="project")
+    await alice.ask("NewProject", scene_id=alice.server.session.require_scene().id, name="project")
     for number in range(points):
         await add_point(alice, f"p{number}")
     alice.take()
@@ -33,8 +33,8 @@ async def add_point(person: Person, name: str) -> None:
     await person.ask("AddActionPoint", name=name, position={"x": 0, "y": 0, "z": 0})
 
 
-def point_names(desk: Desk) -> list[str]:
-    return [point.name for point in desk.session.require_project().action_points]
+def point_names(server: SessionServer) -> list[str]:
+    return [point.name for point in server.session.require_project().action_points]
 
 
 @pytest.mark.parametrize("moment", [0.1, 0.35])
@@ -61,21 +61,21 @@ async def test_acknowledged_edits_survive_a_kill(tmp_path: Path, moment: float) 
         if process.returncode is None:
             process.kill()
         await process.wait()
-    async with open_desk(tmp_path) as desk:
-        project = desk.session.require_project()
+    async with open_server(tmp_path) as server:
+        project = server.session.require_project()
         kept = [action.name for point in project.action_points for action in point.actions]
         missing = set(acknowledged) - set(kept)
         assert not missing
         assert len(acknowledged) >= 50
         # Nobody waits for more than one answer: beyond what was acknowledged there is at most one edit of each.
         assert len(kept) <= len(acknowledged) + 8
-        assert desk.session.project_changed
-        assert not desk.session.scene_changed
+        assert server.session.project_changed
+        assert not server.session.scene_changed
         # It is a document like any other: it goes on, and is saved.
-        alice = await desk.person("alice")
+        alice = await server.person("alice")
         await add_point(alice, "afterwards")
         await alice.ask("SaveProject")
-        assert not desk.session.has_changes
+        assert not server.session.has_changes
 
 
 async def _lines(stream: asyncio.StreamReader, count: int) -> list[str]:
@@ -88,39 +88,39 @@ async def _lines(stream: asyncio.StreamReader, count: int) -> list[str]:
 
 
 async def test_a_restart_restores_the_open_document(tmp_path: Path) -> None:
-    async with open_desk(tmp_path) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path) as server:
+        alice = await server.person("alice")
         await open_project(alice)
         await alice.ask("SaveProject")
         await add_point(alice, "unsaved")
-        await alice.lock(desk.session.require_project().action_points[0].id)
-        scene, project = desk.session.scene, desk.session.project
-        history = list(desk.session.history)
-    async with open_desk(tmp_path) as desk:
-        assert (desk.session.scene, desk.session.project) == (scene, project)
-        assert list(desk.session.history) == history
-        assert desk.session.has_changes
-        assert desk.services.locks.announced() == {}
-        names = [event.event for event in desk.session.greeting(desk.cell.state)]
+        await alice.lock(server.session.require_project().action_points[0].id)
+        scene, project = server.session.scene, server.session.project
+        history = list(server.session.history)
+    async with open_server(tmp_path) as server:
+        assert (server.session.scene, server.session.project) == (scene, project)
+        assert list(server.session.history) == history
+        assert server.session.has_changes
+        assert server.services.locks.announced() == {}
+        names = [event.event for event in server.session.greeting(server.cell.state)]
         assert names == ["OpenProject", "SceneState"]
-        saved = await desk.services.storage.project(desk.session.require_project().id)
+        saved = await server.services.storage.project(server.session.require_project().id)
         assert [point.name for point in saved.action_points] == ["p0"]
-        alice = await desk.person("alice")
+        alice = await server.person("alice")
         await alice.ask("CloseProject", force=True)
-    async with open_desk(tmp_path) as desk:
-        assert desk.session.greeting(desk.cell.state) == []
-        assert desk.session.scene is None
+    async with open_server(tmp_path) as server:
+        assert server.session.greeting(server.cell.state) == []
+        assert server.session.scene is None
 
 
 async def test_a_killed_start_leaves_nothing_behind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    async with open_desk(tmp_path):
+    async with open_server(tmp_path):
         pass
     connection = sqlite3.connect(tmp_path / "journal.sqlite")
     connection.execute("create table extent (content blob)")
     connection.close()
     capsys.readouterr()
-    async with open_desk(tmp_path) as desk:
-        await open_project(await desk.person("alice"))
+    async with open_server(tmp_path) as server:
+        await open_project(await server.person("alice"))
     assert "no room" not in capsys.readouterr().out
     connection = sqlite3.connect(tmp_path / "journal.sqlite")
     assert connection.execute("select count(*) from sqlite_master where name = 'extent'").fetchone() == (0,)
@@ -128,35 +128,35 @@ async def test_a_killed_start_leaves_nothing_behind(tmp_path: Path, capsys: pyte
 
 
 async def test_a_new_scene_survives_without_ever_being_saved(tmp_path: Path) -> None:
-    async with open_desk(tmp_path) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path) as server:
+        alice = await server.person("alice")
         await alice.ask("NewScene", name="scene")
         await alice.ask("AddObjectToScene", name="time", type="TimeActions")
-    async with open_desk(tmp_path) as desk:
-        assert [obj.name for obj in desk.session.require_scene().objects] == ["time"]
-        assert desk.session.scene_changed
-        assert await desk.services.storage.scenes() == []
+    async with open_server(tmp_path) as server:
+        assert [obj.name for obj in server.session.require_scene().objects] == ["time"]
+        assert server.session.scene_changed
+        assert await server.services.storage.scenes() == []
 
 
 async def test_the_journal_stays_short(tmp_path: Path) -> None:
-    async with open_desk(tmp_path, history_limit=10) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path, history_limit=10) as server:
+        alice = await server.person("alice")
         await open_project(alice)
         for number in range(1, 45):
             await add_point(alice, f"p{number}")
-        expected, project = [f"p{number}" for number in range(45)], desk.session.project
-        assert point_names(desk) == expected
+        expected, project = [f"p{number}" for number in range(45)], server.session.project
+        assert point_names(server) == expected
     with sqlite3.connect(tmp_path / "journal.sqlite") as connection:
         (rows,) = connection.execute("select count(*) from edit").fetchone()
         assert 10 <= rows <= 20
     connection.close()
-    async with open_desk(tmp_path, history_limit=10) as desk:
-        assert desk.session.project == project
-        assert desk.session.has_changes
-        assert len(desk.session.history) == 10
+    async with open_server(tmp_path, history_limit=10) as server:
+        assert server.session.project == project
+        assert server.session.has_changes
+        assert len(server.session.history) == 10
         # The edits that are kept lead back step by step.
-        document = desk.session.document
-        for edit in reversed(desk.session.history):
+        document = server.session.document
+        for edit in reversed(server.session.history):
             document.apply([change.inverse() for change in reversed(edit.changes)])
         assert [item.value.name for item in document.of_kind(Kind.POINT)] == expected[:-10]
 
@@ -165,14 +165,14 @@ async def test_the_journal_stays_short(tmp_path: Path) -> None:
 async def test_a_damaged_journal_is_renamed_and_reported(
     tmp_path: Path, damage: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    async with open_desk(tmp_path) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path) as server:
+        alice = await server.person("alice")
         await open_project(alice, points=30)
         await alice.ask("SaveProject")
         await add_point(alice, "one")
         await add_point(alice, "two")
         await add_point(alice, "three")
-        key = desk.session.require_project().id
+        key = server.session.require_project().id
     path = tmp_path / "journal.sqlite"
     statements = {
         "row": "update edit set changes = x'5b5b5d5d'",
@@ -191,37 +191,37 @@ async def test_a_damaged_journal_is_renamed_and_reported(
         connection.close()
     capsys.readouterr()
     left = ["one"] if damage == "gap" else []
-    async with open_desk(tmp_path) as desk:
-        (notice,) = desk.services.damage.notices
+    async with open_server(tmp_path) as server:
+        (notice,) = server.services.damage.notices
         assert "journal.damaged-" in notice
         assert ("Changes 32 to 33" if damage == "gap" else "alice") in notice
-        assert notice == desk.services.greeting()[-1].data.message
-        alice = await desk.person("alice")
+        assert notice == server.services.greeting()[-1].data.message
+        alice = await server.person("alice")
         if not left:
-            assert desk.session.greeting(desk.cell.state) == []
+            assert server.session.greeting(server.cell.state) == []
             await alice.ask("OpenProject", id=key)
-        assert point_names(desk)[30:] == left
+        assert point_names(server)[30:] == left
         await add_point(alice, "again")
     assert "journal.damaged-" in capsys.readouterr().out
     assert len(list(tmp_path.glob("journal.damaged-*.sqlite"))) == 1
-    async with open_desk(tmp_path) as desk:
-        assert point_names(desk)[-1] == "again"
+    async with open_server(tmp_path) as server:
+        assert point_names(server)[-1] == "again"
 
 
 async def test_a_second_server_on_the_same_data_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(journal_file, "BUSY_TIMEOUT", 0.05)
-    async with open_desk(tmp_path):
+    async with open_server(tmp_path):
         with pytest.raises(StorageError, match=r"journal\.sqlite"):
-            async with open_desk(tmp_path):
+            async with open_server(tmp_path):
                 pass
 
 
 async def test_edits_that_cannot_be_stored_are_reverted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    async with open_desk(tmp_path) as desk:
-        alice, bob = await desk.person("alice"), await desk.person("bob")
+    async with open_server(tmp_path) as server:
+        alice, bob = await server.person("alice"), await server.person("bob")
         await open_project(alice, points=2)
         await alice.ask("SaveProject")
-        before, number = desk.session.project, len(desk.session.history)
+        before, number = server.session.project, len(server.session.history)
         write, failing = journal_file.write_job, True
 
         def full(connection: sqlite3.Connection, job: object, serial: int) -> None:
@@ -236,58 +236,58 @@ async def test_edits_that_cannot_be_stored_are_reverted(tmp_path: Path, monkeypa
         assert all(isinstance(result, Refused) for result in results)
         assert any("disk is full" in str(result) for result in results)
         assert bob.events() == []
-        assert desk.session.project == before
-        assert not desk.session.has_changes
-        assert len(desk.session.history) == number
+        assert server.session.project == before
+        assert not server.session.has_changes
+        assert len(server.session.history) == number
         failing = False
         await add_point(alice, "kept")
-        assert point_names(desk) == ["p0", "p1", "kept"]
-    async with open_desk(tmp_path) as desk:
-        assert point_names(desk) == ["p0", "p1", "kept"]
+        assert point_names(server) == ["p0", "p1", "kept"]
+    async with open_server(tmp_path) as server:
+        assert point_names(server) == ["p0", "p1", "kept"]
 
 
 async def test_an_edit_during_a_save_counts_as_unsaved(
-    desk: Desk, alice: Person, monkeypatch: pytest.MonkeyPatch
+    server: SessionServer, alice: Person, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await open_project(alice)
-    put = desk.services.storage.put_project
+    put = server.services.storage.put_project
 
     async def slow(project):  # type: ignore[no-untyped-def]
-        item = desk.session.document.of_kind(Kind.POINT)[0]
-        change = desk.session.document.update(Kind.POINT, item.id, replace(item.value, name="meanwhile"))
-        await desk.session.commit("bob", [change])
+        item = server.session.document.of_kind(Kind.POINT)[0]
+        change = server.session.document.update(Kind.POINT, item.id, replace(item.value, name="meanwhile"))
+        await server.session.commit("bob", [change])
         return await put(project)
 
-    monkeypatch.setattr(desk.services.storage, "put_project", slow)
+    monkeypatch.setattr(server.services.storage, "put_project", slow)
     await alice.ask("SaveProject")
-    assert desk.session.project_changed
-    assert point_names(desk) == ["meanwhile"]
+    assert server.session.project_changed
+    assert point_names(server) == ["meanwhile"]
 
 
-async def test_the_edit_of_a_cancelled_request_is_kept(desk: Desk, alice: Person) -> None:
+async def test_the_edit_of_a_cancelled_request_is_kept(server: SessionServer, alice: Person) -> None:
     await open_project(alice)
     task = asyncio.create_task(add_point(alice, "last"))
-    while point_names(desk)[-1] != "last":
+    while point_names(server)[-1] != "last":
         await asyncio.sleep(0)
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)
     await add_point(alice, "later")
-    assert point_names(desk) == ["p0", "last", "later"]
-    assert not desk.session._pending
+    assert point_names(server) == ["p0", "last", "later"]
+    assert not server.session._pending
 
 
 async def test_a_crash_right_after_saving_leaves_it_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    async with open_desk(tmp_path) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path) as server:
+        alice = await server.person("alice")
         await open_project(alice)
-        monkeypatch.setattr(desk.session, "_shorten", lambda: None)  # the journal never learns of it
+        monkeypatch.setattr(server.session, "_shorten", lambda: None)  # the journal never learns of it
         await alice.ask("SaveProject")
-        saved = await desk.services.storage.project(desk.session.require_project().id)
-    async with open_desk(tmp_path) as desk:
-        assert not desk.session.has_changes
-        assert desk.session.project == saved
-        alice = await desk.person("alice")
+        saved = await server.services.storage.project(server.session.require_project().id)
+    async with open_server(tmp_path) as server:
+        assert not server.session.has_changes
+        assert server.session.project == saved
+        alice = await server.person("alice")
         await alice.ask("Undo")
-        assert desk.session.has_changes
+        assert server.session.has_changes
         await alice.ask("CloseProject", force=True)
         assert (await alice.ask("GetProject", id=saved.id))["modified"] == saved.modified

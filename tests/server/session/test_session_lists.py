@@ -5,17 +5,17 @@ from typing import Any
 
 import pytest
 
-from tests.server.session.desk import Desk, Person
+from tests.server.session.session_server import Person, SessionServer
 from tests.server.session.work import Work
 
 
 class Reads:
     """Counts which documents are read from the storage."""
 
-    def __init__(self, desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, server: SessionServer, monkeypatch: pytest.MonkeyPatch) -> None:
         self.read: list[str] = []
         for name in ("scenes_with_ids", "projects_with_ids"):
-            monkeypatch.setattr(desk.services.storage, name, self._counting(getattr(desk.services.storage, name)))
+            monkeypatch.setattr(server.services.storage, name, self._counting(getattr(server.services.storage, name)))
 
     def _counting(self, read: Any) -> Any:
         async def counted(keys: Sequence[str]) -> Any:
@@ -30,17 +30,17 @@ class Reads:
 
 
 async def test_only_changed_documents_are_checked_again(
-    desk: Desk, alice: Person, monkeypatch: pytest.MonkeyPatch
+    server: SessionServer, alice: Person, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     work = Work(alice)
     project = await work.project("p")
-    scene = desk.session.require_scene().id
+    scene = server.session.require_scene().id
     await work.add_action(work.point("p"), "act")
     await alice.ask("SaveProject")
     await alice.ask("CloseProject")
     for number in range(3):
         await alice.ask("CopyProject", source_id=project, target_name=f"copy {number}")
-    reads = Reads(desk, monkeypatch)
+    reads = Reads(server, monkeypatch)
     listed = await alice.ask("ListProjects")
     assert [entry.get("problems") for entry in listed] == [None] * 4
     assert reads.taken().count("pro") == 4
@@ -53,16 +53,16 @@ async def test_only_changed_documents_are_checked_again(
     # A scene that changed concerns all its projects.
     await alice.ask("OpenScene", id=scene)
     await alice.ask("RemoveFromScene", id=work.object("time"), force=True)
-    await desk.services.storage.put_scene(desk.session.require_scene())
+    await server.services.storage.put_scene(server.session.require_scene())
     reads.taken()
     assert all(entry["problems"] for entry in await alice.ask("ListProjects"))
     assert reads.taken().count("pro") == 4
     await alice.ask("CloseScene", force=True)
     # So does a type that is gone.
-    del desk.types._metas["WeighingMachine"]
-    desk.types.revision += 1
+    del server.types._metas["WeighingMachine"]
+    server.types.revision += 1
     assert "WeighingMachine" in (await alice.ask("ListScenes"))[0]["problems"][0]
     assert all("WeighingMachine" in str(entry["problems"]) for entry in await alice.ask("ListProjects"))
     await alice.ask("DeleteProject", id=project)
     assert len(await alice.ask("ListProjects")) == 3
-    assert len(desk.services.saved_problems._stored.projects) == 3  # nothing is stored for the deleted one
+    assert len(server.services.saved_problems._stored.projects) == 3  # nothing is stored for the deleted one

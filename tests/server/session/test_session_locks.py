@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tests.server.session.desk import Person, Refused, open_desk
+from tests.server.session.session_server import Person, Refused, open_server
 from tests.server.session.work import Work
 
 
@@ -59,8 +59,8 @@ async def test_update_lock_widens_to_the_tree_and_narrows_to_the_object(alice: P
 
 
 async def test_all_locks_of_a_lost_user_are_released(tmp_path: Path) -> None:
-    async with open_desk(tmp_path, lock_timeout=0.2) as desk:
-        alice, bob = await desk.person("alice"), await desk.person("bob")
+    async with open_server(tmp_path, lock_timeout=0.2) as server:
+        alice, bob = await server.person("alice"), await server.person("bob")
         work = Work(alice)
         await work.project("parent", "other")
         child = await work.add_point("child", work.point("parent"))
@@ -76,7 +76,7 @@ async def test_all_locks_of_a_lost_user_are_released(tmp_path: Path) -> None:
         with pytest.raises(Refused):
             await bob.ask("SaveProject")
         await alice.leave()
-        desk._people.remove(alice)
+        server._people.remove(alice)
         released: list[Any] = []
         async with asyncio.timeout(10):
             while not released:

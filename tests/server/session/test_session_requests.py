@@ -7,7 +7,7 @@ import pytest
 
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.object_type import ObjectTypeMeta
-from tests.server.session.desk import Desk, Person, Refused
+from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import NOTHING_KEPT, ORIGIN, POSE, SECONDS, UPRIGHT, Work
 
 
@@ -17,18 +17,18 @@ def work(alice: Person) -> Work:
 
 
 # ------------------------------------------------------------------------------------------------ order of events
-async def test_order_of_events_when_documents_open_and_close(desk: Desk, alice: Person, bob: Person) -> None:
-    desk.types.news = [ObjectTypeMeta("NewType"), ObjectTypeMeta("OtherType")]
+async def test_order_of_events_when_documents_open_and_close(server: SessionServer, alice: Person, bob: Person) -> None:
+    server.types.news = [ObjectTypeMeta("NewType"), ObjectTypeMeta("OtherType")]
     await alice.ask("NewScene", name="scene")
     bob_sees = bob.take()
     assert [e["event"] for e in bob_sees] == ["ChangedObjectTypes", "OpenScene", "SceneState"]
     assert {meta["type"] for meta in bob_sees[0]["data"]} == {"NewType", "OtherType"}
     await alice.ask("AddObjectToScene", name="time", type="TimeActions")
-    scene = desk.session.require_scene()
+    scene = server.session.require_scene()
     alice.take()
     await alice.ask("NewProject", scene_id=scene.id, name="project")
     assert alice.names() == ["SceneSaved", "OpenProject", "SceneState"]
-    assert [e.event for e in desk.session.greeting(desk.cell.state)] == ["OpenProject", "SceneState"]
+    assert [e.event for e in server.session.greeting(server.cell.state)] == ["OpenProject", "SceneState"]
     await alice.ask("SaveProject")
     assert alice.names() == ["ProjectSaved"]
     with pytest.raises(Refused, match="no changes"):
@@ -38,7 +38,7 @@ async def test_order_of_events_when_documents_open_and_close(desk: Desk, alice: 
     events = alice.events()
     assert [e["event"] for e in events] == ["ProjectClosed", "ShowMainScreen"]
     assert events[1]["data"]["what"] == "ProjectsList"
-    assert desk.services.hub.main_screen.data.what == "ProjectsList"
+    assert server.services.hub.main_screen.data.what == "ProjectsList"
     await alice.ask("OpenScene", id=scene.id)
     assert alice.names() == ["OpenScene", "SceneState"]
     await alice.ask("CloseScene")
@@ -69,46 +69,46 @@ async def test_logic_items_always_announce_unlocking(work: Work, alice: Person, 
     await alice.ask("UpdateProjectHasLogic", project_id=work.session.require_project().id, new_has_logic=False)
     assert alice.names() == ["ProjectChanged/update_base"]
     assert work.session.require_project().logic == []
-    with pytest.raises(Refused, match="no logic"):
+    with pytest.raises(Refused, match="script instead of logic"):
         await alice.ask("AddLogicItem", start="START", end=one)
 
 
 async def test_an_action_and_its_connections_are_removed_by_one_edit(
-    desk: Desk, work: Work, alice: Person, bob: Person
+    server: SessionServer, work: Work, alice: Person, bob: Person
 ) -> None:
     await work.project("p")
     point = work.point("p")
     one, two, three = [await work.add_action(point, name) for name in ("one", "two", "three")]
     for start, end in (("START", one), (one, two), (two, three), (three, "END")):
         await alice.ask("AddLogicItem", start=start, end=end)
-    steps = {(item.start, item.end): item.id for item in desk.session.require_project().logic}
+    steps = {(item.start, item.end): item.id for item in server.session.require_project().logic}
     bob.take()
-    edits = len(desk.session.history)
+    edits = len(server.session.history)
     await bob.lock(one)
     with pytest.raises(Refused, match="bob"):
         await alice.ask("RemoveAction", id=two, with_steps=True)
     await bob.ask("WriteUnlock", object_id=one)
     bob.take()
     await alice.ask("RemoveAction", id=two, with_steps=True, dry_run=True)
-    assert len(desk.session.history) == edits
+    assert len(server.session.history) == edits
     await alice.ask("RemoveAction", id=two, with_steps=True)
     # What led to it leads on; the step that led away from it is gone.
     assert bob.names() == ["LogicItemChanged/remove", "LogicItemChanged/update", "ActionChanged/remove"]
-    logic = {item.id: (item.start, item.end) for item in desk.session.require_project().logic}
+    logic = {item.id: (item.start, item.end) for item in server.session.require_project().logic}
     assert logic[steps[one, two]] == (one, three)
     assert steps[two, three] not in logic
-    assert len(desk.session.history) == edits + 1
+    assert len(server.session.history) == edits + 1
     await alice.ask("Undo")
-    assert {(item.start, item.end): item.id for item in desk.session.require_project().logic} == steps
+    assert {(item.start, item.end): item.id for item in server.session.require_project().logic} == steps
     await alice.ask("Redo")
-    assert {item.id: (item.start, item.end) for item in desk.session.require_project().logic} == logic
+    assert {item.id: (item.start, item.end) for item in server.session.require_project().logic} == logic
     # The last one: nothing may lead straight from START to END.
     await alice.ask("RemoveAction", id=one, with_steps=True)
     await alice.ask("RemoveAction", id=three, with_steps=True)
-    assert desk.session.require_project().logic == []
+    assert server.session.require_project().logic == []
 
 
-async def test_an_action_whose_result_is_used_is_not_removed(desk: Desk, work: Work, alice: Person) -> None:
+async def test_an_action_whose_result_is_used_is_not_removed(server: SessionServer, work: Work, alice: Person) -> None:
     await work.project("p")
     point = work.point("p")
     kept = [{"type": "default", "outputs": ["lucky"]}]
@@ -117,10 +117,10 @@ async def test_an_action_whose_result_is_used_is_not_removed(desk: Desk, work: W
     other = await work.add_action(point, "other")
     await alice.ask("AddLogicItem", start=first, end=other)
     await alice.ask("AddLogicItem", start=other, end="END", condition={"what": f"{first}/default/0", "value": "true"})
-    before = desk.session.require_project().logic
+    before = server.session.require_project().logic
     with pytest.raises(Refused, match="condition of the logic"):
         await alice.ask("RemoveAction", id=first, with_steps=True)
-    assert desk.session.require_project().logic == before
+    assert server.session.require_project().logic == before
 
 
 async def test_changing_the_parent_twice(work: Work, alice: Person) -> None:
@@ -138,9 +138,11 @@ async def test_changing_the_parent_twice(work: Work, alice: Person) -> None:
         await alice.ask("UpdateActionPointParent", action_point_id=b, new_parent_id=a)
 
 
-async def test_moving_a_point_needs_its_tree_and_makes_joints_invalid(desk: Desk, work: Work, alice: Person) -> None:
+async def test_moving_a_point_needs_its_tree_and_makes_joints_invalid(
+    server: SessionServer, work: Work, alice: Person
+) -> None:
     await work.project()
-    desk.cell.state = SceneStateEnum.STARTED
+    server.cell.state = SceneStateEnum.STARTED
     await alice.ask("AddApUsingRobot", robot_id=work.object("robot"), end_effector_id="default", name="taught")
     assert alice.names() == ["ActionPointChanged/add", "OrientationChanged/add", "JointsChanged/add"]
     point = work.point("taught")
@@ -188,12 +190,12 @@ async def test_two_users_and_one_tree(work: Work, alice: Person, bob: Person) ->
 
 
 async def test_edits_of_many_users_at_once_keep_their_order(
-    desk: Desk, work: Work, alice: Person, crowd: list[Person]
+    server: SessionServer, work: Work, alice: Person, crowd: list[Person]
 ) -> None:
     await work.project()
     batches = []
-    write = desk.session._journal._write_batch
-    desk.session._journal._write_batch = lambda *args: (batches.append(len(args[1])), write(*args))[1]  # type: ignore[method-assign]
+    write = server.session._journal._write_batch
+    server.session._journal._write_batch = lambda *args: (batches.append(len(args[1])), write(*args))[1]  # type: ignore[method-assign]
     alice.take()
 
     async def edit(n: int) -> None:
@@ -211,7 +213,7 @@ async def test_edits_of_many_users_at_once_keep_their_order(
     batches.clear()
     await asyncio.gather(*map(edit, range(8)))
     changed = [e["data"] for e in alice.events() if e["event"] == "ProjectParameterChanged"]
-    edits = [edit.changes[0].after for edit in list(desk.session.history)[-160:]]
+    edits = [edit.changes[0].after for edit in list(server.session.history)[-160:]]
     assert [(c["id"], c["name"]) for c in changed] == [(e.id, e.name) for e in edits]
     assert sum(batches) == 160
     assert len(batches) < 160, "no two edits shared a commit"
@@ -275,14 +277,14 @@ async def test_a_copy_refers_to_its_own_items(work: Work, alice: Person) -> None
     assert {getattr(user, "name", "") for user in document.users_of(new_source.id)} == {"linked_copy"}
 
 
-async def test_read_locks_end_with_their_items(desk: Desk, work: Work, alice: Person, bob: Person) -> None:
+async def test_read_locks_end_with_their_items(server: SessionServer, work: Work, alice: Person, bob: Person) -> None:
     project = await work.project("p")
     await bob.ask("ReadLock", object_id=work.point("p"))
     with pytest.raises(Refused, match="locked"):
         await alice.ask("WriteLock", object_id=work.point("p"))
     await alice.ask("SaveProject")
     await alice.ask("CloseProject")
-    assert desk.services.locks.locked_roots() == []
+    assert server.services.locks.locked_roots() == []
     await alice.ask("OpenProject", id=project)
     await alice.lock(work.point("p"))
 
@@ -316,19 +318,19 @@ async def test_overrides(work: Work, alice: Person) -> None:
 
 # ------------------------------------------------------------------------------------------------ what saving does
 async def test_saving_a_moved_object_makes_joints_invalid_in_its_projects(
-    desk: Desk, work: Work, alice: Person
+    server: SessionServer, work: Work, alice: Person
 ) -> None:
     project = await work.project()
     scene = work.session.require_scene().id
     on_scale = await work.add_point("on_scale", work.object("scale"))
     above = await work.add_point("above", on_scale)
     free = await work.add_point("free")
-    desk.cell.state = SceneStateEnum.STARTED
+    server.cell.state = SceneStateEnum.STARTED
     for point in (on_scale, above, free):
         await alice.lock(point)
         await alice.ask("AddActionPointJointsUsingRobot", action_point_id=point, robot_id=work.object("robot"))
         await alice.ask("WriteUnlock", object_id=point)
-    desk.cell.state = SceneStateEnum.STOPPED
+    server.cell.state = SceneStateEnum.STOPPED
     await alice.ask("SaveProject")
     await alice.ask("CloseProject")
     await alice.ask("OpenScene", id=scene)
@@ -337,12 +339,12 @@ async def test_saving_a_moved_object_makes_joints_invalid_in_its_projects(
     await alice.ask("UpdateObjectPose", object_id=scale, pose=POSE | {"position": {"x": 9.0, "y": 0.0, "z": 0.0}})
     await alice.ask("WriteUnlock", object_id=scale)
     await alice.ask("SaveScene")
-    saved = await desk.services.storage.project(project)
+    saved = await server.services.storage.project(project)
     valid = {point.name: point.robot_joints[0].is_valid for point in saved.action_points}
     assert valid == {"on_scale": False, "above": False, "free": True}
 
 
-async def test_an_object_used_by_projects_is_not_removed(desk: Desk, work: Work, alice: Person) -> None:
+async def test_an_object_used_by_projects_is_not_removed(server: SessionServer, work: Work, alice: Person) -> None:
     project = await work.project()
     scene = work.session.require_scene().id
     await work.add_point("on_scale", work.object("scale"))
@@ -357,14 +359,14 @@ async def test_an_object_used_by_projects_is_not_removed(desk: Desk, work: Work,
         await alice.ask("RemoveFromScene", id=work.object("scale"))
     await alice.ask("RemoveFromScene", id=work.object("scale"), force=True)
     # Until the scene is saved nothing has happened to the project.
-    assert (await desk.services.storage.project(project)).action_points[0].parent
+    assert (await server.services.storage.project(project)).action_points[0].parent
     await alice.ask("SaveScene")
     await alice.ask("CloseScene")
     await alice.ask("OpenProject", id=project)
     assert work.session.require_project().action_points[0].position.x == 0.5
 
 
-async def test_a_collision_object_is_removed_with_its_type(desk: Desk, work: Work, alice: Person) -> None:
+async def test_a_collision_object_is_removed_with_its_type(server: SessionServer, work: Work, alice: Person) -> None:
     await work.scene()
     box = {"type": "Box", "box": {"id": "crate", "size_x": 0.1, "size_y": 0.1, "size_z": 0.1}}
     add = {"name": "crate", "pose": POSE, "model": box}
@@ -374,26 +376,26 @@ async def test_a_collision_object_is_removed_with_its_type(desk: Desk, work: Wor
         await alice.ask("AddVirtualCollisionObjectToScene", **add)
     await alice.ask("RemoveFromScene", id=work.object("crate"))
     assert alice.names() == ["SceneObjectChanged/remove"]
-    assert desk.types.known("crate")
+    assert server.types.known("crate")
     await alice.ask("SaveScene")
     assert alice.names() == ["SceneSaved", "ChangedObjectTypes/remove"]
-    assert not desk.types.known("crate")
+    assert not server.types.known("crate")
 
 
-async def test_a_live_object_moves_with_its_pose(desk: Desk, work: Work, alice: Person) -> None:
+async def test_a_live_object_moves_with_its_pose(server: SessionServer, work: Work, alice: Person) -> None:
     await work.scene()
-    desk.cell.state = SceneStateEnum.STARTED
+    server.cell.state = SceneStateEnum.STARTED
     for name in ("scale", "robot"):
         await alice.lock(work.object(name))
     await alice.ask("UpdateObjectPose", object_id=work.object("scale"), pose=POSE)
-    assert [moved for moved, _ in desk.cell.moved] == [work.object("scale")]
+    assert [moved for moved, _ in server.cell.moved] == [work.object("scale")]
     with pytest.raises(Refused, match="is a robot"):
         await alice.ask("UpdateObjectPose", object_id=work.object("robot"), pose=POSE)
     with pytest.raises(Refused, match="online"):
         await alice.ask("AddObjectToScene", name="late", type="TimeActions")
 
 
-async def test_names_of_scenes_and_projects_are_unique(desk: Desk, work: Work, alice: Person) -> None:
+async def test_names_of_scenes_and_projects_are_unique(server: SessionServer, work: Work, alice: Person) -> None:
     await work.project()
     scene, project = work.session.require_scene().id, work.session.require_project().id
     with pytest.raises(Refused, match="already"):
@@ -410,28 +412,30 @@ async def test_names_of_scenes_and_projects_are_unique(desk: Desk, work: Work, a
         with pytest.raises(Refused, match="name"):
             await request
     await alice.ask("CopyProject", source_id=project, target_name="copy")
-    copies = [p for p in await desk.services.storage.projects() if p.name == "copy"]
-    own = {p.name: p.value for p in (await desk.services.storage.project(copies[0].id)).parameters}
+    copies = [p for p in await server.services.storage.projects() if p.name == "copy"]
+    own = {p.name: p.value for p in (await server.services.storage.project(copies[0].id)).parameters}
     assert own == {"scene_id": f'"{scene}"', "project_id": f'"{copies[0].id}"'}
 
 
-async def test_a_project_with_problems_is_not_opened(desk: Desk, work: Work, alice: Person) -> None:
+async def test_a_project_with_problems_is_not_opened(server: SessionServer, work: Work, alice: Person) -> None:
     project = await work.project("p")
     await work.add_action(work.point("p"), "act")
     await alice.ask("SaveProject")
     await alice.ask("CloseProject")
-    meta = desk.types._metas.pop("TimeActions")
-    desk.types.revision += 1
+    meta = server.types._metas.pop("TimeActions")
+    server.types.revision += 1
     with pytest.raises(Refused, match="TimeActions does not exist"):
         await alice.ask("OpenProject", id=project)
     listed = await alice.ask("ListProjects")
     assert any("TimeActions" in problem for problem in listed[0]["problems"])
-    desk.types._metas["TimeActions"] = meta
+    server.types._metas["TimeActions"] = meta
     await alice.ask("OpenProject", id=project)
 
 
 # ------------------------------------------------------------------------------------------------ dry runs
-async def test_a_dry_run_checks_and_changes_nothing(desk: Desk, work: Work, alice: Person, bob: Person) -> None:
+async def test_a_dry_run_checks_and_changes_nothing(
+    server: SessionServer, work: Work, alice: Person, bob: Person
+) -> None:
     await work.project("p", "q")
     p, q = work.point("p"), work.point("q")
     action = await work.add_action(p, "act")
@@ -466,8 +470,8 @@ async def test_a_dry_run_checks_and_changes_nothing(desk: Desk, work: Work, alic
         ("UpdateProjectParameter", {"id": parameter, "value": "{}"}),
         ("RemoveAction", {"id": "act_none"}),
     ]
-    document, project = desk.session.document, desk.session.project
-    before, edits, locks = document.items(), len(desk.session.history), desk.services.locks.announced()
+    document, project = server.session.document, server.session.project
+    before, edits, locks = document.items(), len(server.session.history), server.services.locks.announced()
     for person in (alice, bob):
         person.take()
     for name, arguments in good:
@@ -476,10 +480,10 @@ async def test_a_dry_run_checks_and_changes_nothing(desk: Desk, work: Work, alic
         with pytest.raises(Refused):
             await alice.ask(name, dry_run=True, **arguments)
     assert document.items() == before
-    assert desk.session.project is project
-    assert len(desk.session.history) == edits
-    assert desk.services.locks.announced() == locks
-    assert desk.services.locks.write_locked_roots() == list(dict.fromkeys((p, parameter)))
+    assert server.session.project is project
+    assert len(server.session.history) == edits
+    assert server.services.locks.announced() == locks
+    assert server.services.locks.write_locked_roots() == list(dict.fromkeys((p, parameter)))
     assert bob.take() == []
     assert alice.events() == []
     for name, arguments in good[-3:-5:-1]:
@@ -487,7 +491,9 @@ async def test_a_dry_run_checks_and_changes_nothing(desk: Desk, work: Work, alic
     assert bob.events()
 
 
-async def test_requests_without_user_or_document_are_refused(desk: Desk, alice: Person, stranger: Person) -> None:
+async def test_requests_without_user_or_document_are_refused(
+    server: SessionServer, alice: Person, stranger: Person
+) -> None:
     for name, arguments in (("RenameAction", {"action_id": "x", "new_name": "y"}), ("RemoveAction", {"id": "x"})):
         with pytest.raises(Refused, match="No scene"):
             await stranger.ask(name, **arguments)
@@ -496,7 +502,7 @@ async def test_requests_without_user_or_document_are_refused(desk: Desk, alice: 
     await stranger.ask("NewScene", name="scene")
     with pytest.raises(Refused, match="No project"):
         await stranger.ask("AddActionPoint", name="x", position=ORIGIN)
-    desk.services.execution.busy = True  # type: ignore[misc]
+    server.services.execution.busy = True  # type: ignore[misc]
     await alice.ask("CloseScene", force=True)
     with pytest.raises(Refused, match="program is running"):
         await alice.ask("NewScene", name="scene")

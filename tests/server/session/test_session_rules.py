@@ -34,7 +34,7 @@ from arcor2_server.documents.dependents import project_after
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.logic import check_logic_item
 from arcor2_server.documents.reparenting import changes_for_parent
-from tests.server.session.desk import RecordedTypes
+from tests.server.session.session_server import RecordedTypes
 
 RANDOM = SceneObject("rnd", "RandomActions", UNSET, [], "obj_r")
 TIME = SceneObject("time", "TimeActions", UNSET, [], "obj_t")

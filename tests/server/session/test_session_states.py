@@ -20,7 +20,7 @@ from arcor2_server.rpc import (
 )
 from arcor2_server.rpc.registry import DECLARED
 from tests.protocol import STATES
-from tests.server.session.desk import Desk, Person
+from tests.server.session.session_server import Person, SessionServer
 
 MODULES = {
     module.__name__
@@ -90,7 +90,7 @@ def test_every_request_is_in_the_matrix() -> None:
 
 @pytest.mark.parametrize("state", ["unregistered_no_scene", "no_scene", "scene_offline"])
 async def test_requests_are_refused_for_the_recorded_reason(
-    desk: Desk, alice: Person, stranger: Person, state: str
+    server: SessionServer, alice: Person, stranger: Person, state: str
 ) -> None:
     if state == "scene_offline":
         await alice.ask("NewScene", name="scene")

@@ -12,7 +12,7 @@ from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
 from tests.protocol import session
-from tests.server.session.desk import Desk, Person
+from tests.server.session.session_server import Person, SessionServer
 
 ID = re.compile(r"\b(?:scn|obj|pro|acp|ori|joi|act|lit|pco|pkg)_[0-9a-f]{32}\b")
 
@@ -131,17 +131,17 @@ def recorded_answer(name: str, number: int) -> Any:
     return next(m["msg"]["data"] for m in session(name) if m["msg"].get("id") == number and "data" in m["msg"])
 
 
-async def test_the_recorded_session_gives_the_same_messages(desk: Desk, people: dict[str, Person]) -> None:
+async def test_the_recorded_session_gives_the_same_messages(server: SessionServer, people: dict[str, Person]) -> None:
     """A scene is made, changed by a robot, gets a project that is edited off line and on line; all is deleted."""
     mapping, robot = Mapping(), "03_scene_online_robot"
     assert await play("02_scene", people, mapping) == 78
 
-    desk.cell.pose = msgspec.convert(recorded_answer(robot, 53), Pose)
-    desk.cell.pose.position.z += 0.001  # the step made meanwhile (request 66)
-    desk.cell.joints = msgspec.convert(recorded_answer(robot, 47), list[Joint])
-    desk.cell.state = SceneStateEnum.STARTED
+    server.cell.pose = msgspec.convert(recorded_answer(robot, 53), Pose)
+    server.cell.pose.position.z += 0.001  # the step made meanwhile (request 66)
+    server.cell.joints = msgspec.convert(recorded_answer(robot, 47), list[Joint])
+    server.cell.state = SceneStateEnum.STARTED
     assert await play(robot, people, mapping, only=range(70, 73)) == 5
-    desk.cell.state = SceneStateEnum.STOPPED
+    server.cell.state = SceneStateEnum.STOPPED
     assert await play(robot, people, mapping, only=range(74, 75)) == 3
 
     differs = {
@@ -150,10 +150,10 @@ async def test_the_recorded_session_gives_the_same_messages(desk: Desk, people: 
     }
     assert await play("04_project", people, mapping, differs) == 155
 
-    desk.cell.pose = msgspec.convert(recorded_answer(robot, 53), Pose)
-    desk.cell.state = SceneStateEnum.STARTED
+    server.cell.pose = msgspec.convert(recorded_answer(robot, 53), Pose)
+    server.cell.state = SceneStateEnum.STARTED
     assert await play("05_project_online_execute_action", people, mapping, only=range(136, 144)) == 30
-    desk.cell.state = SceneStateEnum.STOPPED
+    server.cell.state = SceneStateEnum.STOPPED
     assert await play("05_project_online_execute_action", people, mapping, only=range(147, 148)) == 3
     await people["A"].ask("CloseProject")
 

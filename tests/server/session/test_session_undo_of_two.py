@@ -5,8 +5,8 @@ import asyncio
 import pytest
 
 from arcor2_hw.data.role import Role
-from tests.server.session.desk import Desk, Person, Refused
 from tests.server.session.edits import make, refused
+from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import ORIGIN, Work
 
 
@@ -15,7 +15,7 @@ def work(alice: Person) -> Work:
     return Work(alice)
 
 
-async def test_undo_reverts_only_own_edits(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_undo_reverts_only_own_edits(server: SessionServer, alice: Person, bob: Person, work: Work) -> None:
     await work.project("a", "b")
     a, b = work.point("a"), work.point("b")
     await make(alice, ("RenameActionPoint", {"action_point_id": a, "new_name": "a2"}, a, False), {})
@@ -34,7 +34,7 @@ async def test_undo_reverts_only_own_edits(desk: Desk, alice: Person, bob: Perso
     with pytest.raises(Refused, match="nothing"):
         await alice.ask("Redo")
     with pytest.raises(Refused, match="bob"):
-        await alice.ask("Undo", number=desk.session.revision - 3)
+        await alice.ask("Undo", number=server.session.revision - 3)
 
 
 async def test_undo_is_refused_naming_the_user_who_changed_it_since(alice: Person, bob: Person, work: Work) -> None:
@@ -52,7 +52,9 @@ async def test_undo_is_refused_naming_the_user_who_changed_it_since(alice: Perso
     assert work.point("p") == p
 
 
-async def test_undo_is_refused_when_others_use_the_item(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_undo_is_refused_when_others_use_the_item(
+    server: SessionServer, alice: Person, bob: Person, work: Work
+) -> None:
     await work.project()
     builder = Work(bob)
     p = await work.add_point("p")
@@ -82,13 +84,13 @@ async def test_undo_is_refused_when_others_use_the_item(desk: Desk, alice: Perso
 
 
 async def test_undo_is_refused_when_the_logic_would_be_invalid(
-    desk: Desk, alice: Person, bob: Person, work: Work
+    server: SessionServer, alice: Person, bob: Person, work: Work
 ) -> None:
     await work.project("p")
     p = work.point("p")
     a, b, c = [await work.add_action(p, name) for name in ("a", "b", "c")]
     await alice.ask("AddLogicItem", start=a, end=b)
-    await alice.ask("RemoveLogicItem", logic_item_id=desk.session.document.outgoing(a)[0].id)
+    await alice.ask("RemoveLogicItem", logic_item_id=server.session.document.outgoing(a)[0].id)
     await bob.ask("AddLogicItem", start=b, end=c)
     await bob.ask("AddLogicItem", start=c, end=a)
     text = await refused(alice)
@@ -99,11 +101,13 @@ async def test_undo_is_refused_when_the_logic_would_be_invalid(
     text = await refused(alice)
     assert "condition" in text
     assert "bob" in text
-    await bob.ask("UpdateProjectHasLogic", project_id=desk.session.require_project().id, new_has_logic=False)
+    await bob.ask("UpdateProjectHasLogic", project_id=server.session.require_project().id, new_has_logic=False)
     assert "bob" in await refused(alice)
 
 
-async def test_undo_is_refused_while_others_hold_locks(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_undo_is_refused_while_others_hold_locks(
+    server: SessionServer, alice: Person, bob: Person, work: Work
+) -> None:
     await work.project("p")
     p = work.point("p")
     below = await work.add_point("below", p)
@@ -120,7 +124,7 @@ async def test_undo_is_refused_while_others_hold_locks(desk: Desk, alice: Person
     await alice.ask("WriteUnlock", object_id=p)
     await bob.lock(below)
     assert "bob" in await refused(alice)
-    assert "bob" in await refused(alice, "RestoreRevision", revision=desk.session.revision - 1)
+    assert "bob" in await refused(alice, "RestoreRevision", revision=server.session.revision - 1)
     await bob.ask("WriteUnlock", object_id=below)
     await bob.ask("ReadLock", object_id=below)
     assert "bob" in await refused(alice)
@@ -128,12 +132,14 @@ async def test_undo_is_refused_while_others_hold_locks(desk: Desk, alice: Person
     # Ones own locks are no hindrance, and stay.
     await alice.lock(p, tree=True)
     await alice.ask("Undo")
-    assert desk.services.locks.write_locked_by("alice") == [p]
+    assert server.services.locks.write_locked_by("alice") == [p]
     await alice.ask("WriteUnlock", object_id=p)
-    assert desk.services.locks.locked_roots() == []
+    assert server.services.locks.locked_roots() == []
 
 
-async def test_locks_follow_removed_and_moved_items(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_locks_follow_removed_and_moved_items(
+    server: SessionServer, alice: Person, bob: Person, work: Work
+) -> None:
     await work.project("a", "b")
     a, b = work.point("a"), work.point("b")
     await make(
@@ -148,12 +154,12 @@ async def test_locks_follow_removed_and_moved_items(desk: Desk, alice: Person, b
     p = await work.add_point("p")
     await alice.lock(p)
     await alice.ask("Undo")
-    assert desk.services.locks.write_locked_by("alice") == [a]
+    assert server.services.locks.write_locked_by("alice") == [a]
     await alice.ask("WriteUnlock", object_id=a)
     await alice.ask("SaveProject")
 
 
-async def test_two_simultaneous_undos_revert_two_edits(desk: Desk, alice: Person, work: Work) -> None:
+async def test_two_simultaneous_undos_revert_two_edits(server: SessionServer, alice: Person, work: Work) -> None:
     await work.project("p")
     p = work.point("p")
     for name in ("q", "r", "s"):
@@ -173,11 +179,11 @@ async def test_undo_needs_a_registered_user(alice: Person, stranger: Person, wor
     assert (await stranger.ask("History"))["revision"] == 1
 
 
-async def test_undo_needs_the_role_of_the_edit(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_undo_needs_the_role_of_the_edit(server: SessionServer, alice: Person, bob: Person, work: Work) -> None:
     await work.project("p")
     await alice.ask("AddProjectParameter", name="x", type="double", value="0.5")
-    (client,) = [client for client in desk.services.hub.clients if client.user == "alice"]
+    (client,) = [client for client in server.services.hub.clients if client.user == "alice"]
     client.role = Role.STANDARD_USER
     assert "advanced user" in (await refused(alice)).replace("_", " ")
     assert "advanced user" in (await refused(alice, "RestoreRevision", revision=0)).replace("_", " ")
-    await alice.ask("Undo", number=desk.session.revision - 1)
+    await alice.ask("Undo", number=server.session.revision - 1)

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from tests.server.session.desk import Person
+from tests.server.session.session_server import Person
 
 POSE = {"position": {"x": 0.5, "y": 0.0, "z": 0.1}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
 ORIGIN = {"x": 0.0, "y": 0.0, "z": 0.0}
@@ -17,8 +17,8 @@ class Work:
 
     def __init__(self, person: Person) -> None:
         self.person = person
-        self.services = person.desk.services
-        self.session = person.desk.session
+        self.services = person.server.services
+        self.session = person.server.session
 
     def object(self, name: str) -> str:
         return next(obj.id for obj in self.session.require_scene().objects if obj.name == name)

@@ -1,4 +1,4 @@
-"""A desk for each test, and waiting for what is told a moment later."""
+"""A server for each test, and waiting for what is told a moment later."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.server.session.desk import Desk, Person, open_desk
+from tests.server.session.session_server import Person, SessionServer, open_server
 
 PATIENCE = 40.0
 
@@ -32,25 +32,25 @@ async def subscribed(person: Person, *names: str, **more: Any) -> Person:
 
 
 @pytest.fixture
-async def desk(tmp_path: Path) -> AsyncIterator[Desk]:
+async def server(tmp_path: Path) -> AsyncIterator[SessionServer]:
     """A server without a socket."""
-    async with open_desk(tmp_path) as opened:
+    async with open_server(tmp_path) as opened:
         yield opened
 
 
 @pytest.fixture
-async def alice(desk: Desk) -> Person:
+async def alice(server: SessionServer) -> Person:
     """Somebody who is logged in."""
-    return await desk.person("alice")
+    return await server.person("alice")
 
 
 @pytest.fixture
-async def bob(desk: Desk) -> Person:
+async def bob(server: SessionServer) -> Person:
     """Somebody else who is logged in."""
-    return await desk.person("bob")
+    return await server.person("bob")
 
 
 @pytest.fixture
-async def stranger(desk: Desk) -> Person:
+async def stranger(server: SessionServer) -> Person:
     """Somebody who is not logged in."""
-    return await desk.person()
+    return await server.person()

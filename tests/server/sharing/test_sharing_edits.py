@@ -7,8 +7,8 @@ import pytest
 
 from arcor2_server.documents.edit_notifications import sentence
 from arcor2_server.execution import breakpoints
-from tests.server.session.desk import Desk, Person, Refused, open_desk
 from tests.server.session.edits import EDITS, make, rich_project
+from tests.server.session.session_server import Person, Refused, SessionServer, open_server
 from tests.server.session.work import POSE, Work
 from tests.server.sharing.conftest import came, subscribed
 
@@ -71,8 +71,8 @@ async def test_a_breakpoint_is_removed_and_restored_with_its_action(alice: Perso
 
 
 async def test_breakpoints_belong_to_the_project(tmp_path: Path) -> None:
-    async with open_desk(tmp_path) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path) as server:
+        alice = await server.person("alice")
         work = Work(alice)
         project = await work.project("p")
         point = work.point("p")
@@ -82,17 +82,17 @@ async def test_breakpoints_belong_to_the_project(tmp_path: Path) -> None:
         with pytest.raises(Refused, match="No scene is open"):
             await alice.ask("GetBreakpoints")
         assert (await alice.ask("GetBreakpoints", project_id=project))["ids"] == [point]
-    async with open_desk(tmp_path) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path) as server:
+        alice = await server.person("alice")
         assert await alice.ask("GetBreakpoints", project_id=project) == {
             "project_id": project,
             "ids": [point],
             "user": "alice",
         }
         await alice.ask("DeleteProject", id=project)
-        assert await desk.services.breakpoints.ids(project) == set()
-    async with open_desk(tmp_path) as desk:
-        assert await desk.services.breakpoints.ids(project) == set()
+        assert await server.services.breakpoints.ids(project) == set()
+    async with open_server(tmp_path) as server:
+        assert await server.services.breakpoints.ids(project) == set()
 
 
 # ---------------------------------------------------------------------------------------------- undo and redo
@@ -174,13 +174,13 @@ SENTENCES = {
 }
 
 
-async def test_every_edit_has_a_name(desk: Desk, alice: Person, work: Work) -> None:
+async def test_every_edit_has_a_name(server: SessionServer, alice: Person, work: Work) -> None:
     ids = await rich_project(work)
-    ids["project"] = desk.session.require_project().id
+    ids["project"] = server.session.require_project().id
     found = {}
     for name, edit in EDITS.items():
         await make(alice, edit, ids)
-        undo = desk.session.history.undoable("alice")
+        undo = server.session.history.undoable("alice")
         assert undo is not None
         found[name] = sentence(undo)
         await alice.ask("Undo")
@@ -191,13 +191,13 @@ async def test_every_edit_has_a_name(desk: Desk, alice: Person, work: Work) -> N
     await alice.ask(
         "UpdateObjectPose", object_id=ids["robot"], pose=POSE | {"position": {"x": 9.0, "y": 9.0, "z": 9.0}}
     )
-    undo = desk.session.history.undoable("alice")
+    undo = server.session.history.undoable("alice")
     assert undo is not None
     assert sentence(undo) == "moving the object robot"
 
 
 async def test_consecutive_edits_are_announced_together_after_the_answers(
-    desk: Desk, alice: Person, work: Work
+    server: SessionServer, alice: Person, work: Work
 ) -> None:
     await work.project()
     await subscribed(alice, "HistoryChanged")

@@ -9,7 +9,7 @@ import pytest
 from arcor2_hw.data.role import Role
 from tests.server.protocol.stage import Actor, Stage, happens, open_stage, until
 from tests.server.protocol.test_protocol_temporary import project
-from tests.server.session.desk import Desk, Person, Refused
+from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import ORIGIN, Work
 
 MOVED = {"x": 1.0, "y": 0.0, "z": 0.0}
@@ -18,17 +18,17 @@ MOVED = {"x": 1.0, "y": 0.0, "z": 0.0}
 async def leave(person: Person) -> None:
     """End the connection."""
     await person.leave()
-    person.desk._people.remove(person)
+    person.server._people.remove(person)
 
 
 def of(person: Person, role: Role) -> None:
-    client = person.desk.services.users.client_of("bob")
+    client = person.server.services.users.client_of("bob")
     assert client is not None
     client.role = role
 
 
 async def test_locks_of_a_user_who_left_are_listed_and_taken_over(
-    desk: Desk, alice: Person, bob: Person, stranger: Person
+    server: SessionServer, alice: Person, bob: Person, stranger: Person
 ) -> None:
     work = Work(alice)
     await work.project("p", "q")
@@ -56,22 +56,22 @@ async def test_locks_of_a_user_who_left_are_listed_and_taken_over(
             await person.ask("TakeOverLocks", user="alice")
     of(bob, Role.STANDARD_USER)
     await bob.ask("TakeOverLocks", user="alice", dry_run=True)
-    assert desk.services.locks.owners() == ["alice"]
+    assert server.services.locks.owners() == ["alice"]
     bob.take()
     assert await bob.ask("TakeOverLocks", user="alice") == {"locks": holder["locks"]}
     (unlocked,) = bob.events()
     assert (unlocked["event"], unlocked["data"]["owner"]) == ("ObjectsUnlocked", "alice")
     assert set(unlocked["data"]["object_ids"]) >= {p, q}
     assert await bob.ask("ListLocks") == []
-    assert desk.services.locks._since == {}
+    assert server.services.locks._since == {}
     with pytest.raises(Refused, match="alice holds no locks"):
         await bob.ask("TakeOverLocks", user="alice")
     await bob.lock(p, tree=True)
     await bob.ask("UpdateActionPointPosition", action_point_id=p, new_position=MOVED)
     # The user who lost the locks learns of it on returning, once.
     for expected in (["bob released your locks", "scale, p, q"], []):
-        again = Person(desk)
-        desk._people.append(again)
+        again = Person(server)
+        server._people.append(again)
         await again.ask("RegisterUser", user_name="alice")
         await again.ask("SystemInfo")
         notices = [e["data"]["message"] for e in again.events() if e["event"] == "Notification"]
@@ -82,12 +82,12 @@ async def test_locks_of_a_user_who_left_are_listed_and_taken_over(
         await leave(again)
 
 
-async def test_a_user_who_returns_in_time_keeps_the_locks(desk: Desk, alice: Person, bob: Person) -> None:
+async def test_a_user_who_returns_in_time_keeps_the_locks(server: SessionServer, alice: Person, bob: Person) -> None:
     work = Work(alice)
     await work.project("p")
     await alice.lock(work.point("p"))
     await leave(alice)
-    again = await desk.person("alice")
+    again = await server.person("alice")
     with pytest.raises(Refused, match="alice is connected"):
         await bob.ask("TakeOverLocks", user="alice")
     (holder,) = await bob.ask("ListLocks")
@@ -105,14 +105,14 @@ async def test_a_user_who_returns_in_time_keeps_the_locks(desk: Desk, alice: Per
     ],
 )
 async def test_users_of_an_open_project_are_listed(
-    desk: Desk, alice: Person, bob: Person, presence: Any, role: Role, used: bool
+    server: SessionServer, alice: Person, bob: Person, presence: Any, role: Role, used: bool
 ) -> None:
     key = await Work(alice).project("p")
     await leave(alice)
     of(bob, role)
     if presence is not None:
         await bob.ask("UpdatePresence", **{name: value.replace("@", key) for name, value in presence.items()})
-    assert desk.services.presence.users_of([key]) == (["bob"] if used else [])
+    assert server.services.presence.users_of([key]) == (["bob"] if used else [])
 
 
 # ---------------------------------------------------------------------------------------------- running a package

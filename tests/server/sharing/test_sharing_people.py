@@ -8,7 +8,7 @@ import pytest
 
 from arcor2_hw.data.role import Role
 from arcor2_server.collaboration import presence, previews
-from tests.server.session.desk import Desk, Person, Refused
+from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import ORIGIN, UPRIGHT, Work
 from tests.server.sharing.conftest import came, subscribed
 
@@ -16,10 +16,10 @@ POSE = {"position": {"x": 1.0, "y": 2.0, "z": 3.0}, "orientation": UPRIGHT}
 
 
 # ---------------------------------------------------------------------------------------------- presence
-async def test_presence_of_users_is_announced(desk: Desk, alice: Person, stranger: Person) -> None:
+async def test_presence_of_users_is_announced(server: SessionServer, alice: Person, stranger: Person) -> None:
     await stranger.ask("SubscribeEvents", events=["UserPresence"])
     assert (await came(stranger, "UserPresence")) == {"user": "alice", "online": True, "role": "programmer"}
-    bob = await desk.person("bob")
+    bob = await server.person("bob")
     assert (await came(stranger, "UserPresence"))["user"] == "bob"
     said: dict[str, Any] = {
         "document": "pro_1",
@@ -31,7 +31,7 @@ async def test_presence_of_users_is_announced(desk: Desk, alice: Person, strange
     await bob.ask("UpdatePresence", **said)
     told = await came(stranger, "UserPresence", lambda data: "presence" in data)
     assert (told["user"], told["presence"]) == ("bob", said)
-    late = await desk.person("carol")
+    late = await server.person("carol")
     await late.ask("SubscribeEvents", events=["UserPresence"])
     everybody = {e["data"]["user"]: e["data"].get("presence") for e in late.events()}
     assert everybody == {"alice": None, "bob": said, "carol": None}
@@ -39,7 +39,7 @@ async def test_presence_of_users_is_announced(desk: Desk, alice: Person, strange
     assert (await came(stranger, "UserPresence", lambda data: data["user"] == "bob"))["online"] is False
     assert "presence" not in await came(stranger, "UserPresence", lambda data: data["user"] == "rob")
     await late.leave()
-    desk._people.remove(late)
+    server._people.remove(late)
     assert (await came(stranger, "UserPresence", lambda data: not data["online"]))["user"] == "carol"
 
 
@@ -104,7 +104,9 @@ async def test_a_drag_is_sent_to_others_until_it_ends(alice: Person, bob: Person
     assert (await alice.ask("History"))["revision"] == work.session.revision
 
 
-async def test_a_drag_ends_with_its_lock_or_its_user(desk: Desk, alice: Person, bob: Person, work: Work) -> None:
+async def test_a_drag_ends_with_its_lock_or_its_user(
+    server: SessionServer, alice: Person, bob: Person, work: Work
+) -> None:
     point = work.point("p")
     await subscribed(bob, "MovePreview")
     await alice.lock(point, tree=True)
@@ -112,17 +114,19 @@ async def test_a_drag_ends_with_its_lock_or_its_user(desk: Desk, alice: Person, 
     await came(bob, "MovePreview")
     await alice.ask("WriteUnlock", object_id=point)
     assert is_over(await came(bob, "MovePreview"))
-    carol = await desk.person("carol")
+    carol = await server.person("carol")
     await carol.lock(point, tree=True)
     await drag(carol, point, 2.0)
     await came(bob, "MovePreview")
     await carol.leave()
-    desk._people.remove(carol)
+    server._people.remove(carol)
     assert await came(bob, "MovePreview") == {"id": point, "user": "carol"}
-    assert desk.services.previews._dragged == {}
+    assert server.services.previews._dragged == {}
 
 
-async def test_invalid_drags_are_refused(desk: Desk, alice: Person, bob: Person, stranger: Person, work: Work) -> None:
+async def test_invalid_drags_are_refused(
+    server: SessionServer, alice: Person, bob: Person, stranger: Person, work: Work
+) -> None:
     point, robot = work.point("p"), work.object("robot")
     orientation = work.session.require_project().action_points[0].orientations[0].id
     await alice.lock(point)
@@ -136,7 +140,7 @@ async def test_invalid_drags_are_refused(desk: Desk, alice: Person, bob: Person,
     await alice.ask("PreviewMove", id=orientation, orientation=UPRIGHT)  # by the lock of its point
     with pytest.raises(Refused, match="does not hold"):
         await drag(alice, robot, 1.0)
-    client = desk.services.users.client_of("alice")
+    client = server.services.users.client_of("alice")
     assert client is not None
     client.role = Role.STANDARD_USER
     with pytest.raises(Refused, match="technician"):

@@ -12,7 +12,7 @@ from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.websocket.hub import Hub
 from tests.server.protocol.stage import Actor, happens, open_stage, until
 from tests.server.protocol.test_protocol_temporary import project
-from tests.server.session.desk import Refused
+from tests.server.session.session_server import Refused
 
 
 def tasks(person: Actor) -> list[dict[str, Any]]:

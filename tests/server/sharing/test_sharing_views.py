@@ -7,7 +7,7 @@ import pytest
 
 from arcor2_hw.data.role import Role
 from arcor2_server.collaboration import view_states
-from tests.server.session.desk import Desk, Person, Refused, open_desk
+from tests.server.session.session_server import Person, Refused, SessionServer, open_server
 from tests.server.session.work import Work
 from tests.server.sharing.conftest import came, subscribed
 
@@ -30,7 +30,9 @@ async def test_view_states_are_stored_by_user_document_and_key(alice: Person, bo
     assert (await view(bob, "shared"))["values"] == {}
 
 
-async def test_shared_view_states_are_announced(desk: Desk, alice: Person, bob: Person, stranger: Person) -> None:
+async def test_shared_view_states_are_announced(
+    server: SessionServer, alice: Person, bob: Person, stranger: Person
+) -> None:
     screen = await subscribed(stranger, "ViewStateChanged", users=["alice"])
     for person in (alice, bob):
         await subscribed(person, "ViewStateChanged")
@@ -82,8 +84,8 @@ async def test_invalid_view_states_are_refused(
     assert (await view(alice))["values"] == {"b": 2, "c": 3, "d": 4}
 
 
-async def test_an_operator_changes_only_own_view_states(alice: Person, desk: Desk) -> None:
-    client = desk.services.users.client_of("alice")
+async def test_an_operator_changes_only_own_view_states(alice: Person, server: SessionServer) -> None:
+    client = server.services.users.client_of("alice")
     assert client is not None
     client.role = Role.OPERATOR
     await alice.ask("SetViewState", scope="user", values={"stars": []})
@@ -103,22 +105,22 @@ async def test_only_the_newest_documents_are_kept(monkeypatch: pytest.MonkeyPatc
 
 
 async def test_view_states_survive_a_restart_and_end_with_their_document(tmp_path: Path) -> None:
-    async with open_desk(tmp_path) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path) as server:
+        alice = await server.person("alice")
         project = await Work(alice).project("p")
         await alice.ask("SaveProject")
         await alice.ask("CloseProject")
         for scope in ("user", "shared"):
             await alice.ask("SetViewState", scope=scope, document=project, values={"a": [1, {"b": None}]})
         before = await alice.ask("SetViewState", scope="user", values={"stars": [project]})
-    async with open_desk(tmp_path) as desk:
-        alice = await desk.person("alice")
+    async with open_server(tmp_path) as server:
+        alice = await server.person("alice")
         for scope in ("user", "shared"):
             assert (await view(alice, scope, document=project))["values"] == {"a": [1, {"b": None}]}
-        lists = desk.services.storage.revision
+        lists = server.services.storage.revision
         after = await alice.ask("SetViewState", scope="user", values={"x": 1})
         assert after["revision"] > before["revision"]
-        assert desk.services.storage.revision == lists  # lists of documents need not be made anew
+        assert server.services.storage.revision == lists  # lists of documents need not be made anew
         await alice.ask("DeleteProject", id=project)
         for scope in ("user", "shared"):
             assert (await view(alice, scope, document=project))["values"] == {}

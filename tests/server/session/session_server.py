@@ -195,15 +195,15 @@ class Refused(Exception):
 
 
 class Person:
-    """A client at the desk, which keeps all that comes, answers and events in order, until it is taken."""
+    """A client of the server, which keeps all that comes, answers and events in order, until it is taken."""
 
-    def __init__(self, desk: "Desk") -> None:
-        self.desk = desk
+    def __init__(self, server: "SessionServer") -> None:
+        self.server = server
         self._messages: list[dict[str, Any]] = []
         self._answers: dict[int, asyncio.Future[dict[str, Any]]] = {}
         self._number = 1000
         self._socket: Any = _Socket(self._came)
-        self._served = asyncio.create_task(desk.endpoint.serve(self._socket))
+        self._served = asyncio.create_task(server.endpoint.serve(self._socket))
 
     def _came(self, message: dict[str, Any]) -> None:
         self._messages.append(message)
@@ -258,7 +258,7 @@ class Person:
         self.take()
 
 
-class Desk:
+class SessionServer:
     """The parts of a server that the session works with."""
 
     def __init__(self, services: Server, types: RecordedTypes, cell: FakeCell) -> None:
@@ -286,7 +286,7 @@ class Desk:
 
 
 @contextlib.asynccontextmanager
-async def open_desk(directory: Path, **settings: Any) -> AsyncIterator[Desk]:
+async def open_server(directory: Path, **settings: Any) -> AsyncIterator[SessionServer]:
     """Bring up the parts over a data directory."""
     given: dict[str, Any] = {"lock_retries": 2, "lock_retry_wait": 0.02} | settings
     chosen = ServerSettings(data_dir=directory, **given)
@@ -337,9 +337,9 @@ async def open_desk(directory: Path, **settings: Any) -> AsyncIterator[Desk]:
             connect_edits(parts.edit_notifications, parts.previews, parts.breakpoints)
             storage.on_deleted += [parts.view_states.forget, parts.breakpoints.forget, session.forget_history]
             try:
-                desk = Desk(parts, types, cell)
-                yield desk
-                await desk.close()
+                server = SessionServer(parts, types, cell)
+                yield server
+                await server.close()
             finally:
                 await parts.saved_problems.close()
                 for part in (parts.edit_notifications, parts.presence, parts.previews, parts.tasks):
