@@ -78,9 +78,9 @@ KINDS: Final = {
     assert device.machine_state() is MachineState.COMPLETE
 
 
-def test_a_command_that_the_state_forbids_is_refused_naming_both(bench):
+def test_a_command_in_a_wrong_state_is_refused(bench):
     device = bench.controlled()
-    with pytest.raises(Refused, match="CLEAR is not allowed in STOPPED"):
+    with pytest.raises(Refused, match="CLEAR is not allowed in the state STOPPED"):
         device.command(MachineCommand.CLEAR)
 """,
         "machine",

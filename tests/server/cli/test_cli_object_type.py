@@ -79,7 +79,7 @@ def test_related_types_are_uploaded_together_and_separately(
     assert "arm_m1.py:3: the imported module abstract_arm does not exist" in lonely.stderr
     together = object_type(server, "add", arm, base, mixin)
     assert (together.returncode, together.stderr) == (0, "")
-    assert together.stdout.split() == ["AbstractArm", "added", "KinematicsMixin", "added", "ArmM1", "added"]
+    assert together.stdout.split() == ["AbstractArm", "uploaded", "KinematicsMixin", "uploaded", "ArmM1", "uploaded"]
     known = loop.run(types(server.url))
     assert known["ArmM1"] == (False, "AbstractArm")
     assert "gains" not in known
@@ -118,7 +118,7 @@ def test_invalid_types_are_refused(sources: Path, object_type: Cli) -> None:
         ((two,), ExitStatus.USAGE, "--name: A, B"),
         ((two, "--name", "C"), ExitStatus.USAGE, "--name: A, B"),
         ((), ExitStatus.USAGE, "specify the files"),
-        ((two, wrong, "--name", "A"), ExitStatus.USAGE, "only with one file"),
+        ((two, wrong, "--name", "A"), ExitStatus.USAGE, "only with a single file"),
         ((wrong,), ExitStatus.ANALYSIS_PROBLEMS, "wrong.py:1"),
         ((sources / "nothing.py",), ExitStatus.NOT_FOUND, "nothing.py"),
         ((two, "--name", "A"), ExitStatus.NO_SERVER, "127.0.0.1:9"),
