@@ -52,7 +52,7 @@ class StopGuard:
 def exclusive_motion(lock: threading.Lock, arm: str) -> Iterator[None]:
     """Hold the motion lock of an arm. Raise Refused if the arm is executing another motion."""
     if not lock.acquire(blocking=False):
-        raise Refused("{arm} is already moving. Wait until the motion ends, or stop it.", arm=arm)
+        raise Refused("{arm} is moving already. Wait until the motion ends, or stop it.", arm=arm)
     try:
         yield
     finally:

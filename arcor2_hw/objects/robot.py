@@ -92,7 +92,7 @@ class Robot(GenericWithPose):
             NotConnected: It is not connected.
         """
         if self.move_in_progress:
-            raise Refused("{name} is already moving. Wait until the motion ends, or stop it.", name=self.name)
+            raise Refused("{name} is moving already. Wait until the motion ends, or stop it.", name=self.name)
 
     def move_to_calibration_pose(self) -> None:
         """Move to a pose in which a camera sees most of the robot."""

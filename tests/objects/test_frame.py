@@ -61,5 +61,5 @@ def test_a_depth_image_keeps_its_camera_data() -> None:
     with pytest.raises(InvalidData, match="has no camera data"):
         PictureNote.of(Image.fromarray(depth))
     back.info["arcor2_view"] = "{}"
-    with pytest.raises(InvalidData, match="taken is invalid"):
+    with pytest.raises(InvalidData, match="camera data of the image is not valid"):
         PictureNote.of(back)

@@ -131,7 +131,7 @@ def test_stop_overtakes_a_motion_and_drops_the_queue(
 ) -> None:
     thread, outcome = in_background(lambda: arm.pick(at(0.2, 0.15, 0.0), speed=0.02))
     fake.control.wait_until(lambda truth: truth["moving"])
-    with pytest.raises(Refused, match="arm is already moving"):
+    with pytest.raises(Refused, match="arm is moving already"):
         arm.move(at(0.2, 0.0, 0.0))
     assert arm.state().program in (ProgramState.PLAYING, ProgramState.STOPPED)
     began = own_time()
