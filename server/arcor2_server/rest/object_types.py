@@ -11,7 +11,6 @@ from arcor2_hw.data.base import Data, Timestamp, Unset, is_valid_name
 from arcor2_hw.data.object_type import Model3dType, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.object_types import translations
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.rest.general import SERVER
@@ -53,6 +52,8 @@ class ObjectTypeOperations:
     @operation("GET", "/api/translations/{language}", SERVER, Role.OPERATOR, plain=True, open=True)
     async def translations(self, language: str) -> dict[str, str]:
         """Return the translations of messages and of texts of installed types into a language, by English text."""
+        from arcor2_server.object_types import translations  # a start has no use for it
+
         return await asyncio.to_thread(translations.into, language, self._types.installed_folders())
 
     @operation("GET", "/object-types", STORAGE, Role.OPERATOR)
