@@ -180,13 +180,13 @@ def test_control_is_refused_while_another_master_has_it(
 ) -> None:
     other = make(fake.ready["can"], master_id=126)
     other.connect()
-    wait_for(lambda: other._observer.heard(127, 0.9))
+    wait_for(lambda: other._observer.received_heartbeat(127, 0.9))
     with pytest.raises(NotInControl, match="node 127, whose heartbeat the drive monitors, has it"):
         other.take_control()
     belt.run(0.05)
     belt.halt()
     belt.release_control()
-    wait_for(lambda: not other._observer.heard(127, 1.0))
+    wait_for(lambda: not other._observer.received_heartbeat(127, 1.0))
     other.take_control()
     assert other.control_owner() == "us"
 
