@@ -33,6 +33,11 @@ class Child:
         self._process: asyncio.subprocess.Process | None = None
         self._drain: asyncio.Task[None] | None = None
 
+    @property
+    def ended(self) -> bool:
+        """Return whether the process has ended."""
+        return self._process is not None and self._process.returncode is not None
+
     async def start(self) -> str:
         """Start it and return the rest of its ready line. Raise ChildFailed with the last line of its log."""
         with self._log.open("wb") as log:
