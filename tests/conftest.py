@@ -2,10 +2,15 @@
 
 from typing import Any
 
+import hypothesis
 import pytest
 
 pytest_plugins = ["pytester", "tests.leaks"]
 
+
+# On a busy machine any example may take long; times are measured in benchmarks.
+hypothesis.settings.register_profile("tests", deadline=None)
+hypothesis.settings.load_profile("tests")
 
 TIMED = ("tests/drivers/", "tests/fakes/", "tests/objects/", "tests/runtime/", "tests/testing/", "tests/e2e/")
 HEAVY = "tests/editor/"

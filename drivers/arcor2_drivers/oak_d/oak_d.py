@@ -147,7 +147,7 @@ class OakD(ImageStream, Camera):
     def fix_exposure(self, exposure: float, *, an: str | None = None) -> None:
         """Set a fixed exposure time.
 
-        :param exposure: exposure time, s, 0.00001 to 0.033
+        :param exposure: seconds, 0.00001 to 0.033
         """
         self.set_exposure(exposure)
 
