@@ -185,7 +185,7 @@ async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place:
 async def test_calibration_of_another_arm_is_not_used(place: Place) -> None:
     await place.go_online()
     assert (await place.told())["in_force"] == "measured"
-    await place.cell.tell("robot", "calibration", deltas=DELTAS.tolist(), told=False)
+    await place.cell.tell("robot", "calibration", deltas=DELTAS.tolist(), reported=False)
     message = await place.go_online()
     assert "The calibration cannot be read from the controller. The stored one is used." in message
     assert place.cell.robot_host in message

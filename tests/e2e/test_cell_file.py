@@ -222,7 +222,7 @@ async def test_a_project_runs_with_a_device_at_another_address(tmp_path: Path, s
         while (await on.client.next_event("PackageState")).data.state is not PackageStateEnum.STOPPED:
             pass
     log = (tmp_path / "data.log").read_text()
-    assert "settings from the cell file" in log
+    assert "cell file overrides settings" in log
     assert scale.ready["port"] in log
     assert "elsewhere" in log, "what is not in the scene may be misspelt"
 

@@ -106,7 +106,7 @@ class Editing:
     def require_no_program(self) -> None:
         """Raise RequestRefused while a package runs."""
         if self._execution.busy:
-            raise RequestRefused("A program is running: stop it first.")
+            raise RequestRefused("A program is running. Stop it first.")
 
     async def require_document_name_free(self, name: str, what: str) -> None:
         """Raise RequestRefused if the name is empty, or a saved or open scene or project has it."""

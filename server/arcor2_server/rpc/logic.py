@@ -35,7 +35,7 @@ class LogicRequests:
         session = self._session
         document = session.require_project_open()
         if not session.bare_project().has_logic:
-            raise RequestRefused("The project {name} has no logic but a script.", name=session.bare_project().name)
+            raise RequestRefused("The project {name} has a script instead of logic.", name=session.bare_project().name)
         return document
 
     def _check(self, document: Document, item: LogicItem) -> None:

@@ -170,8 +170,8 @@ class Told(logging.Handler):
         observing.log.removeHandler(self)
 
     def emit(self, record: logging.LogRecord) -> None:
-        for word in self.count:
-            self.count[word] += f" {word} after" in record.getMessage() or f" {word}:" in record.getMessage()
+        for word, text in (("lost", " is lost:"), ("back", " is restored after")):
+            self.count[word] += text in record.getMessage()
 
 
 def test_reconnection_attempts_back_off_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:

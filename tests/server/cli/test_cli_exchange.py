@@ -601,7 +601,7 @@ def test_failures_have_an_exit_status(cli: Any, place: Place, exported: Path, tm
         (("scene", "export", "nowhere", "--url", place.first), ExitStatus.NOT_FOUND, "no scene nowhere"),
         (("project", "import", "missing.zip", "--url", place.first), ExitStatus.NOT_FOUND, "missing.zip"),
         (("project", "validate", "none.zip"), ExitStatus.DOCUMENT_PROBLEMS, "none.zip"),
-        (("project", "validate", "half.zip"), ExitStatus.DOCUMENT_PROBLEMS, "no usable zip"),
+        (("project", "validate", "half.zip"), ExitStatus.DOCUMENT_PROBLEMS, "not a valid zip archive"),
         (("project", "validate"), ExitStatus.USAGE, "specify the files"),
         (("scene", "list", "--ca", "none.zip", "--url", place.first), ExitStatus.CERTIFICATE_UNUSABLE, "none.zip"),
         (("scene", "export", "bench", "-o", "no/where.zip", "--url", place.first), ExitStatus.FAILED, "written"),

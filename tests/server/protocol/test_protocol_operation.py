@@ -112,7 +112,7 @@ async def test_a_robot_is_streamed_while_a_program_runs(tmp_path: Path) -> None:
         await until(lambda: len(joints(viewer)) > 1)
         assert "time_ms" not in joints(viewer)[-1]
         for args, words in (
-            (what | {"send": False}, "not streamed"),
+            (what | {"send": False}, "not subscribed to"),
             (what | {"rate": 31}, "1 to 30 Hz"),
             (what | {"robot_id": clock}, "not a robot"),
             (what | {"robot_id": "nobody"}, "nobody"),

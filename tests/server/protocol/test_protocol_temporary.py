@@ -56,7 +56,7 @@ async def test_a_project_runs_and_is_reopened(tmp_path: Path) -> None:
         assert "lock" in await refused(stranger, "TemporaryPackage")
         await alice.ask("WriteUnlock", object_id=opened.action_points[0].id)
         await alice.ask("AddActionPoint", name="more", position={"x": 0, "y": 0, "z": 0})
-        assert "not saved" in await refused(stranger, "TemporaryPackage")
+        assert "has unsaved changes" in await refused(stranger, "TemporaryPackage")
         await alice.ask("SaveProject")
         saved = stage.services.session.require_project()
         for person in (alice, bob, stranger):

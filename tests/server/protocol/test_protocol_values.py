@@ -38,7 +38,7 @@ async def test_a_live_object_offers_values(tmp_path: Path) -> None:
         unneeded = await refused(alice, "ActionParamValues", **asked, parent_params=both[:1])
         assert "no other one" in unneeded
         assert "no values" in await refused(alice, "ActionParamValues", id=chooser, param_id="count")
-        assert "no integer" in await refused(
+        assert "not of the type integer" in await refused(
             alice, "ActionParamValues", **items, parent_params=[both[0], parent("count", "two")]
         )
         wrong = [parent("shelf", "middle"), both[1]]

@@ -8,6 +8,7 @@ import pytest
 
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import StorageError
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.websocket.hub import Hub
 from tests.server.protocol.stage import Actor, happens, open_stage, until
@@ -51,10 +52,10 @@ async def test_a_failed_scene_start_is_a_failed_task(tmp_path: Path) -> None:
         await stage.place(alice, eye="BlindEye")
         await alice.ask("SubscribeEvents", events=["TaskState"])
 
-        async def broken(*_: Any) -> str:
-            return "The camera is not there."
+        async def broken(*_: Any) -> Message:
+            return Message.of("The camera is not there.")
 
-        stage.services.online._bring_up = broken  # type: ignore[method-assign, assignment]
+        stage.services.online._go_online = broken  # type: ignore[method-assign, assignment]
         await alice.ask("StartScene")
         failed = await happens(alice, "TaskState", kind="scene_start", state="failed")
         assert failed["message"] == "The camera is not there."
