@@ -161,7 +161,7 @@ async def test_the_bundle_contains_open_documents_and_no_secrets(
         target = tmp_path / "out.zip"
         arguments = ["diagnosis", str(target), "--url", server.url, "--token", key]
         assert await asyncio.to_thread(app, arguments) == ExitStatus.OK
-        assert "sent to nobody" in capsys.readouterr().out
+        assert "not sent anywhere" in capsys.readouterr().out
         assert json.loads(content(target.read_bytes())["scene.json"]) == scene
         assert await asyncio.to_thread(app, arguments) == ExitStatus.CONFLICT
         assert "--force" in capsys.readouterr().err

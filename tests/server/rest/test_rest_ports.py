@@ -111,7 +111,7 @@ async def test_a_used_port_is_named(tmp_path: Path) -> None:
     port = blocker.sockets[0].getsockname()[1]
     async with blocker:
         server = ServerProcess(tmp_path / "data", "--classic-ports", **ANY | {"ARCOR2_STORAGE_SERVICE_PORT": str(port)})
-        with pytest.raises(AssertionError, match=f"{port}.* is taken"):
+        with pytest.raises(AssertionError, match=f"{port}.* is used by another program"):
             await server.start()
         await server.stop()
 
