@@ -250,7 +250,7 @@ async def _teach(place: Site) -> None:
         await asyncio.sleep(0.05)
     assert place.fake.truth()["freedrive"]
     await until(lambda: not place.fake.truth()["freedrive"], "the arm is stiff again", 1.0)
-    with pytest.raises(RequestFailed, match=r"this hold has ended|not renewed"):
+    with pytest.raises(RequestFailed, match=r"motion has ended|not renewed"):
         await place.client.hold_hand_teaching(
             robot_id=place.robot, hold=place.hold, sent_ms=time.monotonic() * 1e3, valid_ms=300
         )
