@@ -135,7 +135,7 @@ class TokenFile:
                 "A token needs the name of a user or device with at most {longest_name} characters.",
                 longest_name=LONGEST_NAME,
             )
-        secret = secrets.token_urlsafe(32)
+        secret = secrets.token_hex(32)  # never starts with a dash, as an option of the command line does
         expires = None
         if days is not None:
             expires = (datetime.now(UTC) + timedelta(days=days)).isoformat(timespec="seconds")

@@ -112,16 +112,34 @@ async def test_a_restart_restores_the_open_document(tmp_path: Path) -> None:
         assert server.session.scene is None
 
 
-async def test_a_killed_start_leaves_nothing_behind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+class Log:
+    """Records the errors and warnings of the journal's file."""
+
+    def __init__(self) -> None:
+        self.reports: list[str] = []
+
+    def error(self, event: str, **values: object) -> None:
+        self.reports.append(f"{event} {values}")
+
+    warning = error
+
+
+@pytest.fixture
+def log(monkeypatch: pytest.MonkeyPatch) -> Log:
+    log = Log()
+    monkeypatch.setattr(journal_file, "log", log)
+    return log
+
+
+async def test_a_killed_start_leaves_nothing_behind(tmp_path: Path, log: Log) -> None:
     async with open_server(tmp_path):
         pass
     connection = sqlite3.connect(tmp_path / "journal.sqlite")
     connection.execute("create table extent (content blob)")
     connection.close()
-    capsys.readouterr()
     async with open_server(tmp_path) as server:
         await open_project(await server.person("alice"))
-    assert "no room" not in capsys.readouterr().out
+    assert log.reports == []
     connection = sqlite3.connect(tmp_path / "journal.sqlite")
     assert connection.execute("select count(*) from sqlite_master where name = 'extent'").fetchone() == (0,)
     connection.close()
@@ -162,9 +180,7 @@ async def test_the_journal_stays_short(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["garbage", "truncated", "row", "gap", "newer", "strange"])
-async def test_a_damaged_journal_is_renamed_and_reported(
-    tmp_path: Path, damage: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+async def test_a_damaged_journal_is_renamed_and_reported(tmp_path: Path, damage: str, log: Log) -> None:
     async with open_server(tmp_path) as server:
         alice = await server.person("alice")
         await open_project(alice, points=30)
@@ -189,7 +205,6 @@ async def test_a_damaged_journal_is_renamed_and_reported(
         connection.execute(statements[damage])
         connection.commit()
         connection.close()
-    capsys.readouterr()
     left = ["one"] if damage == "gap" else []
     async with open_server(tmp_path) as server:
         (notice,) = server.services.damage.notices
@@ -202,7 +217,7 @@ async def test_a_damaged_journal_is_renamed_and_reported(
             await alice.ask("OpenProject", id=key)
         assert point_names(server)[30:] == left
         await add_point(alice, "again")
-    assert "journal.damaged-" in capsys.readouterr().out
+    assert "journal.damaged-" in log.reports[0]
     assert len(list(tmp_path.glob("journal.damaged-*.sqlite"))) == 1
     async with open_server(tmp_path) as server:
         assert point_names(server)[-1] == "again"
