@@ -164,7 +164,7 @@ def sound(source: str | bytes, other: str = OTHER) -> None:
         if found.problem is not None:
             assert found.problem.line >= 1
             assert found.problem.path
-            assert found.problem.text
+            assert found.problem.what.text
         for action in found.actions:
             assert action.disabled is isinstance(action.problem, str)
         msgspec.json.encode((found.meta, found.actions, found.robot, found.problem))

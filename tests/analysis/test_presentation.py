@@ -170,7 +170,8 @@ def test_every_installed_type_has_a_heading_and_units() -> None:
     installed = installed_types()
     library = Library(each.file for each in installed if each.file is not None)
     metas = [library.analyse(each.name).meta for each in installed]
-    assert [meta.type for meta in metas if meta.category is UNSET or meta.icon is UNSET] == []
+    assert [meta.type for meta in metas if UNSET in (meta.display_name, meta.category, meta.icon)] == []
+    assert {meta.type: meta.shown_name for meta in metas}["OakD"] == "Luxonis OAK-D"
     dobot = next(meta for meta in metas if meta.type == "DobotMagician")
     units = {s.name: json.loads(str(s.extra)).get("unit") for s in dobot.settings if s.extra is not UNSET}
     assert units["max_tcp_speed"] == "m/s"

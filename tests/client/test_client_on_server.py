@@ -33,8 +33,6 @@ from arcor2_hw.exceptions import Conflict, ConnectionLost, NotFound
 from arcor2_server.access.tokens import TokenFile
 from tests.server.core.serving import COMMAND, READY_WITHIN, ServerProcess, running
 
-pytestmark = pytest.mark.timeout(90)
-
 
 @pytest.fixture
 async def server(tmp_path: Path) -> AsyncIterator[ServerProcess]:
@@ -56,13 +54,13 @@ async def test_a_project_is_edited_by_methods_with_typed_events(server: ServerPr
             await ann.new_project(scene_id=scene.id, name="wait a little")
             project = (await ann.next_event("OpenProject")).data.project
             await ann.add_action_point(name="here", position=Position(0.1, 0.2, 0.3))
-            told = await anext(points)
-            assert (told.change_type, told.data.name, told.data.position) == (
+            event = await anext(points)
+            assert (event.change_type, event.data.name, event.data.position) == (
                 *(ChangeType.ADD, "here"),
                 Position(0.1, 0.2, 0.3),
             )
             await ann.add_action(
-                action_point_id=told.data.id,
+                action_point_id=event.data.id,
                 name="wait",
                 type=f"{timer.id}/sleep",
                 parameters=[ActionParameter("seconds", "double", "0.01")],
@@ -88,16 +86,16 @@ async def test_a_project_is_edited_by_methods_with_typed_events(server: ServerPr
                 await ann.get_scene("nowhere")
             assert isinstance(missing.value, NotFound)
             assert missing.value.reason == "not_found"
-            await bob.write_lock(told.data.id)
+            await bob.write_lock(event.data.id)
             with pytest.raises(LockedByOther):
-                await ann.rename_action_point(action_point_id=told.data.id, new_name="there")
+                await ann.rename_action_point(action_point_id=event.data.id, new_name="there")
             with pytest.raises(NotOffered):
                 await ann.call("Abracadabra")
             with pytest.raises(BadRequest, match="arguments of GetScene"):
                 await ann.call("GetScene", {"id": 1})
             async with Client(server.url) as nobody:
                 with pytest.raises(Forbidden, match="RegisterUser"):
-                    await nobody.write_lock(told.data.id)
+                    await nobody.write_lock(event.data.id)
             with pytest.raises(RequestFailed):
                 await Client(server.url, "ann").open()
 
@@ -254,8 +252,8 @@ async def _opened_again(client: Client):  # type: ignore[no-untyped-def]
     missed = None
     while missed is None:
         try:
-            await client.next_event(timeout=5.0)
+            await client.next_event(timeout=30.0)
         except EventsMissed as error:
             missed = error
     assert missed.rejoined
-    return await client.next_event("OpenProject", timeout=5.0)
+    return await client.next_event("OpenProject", timeout=30.0)

@@ -25,7 +25,7 @@ from tests.client.scripted import ScriptedServer, cut, scripted
 async def lose(server: ScriptedServer, client: Client) -> None:
     """Break the connection and wait until the client has noticed."""
     server.sockets[-1].transport.abort()
-    async with asyncio.timeout(5.0):
+    async with asyncio.timeout(30.0):
         while client.connected:
             await asyncio.sleep(0.001)
 
@@ -89,13 +89,13 @@ async def test_streams_report_the_gap_after_a_reconnect() -> None:
             with pytest.raises(EventsMissed) as missed:
                 await anext(stream)
             assert missed.value.rejoined
-            assert 0.0 < missed.value.seconds < 10.0
+            assert 0.0 < missed.value.seconds < 60.0
             assert missed.value.not_resumed == ("eef_pose of r1",)
             assert (await anext(stream)).event == "ShowMainScreen"
         server.sockets[-1].transport.abort()
         with pytest.raises(EventsMissed):
             await anext(followed)
-        assert server.asked[-1] == []  # what was refused is not asked for again
+        assert server.asked[-1] == []  # a refused subscription is not repeated
 
 
 async def test_registering_is_repeated_until_the_name_is_free() -> None:
@@ -150,19 +150,19 @@ async def test_without_reconnect_the_first_loss_closes_the_client() -> None:
 
 async def test_time_limits_hold_for_late_answers_and_missing_servers() -> None:
     async def silent(server: ScriptedServer, socket: ServerConnection, request: dict[str, Any]) -> None:
-        kept.append(request)
+        requests.append(request)
 
-    kept: list[dict[str, Any]] = []
+    requests: list[dict[str, Any]] = []
     server = ScriptedServer()
     async with server.running():
-        client = Client(server.url, timeout=5.0)
+        client = Client(server.url, timeout=30.0)
         await client.open()
         server.data = {"SystemInfo": INFO, "GetEndEffectors": ["a"]}
         server.script["GetEndEffectors"] = [silent]
         with pytest.raises(AnswerLate, match=r"GetEndEffectors within 0\.1 s"):
             await client.get_end_effectors("r", timeout=0.1)
         # The late answer answers nothing, and nobody else's question.
-        await server.answer(server.sockets[-1], kept[0])
+        await server.answer(server.sockets[-1], requests[0])
         assert (await client.system_info()).version == "1"
     try:
         with pytest.raises(NotConnected, match=r"within 0\.2 s: SaveScene was not sent"):
@@ -259,7 +259,7 @@ async def test_an_unexpected_error_is_raised_in_waiting_requests(monkeypatch: py
     async with scripted() as server, Client(server.url) as client:
         await client.next_event()
         monkeypatch.setattr("arcor2_hw.client.wire.Wire.open", broken)
-        waiting = asyncio.create_task(client.next_event(timeout=5.0))
+        waiting = asyncio.create_task(client.next_event(timeout=30.0))
         await lose(server, client)
         with pytest.raises(ZeroDivisionError):
             await waiting

@@ -22,7 +22,7 @@ from arcor2_hw.data.package import PackageStateEnum
 from tests.demo.running import Run, demo
 from tests.e2e.harness import until
 
-pytestmark = [pytest.mark.timeout(240), pytest.mark.asyncio(loop_scope="module")]
+pytestmark = pytest.mark.asyncio(loop_scope="module")
 SEED = random.SystemRandom().randrange(1_000_000)
 BOARDS = 2
 GOOD = 3
@@ -123,8 +123,8 @@ async def test_four_readings_agree(cell: Cell) -> None:
     assert counters == [boards, passed, failed]
     where = [(board["good"], board["place"]) for board in world["boards"]]
     assert sorted(where) == sorted([(True, "good")] * passed + [(False, "bad")] * failed)
-    told = {(result["serial"], result["passed"]) for result in erp["results"]}
-    assert told == {(board["code"], board["good"]) for board in world["boards"]}
+    reported = {(result["serial"], result["passed"]) for result in erp["results"]}
+    assert reported == {(board["code"], board["good"]) for board in world["boards"]}
     assert len(erp["results"]) == boards
 
 
@@ -149,24 +149,24 @@ async def test_each_fault_is_reported_and_the_cell_restarts(cell: Cell) -> None:
     tell, run = cell.run.tell, cell.run
     await tell("erp", "add_order", order="AGAIN", product="Controller board", quantity=1)
     async with Client(cell.url, "tests") as client:
-        # The reader is dumb.
+        # The barcode reader does not answer.
         await cell.renew()
         await tell("reader", "silence")
         problem = await cell.program(client)
         assert "reader" in problem
         await tell("reader", "heal")
 
-        # The belt is jammed; told by the command line, and mended by it.
+        # The belt has a following error, which the command line injects and clears.
         await cell.renew()
-        status, said = await run.command("fake", "fault", "belt", "follow_error")
-        assert (status, said) == (0, "belt: follow_error done\n")
+        status, output = await run.command("fake", "fault", "belt", "follow_error")
+        assert (status, output) == (0, "belt: follow_error done\n")
         problem = await cell.program(client)
         assert "belt" in problem
         assert "8611" in problem or "following error" in problem.lower(), problem
         assert (await run.command("fake", "fault", "belt", "follow_error", "on=false"))[0] == 0
         assert (await run.command("fake", "fault", "belt", "power_cycle"))[0] == 0
 
-        # The light barrier sees nothing.
+        # The light barrier detects nothing.
         await cell.renew()
         await tell("world", "barrier", number=0, stuck=False)
         problem = await cell.program(client)
@@ -216,8 +216,8 @@ async def test_each_fault_is_reported_and_the_cell_restarts(cell: Cell) -> None:
     world, erp = await tell("world", "truth"), await tell("erp", "truth")
     assert world["counts"]["good"] == 1
     (board,) = world["boards"]
-    told = [(result["serial"], result["passed"]) for result in erp["results"] if result["order"] == "AGAIN"]
-    assert told == [(board["code"], True)]
+    repeated = [(result["serial"], result["passed"]) for result in erp["results"] if result["order"] == "AGAIN"]
+    assert repeated == [(board["code"], True)]
 
 
 async def test_a_package_of_the_first_version_runs_with_its_own_drivers(cell: Cell, tmp_path: Path) -> None:
@@ -262,7 +262,7 @@ async def _state(run: Run, wanted: str) -> bool:
 async def test_once_prints_one_line_when_a_fault_ends_the_program(tmp_path: Path) -> None:
     async with demo(tmp_path, "--once", "--boards", "1", "--seed", str(GOOD)) as run:
         await until(run.at, "the demo to say where everything is", 40)
-        # Nobody waits for the belt just now: what is told must name it all the same.
+        # No call of the belt is running: the message must name it nevertheless.
         await until(lambda: "  board_there" in run.output, "the board to be waited for", 60)
         await run.tell("belt", "emergency", code=0x2310)
         assert await asyncio.wait_for(run.process.wait(), 60) == 8, run.output

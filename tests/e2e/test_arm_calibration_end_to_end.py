@@ -22,7 +22,7 @@ from arcor2_hw.kinematics.dh import DhRow, calibrated
 from arcor2_hw.kinematics.model import RobotModel
 from tests.e2e.harness import Cell, scene_state
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(120)]
+pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 MODEL = RobotModel.load(Path(next(iter(arcor2_drivers.__path__))) / "universal_robots" / "urdf" / "ur5e")
 Q = (0.4, -1.3, 1.1, 0.2, -0.7, 2.0)
@@ -49,8 +49,8 @@ class Place:
     client: Client
     robot: str
 
-    async def told(self) -> dict[str, Any]:
-        async with httpx.AsyncClient(base_url=self.cell.url.replace("ws", "http", 1)) as http:
+    async def robot_kinematics(self) -> dict[str, Any]:
+        async with httpx.AsyncClient(timeout=60, base_url=self.cell.url.replace("ws", "http", 1)) as http:
             answer = await http.get(f"/api/robots/{self.robot}/kinematics")
             assert answer.status_code == 200, answer.text
             found: dict[str, Any] = answer.json()
@@ -65,7 +65,7 @@ class Place:
         return pose.position
 
     async def go_online(self) -> str:
-        """Start the scene and stop it again; gives what people were told of the robot's kinematics meanwhile."""
+        """Start the scene and stop it again. Return the notification about the robot's kinematics."""
         await self.client.call("StartScene")
         await scene_state(self.client, SceneStateEnum.STARTED)
         message: str = (await self.client.next_event("Notification", timeout=20)).data.message
@@ -95,7 +95,7 @@ async def place(tmp_path: Path) -> AsyncIterator[Place]:
         await client.call("NewScene", rpc.NewSceneArgs("arm"))
         parameters = [Parameter("host", "string", msgspec.json.encode(cell.robot_host).decode())]
         await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("arm", "UR5e", Pose(), parameters))
-        robot = (await client.next_event("SceneObjectChanged", timeout=10)).data.id
+        robot = (await client.next_event("SceneObjectChanged", timeout=60)).data.id
         yield Place(cell, client, robot)
     finally:
         await cell.stop()
@@ -104,17 +104,17 @@ async def place(tmp_path: Path) -> AsyncIterator[Place]:
 async def test_calibration_from_the_controller_is_used_offline_and_after_a_restart(
     place: Place,
 ) -> None:
-    told = await place.told()
-    assert (told["in_force"], "read" in told) == ("nominal", False)
+    kinematics = await place.robot_kinematics()
+    assert (kinematics["in_force"], "read" in kinematics) == ("nominal", False)
     assert (await place.forward()).distance_to(tip()) < 1e-6
     assert tip().distance_to(tip(DELTAS)) > 1e-3, "else nothing would be tested"
 
     message = await place.go_online()
     assert message.startswith("arm: The calibration in the controller is now used")
-    told = await place.told()
-    assert told["in_force"] == "measured"
-    assert len(told["checksum"].split("-")) == 6
-    assert told["read"]
+    kinematics = await place.robot_kinematics()
+    assert kinematics["in_force"] == "measured"
+    assert len(kinematics["checksum"].split("-")) == 6
+    assert kinematics["read"]
     assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6
 
     await place.client.call("SaveScene")
@@ -126,10 +126,10 @@ async def test_calibration_from_the_controller_is_used_offline_and_after_a_resta
 
     # It is not that of whatever has another address.
     await place.set_host("127.99.0.7")
-    assert (await place.told())["in_force"] == "nominal"
+    assert (await place.robot_kinematics())["in_force"] == "nominal"
     assert (await place.forward()).distance_to(tip()) < 1e-6
     await place.set_host(place.cell.robot_host)
-    assert (await place.told())["in_force"] == "measured"
+    assert (await place.robot_kinematics())["in_force"] == "measured"
 
 
 async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place: Place) -> None:
@@ -150,11 +150,11 @@ async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place:
             orientation=tip.orientation,
             linear=True,
         )
-        while (told := (await client.next_event("RobotMoveToPose", timeout=20)).data).move_event_type == "start":
+        while (motion := (await client.next_event("RobotMoveToPose", timeout=20)).data).move_event_type == "start":
             pass
-        return told.message if told.move_event_type == "failed" else ""
+        return motion.message if motion.move_event_type == "failed" else ""
 
-    async with httpx.AsyncClient(base_url=place.cell.url.replace("ws", "http", 1)) as http:
+    async with httpx.AsyncClient(timeout=60, base_url=place.cell.url.replace("ws", "http", 1)) as http:
 
         async def put(key: str, at: Position, x: float, y: float, z: float) -> None:
             size = {"boxId": key, "sizeX": x, "sizeY": y, "sizeZ": z}
@@ -184,7 +184,7 @@ async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place:
 
 async def test_calibration_of_another_arm_is_not_used(place: Place) -> None:
     await place.go_online()
-    assert (await place.told())["in_force"] == "measured"
+    assert (await place.robot_kinematics())["in_force"] == "measured"
     await place.cell.tell("robot", "calibration", deltas=DELTAS.tolist(), reported=False)
     message = await place.go_online()
     assert "The calibration cannot be read from the controller. The stored one is used." in message
@@ -196,9 +196,9 @@ async def test_calibration_of_another_arm_is_not_used(place: Place) -> None:
     await place.cell.tell("robot", "calibration", deltas=strange.tolist())
     message = await place.go_online()
     assert "arm: The calibration in the controller cannot be used. Kinematics are nominal." in message
-    told = await place.told()
-    assert told["in_force"] == "nominal"
-    assert "50 mm" in told["refused"]
+    kinematics = await place.robot_kinematics()
+    assert kinematics["in_force"] == "nominal"
+    assert "50 mm" in kinematics["refused"]
     assert (await place.forward()).distance_to(tip()) < 1e-6
 
     await place.cell.tell("robot", "calibration", deltas=DELTAS.tolist())

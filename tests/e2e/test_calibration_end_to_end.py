@@ -25,7 +25,7 @@ from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, in_view, o
 from tests.fakes.conftest import FakeProcess
 from tests.server.core.serving import ServerProcess
 
-pytestmark = [pytest.mark.asyncio(loop_scope="module"), pytest.mark.timeout(180)]
+pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 
 class World:
@@ -78,6 +78,12 @@ class World:
         """Put into the camera's view what stands there."""
         self.camera.control.do("scene", things=in_view(markers=markers, robot=robot))
         self.camera.control.do("camera", pose=pose(CAMERA))
+
+    async def configure_markers(self) -> None:
+        """Set the poses of the markers at the server."""
+        markers = [{"marker_id": n, "pose": {"position": {"x": x, "y": y}}} for n, (x, y) in MARKERS.items()]
+        answer = await self.http.put("/api/calibration/markers", json={"marker_size": SIZE, "markers": markers})
+        assert answer.status_code == 200, answer.text
 
     async def stop(self) -> None:
         await self._exit.aclose()
@@ -132,9 +138,7 @@ async def test_camera_pose_is_calibrated_from_markers(world: World) -> None:
         state, message = await world.calibrated("cam")
         assert state == "failed"
         assert "No markers are configured" in message
-        markers = [{"marker_id": n, "pose": {"position": {"x": x, "y": y}}} for n, (x, y) in MARKERS.items()]
-        answer = await world.http.put("/api/calibration/markers", json={"marker_size": SIZE, "markers": markers})
-        assert answer.status_code == 200, answer.text
+        await world.configure_markers()
         state, message = await world.calibrated("cam")
         assert state == "finished", message
         millimetres, degrees = off(await world.placed("cam"), CAMERA)
@@ -161,7 +165,11 @@ async def test_robot_pose_is_calibrated_from_depth(world: World) -> None:
 
 
 async def test_hidden_cameras_and_robots_are_refused(world: World) -> None:
-    for name, hidden, words in (("cam", {"markers": False}, "shows nothing"), ("arm", {"robot": False}, "robot")):
+    await world.configure_markers()
+    for name, hidden, words in (
+        ("cam", {"markers": False}, "No configured marker"),
+        ("arm", {"robot": False}, "robot"),
+    ):
         async with world.holding(name):
             before = await world.placed(name)
             records = (await world.http.get("/api/calibrations")).json()

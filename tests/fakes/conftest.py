@@ -5,26 +5,29 @@ import select
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
 
 from arcor2_fakes.control import BlockingControlClient
+from tests import waiting
 
 READY_WITHIN = 60.0  # s; imports on a busy machine, of OPC UA above all
-ENDS_WITHIN = 5.0  # s
+ENDS_WITHIN = 30.0  # s
 
 
 class FakeProcess:
     """A running fake: `ready` holds what its ready line said, `control` speaks to its control channel."""
 
-    def __init__(self, module: str, *arguments: str) -> None:
+    def __init__(self, module: str | Path, *arguments: str) -> None:
+        """Start a module of `arcor2_fakes`, or the file of another fake."""
         self.stderr = tempfile.TemporaryFile("w+")  # noqa: SIM115 - closed in `end`
+        started = [str(module)] if isinstance(module, Path) else ["-m", f"arcor2_fakes.{module}"]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", f"arcor2_fakes.{module}", *arguments], stdout=subprocess.PIPE, stderr=self.stderr
+            [sys.executable, *started, *arguments], stdout=subprocess.PIPE, stderr=self.stderr
         )
         self._control: BlockingControlClient | None = None
         line = self._first_line()
@@ -86,13 +89,5 @@ def start_fake() -> Iterator[Callable[..., FakeProcess]]:
 
 @pytest.fixture
 def wait_for() -> Callable[..., Any]:
-    """Gives ``wait_for(read, holds, within=5.0)``: asks until the value satisfies `holds`, and returns it."""
-
-    def wait(read: Callable[[], Any], holds: Callable[[Any], bool] = bool, within: float = 20.0) -> Any:
-        deadline = time.monotonic() + within
-        while not holds(value := read()):
-            assert time.monotonic() < deadline, f"not as expected within {within:g} s, last {value!r}"
-            time.sleep(0.005)
-        return value
-
-    return wait
+    """Return `tests.waiting.wait_for`."""
+    return waiting.wait_for

@@ -132,7 +132,7 @@ REFUSED = {
     "a setting of nothing": (
         urdf(GOOD + '<arcor2_hw><setting name="s" joint="k" component="x"/></arcor2_hw>'),
         ModelError,
-        "no joint k",
+        "joint k does not exist",
     ),
 }
 
@@ -167,7 +167,7 @@ def test_invalid_and_unsafe_packages_are_refused(tmp_path: Path, monkeypatch: py
     damaged[45] ^= 0xFF
     with pytest.raises(ModelError, match="damaged"):
         RobotModel.load(bytes(damaged))
-    with pytest.raises(ModelError, match="no robot model nowhere"):
+    with pytest.raises(ModelError, match="Robot model nowhere does not exist"):
         RobotModel.load(tmp_path / "nowhere")
     (tmp_path / "arm").mkdir()
     (tmp_path / "secret").write_text("secret")

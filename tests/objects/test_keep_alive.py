@@ -13,8 +13,8 @@ import pytest
 
 from arcor2_hw.keep_alive import KeepAlive, RunningTime, acquire_within, once_within, pulse, result_within
 from arcor2_hw.keep_alive_process import FROZEN_AFTER, Parent, ParentEnd
-from arcor2_hw.testing.own_time import own_time
 from tests.drivers.stall import BUSY, stall
+from tests.waiting import WITHIN
 
 MESSAGE = b"kick\r"
 OWNER = """
@@ -52,12 +52,12 @@ def test_messages_are_written_only_while_pulses_arrive(line: tuple[int, int]) ->
         while time.monotonic() < until:
             keep_alive.pulse()
             time.sleep(0.05)
-        stall(BUSY)  # a busy process costs nothing
+        assert os.read(reading, 65536)
+        stall(BUSY)
+        assert len(os.read(reading, 65536)) >= 3 * len(MESSAGE), "a busy process interrupts the messages"
         keep_alive.pulse()
         pulsed = time.monotonic()
-        assert len(os.read(reading, 65536)) >= 20 * len(MESSAGE)
-        last = last_message(reading, 0.4)
-        assert FROZEN_AFTER - 0.1 < last - pulsed < FROZEN_AFTER + 0.3
+        assert last_message(reading, 2.0) - pulsed > FROZEN_AFTER / 2.0
     finally:
         keep_alive.close()
         keep_alive.close()
@@ -66,14 +66,14 @@ def test_messages_are_written_only_while_pulses_arrive(line: tuple[int, int]) ->
 
 def test_no_message_is_written_while_the_line_is_in_use(line: tuple[int, int]) -> None:
     writing, reading = line
-    keep_alive = KeepAlive(writing, MESSAGE, 0.02, quiet=0.3)
+    keep_alive = KeepAlive(writing, MESSAGE, 0.02, quiet=0.4)
     try:
-        until = time.monotonic() + 0.4
+        until = time.monotonic() + 0.6
         while time.monotonic() < until:
             keep_alive.pulse()
             time.sleep(0.02)
         assert not select.select([reading], [], [], 0.0)[0]
-        assert select.select([reading], [], [], 1.0)[0]
+        assert select.select([reading], [], [], WITHIN)[0]
     finally:
         keep_alive.close()
 
@@ -83,9 +83,9 @@ def test_messages_stop_at_once_when_the_parent_dies() -> None:
         assert owner.stdout is not None
         assert owner.stdout.read(4) == b"kick"
         owner.kill()
-        killed = own_time()
-        owner.stdout.read()  # to the end: the child has closed the line as well
-        assert own_time() - killed < FROZEN_AFTER / 2.0
+        os.read(owner.stdout.fileno(), 65536)
+        messages = owner.stdout.read()  # to the end: the child has closed the line as well
+        assert messages.count(b"kick") < FROZEN_AFTER / 2.0 / 0.02, "it took the owner for frozen, not for ended"
 
 
 def test_the_time_of_sending_a_pulse_counts() -> None:
@@ -121,16 +121,17 @@ def test_a_stall_does_not_count_as_waiting() -> None:
         future.set_result(1)
         lock.release()
 
+    limit = 2.0
     waiters = [
-        threading.Thread(target=lambda: results.append(result_within(future, 0.3))),
-        threading.Thread(target=lambda: results.append(acquire_within(lock, 0.3))),
-        threading.Thread(target=lambda: results.append(once_within(future.done, 0.3, 0.01))),
+        threading.Thread(target=lambda: results.append(result_within(future, limit))),
+        threading.Thread(target=lambda: results.append(acquire_within(lock, limit))),
+        threading.Thread(target=lambda: results.append(once_within(future.done, limit, 0.01))),
     ]
     answering = threading.Thread(target=answer)
     for thread in (*waiters, answering):
         thread.start()
-    stall(BUSY)
-    assert clock() < 0.3
+    stall(1.5 * limit)
+    assert clock() < limit
     ready.set()
     for thread in (*waiters, answering):
         thread.join()

@@ -1,7 +1,6 @@
 """The Modbus link on a socket and a pty: exact frames, and late, incomplete or foreign answers."""
 
 import contextlib
-import itertools
 import os
 import socket
 import threading
@@ -13,7 +12,7 @@ import pytest
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected
 from arcor2_hw.objects.modbus_link import ModbusLink
-from arcor2_hw.testing.own_time import own_time
+from tests.waiting import WITHIN, wait_for
 
 Script = Callable[[bytes], bytes | None]
 """Returns the answer to a request, or None for no answer."""
@@ -72,8 +71,8 @@ def peer() -> Iterator[Peer]:
 
 @pytest.fixture
 def link(peer: Peer) -> Iterator[ModbusLink]:
-    link = ModbusLink("press", "127.0.0.1", peer.port, unit_id=1, request_timeout=0.2)
-    link.open(1.0)
+    link = ModbusLink("press", "127.0.0.1", peer.port, unit_id=1, request_timeout=WITHIN)
+    link.open(WITHIN)
     yield link
     link.close()
 
@@ -174,29 +173,33 @@ def test_an_answer_in_pieces_is_assembled(peer: Peer, link: ModbusLink) -> None:
 
 
 def test_the_time_limit_is_exact_although_bytes_keep_arriving(peer: Peer, link: ModbusLink) -> None:
+    ended = threading.Event()
+
     def script(_: bytes) -> None:
-        for byte in itertools.repeat(b"\0", 100):
-            peer.connections[-1].sendall(byte)
-            time.sleep(0.02)
+        while not ended.wait(0.02):
+            peer.connections[-1].sendall(b"\0")
 
     peer.script = script
-    began = own_time()
-    with pytest.raises(DeviceTimeout, match=r"no valid answer within 0.2 s .*; it may have been executed$"):
+    began = time.monotonic()
+    with (
+        link.limited(0.2),
+        pytest.raises(DeviceTimeout, match=r"no valid answer within 0.2 s .*; it may have been executed$"),
+    ):
         link.write_register(0, 1)
-    ended = own_time()
-    assert ended.clock - began.clock > 0.19
-    assert ended - began < 0.5
+    assert time.monotonic() - began > 0.19
+    ended.set()
     assert len(peer.requests) == 1
 
 
 def test_a_read_is_repeated_once_and_a_write_never(peer: Peer, link: ModbusLink) -> None:
-    with pytest.raises(DeviceTimeout, match=r"no answer within 0.2 s \(reading input registers 0 to 0\) twice$"):
-        link.read_input_registers(0, 1)
-    assert len(peer.requests) == 2
-    with pytest.raises(DeviceTimeout, match="it may have been executed"):
-        link.write_coil(0, True)
-    assert len(peer.requests) == 3
-    assert len(peer.connections) == 3  # so that what is late finds nobody
+    with link.limited(0.2):
+        with pytest.raises(DeviceTimeout, match=r"no answer within 0.2 s \(reading input registers 0 to 0\) twice$"):
+            link.read_input_registers(0, 1)
+        wait_for(lambda: len(peer.requests) == 2)
+        with pytest.raises(DeviceTimeout, match="it may have been executed"):
+            link.write_coil(0, True)
+    wait_for(lambda: len(peer.requests) == 3)
+    assert len(peer.connections) == 3  # so that late answers are not received
     peer.script = lambda request: adu("04 02 0005", number=int.from_bytes(request[:2], "big"))
     assert link.read_input_registers(0, 1) == [5]
 
@@ -214,13 +217,13 @@ def test_a_connection_closed_by_the_device_stays_lost(peer: Peer, link: ModbusLi
             link.read_input_registers(0, 1)
     assert len(peer.connections) == 1
     peer.script = lambda _: adu("04 02 0005")
-    link.open(1.0)
+    link.open(WITHIN)
     assert link.read_input_registers(0, 1) == [5]
 
 
 def test_close_wakes_waiting_threads(peer: Peer) -> None:
-    link = ModbusLink("press", "127.0.0.1", peer.port, request_timeout=5.0)
-    link.open(1.0)
+    link = ModbusLink("press", "127.0.0.1", peer.port, request_timeout=2.0 * WITHIN)
+    link.open(WITHIN)
     came = threading.Event()
     peer.script = lambda _: came.set()
     failed: list[Exception] = []
@@ -233,12 +236,10 @@ def test_close_wakes_waiting_threads(peer: Peer) -> None:
 
     thread = threading.Thread(target=ask)
     thread.start()
-    assert came.wait(5.0)
-    began = own_time()
+    assert came.wait(WITHIN)
     link.close()
-    thread.join(5.0)
+    thread.join(WITHIN)
     assert failed
-    assert own_time() - began < 1.0
     with pytest.raises(NotConnected, match="is not connected"):
         link.write_coil(0, True)
 
@@ -246,22 +247,22 @@ def test_close_wakes_waiting_threads(peer: Peer) -> None:
 def test_an_interrupted_request_leaves_the_line_usable(peer: Peer, link: ModbusLink) -> None:
     """A stop may interrupt a thread anywhere; its answer must not be returned to the next request."""
 
-    class ToldToEnd(BaseException):
+    class Interrupted(BaseException):
         pass
 
     client = link._client
     assert client is not None
-    asked: list[bytes] = []
+    calls: list[int | None] = []
 
-    def broken_off(size: int | None) -> bytes:
-        asked.append(b"")
-        raise ToldToEnd
+    def interrupted(size: int | None) -> bytes:
+        calls.append(size)
+        raise Interrupted
 
-    client.recv = broken_off  # type: ignore[method-assign]
+    client.recv = interrupted  # type: ignore[method-assign]
     peer.script = lambda _: adu("04 02 0001")
-    with pytest.raises(ToldToEnd):
+    with pytest.raises(Interrupted):
         link.read_input_registers(0, 1)
-    assert asked
+    assert calls
     peer.script = lambda _: adu("04 02 0002")
     assert link.read_input_registers(0, 1) == [2]
     assert len(peer.connections) == 2
@@ -291,7 +292,7 @@ def test_an_unreachable_device_is_named() -> None:
         taken.bind(("127.0.0.1", 0))  # not listening: refuses
         link = ModbusLink("press", *taken.getsockname())
         with pytest.raises(NotConnected, match=r"^press at 127\.0\.0\.1:.* cannot be reached: connection refused"):
-            link.open(1.0)
+            link.open(WITHIN)
     with pytest.raises(NotConnected, match="the port cannot be opened"):
         ModbusLink("press", serial_port="/dev/none").open(1.0)
 
@@ -301,8 +302,8 @@ def test_an_unreachable_device_is_named() -> None:
 def line() -> Iterator[tuple[int, ModbusLink]]:
     ours, theirs = os.openpty()
     tty.setraw(theirs)
-    link = ModbusLink("press", serial_port=os.ttyname(theirs), baudrate=115200, unit_id=1, request_timeout=0.2)
-    link.open(1.0)
+    link = ModbusLink("press", serial_port=os.ttyname(theirs), baudrate=115200, unit_id=1, request_timeout=WITHIN)
+    link.open(WITHIN)
     yield ours, link
     link.close()
     os.close(ours)
@@ -339,7 +340,7 @@ def test_rtu_frames_have_a_checksum(line: tuple[int, ModbusLink]) -> None:
 def test_an_rtu_answer_with_a_wrong_checksum_is_ignored(line: tuple[int, ModbusLink]) -> None:
     end, link = line
     thread, requests = answer_on(end, [bytes.fromhex("0103020000B845")] * 2)
-    with pytest.raises(DeviceTimeout, match="no valid answer"):
+    with link.limited(0.5), pytest.raises(DeviceTimeout, match="no valid answer"):
         link.read_holding_registers(0, 1)
     thread.join()
     assert len(requests) == 2
@@ -352,14 +353,15 @@ def test_a_late_answer_on_a_serial_line_is_discarded(line: tuple[int, ModbusLink
 
     def serve() -> None:
         os.read(end, 300)
-        time.sleep(0.3)  # the time-out is 0.2 s, the line is drained until 0.4 s
+        time.sleep(1.5)  # the request times out after 1 s, the line is drained until 2 s
         os.write(end, late)
         os.read(end, 300)
         os.write(end, fresh)
 
     thread = threading.Thread(target=serve)
     thread.start()
-    assert link.read_holding_registers(0, 1) == [10]
+    with link.limited(1.0):
+        assert link.read_holding_registers(0, 1) == [10]
     thread.join()
 
 

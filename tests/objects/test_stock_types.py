@@ -17,6 +17,7 @@ from arcor2_hw.objects.stock.flow_actions import FlowActions
 from arcor2_hw.objects.stock.logic_actions import LogicActions
 from arcor2_hw.objects.stock.random_actions import RandomActions, RandomSettings
 from arcor2_hw.objects.stock.time_actions import TimeActions
+from tests.waiting import WITHIN
 
 STOCK = [CounterActions, FlowActions, LogicActions, RandomActions, TimeActions]
 
@@ -62,7 +63,7 @@ def test_a_wait_ends_in_time_or_when_cancelled(obj: FlowActions | TimeActions, m
 
     thread = threading.Thread(target=run)
     thread.start()
-    deadline = time.monotonic() + 5
+    deadline = time.monotonic() + WITHIN
     while thread.is_alive() and time.monotonic() < deadline:  # it may be cancelled before it waits: that does not count
         getattr(obj, type(obj).CANCEL_MAPPING[method])()
         thread.join(0.001)

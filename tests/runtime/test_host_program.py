@@ -17,7 +17,7 @@ from arcor2_hw.data.project import Action, ActionPoint, NamedOrientation, Projec
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.runtime import messages as m
-from arcor2_hw.testing.own_time import own_time
+from tests.waiting import WITHIN, wait_for
 
 from .conftest import HostProcess, Package, scene_object
 
@@ -65,6 +65,14 @@ class Arm(Robot):
         with self._move_lock:
             self.stopped.wait(seconds)
         return "arrived"
+
+    def wait_for_test(self) -> None:
+        while not Path(self.settings.file).with_name("go on").exists():
+            time.sleep(0.01)
+
+    @action
+    def gated(self, *, an: str | None = None) -> None:
+        self.wait_for_test()
 
     @action
     def joints(self, target: ProjectRobotJoints, *, an: str | None = None) -> bool:
@@ -148,12 +156,17 @@ class Run:
         return self.notes_path.read_text().splitlines() if self.notes_path.exists() else []
 
     def wait_note(self, text: str) -> None:
-        deadline = time.monotonic() + 10
-        while text not in self.notes():
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+        wait_for(lambda: text in self.notes())
 
-    def told(self, name: str) -> list[dict[str, object]]:
+    def go_on(self) -> None:
+        """Let `gated` and `wait_for_test` return."""
+        self.notes_path.with_name("go on").touch()
+
+    def handled(self) -> None:
+        """Wait until the host has handled the messages that were sent."""
+        assert self.host.call("obj_none", "quick").code == "not_found"
+
+    def data_of(self, name: str) -> list[dict[str, object]]:
         return [
             json.loads(e.encoded)["data"] for e in self.host.seen if isinstance(e, m.ProgramEvent) and e.event == name
         ]
@@ -187,7 +200,7 @@ def test_events_of_a_complete_run(run: Run) -> None:
     assert run.host.gone() == 0
     pairs = ["ActionStateBefore", "ActionStateAfter"] * 4
     assert run.host.events() == ["running", "PackageInfo", *pairs, "stopped"]
-    before, after = run.told("ActionStateBefore"), run.told("ActionStateAfter")
+    before, after = run.data_of("ActionStateBefore"), run.data_of("ActionStateAfter")
     assert [b["action_id"] for b in before] == [f"act_{name}" for name in NAMES]
     assert before[0]["action_point_ids"] == ["acp_child"]
     assert before[0]["parameters"][1] == "0.75"
@@ -201,7 +214,7 @@ def test_events_of_a_complete_run(run: Run) -> None:
         {"action_id": "act_a3", "results": ["2", '"done"']},
         {"action_id": "act_a4"},
     ]
-    [info] = run.told("PackageInfo")
+    [info] = run.data_of("PackageInfo")
     assert (info["package_id"], info["package_name"]) == ("pkg_1", "demo")
     assert info["scene"]["objects"][0]["id"] == OBJ
     assert run.notes() == ["control", "go 12", "go 11", "go 11", "go 99", "disconnected"]
@@ -220,25 +233,27 @@ def test_robots_are_streamed_while_an_action_runs(run: Run) -> None:
 
 
 def test_pause_waits_for_the_running_action_and_blocks_the_next(run: Run) -> None:
-    run.start('arm.slow(0.4, an="a1")\narm.slow(0.0, an="a2")')
+    run.start('arm.gated(an="a1")\narm.slow(0.0, an="a2")')
     run.host.expect_event("ActionStateBefore")
     run.host.send(m.Pause())
+    run.handled()
+    run.go_on()
     run.host.expect_state("paused")
     assert run.host.events() == ["running", "PackageInfo", "ActionStateBefore", "ActionStateAfter", "paused"]
     time.sleep(0.2)
-    assert run.notes().count("slow") == 1
+    assert "slow" not in run.notes()
     run.host.send(m.Resume())
     run.host.expect_state("stopped")
     assert run.host.events()[5:] == ["running", "ActionStateBefore", "ActionStateAfter", "stopped"]
 
 
 def test_pause_between_actions_is_reported_at_once(run: Run) -> None:
-    run.start('time.sleep(0.5)\narm.slow(0.0, an="a1")')
+    run.start('arm.wait_for_test()\narm.slow(0.0, an="a1")')
     run.host.expect_event("PackageInfo")
-    began = own_time()
     run.host.send(m.Pause())
     run.host.expect_state("paused")
-    assert own_time() - began < 0.4
+    assert run.host.events() == ["running", "PackageInfo", "paused"]
+    run.go_on()
     run.host.expect_event("ActionStateBefore")
     time.sleep(0.1)
     assert "slow" not in run.notes()
@@ -266,7 +281,7 @@ def test_a_breakpoint_pauses_at_its_action_point(run: Run) -> None:
         breakpoints=("acp_child",),
     )
     run.host.expect_state("paused")
-    assert run.told("ActionStateBefore")[-1]["action_id"] == "act_a2"
+    assert run.data_of("ActionStateBefore")[-1]["action_id"] == "act_a2"
     assert [n for n in run.notes() if n.startswith("go")] == ["go 11"]
     run.host.send(m.Resume())
     assert run.host.expect_state("stopped").finished
@@ -282,13 +297,13 @@ def test_shared_breakpoints_may_be_unknown_and_change(run: Run) -> None:
     )
     for expected in ("act_a2", "act_a3"):
         run.host.expect_state("paused")
-        assert run.told("ActionStateBefore")[-1]["action_id"] == expected
+        assert run.data_of("ActionStateBefore")[-1]["action_id"] == expected
         if expected == "act_a3":
             run.host.send(m.SetBreakpoints(["act_a1"]))
         run.host.send(m.Resume())
-    for expected in ("act_a1", "act_a2"):  # the second round: what was asked for at the start stays
+    for expected in ("act_a1", "act_a2"):  # the second round: breakpoints of the start remain
         run.host.expect_state("paused")
-        assert run.told("ActionStateBefore")[-1]["action_id"] == expected
+        assert run.data_of("ActionStateBefore")[-1]["action_id"] == expected
         run.host.send(m.Resume())
     assert run.host.expect_state("stopped").finished
 
@@ -306,18 +321,18 @@ def test_each_action_is_reported_with_time_and_result(run: Run) -> None:
     )
     before = time.time()
     assert run.host.expect_state("stopped").error is not None
-    told = [e for e in run.host.seen if isinstance(e, m.ProgramEvent) and e.number]
+    reported = [e for e in run.host.seen if isinstance(e, m.ProgramEvent) and e.number]
     failed = [e for e in run.host.seen if isinstance(e, m.ActionFailed)]
-    assert [(e.event.removeprefix("ActionState"), e.number, e.name) for e in told] == [
+    assert [(e.event.removeprefix("ActionState"), e.number, e.name) for e in reported] == [
         ("Before", 1, "a1"),
         ("After", 1, ""),
         ("Before", 2, "a2"),
         ("Before", 3, "a3"),
     ]
-    assert abs(told[0].time - before) < 10
-    assert 0.2 <= told[1].time < 2
-    assert [(e.number, e.error.rpartition(" ")[2]) for e in failed] == [(2, "odd"), (3, "cut")]
-    [exception] = run.told("ProjectException")
+    assert abs(reported[0].time - before) < 60
+    assert 0.2 <= reported[1].time < 60
+    assert [(e.number, str(e.error).rpartition(" ")[2]) for e in failed] == [(2, "odd"), (3, "cut")]
+    [exception] = run.data_of("ProjectException")
     assert exception["action_id"] == "act_a3"
 
 
@@ -326,7 +341,7 @@ def test_a_program_waits_for_a_slow_server_without_losing_events(run: Run) -> No
     time.sleep(1.5)  # nothing is read meanwhile: more than what waits here and in the socket is never made
     done = len([note for note in run.notes() if note == "slow"])
     assert done < 6000
-    ended = run.host.expect_state("stopped", 60.0)
+    ended = run.host.expect_state("stopped", 120.0)
     assert ended.finished
     numbers = [e.number for e in run.host.seen if isinstance(e, m.ProgramEvent) and e.event == "ActionStateAfter"]
     assert numbers == list(range(1, 6001))
@@ -361,9 +376,9 @@ def test_a_flow_action_finishes_the_program(run: Run) -> None:
 def test_an_exception_is_reported_and_all_devices_stop(run: Run, body: str, kind: str, handled: bool) -> None:
     run.start(body)
     ended = run.host.expect_state("stopped")
-    [told] = run.told("ProjectException")
-    assert (told["type"], told["handled"]) == (kind, handled)
-    assert told["message"]
+    [exception] = run.data_of("ProjectException")
+    assert (exception["type"], exception["handled"]) == (kind, handled)
+    assert exception["message"]
     assert not ended.finished
     assert ended.error is not None
     assert ended.error.type == kind
@@ -394,10 +409,8 @@ def test_a_handled_exception_does_not_end_the_program(run: Run) -> None:
 def test_stop_ends_the_script_in_any_state(run: Run, body: str) -> None:
     run.start(body)
     run.wait_note("slow")
-    began = own_time()
     run.host.send(m.StopProgram())
     ended = run.host.expect_state("stopped")
-    assert own_time() - began < 1.5
     assert not ended.finished
     assert ended.error is None
     assert run.notes()[-2:] == ["stop", "disconnected"]
@@ -417,21 +430,17 @@ def test_stop_ends_a_paused_program(run: Run) -> None:
 def test_a_hanging_driver_does_not_keep_the_host_running(run: Run) -> None:
     run.start('arm.unstoppable(an="a1")')
     run.wait_note("unstoppable")
-    began = own_time()
     run.host.send(m.StopProgram())
     run.host.expect_state("stopped")
     assert run.host.gone() == 0
-    assert own_time() - began < 4
     assert run.notes()[-1] == "disconnected"
 
 
 def test_the_host_stops_the_program_when_the_server_is_killed(run: Run) -> None:
     run.start('arm.slow(1000.0, an="a1")')
     run.wait_note("slow")
-    began = own_time()
     run.host.socket.close()
-    run.host.gone(5)
-    assert own_time() - began < 2.0
+    run.host.gone()
     assert [n for n in run.notes() if n in ("stop", "disconnected")][-1] == "disconnected"
     assert "stop" in run.notes()
 
@@ -460,17 +469,17 @@ def test_a_script_run_by_hand_prints_events_and_reads_commands(run: Run) -> None
     with _by_hand(directory, "-p") as process:
         assert process.stdin is not None
         assert process.stdout is not None
-        told = []
+        printed = []
         for line in process.stdout:
             event = json.loads(line)
-            told.append(event["data"]["state"] if event["event"] == "PackageState" else event["event"])
-            if told[-1] == "paused":
-                process.stdin.write("s\n" if told.count("paused") == 1 else "r\n")
+            printed.append(event["data"]["state"] if event["event"] == "PackageState" else event["event"])
+            if printed[-1] == "paused":
+                process.stdin.write("s\n" if printed.count("paused") == 1 else "r\n")
                 process.stdin.flush()
-        assert process.wait(10) == 0
+        assert process.wait(WITHIN) == 0
     before, after = "ActionStateBefore", "ActionStateAfter"
     first = ["running", "PackageInfo", before, "paused", "running", after]
-    assert told == [*first, before, "paused", "running", after]
+    assert printed == [*first, before, "paused", "running", after]
     assert run.notes() == ["control", "slow", "slow", "disconnected"]
 
 
@@ -479,5 +488,5 @@ def test_ctrl_c_stops_a_script_run_by_hand(run: Run) -> None:
     with _by_hand(directory) as process:
         run.wait_note("slow")
         process.send_signal(signal.SIGINT)
-        assert process.wait(5) == 0
+        assert process.wait(WITHIN) == 0
     assert run.notes() == ["control", "slow", "stop", "disconnected"]

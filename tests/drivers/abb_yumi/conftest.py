@@ -2,8 +2,7 @@
 
 import itertools
 import os
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -68,7 +67,7 @@ def make(host: str, pose: Pose | None = None, **changed: Any) -> YuMi:
 def robot(fake: FakeYumi) -> Iterator[YuMi]:
     """Connected, control not taken."""
     robot = make(fake.host)
-    robot.connect(3.0)
+    robot.connect(30.0)
     yield robot
     robot.disconnect()
 
@@ -83,10 +82,3 @@ def ready(robot: YuMi) -> YuMi:
 def under_way(fake: FakeYumi, *arms: str) -> None:
     """Return when the arms really move."""
     fake.control.wait_until(lambda t: all(t["arms"][arm]["speed"] > 0.05 for arm in arms))
-
-
-def wait(holds: Callable[[], bool], within: float = 20.0) -> None:
-    until = time.monotonic() + within
-    while not holds():
-        assert time.monotonic() < until, f"not within {within} s"
-        time.sleep(0.005)

@@ -4,8 +4,9 @@ import pytest
 
 from arcor2_drivers.abb_yumi.yumi import ArmId, YuMi
 from arcor2_hw.exceptions import Cancelled, DeviceFault, Refused
+from tests.waiting import wait_for
 
-from .conftest import BackgroundCall, FakeYumi, make, under_way, wait
+from .conftest import BackgroundCall, FakeYumi, make, under_way
 from .test_yumi_motion import turned
 
 
@@ -55,7 +56,7 @@ def test_a_suction_cup_that_is_not_configured_is_refused(fake: FakeYumi, ready: 
     assert "left_suction" in str(error.value)
     ready.disconnect()
     robot = make(fake.host, left_suction=True, left_gripper=False)
-    robot.connect(3.0)
+    robot.connect(30.0)
     robot.take_control()
     robot.set_suction(ArmId.LEFT, True)
     assert fake.arm("left")["vacuum"]
@@ -74,7 +75,7 @@ def test_one_arm_is_taught_by_hand(fake: FakeYumi, ready: YuMi) -> None:
     assert fake.arm("left")["lead_through"]
     assert fake.truth()["mastership"]["motion"] is None
     fake.do("place", arm="left", joints=[0.0, -120.0, 20.0, 10.0, 40.0, 0.0, 130.0])
-    wait(lambda: abs(ready.robot_joints(arm_id="left")[3].value - 0.1745) < 1e-3)
+    wait_for(lambda: abs(ready.robot_joints(arm_id="left")[3].value - 0.1745) < 1e-3)
     for arm in ("left", "right"):
         with pytest.raises(Refused) as error:
             ready.move_to_joints(turned(ready, arm, 6, 0.2), 0.5, arm_id=arm)

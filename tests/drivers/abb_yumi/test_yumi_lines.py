@@ -134,26 +134,26 @@ def test_nominal_inverse_kinematics_inverts_forward_kinematics(arm: str) -> None
 def pair() -> Iterator[tuple[ArmLine, socket.socket]]:
     """A line whose command socket is in the hands of the test."""
     ours, theirs = socket.socketpair()
-    watch, kept = socket.socketpair()
+    watch, other_end = socket.socketpair()
     made = ArmLine("yumi", "left", "127.0.0.1", 1, lambda _: None)
 
     def keep_answering() -> None:
         rest = b""
         with contextlib.suppress(OSError):  # what we did not read when the line was ended is reset
-            while data := kept.recv(4096):
+            while data := other_end.recv(4096):
                 *lines, rest = (rest + data).split(b"\n")
                 for each in lines:
                     sequence, code, _ = protocol.parsed(each.decode())
-                    kept.sendall(protocol.framed(f"{sequence} {code} 0 0 1"))
+                    other_end.sendall(protocol.framed(f"{sequence} {code} 0 0 1"))
 
     answering = threading.Thread(target=keep_answering)
     answering.start()
     made.attach(ours, watch, 0.4)
     yield made, theirs
     made.end(NotInControl("the test is over"))
-    kept.shutdown(socket.SHUT_RDWR)
+    other_end.shutdown(socket.SHUT_RDWR)
     answering.join(20.0)
-    for each in (theirs, kept):
+    for each in (theirs, other_end):
         each.close()
 
 
@@ -172,7 +172,7 @@ def test_a_late_answer_is_not_used_for_a_later_request(pair: tuple[ArmLine, sock
     server.sendall(protocol.framed(f"{sequence} 41 0 1 1 1 1"))
     server.sendall(protocol.framed(f"{second} 40 0 2 2 2 2"))  # another command's code
     server.sendall(protocol.framed(f"{second} 41 0 3 3 3 3"))
-    asking.join(3.0)
+    asking.join(30.0)
     assert answered == [(3.0, 3.0, 3.0, 3.0)]
 
 
@@ -185,7 +185,7 @@ def test_an_answer_received_in_pieces_is_joined(pair: tuple[ArmLine, socket.sock
     whole = protocol.framed(f"{sequence} 53 0 12.5")
     for each in (whole[:3], whole[3:9], whole[9:]):
         server.sendall(each)
-    asking.join(3.0)
+    asking.join(30.0)
     assert answered == [(12.5,)]
 
 
@@ -193,5 +193,5 @@ def test_garbage_ends_the_line(pair: tuple[ArmLine, socket.socket]) -> None:
     made, server = pair
     server.sendall(b"\x00\x01\x02 nonsense\n")
     with pytest.raises(DeviceFault) as error:
-        made.ask(Code.HAND_STATE, within=2.0)
+        made.ask(Code.HAND_STATE, within=30.0)
     assert error.value.fault_code == "garbled"

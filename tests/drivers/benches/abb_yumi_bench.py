@@ -13,7 +13,8 @@ from arcor2_hw.data.robot import Joint, Safety
 from arcor2_hw.exceptions import Stale
 from arcor2_hw.objects import Generic
 from arcor2_hw.testing.bench import Bench, Check
-from tests.drivers.abb_yumi.conftest import RWS_PORT, FakeYumi, settings, wait
+from tests.drivers.abb_yumi.conftest import RWS_PORT, FakeYumi, settings
+from tests.waiting import wait_for
 
 ORPHAN = """
 import sys
@@ -158,7 +159,7 @@ class YuMiBench(Bench):
 
         def collided() -> None:
             self.fake.do("collide", arm="left")
-            wait(protected)
+            wait_for(protected)
             device.acknowledge_protective_stop("the suite")
             device.take_control()
 

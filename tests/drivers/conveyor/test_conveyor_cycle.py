@@ -34,7 +34,7 @@ def under_way(fake: FakeProcess, act: Callable[[], None]) -> Iterator[list[Any]]
         fake.control.wait_until(lambda t: abs(t["velocity"]) > 2900)
         yield outcome
     finally:
-        thread.join(10.0)
+        thread.join(30.0)
         assert not thread.is_alive()
 
 

@@ -23,9 +23,9 @@ from arcor2_hw.exceptions import (
     Refused,
 )
 from arcor2_hw.objects import MachineCommand, MachineState
-from arcor2_hw.testing.own_time import own_time
 from tests.drivers.conveyor.test_conveyor_cycle import under_way
 from tests.fakes.conftest import FakeProcess
+from tests.waiting import wait_for
 
 S = MachineState
 
@@ -119,16 +119,16 @@ def test_a_fault_aborts_and_is_cleared(fake: FakeProcess, belt: Conveyor) -> Non
 
     def wait() -> None:
         try:
-            belt.wait_for(S.STOPPED, 5.0)
+            belt.wait_for(S.STOPPED, 30.0)
         except DeviceFault as error:
             thread_errors.append(error)
 
     thread = threading.Thread(target=wait)
     thread.start()
     fake.control.do("emergency", code=0x3210)
-    thread.join(5.0)
+    thread.join(30.0)
     assert "fault 3210h, overvoltage of the DC link" in str(thread_errors[0])
-    belt.wait_for(S.ABORTED, 2.0)
+    belt.wait_for(S.ABORTED, 30.0)
     assert "fault 3210h" in belt.stop_reason()
     belt.clear()
     assert belt.machine_state() is S.STOPPED
@@ -165,14 +165,18 @@ def test_the_state_arrives_by_pdo_during_control(fake: FakeProcess, belt: Convey
         (0x1801, 1, "85020000"),
     ]
     belt.run(0.2)
-    asked = sum(f["from_host"] and f["data"].startswith("404160") for f in fake.truth()["frames"])
-    sent, before = sum(fake.truth()["pdos_sent"]), belt._observer.pdos.received
-    time.sleep(1.0)
-    sent, came = sum(fake.truth()["pdos_sent"]) - sent, belt._observer.pdos.received - before
-    assert came == pytest.approx(sent, rel=0.15)
-    assert sum(f["from_host"] and f["data"].startswith("404160") for f in fake.truth()["frames"]) == asked
+
+    def polls() -> int:
+        return sum(f["from_host"] and f["data"].startswith("404160") for f in fake.truth()["frames"])
+
+    def nothing_is_polled() -> bool:
+        """Return whether 100 PDOs arrived and no poll came in between, as one does when a PDO is late."""
+        before, received = polls(), belt._observer.pdos.received
+        wait_for(lambda: belt._observer.pdos.received - received >= 100)
+        return polls() == before
+
+    wait_for(nothing_is_polled)
     assert belt.velocity().value == pytest.approx(0.2, abs=0.001)
-    assert belt.position().age < 0.2
 
 
 def test_a_drive_without_pdos_is_polled(fake: FakeProcess, belt: Conveyor) -> None:
@@ -180,8 +184,9 @@ def test_a_drive_without_pdos_is_polled(fake: FakeProcess, belt: Conveyor) -> No
     for number in (0, 1):
         belt._observer.link.write(_entry(0x1800 + number, 5, "<H"), 0)  # the event timer
     time.sleep(0.3)
-    assert belt._observer.pdos.newest < time.monotonic() - 0.1
-    assert belt.position().age < 0.4
+    newest = belt._observer.pdos.newest
+    assert newest < time.monotonic() - 0.1
+    assert belt.position().monotonic > newest
     belt.move_by(0.01, 0.3)
     assert belt.connection is Connection.ONLINE
 
@@ -248,10 +253,8 @@ def test_a_bus_refused_by_socketcand_is_reported(fake: FakeProcess, make: Callab
 def test_a_silent_socketcand_server_times_out(make: Callable[..., Conveyor]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         belt = make("{}:{}/can0".format(*server.getsockname()), interface=CanInterface.SOCKETCAND)
-        began = own_time()
         with pytest.raises(DeviceTimeout, match=r"cannot be reached within 0\.4 s"):
             belt.connect(0.4)
-        assert own_time() - began < 1.0
 
 
 def test_socketcand_frames_byte_for_byte() -> None:
@@ -271,11 +274,11 @@ def test_socketcand_frames_byte_for_byte() -> None:
                 time.sleep(0.02)
                 connection.sendall(b"00 >< frame 705 2.000000 7F >< frame 18FF1234 2.5  >")
                 sent.append(connection.recv(100))
-                done.wait(5.0)
+                done.wait(30.0)
 
         thread = threading.Thread(target=serve)
         thread.start()
-        bus = SocketcandBus("can0", *server.getsockname(), timeout=2.0)
+        bus = SocketcandBus("can0", *server.getsockname(), timeout=30.0)
         try:
             frames = [bus.recv(2.0) for _ in range(3)]
             bus.send(can.Message(arbitration_id=0x605, data=bytes.fromhex("4041600000000000"), is_extended_id=False))

@@ -21,7 +21,7 @@ def make() -> Iterator[Callable[..., DobotMagician]]:
     made: list[DobotMagician] = []
 
     def build(port: str, **settings: Any) -> DobotMagician:
-        arm = DobotMagician("arm_id", "arm", BASE, DobotMagicianSettings(port, **settings))
+        arm = DobotMagician("arm_id", "arm", BASE, DobotMagicianSettings(port, **{"answer_timeout": 1.0, **settings}))
         made.append(arm)
         return arm
 

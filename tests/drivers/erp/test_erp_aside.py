@@ -8,9 +8,9 @@ import pytest
 from arcor2_drivers.erp.erp_service import ErpService
 from arcor2_hw.data.device import Health
 from arcor2_hw.exceptions import Cancelled, NotFound, Refused
-from arcor2_hw.testing.own_time import own_time
 from tests.drivers.erp.conftest import Waiting, serials
 from tests.fakes.conftest import FakeProcess
+from tests.waiting import wait_for
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def test_refused_results_are_stored_separately_and_named(fake: FakeProcess, erp:
     erp.report_result(order, "S-1", True)
     erp.report_result("B-1", "S-2", True)
     erp.report_result("C-9", "S-3", True)
-    erp.wait_until_sent(5.0)
+    erp.wait_until_sent(30.0)
     assert [result["serial"] for result in fake.truth()["results"]] == ["S-2"]
     refused = erp.refused()
     assert [(each.order_id, each.why) for each in refused] == [
@@ -46,7 +46,7 @@ def test_refused_results_are_stored_separately_and_named(fake: FakeProcess, erp:
     assert results_asked(fake) == before, "it is tried for ever"
     fake.control.do("forbid", order=order, on=False)
     assert erp.resend_refused() == 2
-    erp.wait_until_sent(5.0)
+    erp.wait_until_sent(30.0)
     assert serials(fake) == ["S-1"]
     assert [each.order_id for each in erp.refused()] == ["C-9"]
     erp.acknowledge("results_refused")
@@ -64,13 +64,12 @@ def test_results_that_wait_too_long_raise_an_alarm(
     fake.control.do("fail", status=503, count=-1, path="/results")
     erp.report_result(order, "S-1", True)
     assert erp.alarms() == []
-    time.sleep(1.5)
-    (alarm,) = erp.alarms()
+    (alarm,) = wait_for(erp.alarms)
     assert alarm.code == "results_wait"
     assert "503" in alarm.text
     assert erp.alarms()[0].since == alarm.since
     fake.control.do("work")
-    erp.wait_until_sent(5.0)
+    erp.wait_until_sent(30.0)
     assert erp.alarms() == []
 
 
@@ -103,17 +102,17 @@ def test_results_go_only_to_their_service(fake: FakeProcess, make: Callable[...,
 def test_disconnecting_from_a_silent_service_keeps_all_results(
     fake: FakeProcess, make: Callable[..., ErpService], order: str
 ) -> None:
-    erp = make(fake.ready["url"], request_timeout=1.5)
+    erp = make(fake.ready["url"], request_timeout=10.0)
     erp.connect()
     fake.control.do("silence")
     erp.report_result(order, "S-1", True)
     time.sleep(0.2)
-    began = own_time()
+    began = time.monotonic()
     erp.disconnect()
-    assert own_time() - began < 1.5
+    assert time.monotonic() - began < 8.0, "it waits for the request"
     fake.control.do("heal")
-    erp.connect(10.0)
-    erp.wait_until_sent(5.0)
+    erp.connect(60.0)
+    erp.wait_until_sent(30.0)
     assert serials(fake) == ["S-1"]
 
 
@@ -121,9 +120,7 @@ def test_stop_ends_waiting_for_the_outbox(fake: FakeProcess, erp: ErpService, or
     fake.control.do("fail", status=503, count=-1, path="/results")
     erp.report_result(order, "S-1", True)
     waiting = Waiting(lambda: erp.wait_until_sent(60.0))
-    time.sleep(0.2)
-    erp.stop()
-    assert isinstance(waiting.outcome(2.0), Cancelled)
+    assert isinstance(waiting.outcome_after(erp.stop), Cancelled)
     fake.control.do("work")
-    erp.wait_until_sent(5.0)
+    erp.wait_until_sent(30.0)
     assert serials(fake) == ["S-1"]

@@ -1,6 +1,5 @@
 """The label printer's driver: each label is printed once and counted, faults are named, nothing is sent again."""
 
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +11,7 @@ from arcor2_hw.data.device import Connection, Health, Identity
 from arcor2_hw.exceptions import (
     Cancelled,
     ConnectionLost,
+    DeviceError,
     DeviceFault,
     DeviceTimeout,
     NotConnected,
@@ -20,7 +20,6 @@ from arcor2_hw.exceptions import (
     Refused,
 )
 from arcor2_hw.testing.life import BackgroundCall
-from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
 
 on_both = pytest.mark.parametrize("fake", ["tcp", "pty"], indirect=True)
@@ -101,7 +100,7 @@ def test_no_reply_means_media_out_or_head_open(
         wait_for(lambda: printer.connection, lambda state: state is Connection.LOST)
     assert [alarm.code for alarm in printer.alarms()] == ["no_reply"]
     fake.control.do(command, **off)
-    wait_for(lambda: printer.connection, lambda state: state is Connection.BACK, within=8.0)
+    wait_for(lambda: printer.connection, lambda state: state is Connection.BACK)
     assert printer.alarms() == []
     assert printer.print(LABEL) == "printer-1"
     assert fake.truth()["received"].count("format") == 1
@@ -183,7 +182,7 @@ def test_nothing_is_sent_again_after_a_loss(
     wait_for(lambda: printer.connection, lambda state: state is Connection.LOST)
     assert printer.health is Health.FAILURE
     fake.control.do("plug")
-    wait_for(lambda: printer.connection, lambda state: state is Connection.BACK, within=8.0)
+    wait_for(lambda: printer.connection, lambda state: state is Connection.BACK)
     with pytest.raises(Refused, match="it is unknown whether the last label was printed"):
         printer.print(LABEL)
     assert printer.last_came_out() is True
@@ -209,15 +208,13 @@ def test_labels_of_another_host(fake: FakeProcess, printer: ZplPrinter) -> None:
 def test_invalid_answers_of_the_device_are_typed_errors(
     fake: FakeProcess, printer: ZplPrinter, wait_for: Callable[..., Any], fault: str
 ) -> None:
-    began = own_time()
     with printer.line.held():
         fake.control.do(fault)
         with pytest.raises(DeviceFault, match=f"^printer at {fake.ready['port']} does not answer") as raised:
             printer.print(LABEL)
-    assert own_time() - began < 1.0
     assert "~HS within 0.4 s" in raised.value.detail
     fake.control.do("heal")
-    wait_for(lambda: printer.connection, lambda state: state is Connection.BACK, within=8.0)
+    wait_for(lambda: printer.connection, lambda state: state is Connection.BACK)
     assert printer.print(LABEL) == "printer-1"
 
 
@@ -273,11 +270,26 @@ def test_stop_ends_the_wait_and_the_label_is_printed_once(fake: FakeProcess, pri
     while "format" not in fake.truth()["received"]:
         assert not printing.over
     printer.stop()
-    error = printing.outcome(2.0, "printing that was stopped")
+    error = printing.outcome(30.0, "printing that was stopped")
     assert isinstance(error, Cancelled)
     assert "not sent again" in str(error)
     assert [alarm.code for alarm in printer.alarms()] == ["unconfirmed"]
-    while fake.truth()["counter"] == 0:
-        time.sleep(0.01)
+    fake.control.wait_until(lambda truth: truth["counter"] > 0)
     assert printer.last_came_out()
     assert printer.print(LABEL) == "printer-2"
+
+
+def test_disconnecting_ends_the_wait_and_nothing_is_sent_again(
+    fake: FakeProcess, make: Callable[..., ZplPrinter]
+) -> None:
+    printer = make(fake.ready["port"], print_timeout=30.0)
+    printer.connect()
+    fake.control.do("forgetful", on=True)
+    printing = BackgroundCall(lambda: printer.print(LABEL))
+    while "format" not in fake.truth()["received"]:
+        assert not printing.over
+    printer.disconnect()
+    assert isinstance(printing.outcome(30.0, "printing while it disconnects"), DeviceError)
+    fake.control.do("forgetful", on=False)
+    printer.connect()
+    assert fake.truth()["received"].count("format") == 1

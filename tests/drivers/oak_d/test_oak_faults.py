@@ -6,7 +6,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
 
 import psutil
 import pytest
@@ -24,17 +23,10 @@ from arcor2_hw.exceptions import (
     Stale,
 )
 from arcor2_hw.testing.life import BackgroundCall
-from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
+from tests.waiting import wait_for
 
 from .conftest import PATIENCE
-
-
-def wait(holds: Callable[[], Any], within: float = 30.0) -> None:
-    deadline = time.monotonic() + within
-    while not holds():
-        assert time.monotonic() < deadline, f"not within {within:g} s"
-        time.sleep(0.02)
 
 
 def fresh(camera: OakD) -> bool:
@@ -46,8 +38,8 @@ def fresh(camera: OakD) -> bool:
 
 
 def back(camera: OakD) -> None:
-    wait(lambda: camera.connection is Connection.BACK)
-    wait(lambda: fresh(camera))
+    wait_for(lambda: camera.connection is Connection.BACK)
+    wait_for(lambda: fresh(camera))
 
 
 def test_a_frozen_picture_is_stale(fake: FakeProcess, camera: OakD) -> None:
@@ -57,13 +49,13 @@ def test_a_frozen_picture_is_stale(fake: FakeProcess, camera: OakD) -> None:
         camera.capture()
     with pytest.raises(Stale, match=r"camera at .* sent no new image|the newest image"):
         camera.color_image()
-    wait(lambda: camera.alarms())
+    wait_for(lambda: camera.alarms())
     assert [alarm.code for alarm in camera.alarms()] == ["frozen"]
     assert camera.health is Health.FAILURE
     assert camera.connection is Connection.ONLINE  # it sends, after all
     fake.control.do("heal")
-    wait(lambda: not camera.alarms())
-    wait(lambda: fresh(camera))
+    wait_for(lambda: not camera.alarms())
+    wait_for(lambda: fresh(camera))
 
 
 def next_frame(camera: OakD) -> None:
@@ -100,30 +92,30 @@ def test_invalid_pictures_are_errors(fake: FakeProcess, camera: OakD) -> None:
 
 def test_overheating_is_reported_before_shutdown(fake: FakeProcess, camera: OakD) -> None:
     fake.control.do("overheat", temperature=95)
-    wait(lambda: camera.alarms())
+    wait_for(lambda: camera.alarms())
     [alarm] = camera.alarms()
     assert (alarm.code, camera.health) == ("hot", Health.OFF_SPEC)
     assert camera.trigger().depth is not None
     fake.control.do("overheat", temperature=106)
-    wait(lambda: camera.connection is Connection.LOST)
+    wait_for(lambda: camera.connection is Connection.LOST)
     fake.control.do("heal")
     back(camera)
-    wait(lambda: not camera.alarms())
+    wait_for(lambda: not camera.alarms())
 
 
 def test_the_exposure_is_restored_after_a_power_cycle(fake: FakeProcess, camera: OakD) -> None:
     camera.set_exposure(0.005)
     fake.control.do("power_cycle")
-    wait(lambda: camera.connection is Connection.BACK)
+    wait_for(lambda: camera.connection is Connection.BACK)
     assert fake.truth()["exposure"] == pytest.approx(0.005)
     frame = camera.trigger()  # its clock has begun anew; ages are right all the same
-    assert time.monotonic() - frame.monotonic < 2.0
+    assert time.monotonic() - frame.monotonic < 30.0
 
 
 @pytest.mark.parametrize("fault", ["half_frame", "garbage", "wrong_checksum", "reset"])
 def test_a_broken_stream_is_a_loss_and_recovers(fake: FakeProcess, camera: OakD, fault: str) -> None:
     fake.control.do(fault)
-    wait(lambda: camera.connection is not Connection.ONLINE)
+    wait_for(lambda: camera.connection is not Connection.ONLINE)
     if fault != "reset":
         with pytest.raises((ConnectionLost, DeviceFault), match=r"camera at 127\.0\.0\.1"):
             camera.capture()
@@ -134,14 +126,14 @@ def test_a_broken_stream_is_a_loss_and_recovers(fake: FakeProcess, camera: OakD,
 def test_a_slow_stream_gives_stale_pictures(fake: FakeProcess, camera: OakD) -> None:
     fake.control.do("slow", seconds=0.7)
     time.sleep(0.2)
-    wait(lambda: not fresh(camera))
+    wait_for(lambda: not fresh(camera))
     fake.control.do("heal")
-    wait(lambda: camera.connection is not Connection.LOST)
-    wait(lambda: fresh(camera))
+    wait_for(lambda: camera.connection is not Connection.LOST)
+    wait_for(lambda: fresh(camera))
 
 
 def test_another_protocol_is_refused(fake: FakeProcess, make: Callable[..., OakD]) -> None:
-    control = make(fake.ready["control"])  # says nothing until it is asked
+    control = make(fake.ready["control"])  # it sends nothing before a request
     with pytest.raises(DeviceTimeout, match=f"^camera at {fake.ready['control']} sends nothing"):
         control.connect(0.5)
     fake.control.do("wrong_checksum")
@@ -183,13 +175,19 @@ def test_repeated_connections_leak_nothing(fake: FakeProcess, camera: OakD) -> N
 def test_a_missing_camera_is_reported_at_once(make: Callable[..., OakD], monkeypatch: pytest.MonkeyPatch) -> None:
     import depthai as dai
 
-    monkeypatch.setattr(dai.Device, "getAllAvailableDevices", staticmethod(lambda: []))
+    class NoDevice:
+        """Opening a missing device would take 11.5 s."""
+
+        getAllAvailableDevices = staticmethod(list)  # noqa: N815
+
+        def __init__(self, *_: object) -> None:
+            pytest.fail("it tries to open a missing device")
+
+    monkeypatch.setattr(dai, "Device", NoDevice)
     for address, who in (("", "the only camera"), ("14442C10D13EABCE00", "14442C10D13EABCE00")):
         camera = make(address)
-        began = own_time()
         with pytest.raises(NotConnected, match=f"^camera at {who} was not found") as raised:
             camera.connect(PATIENCE)
-        assert own_time() - began < 3.0  # opening one that is not there takes 11.5 s
         assert raised.value.detail == "found: none"
     with pytest.raises(NotConnected, match=r"^camera at 127\.0\.0\.9 cannot be reached"):
         make("127.0.0.9").connect(2.0)
@@ -220,7 +218,7 @@ def test_a_camera_that_starts_too_late_times_out(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(dai, "Device", Slow)
     with pytest.raises(DeviceTimeout, match=r"^camera at X did not start within 0\.1 s"):
         device_feed.boot("camera at X", dai.DeviceInfo("X"), 0.1)
-    assert Slow.closed.wait(5.0)  # not kept from the next that wants it
+    assert Slow.closed.wait(30.0)  # the next driver can open it
 
 
 def test_several_cameras_need_an_identifier(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -244,5 +242,5 @@ def test_stop_ends_the_wait_for_a_picture(fake: FakeProcess, camera: OakD) -> No
         time.sleep(0.01)
     assert isinstance(waiting.error, Cancelled)
     fake.control.do("heal")
-    wait(lambda: fresh(camera))
+    wait_for(lambda: fresh(camera))
     assert camera.color_image().size == (640, 360)

@@ -16,6 +16,7 @@ from arcor2_hw.exceptions import NotConnected, OutOfRange
 from arcor2_hw.objects.camera import Mode
 from arcor2_hw.objects.frame import Frame, PictureNote, rays
 from tests.fakes.conftest import FakeProcess
+from tests.waiting import wait_for
 
 from .conftest import PATIENCE
 
@@ -138,9 +139,7 @@ def test_exposure_is_set(fake: FakeProcess, camera: OakD) -> None:
     bright = np.asarray(camera.color_image()).mean()
     camera.fix_exposure(0.004)
     assert fake.truth()["exposure"] == pytest.approx(0.004)
-    time.sleep(0.1)
-    frame = camera.trigger()
-    assert frame.exposure == pytest.approx(0.004)
+    frame = wait_for(camera.trigger, lambda frame: frame.exposure == pytest.approx(0.004))
     assert frame.color.mean() == pytest.approx(0.4 * bright, rel=0.1)
     camera.auto_exposure()
     assert fake.truth()["exposure"] is None

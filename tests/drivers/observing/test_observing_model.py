@@ -15,6 +15,7 @@ from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, NotConnected
 from arcor2_hw.objects import observing
 from arcor2_hw.objects.observing import Observing, listening
+from tests.waiting import wait_for
 
 C = Connection
 MAY_FOLLOW = {
@@ -65,10 +66,7 @@ class Device:
         self.recipe = ""
 
     def until(self, holds: Callable[[], bool]) -> None:
-        end = time.monotonic() + 10.0
-        while not holds():
-            assert time.monotonic() < end, f"stuck after {self.path}"
-            time.sleep(0.001)
+        wait_for(lambda: self.path, lambda _: holds())
 
 
 @pytest.fixture
@@ -196,9 +194,10 @@ def test_a_connection_that_breaks_at_once_keeps_the_back_off(monkeypatch: pytest
     with listening(lambda life: device.path.append(life.state)):
         device.life = Observing("line 7", device.open, device.watch, device.close)
     device.life.start(1.0)
-    time.sleep(0.5)
+    wait_for(lambda: len(device.attempts) >= 7)
     device.life.stop()
-    assert 3 <= len(device.attempts) <= 1 + 4 + 5, "0.01, 0.02, 0.04, 0.08 s, then 0.1 s each"
+    pauses = [later - earlier for earlier, later in itertools.pairwise(device.attempts[1:])]
+    assert all(pause >= least for pause, least in zip(pauses, (0.02, 0.04, 0.08, 0.1), strict=False)), pauses
 
 
 def _break() -> None:
@@ -209,9 +208,10 @@ def test_a_watch_that_returns_does_not_spin() -> None:
     calls: list[float] = []
     life = Observing("line 7", lambda _: None, lambda _: calls.append(0.0), lambda: None)
     life.start(1.0)
-    time.sleep(0.2)
+    began = time.monotonic()
+    wait_for(lambda: len(calls) >= 3)
     life.stop()
-    assert 1 <= len(calls) <= 1 + 0.2 / observing.WATCH_PAUSE + 10
+    assert len(calls) <= 2 + (time.monotonic() - began) / observing.WATCH_PAUSE
 
 
 def test_an_error_in_the_drivers_watch_is_a_loss(quick: None, caplog: pytest.LogCaptureFixture) -> None:

@@ -13,6 +13,7 @@ import pytest
 from arcor2_drivers.robotiq_2f.rtu_link import decode, encode
 from arcor2_drivers.robotiq_2f.status import Activation, Command, Object
 from tests.fakes.conftest import FakeProcess
+from tests.waiting import WITHIN
 
 CLEAR = "09 10 03 E8 00 03 06 00 00 00 00 00 00 73 30"
 ACTIVATE = "09 10 03 E8 00 03 06 01 00 00 00 00 00 72 E1"
@@ -76,17 +77,17 @@ def test_the_fake_answers_as_in_the_example_of_the_manual(fake: FakeProcess, wai
 
     def ask(frame: str, length: int) -> str:
         os.write(descriptor, bytes.fromhex(frame))
-        came, until = b"", time.monotonic() + 3.0
-        while len(came) < length and time.monotonic() < until:
+        answer, until = b"", time.monotonic() + WITHIN
+        while len(answer) < length and time.monotonic() < until:
             if select.select([descriptor], [], [], 0.1)[0]:
-                came += os.read(descriptor, 64)
-        return came.hex(" ").upper()
+                answer += os.read(descriptor, 64)
+        return answer.hex(" ").upper()
 
     try:
         assert ask(CLEAR, 8) == WRITTEN
         assert ask(ACTIVATE, 8) == WRITTEN
         wait_for(lambda: ask(ASK_ACTIVATION, 7), lambda answer: answer == ACTIVATING)
-        # gOBJ, the upper two bits, counts only when the gripper was told to go somewhere.
+        # gOBJ, the upper two bits, counts only after a motion command.
         wait_for(
             lambda: int(ask(ASK_ACTIVATION, 7)[9:11], 16) & 0x3F, lambda status: status == int(ACTIVATED[9:11], 16)
         )

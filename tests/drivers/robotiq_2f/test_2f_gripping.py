@@ -155,7 +155,7 @@ def test_stop_ends_a_grip_and_keeps_the_part(
         gripper.release()
     gripper.stop()
     position = fake.truth()["position"]
-    thread.join(5.0)
+    thread.join(30.0)
     assert isinstance(outcome[0], Cancelled)
     assert 3 < position < 230
     assert fake.truth()["position"] == position
@@ -175,7 +175,7 @@ def test_stop_ends_an_activation(fake: FakeProcess, observed: Robotiq2F, wait_fo
     thread, outcome = in_background(observed.activate)
     wait_for(lambda: fake.truth()["registers"]["STA"] == 1)
     observed.stop()
-    thread.join(5.0)
+    thread.join(30.0)
     assert isinstance(outcome[0], Cancelled)
     assert fake.truth()["registers"]["STA"] == 0
     observed.activate()
@@ -189,7 +189,7 @@ def test_major_fault_ends_a_grip_and_is_acknowledged(
     thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
     wait_for(gripper.state, lambda state: state is GripperState.MOVING)
     fake.control.do("fault", code=code)
-    thread.join(5.0)
+    thread.join(30.0)
     error = outcome[0]
     assert isinstance(error, DeviceFault)
     assert error.fault_code == code
@@ -232,7 +232,7 @@ def test_a_power_cycle_during_a_grip(fake: FakeProcess, gripper: Robotiq2F, wait
     thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
     wait_for(gripper.state, lambda state: state is GripperState.MOVING)
     fake.control.do("power_cycle")
-    thread.join(5.0)
+    thread.join(30.0)
     assert isinstance(outcome[0], DeviceFault)
     assert gripper.state() is GripperState.INACTIVE
     commands = fake.truth()["count"]
@@ -255,7 +255,7 @@ def test_another_client_is_detected_and_named(
     with pytest.raises(NotInControl, match="another client, which moves the gripper, has it"):
         gripper.take_control()
     other.stop()
-    thread.join(5.0)
+    thread.join(30.0)
     gripper.take_control()
     gripper.release()
 

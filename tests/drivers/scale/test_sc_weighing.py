@@ -23,7 +23,6 @@ from arcor2_hw.exceptions import (
     Refused,
     Stale,
 )
-from arcor2_hw.testing.own_time import own_time
 from tests.fakes.conftest import FakeProcess
 
 on_both = pytest.mark.parametrize("fake", ["pty", "tcp"], indirect=True)
@@ -79,18 +78,17 @@ def test_an_unstable_load_is_waited_for_and_not_tared(fake: FakeProcess, scale: 
             call()
     assert not {"T", "Z", "@"} & set(fake.truth()["received"])
     assert abs(scale.weigh(stable=False).value) < 0.01
-    began = own_time()
+    began = time.monotonic()
     with pytest.raises(DeviceTimeout, match=r"^scale at .*: the load did not become stable within 1 s"):
         scale.weigh()
-    ended = own_time()
-    assert ended.clock - began.clock > 0.95
-    assert ended - began < 1.9
+    assert time.monotonic() - began > 0.95
     assert scale.connection is Connection.ONLINE
     fake.control.do("vibrate", on=False)
     assert scale.weight() == 0.0
 
 
-def test_stop_ends_a_weighing(fake: FakeProcess, make: Callable[..., MtSicsScale]) -> None:
+def interrupted(fake: FakeProcess, make: Callable[..., MtSicsScale], interrupt: Callable[[MtSicsScale], None]) -> Any:
+    """Interrupt a weighing that waits for a stable load; return its outcome."""
     scale = make(fake.ready["port"], stable_timeout=30.0)
     scale.connect()
     fake.control.do("vibrate", on=True)
@@ -105,9 +103,19 @@ def test_stop_ends_a_weighing(fake: FakeProcess, make: Callable[..., MtSicsScale
     thread = threading.Thread(target=weigh)
     thread.start()
     fake.control.wait_until(lambda truth: truth["received"].count("SI") >= 3)
-    scale.stop()
-    thread.join(20.0)
-    assert isinstance(outcome[0], Cancelled)
+    interrupt(scale)
+    thread.join(30.0)
+    return outcome[0]
+
+
+def test_stop_ends_a_weighing(fake: FakeProcess, make: Callable[..., MtSicsScale]) -> None:
+    assert isinstance(interrupted(fake, make, MtSicsScale.stop), Cancelled)
+
+
+def test_disconnecting_ends_a_weighing(fake: FakeProcess, make: Callable[..., MtSicsScale]) -> None:
+    began = time.monotonic()
+    assert isinstance(interrupted(fake, make, MtSicsScale.disconnect), DeviceError)
+    assert time.monotonic() - began < 15.0  # the weighing waits for 30 s
 
 
 def test_weights_out_of_range_are_errors(fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any]) -> None:
@@ -196,7 +204,6 @@ def test_unplugging_and_reconnecting(fake: FakeProcess, scale: MtSicsScale, wait
 def test_invalid_answers_of_the_device_are_typed_errors(
     fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any], fault: str
 ) -> None:
-    began = own_time()
     with scale.line.held():
         fake.control.do(fault)
         with pytest.raises(
@@ -204,9 +211,8 @@ def test_invalid_answers_of_the_device_are_typed_errors(
             match=f"^scale at {fake.ready['port']} (did not answer|gave no valid answer to) SI within 0.4 s",
         ):
             scale.weigh()
-    assert own_time() - began < 1.0
     fake.control.do("heal")
-    wait_for(lambda: scale.connection, lambda state: state is Connection.BACK, within=8.0)
+    wait_for(lambda: scale.connection, lambda state: state is Connection.BACK)
     assert scale.weight() == 0.0
 
 
@@ -216,8 +222,8 @@ def test_a_late_answer_is_discarded(fake: FakeProcess, scale: MtSicsScale, wait_
         with pytest.raises(DeviceTimeout):
             scale.weigh()
         fake.control.do("heal")
-    fake.control.do("put", kg=0.7)
-    wait_for(lambda: scale.connection, lambda state: state is Connection.BACK, within=8.0)
+        fake.control.do("put", kg=0.7)
+    wait_for(lambda: scale.connection, lambda state: state is Connection.BACK)
     assert scale.weight() == 0.7  # the late zero was not taken for it
 
 

@@ -19,8 +19,8 @@ def ask(fake: FakeProcess, method: str, path: str, key: str = "", body: Any = No
     """Ask in bytes of our own making; gives status, body and head."""
     data = b"" if body is None else msgspec.json.encode(body)
     head = f"{method} {path} HTTP/1.1\r\nHost: x\r\nContent-Length: {len(data)}\r\nIdempotency-Key: {key}\r\n\r\n"
-    with socket.create_connection(parse_address(fake.ready["url"].removeprefix("http://")), 2.0) as line:
-        line.settimeout(2.0)
+    with socket.create_connection(parse_address(fake.ready["url"].removeprefix("http://")), 30.0) as line:
+        line.settimeout(30.0)
         line.sendall(head.encode() + data)
         came = b""
         while True:

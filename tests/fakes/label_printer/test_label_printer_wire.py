@@ -10,7 +10,7 @@ GETVAR = b'! U1 getvar "odometer.total_label_count"\r\n'
 
 def test_commands_on_the_wire(start_fake: Callable[..., Any]) -> None:
     fake = start_fake("label_printer", "--duration", "0.05")
-    with serial.serial_for_url(fake.ready["port"], timeout=2.0) as line:
+    with serial.serial_for_url(fake.ready["port"], timeout=30.0) as line:
 
         def status() -> bytes:
             line.write(b"~HS")

@@ -198,6 +198,6 @@ def test_half_a_frame_and_silence_on_the_line(fake: FakeProcess) -> None:
 
 
 def test_the_process_ends_on_sigterm_and_refuses_invalid_arguments(fake: FakeProcess) -> None:
-    with pytest.raises(Exception, match="no servo 7"):
+    with pytest.raises(Exception, match="servo 7 does not exist"):
         fake.control.do("hardware_error", servo=7)
     assert fake.terminate() == 0

@@ -46,12 +46,12 @@ def token(server: ServerProcess, name: str, role: Role, days: int | None = None)
 
 
 def rest(server: ServerProcess, **options: Any) -> httpx.AsyncClient:
-    return httpx.AsyncClient(base_url=server.url.replace("ws", "http", 1), **options)
+    return httpx.AsyncClient(timeout=60, base_url=server.url.replace("ws", "http", 1), **options)
 
 
 async def closed_with(socket: ClientConnection) -> int | None:
     """Give the code with which the server closes."""
-    async with asyncio.timeout(15):
+    async with asyncio.timeout(60):
         with contextlib.suppress(ConnectionClosedError):
             async for _ in socket:
                 pass
@@ -135,7 +135,7 @@ async def test_the_server_starts_with_damaged_token_files(tmp_path: Path) -> Non
         (data / name).write_text("{" * 10_000)
     missing = {name: str(data / name).removesuffix(Path(name).suffix) for name in damaged}
     async with running(data) as server:
-        async with connect(server.url, additional_headers=bearer(secret)) as socket, asyncio.timeout(15):
+        async with connect(server.url, additional_headers=bearer(secret)) as socket, asyncio.timeout(60):
             async for message in socket:
                 event = json.loads(message)
                 if event["event"] == "Notification":
@@ -249,7 +249,7 @@ async def test_without_tokens_local_clients_have_all_rights(tmp_path: Path) -> N
 # ------------------------------------------------------------------------------------------------ other machines
 def start(tmp_path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     command = [*COMMAND, "serve", "--port", "0", "--data-dir", str(tmp_path / "data"), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
 def test_other_machines_are_not_served_without_tokens(tmp_path: Path) -> None:
@@ -344,7 +344,7 @@ async def test_legacy_clients_have_a_separate_port(tmp_path: Path) -> None:
 def test_tokens_are_managed_by_the_command_line(tmp_path: Path) -> None:
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "arcor2_server.cli.main", "token", *arguments, "--data-dir", str(tmp_path)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+        return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
     assert "no token" in run("list").stdout
     added = run("add", "line 3", "--role", "technician", "--days", "30")

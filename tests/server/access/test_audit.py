@@ -34,7 +34,7 @@ async def test_commands_and_refusals_are_logged_once(tmp_path: Path) -> None:
             await talker.request("RenameScene", {"id": "x", "new_name": "y"}, dry_run=True)
             await talker.granted("ListScenes")
             await talker.granted("GetObjectTypes")
-        async with httpx.AsyncClient(base_url=server.url.replace("ws", "http")) as http:
+        async with httpx.AsyncClient(timeout=60, base_url=server.url.replace("ws", "http")) as http:
             assert (await http.delete("/scenes/none", headers=headers)).status_code == 404
             assert (await http.get("/scenes", headers=headers)).status_code == 200
             forbidden = await http.delete("/scenes/other", headers={"Authorization": f"Bearer {ivo}"})

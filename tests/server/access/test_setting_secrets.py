@@ -98,21 +98,21 @@ def open_to_others(directory: Path) -> list[str]:
 @contextlib.asynccontextmanager
 async def listening(server: ServerProcess) -> AsyncIterator[list[str]]:
     """Collect whatever another client is sent."""
-    heard: list[str] = []
+    received: list[str] = []
     async with connect(server.url) as socket:
-        yield heard
+        yield received
         with contextlib.suppress(TimeoutError):
             while True:
-                heard.append(str(await asyncio.wait_for(socket.recv(), 0.2)))
+                received.append(str(await asyncio.wait_for(socket.recv(), 0.2)))
 
 
 async def test_a_secret_reaches_the_device_and_nobody_else(tmp_path: Path) -> None:
     data = tmp_path / "data"
     async with (
         running(data) as server,
-        listening(server) as heard,
+        listening(server) as received,
         Client(server.url, "ann") as client,
-        httpx.AsyncClient(base_url=server.url.replace("ws", "http")) as http,
+        httpx.AsyncClient(timeout=60, base_url=server.url.replace("ws", "http")) as http,
     ):
         call = client.call
         uploaded = await http.put("/object-types", json={"id": "Vault", "name": "Vault", "source": VAULT})
@@ -196,8 +196,8 @@ async def test_a_secret_reaches_the_device_and_nobody_else(tmp_path: Path) -> No
         answers += [files.read(name).decode(errors="replace") for name in files.namelist()]
     with zipfile.ZipFile(io.BytesIO(diagnosis)) as files:
         answers += [files.read(name).decode(errors="replace") for name in files.namelist()]
-    answers += heard
-    assert len(heard) > 20
+    answers += received
+    assert len(received) > 20
     for secret in (CODE, OTHER, UNSAVED):
         assert [answer for answer in answers if secret in answer] == []
     assert leaks(tmp_path, CODE, OTHER, UNSAVED) == []
@@ -274,7 +274,7 @@ async def test_a_secret_reference_is_resolved_only_for_its_setting(tmp_path: Pat
         secrets = services.secrets
         (first,) = secrets.hide("YuMi", [setting("password", CODE)])
         (second,) = secrets.hide("YuMi", [setting("password", CODE)])
-        assert first != second  # equal passwords cannot be told by their references
+        assert first != second  # references do not reveal equal passwords
         assert secrets.hide("YuMi", [setting("password", CODE)], [first]) == [first]
         assert secrets.hide("YuMi", [first]) == [first]
         assert secrets.hide("YuMi", [setting("password", HIDDEN)], [first]) == [first]
@@ -286,7 +286,7 @@ async def test_a_secret_reference_is_resolved_only_for_its_setting(tmp_path: Pat
         # A secret cannot be sent to another device.
         with pytest.raises(InvalidData, match="another setting"):
             secrets.hide("Other", [msgspec.structs.replace(first, name="api_key")])
-        # A reference of another server is kept, and says nothing.
+        # A reference of another server is stored and reveals nothing.
         away = setting("password", HIDDEN + "0123456789abcdef")
         assert secrets.hide("YuMi", [away]) == [away]
         assert secrets.values_for(scene_with(setting("host", "yumi1"), away)) == {}
@@ -303,7 +303,7 @@ async def test_a_secret_is_not_sent_to_another_host(tmp_path: Path) -> None:
     async with (
         running(tmp_path / "data") as server,
         Client(server.url, "ann") as client,
-        httpx.AsyncClient(base_url=server.url.replace("ws", "http")) as http,
+        httpx.AsyncClient(timeout=60, base_url=server.url.replace("ws", "http")) as http,
     ):
         call = client.call
         await http.put("/object-types", json={"id": "Vault", "name": "Vault", "source": VAULT})

@@ -41,7 +41,7 @@ DECLARED = {
     "ask2": ObjectAction("ask2", returns=["boolean", "boolean"]),
     "use": ObjectAction("use", parameters=[ParameterMeta("flag", "boolean"), ParameterMeta("x", "double")]),
 }
-TYPES = {"Thing": TypeFacts("object_types.thing", DECLARED)}
+TYPES = {"Thing": TypeFacts("object_types.thing", "Thing", DECLARED)}
 SCENE = Scene("scene", objects=[SceneObject("thing", "Thing", id=OBJECT)], id="scn_1")
 
 

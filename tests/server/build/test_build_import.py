@@ -101,7 +101,7 @@ async def test_a_package_is_imported_completely(here: Any, packed: bytes) -> Non
     # What came back can be built again at once, into the same program.
     again = files_in(await here.build.publish("pro_1"))
     assert again["script.py"] == files_in(packed)["script.py"]
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(30):
         while not here.hub.told:
             await asyncio.sleep(0.05)
     assert [event.event for event in here.hub.told] == ["ChangedObjectTypes"]

@@ -398,6 +398,10 @@ def test_a_boolean_has_no_default_branch() -> None:
 def test_branching_requires_a_supported_result_type() -> None:
     draft = choosing("low", None)
     project = draft.project()
-    types = {"Thing": TypeFacts("object_types.thing", {**DECLARED, "sort": ObjectAction("sort", returns=["double"])})}
+    types = {
+        "Thing": TypeFacts(
+            "object_types.thing", "Thing", {**DECLARED, "sort": ObjectAction("sort", returns=["double"])}
+        )
+    }
     with pytest.raises(InvalidProject, match="r is double, which a condition cannot use"):
         from_logic(SCENE, project, types)

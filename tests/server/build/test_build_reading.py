@@ -289,7 +289,7 @@ def test_numbers_and_texts_with_an_else() -> None:
     before = workplace.project()
     facts = {**workplace.FACTS}
     more = {**facts["FlowActions"].actions, "count": ObjectAction("count", returns=["integer"])}
-    facts["FlowActions"] = TypeFacts("object_types.flow_actions", more)
+    facts["FlowActions"] = TypeFacts("object_types.flow_actions", "Program flow", more)
 
     def steps(branches: str) -> list[tuple[str, str, str]]:
         source = edited((PICK, counted + branches))
@@ -341,7 +341,7 @@ def test_a_script_of_the_original_is_read() -> None:
         (ABOVE, "        robot.pick(  #!\n            aps.feeder.poses.default)\n", "has no name"),
         (ABOVE, "        robot.pick(aps.feeder.poses.default, an=name)  #!\n", "must be a string, not name"),
         (BACK, '        robot.pick(aps.feeder.poses.default, an="pick")  #!\n', "already has an action 'pick'"),
-        (ABOVE, '        robot.fly(an="x")  #!\n', "Arm has no action fly"),
+        (ABOVE, '        robot.fly(an="x")  #!\n', "Robot arm has no action fly"),
         (ABOVE, '        robot.pick(an="x")  #!\n', "parameter pose of pick is missing"),
         (ABOVE, '        robot.pick(aps.nowhere.poses.default, an="x")  #!\n', "the project has no aps.nowhere"),
         (
@@ -497,6 +497,6 @@ def test_unusual_scripts_are_read_or_refused() -> None:
     )
     facts = {**workplace.FACTS}
     more = {**facts["FlowActions"].actions, "count": ObjectAction("count", returns=["integer"])}
-    facts["FlowActions"] = TypeFacts("object_types.flow_actions", more)
+    facts["FlowActions"] = TypeFacts("object_types.flow_actions", "Program flow", more)
     project = from_script(source, workplace.scene(), workplace.project(), facts)
     assert len([step for step in steps_of(project) if step[0] == "count"]) == 401

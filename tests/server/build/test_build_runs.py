@@ -121,7 +121,7 @@ async def test_a_handwritten_script_runs_and_can_be_debugged(server: Server) -> 
     dropped = await client.event("ActionStateBefore", lambda data: data["parameters"][1:] == ["0.2"])
     assert '"x"' in dropped["parameters"][0]
     await ended(server)
-    assert server.services.execution.last_error is None
+    assert server.services.execution.program.error is None
 
 
 @serving()
@@ -144,7 +144,7 @@ async def test_handwritten_scripts_that_fail_or_are_stopped(server: Server) -> N
     await server.client.event("ActionStateBefore")
     await server.ask("StopPackage")
     await ended(server)
-    assert server.services.execution.last_error is None
+    assert server.services.execution.program.error is None
 
 
 async def test_a_handwritten_script_is_checked_before_a_build(tmp_path: Path) -> None:

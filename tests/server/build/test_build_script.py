@@ -113,7 +113,8 @@ def test_colliding_names_are_made_unique() -> None:
             workplace.step("third", "END"),
         ],
     )
-    source = script.from_logic(scene, project, {"Thing": TypeFacts("object_types.thing", {"ask": ask})})
+    facts = {"Thing": TypeFacts("object_types.thing", "Thing", {"ask": ask})}
+    source = script.from_logic(scene, project, facts)
     tree = ast.parse(source)
     main = next(node for node in tree.body if isinstance(node, ast.FunctionDef))
     stored = [n.id for n in ast.walk(main) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
@@ -121,7 +122,7 @@ def test_colliding_names_are_made_unique() -> None:
         ["aps", "main_2", "aps_2", "print_2", "Thing", "lambda_", "limit", "aps_3", "aps_4", "limit_2"]
     )
     assert "from object_types.thing import Thing as ThingType" in source
-    assert script.from_logic(scene, project, {"Thing": TypeFacts("object_types.thing", {"ask": ask})}) == source
+    assert script.from_logic(scene, project, facts) == source
 
 
 @given(st.lists(st.text(max_size=8), max_size=20))
@@ -165,7 +166,7 @@ def test_formatted_code_equals_its_syntax_tree(values: list[str]) -> None:
     logic.append(msgspec.structs.replace(logic[-1], start=f"act_{len(names) - 1}", end="END"))
     scene = Scene("s", id="scn_1", objects=[SceneObject("thing", "Thing", id="obj_1")])
     project = Project("p", "scn_1", action_points=[ActionPoint("ap", Position(), actions=actions)], logic=logic)
-    source = script.from_logic(scene, project, {"Thing": TypeFacts("object_types.thing", {"say": declared})})
+    source = script.from_logic(scene, project, {"Thing": TypeFacts("object_types.thing", "Thing", {"say": declared})})
     calls = [
         keyword.value.value
         for node in ast.walk(ast.parse(source))
@@ -227,7 +228,7 @@ def _with(name: str, *arguments: tuple[str, str, str], method: str = "", results
         (_with("pick", ("pose", "pose", '"ori_good"'), ("grip", "string_enum", '"x"')), "'pick': parameter grip"),
         (_with("pick", ("pose", "pose", "not json")), "'pick': parameter pose: the value is not JSON"),
         (_with("pick", ("pose", "pose", '"ori_good"'), results=("a",)), "'pick' names 1 results, but pick returns 0"),
-        (_with("pick", method="obj_robot/fly"), "'pick': Arm has no action fly"),
+        (_with("pick", method="obj_robot/fly"), "'pick': Robot arm has no action fly"),
         (_with("pick", method="nonsense"), "'pick'"),
         (_with("scan code", ("timeout", "link", '"act_boards_left?/default/0"'), results=("code",)), "needs double"),
         (
@@ -273,9 +274,9 @@ def test_a_disabled_action_is_refused_with_its_problem() -> None:
     broken = ObjectAction("drop", disabled=True, problem="no return annotation")
     facts = {
         **workplace.FACTS,
-        "Arm": TypeFacts("object_types.arm", {**workplace.FACTS["Arm"].actions, "drop": broken}),
+        "Arm": TypeFacts("object_types.arm", "Robot arm", {**workplace.FACTS["Arm"].actions, "drop": broken}),
     }
-    with pytest.raises(InvalidProject, match=r"'throw away': Arm\.drop cannot be used: no return annotation"):
+    with pytest.raises(InvalidProject, match=r"'throw away': drop of Robot arm cannot be used: no return annotation"):
         script.from_logic(workplace.scene(), workplace.project(), facts)
 
 

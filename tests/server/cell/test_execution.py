@@ -17,13 +17,13 @@ from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.project import Action, ActionPoint, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidPackage, NotFound
-from arcor2_hw.testing.own_time import own_time
 from arcor2_server.errors import RequestRefused
 from arcor2_server.storage import packages as packages_module
 from arcor2_server.storage.packages import Packages
 from tests.runtime.conftest import Package, scene_object
+from tests.server.core.serving import until
 
-from .conftest import Recorder, Server, serving
+from .conftest import PATIENCE, Recorder, Server, serving
 
 LAMP = """
 class Lamp(Generic):
@@ -33,11 +33,11 @@ class Lamp(Generic):
         return times
     @action
     def wait(self, *, an: str | None = None) -> None:
-        time.sleep(30)
+        time.sleep(300)
     @action
     def hold_all(self, after: float, *, an: str | None = None) -> None:
         time.sleep(after)
-        ctypes.PyDLL(None).sleep(60)
+        ctypes.PyDLL(None).sleep(300)
 """
 OBJ = "obj_lamp"
 NAMES = ("a", "b", "c")
@@ -63,11 +63,9 @@ def states(events: list[dict[str, Any]]) -> list[str]:
 
 
 async def until_stopped(server: Server, client: Recorder | None = None) -> list[str]:
-    """Wait for the end; gives everything that was told, in order."""
+    """Wait for the end. Return all states and other events, in order."""
     client = client or server.client
-    async with asyncio.timeout(15):
-        while not client.got or client.got[-1]["event"] != "ShowMainScreen":
-            await asyncio.sleep(0.01)
+    await until(lambda: client.got and client.got[-1]["event"] == "ShowMainScreen")
     return states(client.got)
 
 
@@ -76,8 +74,7 @@ async def test_clients_see_each_state_of_a_run(server: Server) -> None:
     write(server, 'for n in ("a", "b"): lamp.blink(2, an=n)')
     await server.ask("RunPackage", {"id": "pkg_1"})
     action = ["ActionStateBefore", "ActionStateAfter"]
-    told = await until_stopped(server)
-    assert told == [
+    assert await until_stopped(server) == [
         "started",
         "response RunPackage",
         "running",
@@ -89,7 +86,7 @@ async def test_clients_see_each_state_of_a_run(server: Server) -> None:
     assert server.client.got[0]["data"] == {"state": "started", "package_id": "pkg_1"}
     assert server.client.got[5]["data"] == {"action_id": "act_a", "results": ["2"]}
     assert server.client.got[-1]["data"] == {"what": "PackagesList", "highlight": "pkg_1"}
-    async with asyncio.timeout(5):  # it is noted beside the run, so as not to delay it
+    async with asyncio.timeout(PATIENCE):  # it is stored concurrently with the run
         while not isinstance((await server.ask("ListPackages"))[0].package_meta.executed, str):
             await asyncio.sleep(0.02)
     [summary] = await server.ask("ListPackages")
@@ -134,11 +131,9 @@ async def test_a_killed_host_ends_the_run(server: Server) -> None:
     await server.client.event("ActionStateBefore")
     host = server.services.execution._host.host
     assert host is not None
-    began = own_time()
     os.kill(host.pid, signal.SIGKILL)
     lost = await server.client.event("ProjectException")
     await server.client.state("stopped", "PackageState")
-    assert own_time() - began < 1.0
     assert "SIGKILL" in lost["message"]
     assert not lost["handled"]
 
@@ -146,14 +141,12 @@ async def test_a_killed_host_ends_the_run(server: Server) -> None:
 @serving()
 async def test_a_program_that_holds_the_interpreter_is_killed(server: Server) -> None:
     server.services.execution.stop_within = 0.3
-    write(server, 'lamp.hold_all(0.2, an="a")')  # long enough for what was told to get out
+    write(server, 'lamp.hold_all(0.2, an="a")')  # the event is sent before
     await server.ask("RunPackage", {"id": "pkg_1"})
     await server.client.event("ActionStateBefore")
     await asyncio.sleep(0.3)
-    began = own_time()
     await server.ask("StopPackage")
     await server.client.state("stopped", "PackageState")
-    assert own_time() - began < 2.0
     assert all(event["event"] != "ProjectException" for event in server.client.got)
 
 
@@ -162,13 +155,11 @@ async def test_a_program_that_hangs_during_its_start_can_be_stopped(server: Serv
     server.services.execution.stop_within = 0.1
     write(server, "")
     script = server.services.settings.packages_dir / "pkg_1" / "script.py"
-    script.write_text("import ctypes\nctypes.PyDLL(None).sleep(60)")
+    script.write_text("import ctypes\nctypes.PyDLL(None).sleep(300)")
     await server.ask("RunPackage", {"id": "pkg_1"})
     with pytest.raises(RequestRefused):
         await server.ask("StopPackage")
-    async with asyncio.timeout(5):
-        while server.services.execution.board.answering:
-            await asyncio.sleep(0.02)
+    await until(lambda: not server.services.execution.board.answering)
     await server.ask("StopPackage")
     await server.client.state("stopped", "PackageState")
 
@@ -177,10 +168,10 @@ async def test_a_program_that_hangs_during_its_start_can_be_stopped(server: Serv
 async def test_a_script_error_is_reported(server: Server) -> None:
     write(server, "print('x' * 200_000)\nraise KeyError('gone')")
     await server.ask("RunPackage", {"id": "pkg_1"})
-    told = await server.client.event("ProjectException")
-    assert (told["type"], told["handled"]) == ("KeyError", False)
+    exception = await server.client.event("ProjectException")
+    assert (exception["type"], exception["handled"]) == ("KeyError", False)
     await server.client.state("stopped", "PackageState")
-    error = server.services.execution.last_error
+    error = server.services.execution.program.error
     assert error is not None
     assert error.type == "KeyError"
 

@@ -65,7 +65,7 @@ class ServerProcess:
     async def stop(self) -> int:
         if self.process.returncode is None:
             self.process.send_signal(signal.SIGTERM)
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(30):
             await self.process.communicate()
         assert self.process.returncode is not None
         return self.process.returncode
@@ -82,7 +82,7 @@ async def running(data_dir: Path, *arguments: str, **environment: str) -> AsyncI
 
 
 class Talker:
-    """One bare connection: what comes is kept as it came, answers apart from events."""
+    """One bare connection. It stores received messages in order, answers separate from events."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket = socket

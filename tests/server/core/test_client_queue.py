@@ -7,6 +7,7 @@ import pytest
 
 from arcor2_server.settings import ServerSettings
 from arcor2_server.websocket.client import Client, CloseCode, Wire
+from tests.server.core.serving import until
 
 
 class ValveWire(Wire):
@@ -60,7 +61,7 @@ async def test_order_and_newest_of_a_stream(wire: ValveWire, tmp_path: Path) -> 
     assert wire.sent == [b"at once"]
     wire.open.clear()
     client.put(b"first")
-    await asyncio.sleep(0)  # the writer now waits with `first` in its hands
+    await asyncio.sleep(0)  # the writer is now sending `first`
     client.put_newest("joints/a", b"a1")
     client.put(b"second")
     client.put_newest("joints/b", b"b1")
@@ -69,7 +70,7 @@ async def test_order_and_newest_of_a_stream(wire: ValveWire, tmp_path: Path) -> 
     client.put(b"third")
     wire.open.set()
     client.put(b"fourth")
-    await asyncio.sleep(0.01)
+    await until(lambda: len(wire.sent) == 7)
     assert wire.sent[1:] == [b"first", b"a999", b"second", b"b1", b"third", b"fourth"]
     client.put_newest("joints/a", b"later")
     assert wire.sent[-1] == b"later"
@@ -78,7 +79,7 @@ async def test_order_and_newest_of_a_stream(wire: ValveWire, tmp_path: Path) -> 
     assert wire.closed == (1000, "bye")
 
 
-@pytest.mark.parametrize("limits", [{"outgoing_messages": 10}, {"outgoing_bytes": 1000}, {"outgoing_age": 0.05}])
+@pytest.mark.parametrize("limits", [{"outgoing_messages": 10}, {"outgoing_bytes": 1000}, {"outgoing_age": 60.0}])
 async def test_a_client_that_lags_too_far_is_closed(
     wire: ValveWire, tmp_path: Path, limits: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -90,7 +91,8 @@ async def test_a_client_that_lags_too_far_is_closed(
         client.put(b"x" * 90)
         await asyncio.sleep(0)
     assert not client.closed
-    await asyncio.sleep(0.06)
+    assert client._sending_since is not None
+    client._sending_since -= 61.0
     for _ in range(9):
         client.put(b"x" * 90)
     assert client.closed
@@ -98,7 +100,7 @@ async def test_a_client_that_lags_too_far_is_closed(
     assert client._bytes == 0
     assert client._closing is not None
     assert client._closing[0] == CloseCode.TOO_SLOW
-    async with asyncio.timeout(2):
+    async with asyncio.timeout(30):
         await writer
     assert wire.aborted
 

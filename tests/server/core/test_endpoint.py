@@ -65,8 +65,8 @@ class Socket:
     def hang_up(self) -> None:
         self.incoming.put_nowait({"type": "websocket.disconnect"})
 
-    async def heard(self, count: int) -> list[dict[str, Any]]:
-        async with asyncio.timeout(5):
+    async def received(self, count: int) -> list[dict[str, Any]]:
+        async with asyncio.timeout(30):
             while len(self.protocol.sent) < count:
                 await asyncio.sleep(0.001)
         return self.protocol.sent
@@ -118,12 +118,16 @@ async def test_events_are_sent_before_or_after_the_answer_as_declared(
 
         handle(connect, "SaveScene", handler)
         ann, bob = connect(), connect()
-        await bob.heard(1)
+        await bob.received(1)
         ann.say(id=1, request="SaveScene")
-        heard = await ann.heard(4)
-        assert [one.get("event") or one["response"] for one in heard[1:]] == ["ProjectSaved", "SaveScene", "SceneSaved"]
-        assert heard[2] == {"id": 1, "response": "SaveScene", "result": True, "data": ["x"]}
-        assert [one["event"] for one in (await bob.heard(3))[1:]] == ["ProjectSaved", "SceneSaved"]
+        received = await ann.received(4)
+        assert [one.get("event") or one["response"] for one in received[1:]] == [
+            "ProjectSaved",
+            "SaveScene",
+            "SceneSaved",
+        ]
+        assert received[2] == {"id": 1, "response": "SaveScene", "result": True, "data": ["x"]}
+        assert [one["event"] for one in (await bob.received(3))[1:]] == ["ProjectSaved", "SceneSaved"]
 
 
 async def test_a_refusal_drops_events_unless_something_was_done(
@@ -143,9 +147,9 @@ async def test_a_refusal_drops_events_unless_something_was_done(
         handle(connect, "SaveProject", partly)
         ann = connect()
         ann.say(id=1, request="SaveScene")
-        await ann.heard(2)
+        await ann.received(2)
         ann.say(id=2, request="SaveProject")
-        assert (await ann.heard(4))[1:] == [
+        assert (await ann.received(4))[1:] == [
             {"id": 1, "response": "SaveScene", "result": False, "messages": ["not now"]},
             {"event": "ProjectSaved"},
             {"id": 2, "response": "SaveProject", "result": False, "messages": ["not all"], "data": ["a"]},
@@ -161,7 +165,7 @@ async def test_typed_errors_become_the_message(services: Server, monkeypatch: py
         handle(connect, "SaveScene", handler)
         ann = connect()
         ann.say(id=1, request="SaveScene")
-        assert (await ann.heard(2))[1]["messages"] == ["robot at 10.0.0.1 did not answer"]
+        assert (await ann.received(2))[1]["messages"] == ["robot at 10.0.0.1 did not answer"]
 
 
 async def test_unexpected_errors_refer_to_the_log(services: Server, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -181,10 +185,10 @@ async def test_unexpected_errors_refer_to_the_log(services: Server, monkeypatch:
         handle(connect, "SystemInfo", cached=no_cached_answer)
         ann = connect()
         with structlog.testing.capture_logs() as logged:
-            monkeypatch.setattr("arcor2_server.websocket.endpoint.log", structlog.get_logger())
+            monkeypatch.setattr("arcor2_server.websocket.dispatch.log", structlog.get_logger())
             for number, name in enumerate(("SaveScene", "SaveProject", "SystemInfo"), 1):
                 ann.say(id=number, request=name)
-            answers = {one["id"]: one for one in (await ann.heard(4))[1:]}
+            answers = {one["id"]: one for one in (await ann.received(4))[1:]}
         references = {entry["request"]: entry["reference"] for entry in logged if entry["event"] == "request failed"}
         assert set(references) == {"SaveScene", "SaveProject"}
         for number, name in ((1, "SaveScene"), (2, "SaveProject")):
@@ -206,15 +210,15 @@ async def test_bounded_number_in_flight(services: Server, monkeypatch: pytest.Mo
         ann = connect()
         for number in range(10):
             ann.say(id=number, request="SaveScene")
-        await ann.heard(1)
+        await ann.received(1)
         await asyncio.sleep(0.02)
         assert len(started) == 2
         # Another client is not held up by it.
         bob = connect()
         bob.say(id=1, request="SystemInfo")
-        await bob.heard(2)
+        await bob.received(2)
         go_on.set()
-        assert len(await ann.heard(11)) == 11
+        assert len(await ann.received(11)) == 11
         assert len(started) == 10
 
 
@@ -233,20 +237,20 @@ async def test_a_request_is_completed_after_its_client_left(services: Server, mo
         await entered.wait()
         ann.hang_up()
         go_on.set()
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(30):
             await done.wait()
 
 
 async def test_an_oversized_name_is_refused_without_events(services: Server) -> None:
     async with connecting(services) as connect:
         ann, bob = connect(), connect()
-        await bob.heard(1)
+        await bob.received(1)
         ann.say(id=1, request="RegisterUser", args={"user_name": "x" * 15_000_000}, codes=True)
-        answer = (await ann.heard(2))[-1]
+        answer = (await ann.received(2))[-1]
         assert (answer["result"], answer["code"]) == (False, "text_too_long")
         assert "user_name has 15000000 characters; at most 200 are allowed" in answer["messages"][0]
         ann.say(id=2, request="RegisterUser", args={"user_name": "x" * 200})
-        assert (await ann.heard(3))[2]["result"]
+        assert (await ann.received(3))[2]["result"]
         assert len(bob.protocol.sent) == 1
 
 
@@ -259,7 +263,7 @@ async def test_a_refusal_contains_what_is_needed_to_translate_it_if_codes_are_re
         ann = connect()
         ann.say(id=1, request="SaveScene", codes=True)
         ann.say(id=2, request="SaveScene")
-        first, second = [each for each in await ann.heard(3) if each.get("response") == "SaveScene"]
+        first, second = [each for each in await ann.received(3) if each.get("response") == "SaveScene"]
         assert first["messages"] == second["messages"] == ["The scene 's1' is open."]
         assert (first["key"], first["values"]) == ("The scene {name} is open.", {"name": "'s1'"})
         assert second.keys().isdisjoint({"code", "key", "values"})

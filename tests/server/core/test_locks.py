@@ -138,7 +138,7 @@ async def test_auto_waits_for_the_lock_then_gives_up(locks: Locks) -> None:
     with pytest.raises(Locked):
         async with locks.auto("bob", "SCENE", "robot"):
             pass
-    assert 0.14 <= loop.time() - start < 1.0
+    assert loop.time() - start >= 0.14
     assert locks.locked_roots() == ["robot"], "nothing of a refused set stays locked"
     # Also when the same user holds it.
     with pytest.raises(Locked):
@@ -195,13 +195,12 @@ async def test_a_client_cannot_get_a_lock_that_its_request_holds(locks: Locks) -
     assert await locks.write_lock("ann", "robot") == ["robot"]
 
 
-async def test_exclusive_is_refused_at_once_while_a_client_holds_a_lock(locks: Locks) -> None:
+async def test_exclusive_is_refused_at_once_while_a_client_holds_a_lock(tree: Tree) -> None:
+    locks = Locks(tree, is_stored, retries=1, retry_wait=3600.0)
     await locks.write_lock("ann", "box")
-    start = asyncio.get_running_loop().time()
     with pytest.raises(Locked):
-        async with locks.exclusive():
+        async with asyncio.timeout(30), locks.exclusive():
             pass
-    assert asyncio.get_running_loop().time() - start < 0.05
 
 
 async def test_exclusive_waits_for_silent_locks_and_blocks_others(locks: Locks) -> None:

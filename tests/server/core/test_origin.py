@@ -75,7 +75,7 @@ async def test_a_foreign_page_gets_neither_the_websocket_nor_a_route(server: Ser
         await connect(server.url, additional_headers=foreign)
     assert refused.value.response.status_code == 403
     url = server.url.replace("ws://", "http://")
-    async with httpx.AsyncClient(base_url=url) as http:
+    async with httpx.AsyncClient(timeout=60, base_url=url) as http:
         body = {"id": "Evil", "name": "Evil", "source": "class Evil: ..."}
         assert (await http.put("/object-types", json=body, headers=foreign)).status_code == 403
         assert (await http.get("/object-types", headers={"Origin": url})).json() == []
@@ -84,7 +84,7 @@ async def test_a_foreign_page_gets_neither_the_websocket_nor_a_route(server: Ser
 
 
 async def test_dns_rebinding_is_refused(server: ServerProcess) -> None:
-    async with httpx.AsyncClient(base_url=server.url.replace("ws://", "http://")) as http:
+    async with httpx.AsyncClient(timeout=60, base_url=server.url.replace("ws://", "http://")) as http:
         for path in ("/", "/editor/x", "/swagger", "/api/diagnosis", "/api/devices", "/scenes", "/projects"):
             answer = await http.get(path, headers=REBOUND)
             assert answer.status_code == 403, path
@@ -120,7 +120,7 @@ async def test_forwarded_addresses_of_untrusted_clients_are_ignored(server: Serv
 
 
 async def test_every_response_has_the_security_headers(server: ServerProcess) -> None:
-    async with httpx.AsyncClient(base_url=server.url.replace("ws://", "http://")) as http:
+    async with httpx.AsyncClient(timeout=60, base_url=server.url.replace("ws://", "http://")) as http:
         for path in ("/", "/swagger", "/object-types", "/nothing", "/healthz/ready"):
             headers = (await http.get(path)).headers
             assert headers["X-Content-Type-Options"] == "nosniff", path

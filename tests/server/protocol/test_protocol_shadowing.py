@@ -13,6 +13,7 @@ from arcor2_object_types.abstract import Generic
 
 class LogicActions(Generic):
     _ABSTRACT = False
+    display_name = "Inverted logic"
 
     def logical_not(self, value: bool, *, an: None | str = None) -> bool:
         return value
@@ -92,7 +93,7 @@ async def test_documents_use_the_type_that_shadows_an_installed_one(tmp_path: Pa
         (meta,) = event["data"]
         assert (meta["type"], meta["built_in"]) == ("LogicActions", False)
         assert meta["shadows"].startswith("arcor2-hw ")
-        assert found == ["unused: The object type LogicActions has no action 'logical_and'."]
+        assert found == ["unused: The object type Inverted logic has no action 'logical_and'."]
         assert "logical_and" in await refused(alice, "OpenProject", id=project_id)
 
         # A released package runs the code that it was built with, a new one that of the upload.
@@ -102,7 +103,8 @@ async def test_documents_use_the_type_that_shadows_an_installed_one(tmp_path: Pa
         assert await run(alice, rebuilt) == ["true"]
 
         # Deleting restores the installed type. The program that runs goes on as it is.
-        assert "is used in the scenes" in (await deleted(alice, "LogicActions"))[0]["error"]
+        (kept,) = await deleted(alice, "LogicActions")
+        assert kept["error"].startswith("The object type Inverted logic is used in the scenes")
         await stage.services.storage.delete_object_type("LogicActions")
         await stage.services.type_notifications.uploaded()
         assert await problems(alice, project_id) == []

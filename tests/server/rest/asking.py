@@ -20,7 +20,7 @@ TRANSLATION = {"key", "values"}
 async def asking(services: Server) -> AsyncIterator[httpx.AsyncClient]:
     """Give what asks the parts of a server over REST, without a network between."""
     transport = httpx.ASGITransport(create_app(services))  # type: ignore[arg-type]
-    async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1:6789") as client:
+    async with httpx.AsyncClient(timeout=60, transport=transport, base_url="http://127.0.0.1:6789") as client:
         yield client
 
 

@@ -118,7 +118,7 @@ async def test_the_bundle_contains_open_documents_and_no_secrets(
     def by(token: str) -> dict[str, str]:
         return {"Authorization": f"Bearer {token}"}
 
-    async with Client(server.url, "ada", token=key) as client, httpx.AsyncClient(base_url=base) as http:
+    async with Client(server.url, "ada", token=key) as client, httpx.AsyncClient(timeout=60, base_url=base) as http:
         await client.new_scene("hall 7")
         values: dict[str, Any] = {"host": "127.0.0.9", "password": PASSWORD}
         given = [Parameter(name, "string", msgspec.json.encode(value).decode()) for name, value in values.items()]

@@ -9,19 +9,19 @@ from tests.server.rest.test_rest_storage import lamp, scene
 
 
 async def test_types_are_announced_before_the_scene_opens(server: ServerProcess) -> None:
-    async with httpx.AsyncClient(base_url=base(server)) as http, talking(server.url, "ann") as ann:
+    async with httpx.AsyncClient(timeout=60, base_url=base(server)) as http, talking(server.url, "ann") as ann:
         for name in ("LampA", "LampB"):
             granted(await http.put("/object-types", json=lamp(name)))
         await ann.granted("NewScene", {"name": "scene"})
-        told: list[str] = []
-        # A busy computer may need longer for one upload than it takes to be quiet: then it is told in two parts.
+        announced: list[str] = []
+        # A busy computer may announce the uploads in two events.
         while "OpenScene" not in [event["event"] for event in ann.events]:
             ann.events.append(await ann.receive())
         while ann.events[0]["event"] == "ChangedObjectTypes":
             event = ann.events.pop(0)
             assert event["change_type"] == "add"
-            told += [meta["type"] for meta in event["data"]]
-        assert sorted(told) == ["LampA", "LampB"]
+            announced += [meta["type"] for meta in event["data"]]
+        assert sorted(announced) == ["LampA", "LampB"]
         await ann.event("OpenScene")
         await ann.event("SceneState")
         await ann.nothing_more()
@@ -31,7 +31,7 @@ async def test_types_are_announced_before_the_scene_opens(server: ServerProcess)
 
 
 async def test_lists_show_stored_documents_and_their_problems(server: ServerProcess) -> None:
-    async with httpx.AsyncClient(base_url=base(server)) as http, talking(server.url, "bob") as bob:
+    async with httpx.AsyncClient(timeout=60, base_url=base(server)) as http, talking(server.url, "bob") as bob:
         granted(await http.put("/object-types", json=lamp("LampC")))
         granted(await http.put("/scenes", json=scene("scn_c", "LampC")))
         listed = {one["id"]: one for one in await bob.granted("ListScenes")}

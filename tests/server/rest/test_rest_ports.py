@@ -70,8 +70,8 @@ def test_two_services_cannot_have_one_port() -> None:
 
 def ports_of(server: ServerProcess) -> dict[str, int]:
     """Read from the log which ports there are."""
-    told = (json.loads(line) for line in server.log.read_text().splitlines() if line.startswith("{"))
-    return {line["service"]: line["port"] for line in told if line["event"] == "classic port"}
+    entries = (json.loads(line) for line in server.log.read_text().splitlines() if line.startswith("{"))
+    return {line["service"]: line["port"] for line in entries if line["event"] == "classic port"}
 
 
 async def test_each_service_listens_at_its_port(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ async def test_each_service_listens_at_its_port(tmp_path: Path) -> None:
             "Build": "/healthz/ready",
             "Calibration": "/healthz/ready",
         }
-        async with httpx.AsyncClient() as http:
+        async with httpx.AsyncClient(timeout=60) as http:
             for service, path in routes.items():
                 at = f"http://127.0.0.1:{ports[service]}"
                 assert (await http.get(at + path)).status_code == 200, service
@@ -138,7 +138,7 @@ async def collected(talker: Talker, until: dict[str, Any]) -> list[str]:
 async def test_the_execution_port_serves_only_packages(tmp_path: Path) -> None:
     async with (
         running(tmp_path / "data") as server,
-        httpx.AsyncClient(base_url=base(server)) as http,
+        httpx.AsyncClient(timeout=60, base_url=base(server)) as http,
         connect(f"{server.url}/execution") as socket,
         talking(server.url, "ann") as editor,
     ):

@@ -135,7 +135,7 @@ async def test_objects_of_the_online_scene_are_obstacles(http: httpx.AsyncClient
         await services.session.show(Scene("scene", objects=[placed], id="scn_1"))
         assert granted(await own.get("/collisions")) == []
         assert granted(await own.get("/system/running")) is False
-        await services.online.begin_start()
+        await services.online.begin_start("ann")
         await until(lambda: services.online.online)
         assert granted(await own.get("/collisions")) == ["obj_crate"]
         assert granted(await own.get("/system/running")) is True
@@ -143,7 +143,7 @@ async def test_objects_of_the_online_scene_are_obstacles(http: httpx.AsyncClient
         assert answer == {"safe": False, "object_id": "obj_crate"}
         granted(await own.put("/system/stop"))
         assert granted(await own.get("/collisions")) == ["obj_crate"], "it is still there"
-        await services.online.begin_stop()
+        await services.online.begin_stop("ann")
         await until(lambda: services.online.state.value == "stopped")
         assert granted(await own.get("/collisions")) == []
 

@@ -10,7 +10,7 @@ from tests.server.session.session_server import Person, Refused, open_server
 from tests.server.session.work import Work
 
 
-def told(person: Person) -> list[tuple[str, set[str], str]]:
+def lock_events(person: Person) -> list[tuple[str, set[str], str]]:
     """Return the lock events since the last time."""
     return [(e["event"], set(e["data"]["object_ids"]), e["data"]["owner"]) for e in person.events()]
 
@@ -41,7 +41,7 @@ async def test_update_lock_widens_to_the_tree_and_narrows_to_the_object(alice: P
 
     await update(alice, "TREE")
     rest = {child, orientation}
-    assert told(bob) == told(alice) == [("ObjectsLocked", rest, "alice")]
+    assert lock_events(bob) == lock_events(alice) == [("ObjectsLocked", rest, "alice")]
     with pytest.raises(Refused):
         await bob.lock(child)
     with pytest.raises(Refused):  # it is a tree already
@@ -49,13 +49,13 @@ async def test_update_lock_widens_to_the_tree_and_narrows_to_the_object(alice: P
     bob.take()
 
     await update(alice, "OBJECT")
-    assert told(bob) == [("ObjectsUnlocked", rest, "alice")]
+    assert lock_events(bob) == [("ObjectsUnlocked", rest, "alice")]
     await bob.lock(child)
     with pytest.raises(Refused):
         await bob.lock(parent)
     await bob.ask("WriteUnlock", object_id=child)
     await alice.ask("WriteUnlock", object_id=parent)
-    assert told(bob)[-1] == ("ObjectsUnlocked", {parent}, "alice")
+    assert lock_events(bob)[-1] == ("ObjectsUnlocked", {parent}, "alice")
 
 
 async def test_all_locks_of_a_lost_user_are_released(tmp_path: Path) -> None:
@@ -78,9 +78,9 @@ async def test_all_locks_of_a_lost_user_are_released(tmp_path: Path) -> None:
         await alice.leave()
         server._people.remove(alice)
         released: list[Any] = []
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(30):
             while not released:
-                released = told(bob)
+                released = lock_events(bob)
                 await asyncio.sleep(0.01)
         assert released == [("ObjectsUnlocked", {child, orientation, tree, below}, "alice")]
         for item in (child, orientation, below, work.point("parent")):

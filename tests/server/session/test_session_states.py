@@ -37,7 +37,7 @@ MODULES = {
         scene_objects,
     )
 }
-OURS = sorted(name for name, module in DECLARED.items() if module in MODULES)
+OURS = sorted(name for name, module in DECLARED.items() if module in MODULES and not RPCS[name].additional)
 REASONS = {
     "needs a registered user": "not logged in",
     "needs an open scene": "is open: open one first",
