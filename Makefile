@@ -21,7 +21,7 @@ run: .make/run .make/editor
 ALONE = $(shell grep -rl --include='test_*.py' mark.alone tests)
 
 # Tests mostly wait for simulated devices, so four workers suit two cores. Tests marked `alone` start a dozen processes
-# each and run afterwards, in two workers. Failed tests run once more without others, since some still depend on tenths
+# each and run afterwards, in two workers. Failed tests run once more without others, since a few still depend on tenths
 # of a second; both results are shown. Exit code 5 means that ARGS selected no test of that kind.
 AGAIN := --last-failed --last-failed-no-failures none
 test: .make/dev .make/editor .make/browser
@@ -111,12 +111,14 @@ EDITOR := $(shell find editor -name node_modules -prune -o -name __pycache__ -pr
 	$(BIN)/python editor/build.py
 	@touch $@
 
-# The browser in which the editor is tested.
+# The browser in which the editor is tested: Chromium without a window, where the distribution has it.
 .make/browser:
 	@mkdir -p .make
-	@command -v chromium >/dev/null || { \
-	  if test "$$(id -u)" = 0; then apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium >/dev/null; \
-	  else echo "please install: chromium" >&2; exit 1; fi; \
+	@command -v chromium-headless-shell >/dev/null || command -v chromium >/dev/null || { \
+	  if test "$$(id -u)" = 0; then apt-get update -qq && \
+	    apt-get install -y -qq --no-install-recommends chromium-headless-shell >/dev/null || \
+	    apt-get install -y -qq --no-install-recommends chromium >/dev/null; \
+	  else echo "please install: chromium-headless-shell or chromium" >&2; exit 1; fi; \
 	}
 	@touch $@
 

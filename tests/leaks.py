@@ -18,8 +18,8 @@ from typing import Any
 import psutil
 import pytest
 
-GRACE = 2.0
-"""Seconds: threads and children need a moment to end after they were told to."""
+GRACE = 20.0
+"""Time for threads and children to end after a request to stop, s."""
 
 
 @dataclass

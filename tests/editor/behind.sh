@@ -1,8 +1,7 @@
 #!/bin/sh
-# Chromium that waits for others that are at work. Where it may, it puts the threads that draw before everything else, drivers
-# and their fakes included; so it may not.
-browser=$(command -v chromium || command -v chromium-browser)
+# Run the browser at $BROWSER with a low priority. Root may raise priorities, and Chromium would raise that of its drawing
+# threads above drivers and fakes; so it loses that right.
 if test "$(id -u)" = 0; then
-  exec nice -n 10 setpriv --bounding-set=-sys_nice --inh-caps=-sys_nice "$browser" "$@"
+  exec nice -n 10 setpriv --bounding-set=-sys_nice --inh-caps=-sys_nice "$BROWSER" "$@"
 fi
-exec nice -n 10 "$browser" "$@"
+exec nice -n 10 "$BROWSER" "$@"

@@ -66,7 +66,8 @@ async def running_browser(*, behind: bool = False) -> AsyncIterator[Browser]:
     """Run Chromium. `behind`: with a low priority, so that software rendering does not delay drivers and fakes."""
     async with async_playwright() as playwright:
         path = _BEHIND if behind else chromium()
-        browser = await playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        environment: dict[str, str | float | bool] = {**os.environ, "BROWSER": chromium()}
+        browser = await playwright.chromium.launch(executable_path=path, args=ARGUMENTS, env=environment)
         try:
             yield browser
         finally:
