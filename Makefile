@@ -47,7 +47,8 @@ bench-editor: .make/dev .make/editor .make/browser
 	$(BIN)/python -m benchmarks.editor $(ARGS)
 
 # Change the journal, the lock table and the lane of a device in small ways, and count what the tests notice. In a crash
-# or on a loaded server, a fault there loses data or moves a device. Takes about half an hour.
+# or on a loaded server, a fault there loses data or moves a device. All of them take an hour or two; a sample of the
+# journal's: make mutation ARGS="journal --sample 200"
 mutation: .make/mutation
 	$(BIN)/python -m tests.mutation $(ARGS)
 

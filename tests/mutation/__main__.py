@@ -4,6 +4,7 @@ Runs in copies of the checkout, so that an interrupted run leaves no mutant behi
 """
 
 import os
+import random
 import shutil
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from pathlib import Path
 
 import cyclopts
 from cosmic_ray.work_db import WorkDB, use_db
-from cosmic_ray.work_item import TestOutcome
+from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkResult
 from rich.console import Console
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -85,8 +86,17 @@ def copy_checkout(folder: Path) -> None:
             shutil.copy2(REPOSITORY / name, folder / name)
 
 
-def mutate(target: Target) -> Result:
-    """Run the tests of a target against each of its mutants."""
+def skip_all_but(sample: int, path: Path) -> None:
+    """Skip all pending mutants of a session but a sample, which is the same in every run."""
+    with use_db(str(path), WorkDB.Mode.open) as database:
+        pending = sorted(database.pending_work_items, key=lambda item: repr(item.mutations))
+        random.Random(len(pending)).shuffle(pending)
+        for item in pending[sample:]:
+            database.set_result(item.job_id, WorkResult(WorkerOutcome.SKIPPED))
+
+
+def mutate(target: Target, sample: int) -> Result:
+    """Run the tests of a target against its mutants, or against a sample of them unless it is 0."""
     with tempfile.TemporaryDirectory(prefix="mutation-") as name:
         folder = Path(name)
         copy_checkout(folder)
@@ -108,6 +118,8 @@ def mutate(target: Target) -> Result:
 
         run("cosmic-ray", "init", "mutation.toml", "mutation.sqlite")
         run("cr-filter-operators", "mutation.sqlite", "mutation.toml")
+        if sample:
+            skip_all_but(sample, folder / "mutation.sqlite")
         run("cosmic-ray", "--verbosity", "ERROR", "baseline", "mutation.toml")
         run("cosmic-ray", "exec", "mutation.toml", "mutation.sqlite")
         with use_db(str(folder / "mutation.sqlite"), WorkDB.Mode.open) as database:
@@ -116,16 +128,17 @@ def mutate(target: Target) -> Result:
         return Result(len(results), survived)
 
 
-def main(*names: str) -> None:
+def main(*names: str, sample: int = 0) -> None:
     """Mutate the named targets, or all.
 
     Args:
         names: lane, locks or journal.
+        sample: number of mutants of each target, drawn at random; 0: all.
     """
     targets = [target for target in TARGETS if not names or target.name in names]
     enough = True
     with ThreadPoolExecutor(2) as pool:
-        for target, result in zip(targets, pool.map(mutate, targets), strict=True):
+        for target, result in zip(targets, pool.map(lambda each: mutate(each, sample), targets), strict=True):
             for diff in result.survived:
                 console.print(diff, markup=False, highlight=False)
             killed = result.total - len(result.survived)

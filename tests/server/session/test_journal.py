@@ -36,7 +36,7 @@ class Disk:
         real = JournalFile.commit
 
         def commit(file: JournalFile, jobs: Jobs) -> None:
-            self.ready.wait(5)
+            self.ready.wait(30)
             if self.error is not None:
                 raise self.error
             self.commits.append(jobs)

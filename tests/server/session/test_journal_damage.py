@@ -156,7 +156,26 @@ def test_damage_in_changes_that_only_undo_needs(killed: Path, tmp_path: Path) ->
     assert found is not None
     assert [each.number for each in found.edits] == list(range(8, EDITS + 1))
     assert loss is not None
+    assert loss.reason == "the checksum of change 7 is wrong, or it is missing"
     assert "those before number 8 cannot be undone" in loss.lost
+    assert not loss.incomplete
+
+
+@pytest.mark.parametrize(
+    ("number", "lost"),
+    [(30, "Changes 30 to 40 of scene 'open' are lost"), (EDITS, "Change 40 of scene 'open' is lost")],
+)
+def test_changes_after_a_missing_one_are_reported(killed: Path, tmp_path: Path, number: int, lost: str) -> None:
+    shutil.copytree(killed, tmp_path / "data")
+    connection = sqlite3.connect(tmp_path / "data" / "journal.sqlite")
+    connection.execute("delete from edit where number = ?", (number,))
+    connection.commit()
+    connection.close()
+    found, loss = reopened(tmp_path / "data")
+    assert objects(found) == ALL_OBJECTS[: number - 1]
+    assert loss is not None
+    assert loss.lost.startswith(lost)
+    assert loss.incomplete
 
 
 def test_a_document_that_was_closed_is_not_reopened(killed: Path, tmp_path: Path) -> None:

@@ -50,6 +50,13 @@ def test_a_position_has_a_limited_size() -> None:
     assert Position().last_change == ""
 
 
+def test_opening_and_closing_a_document_are_counted() -> None:
+    opened = Position(4, 9, "scene 'cell'").after(scene("other"))
+    assert opened == Position(5, 0, "scene 'other'")
+    assert opened.after(None) == Position(6)
+    assert Position(6).after(None) == Position(7)
+
+
 def test_a_project_is_named_before_its_scene() -> None:
     document = Document.of(Scene(name="cell", id="s"), Project(name="sorting", scene_id="s", id="p"))
     assert document_of(document.items()) == "project 'sorting'"
