@@ -58,9 +58,9 @@ def parameter_type(name: str) -> ParameterType:
     """Return the parameter type of a name.
 
     Raises:
-        InvalidData: There is no such type.
+        InvalidData: The type does not exist.
     """
     try:
         return PARAMETER_TYPES[name]
     except KeyError:
-        raise InvalidData("there is no parameter type {name!r:.80}", name=name) from None
+        raise InvalidData("Parameter type {name!r:.80} does not exist.", name=name) from None

@@ -88,7 +88,7 @@ class Library:
         """Remove a source.
 
         Raises:
-            NotFound: There is no source of that name.
+            NotFound: The source does not exist.
         """
         file = self._file(name)
         del self._files[name]
@@ -111,7 +111,7 @@ class Library:
         """Return the source of an added type.
 
         Raises:
-            NotFound: There is no source of that name.
+            NotFound: The source does not exist.
         """
         return self._file(name)
 
@@ -124,7 +124,7 @@ class Library:
         try:
             return self._files[name]
         except KeyError:
-            raise NotFound("there is no source of an object type {name}", name=name) from None
+            raise NotFound("The source of object type {name} does not exist.", name=name) from None
 
     def _forget(self) -> None:
         self._analyses.clear()
@@ -219,7 +219,7 @@ class Library:
         """Analyse the source of a type. Errors in it are reported in `problem`, which disables the type.
 
         Raises:
-            NotFound: There is no source of that name.
+            NotFound: The source does not exist.
         """
         if name not in self._analyses:
             with garbage_collection_disabled():

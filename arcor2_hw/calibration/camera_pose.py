@@ -46,7 +46,7 @@ def find_camera_pose(
         InvalidPicture: A file is not an image, damaged or too large, or the images have different sizes.
         InvalidData: Parameters or a marker are invalid.
         Conflict: A marker is listed twice.
-        CalibrationRefused: The image is blurred; there is no marker; the pose is ambiguous (one marker seen from the
+        CalibrationRefused: The image is blurred; it shows no marker; the pose is ambiguous (one marker seen from the
             front; the message says what helps), unobservable (too uncertain) or implausible (a marker appears twice or
             not at its configured place, or the camera moved between the images).
     """

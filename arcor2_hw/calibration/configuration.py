@@ -110,7 +110,7 @@ def read_configuration(path: Path) -> CalibrationConfiguration:
     """Read a file.
 
     Raises:
-        NotFound: There is no such file.
+        NotFound: The file does not exist.
         InvalidData: The file is invalid, such as a marker listed twice; the message names the file and the place.
     """
     try:
@@ -122,7 +122,7 @@ def read_configuration(path: Path) -> CalibrationConfiguration:
             )
         text = path.read_bytes()
     except FileNotFoundError:
-        raise NotFound("There is no file {path}.", path=path) from None
+        raise NotFound("File {path} does not exist.", path=path) from None
     except OSError as error:
         raise InvalidData("{path} cannot be read: {reason}.", path=path, reason=error.strerror) from None
     return configuration_of(yaml_of(text, str(path)), str(path))

@@ -93,7 +93,7 @@ def _motions(
     pairs = [(i, j) for i, j in pairs if np.linalg.norm(rotation_vector(hand[j].T @ hand[i])) >= smallest]
     pairs = pairs[:: max(1, len(pairs) // _MOST_PAIRS)]
     if not pairs:
-        raise ValueError("there is no rotation between the stations")
+        raise ValueError("the orientation is the same at all stations")
     a = np.stack([hand[j].T @ hand[i] for i, j in pairs])
     a_at = np.stack([hand[j].T @ (np.ravel(hand_at[i]) - np.ravel(hand_at[j])) for i, j in pairs])
     b = np.stack([eye[j] @ eye[i].T for i, j in pairs])

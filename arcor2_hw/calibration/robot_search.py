@@ -114,7 +114,7 @@ class Search:
         """Search from all starts and return the distinct results, best first.
 
         Raises:
-            CalibrationRefused: There is no result.
+            CalibrationRefused: Nothing was found.
         """
         few = self._cloud[self._random.permutation(len(self._cloud))[:FEW_POINTS]]
         some = self._cloud[self._random.permutation(len(self._cloud))[: 6 * FEW_POINTS]]

@@ -46,7 +46,7 @@ def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]
         in_plane: At least one point, m; the first one is on the +y side of x.
 
     Raises:
-        InvalidData: There is no point in the plane, or a coordinate is not finite.
+        InvalidData: The list of points in the plane is empty, or a coordinate is not finite.
         CalibrationRefused: The points are on one line, too near each other, or not in one plane.
     """
     points = _points("touched", [origin, on_x, *in_plane], 3)
@@ -191,7 +191,7 @@ def orientation_by_alignment(flange: Sequence[Orientation], reference: Orientati
         reference: base_from_reference, the frame that the tool was aligned with.
 
     Raises:
-        InvalidData: There is no orientation.
+        InvalidData: The list of orientations is empty.
         CalibrationRefused: The orientations differ by more than measurement errors.
     """
     if not 1 <= len(flange) <= _MOST:

@@ -81,7 +81,7 @@ class Client(Requests):
         self._robots: dict[tuple[str, str], RegisterForRobotEventArgs] = {}
         self._wire: Wire | None = None
         self._joined = asyncio.Event()
-        self._end: Exception | None = NotConnected("There is no connection to {url}.", url=self._url)
+        self._end: Exception | None = NotConnected("Not connected to {url}.", url=self._url)
         self._lost_at = 0.0
         self._keeper: asyncio.Task[None] | None = None
         self._own: EventStream[Event] = EventStream()
@@ -273,7 +273,7 @@ class Client(Requests):
             RequestFailed: The server refused it, with a subclass for each kind of reason.
             AnswerUnknown: The connection broke after it was sent.
             AnswerLate: No answer came in time.
-            NotConnected: There was no connection in time. Nothing was sent.
+            NotConnected: The connection was not established in time. Nothing was sent.
             ConnectionLost: The connection is closed. Nothing was sent.
             NotAdmitted: The token is not valid. Nothing was sent.
         """
@@ -309,7 +309,7 @@ class Client(Requests):
                         await self._joined.wait()
             except TimeoutError:
                 raise NotConnected(
-                    "There was no connection to {url} within {limit:g} s: {name} was not sent.",
+                    "Not connected to {url} within {limit:g} s: {name} was not sent.",
                     url=self._url,
                     limit=limit,
                     name=name,
@@ -363,7 +363,7 @@ class Client(Requests):
         """Return the next event of the own stream with one of the names, dropping others; any event without names.
 
         Raises:
-            DeviceTimeout: There is no such event in time.
+            DeviceTimeout: No such event was received in time.
             EventsMissed: Events are missing.
             ConnectionLost: The stream has ended.
         """

@@ -36,7 +36,7 @@ class Requests(ABC):
         the stream, or use it in `with`, when you no longer read it.
         """
         if unknown := set(names) - EVENTS.keys():
-            raise ValueError(f"there is no event {', '.join(sorted(unknown))}")
+            raise ValueError(f"unknown event: {', '.join(sorted(unknown))}")
         return self._follow(frozenset(names), limit)
 
 

@@ -159,7 +159,7 @@ class Wire:
         Raises:
             Unsent: Nothing was sent.
             Unanswered: The connection broke before the answer.
-            AnswerLate: There was no answer within `limit` s.
+            AnswerLate: No answer was received within `limit` s.
         """
         if self._socket.state is not State.OPEN or self.closed.is_set():
             raise Unsent

@@ -65,7 +65,7 @@ class CollisionWorld(WorldState):
             q: Joint values, in the model's order.
 
         Raises:
-            NotFound: There is no such robot.
+            NotFound: The robot does not exist.
         """
         return not self.robot(robot).in_self_collision(q) and self.is_free_around(robot, q)
 
@@ -94,7 +94,7 @@ class CollisionWorld(WorldState):
         An attached body at the end effector collides in every configuration that reaches a pose, so it is named first.
 
         Raises:
-            NotFound: There is no such robot.
+            NotFound: The robot does not exist.
         """
         mine = self.robot(robot)
         mine.pose(q, everything=True)
@@ -166,7 +166,7 @@ class CollisionWorld(WorldState):
             within: Maximum distance, m.
 
         Raises:
-            NotFound: There is no such robot.
+            NotFound: The robot does not exist.
         """
         mine = self.robot(robot)
         mine.pose(q, everything=True)

@@ -96,7 +96,7 @@ class WorldState:
         """Move a body; an attached one is detached.
 
         Raises:
-            NotFound: There is no such body.
+            NotFound: The body does not exist.
             InvalidData: The pose is not finite.
         """
         placed = _matrix(pose, name)
@@ -116,7 +116,7 @@ class WorldState:
         """Remove a body, attached or not.
 
         Raises:
-            NotFound: There is no such body.
+            NotFound: The body does not exist.
         """
         if name in self._held:
             robot = self.robots[self._held.pop(name)]
@@ -148,7 +148,7 @@ class WorldState:
         """Return the present pose of a body; an attached body moves with its robot.
 
         Raises:
-            NotFound: There is no such body.
+            NotFound: The body does not exist.
         """
         if name in self._held:
             robot = self.robots[self._held[name]]
@@ -160,7 +160,7 @@ class WorldState:
         try:
             return self._bodies[name]
         except KeyError:
-            raise NotFound("There is no body {name!r}.", name=name) from None
+            raise NotFound("Body {name!r} does not exist.", name=name) from None
 
     def _insert(self, name: str, shape: Shape, pose: Array) -> None:
         geometry = coal_geometry(shape)
@@ -200,7 +200,7 @@ class WorldState:
         """Remove a robot; bodies attached to it stay at their present poses.
 
         Raises:
-            NotFound: There is no such robot.
+            NotFound: The robot does not exist.
         """
         robot = self.robot(name)
         for held in list(robot.held):
@@ -213,18 +213,18 @@ class WorldState:
         """Return a robot.
 
         Raises:
-            NotFound: There is no such robot.
+            NotFound: The robot does not exist.
         """
         try:
             return self.robots[name]
         except KeyError:
-            raise NotFound("There is no robot {name!r}.", name=name) from None
+            raise NotFound("Robot {name!r} does not exist.", name=name) from None
 
     def move_robot(self, name: str, base: Pose) -> None:
         """Move the base of a robot, with everything attached to it.
 
         Raises:
-            NotFound: There is no such robot.
+            NotFound: The robot does not exist.
             InvalidData: The pose is not finite.
         """
         robot = self.robot(name)
@@ -236,7 +236,7 @@ class WorldState:
         """Set the present joint values of a robot, in the model's order.
 
         Raises:
-            NotFound: There is no such robot.
+            NotFound: The robot does not exist.
             InvalidData: A value is missing or not finite.
         """
         robot = self.robot(name)
@@ -256,7 +256,7 @@ class WorldState:
             touching: Further links that the body may touch.
 
         Raises:
-            NotFound: There is no such body, robot or link.
+            NotFound: The body, robot or link does not exist.
             Conflict: The body is attached already.
         """
         holder = self.robot(robot)

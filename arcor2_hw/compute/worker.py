@@ -90,7 +90,7 @@ def _answer(work: m.Work, state: WorkerState) -> m.Done | m.Failed:
             )
         )
     except MemoryError:
-        return failed(InvalidData("There is not enough memory for this computation."))
+        return failed(InvalidData("This computation needs more memory than is available."))
     except Exception as error:  # noqa: BLE001 - a library may raise anything; the caller receives it
         sys.excepthook(type(error), error, error.__traceback__)
         return m.Failed(

@@ -128,7 +128,7 @@ class WorldReplica:
             frames = standing.link_frames(standing.q)
             if body.attachment.link not in frames:
                 raise NotFound(
-                    "{id} is attached to {link}, which is no link of {robot}.",
+                    "{id} is attached to {link}, which is not a link of {robot}.",
                     id=body.id,
                     link=body.attachment.link,
                     robot=body.attachment.robot,
@@ -175,7 +175,7 @@ class WorldReplica:
         """Return the reachability of an end effector, with its cache.
 
         Raises:
-            NotFound: There is no such robot or end effector.
+            NotFound: The robot or end effector does not exist.
         """
         key = (robot, end_effector)
         if key not in self._reach:
@@ -187,7 +187,7 @@ class WorldReplica:
         """Return the inverse kinematics of an end effector.
 
         Raises:
-            NotFound: There is no such robot or end effector.
+            NotFound: The robot or end effector does not exist.
         """
         key = (robot, end_effector)
         if key not in self._inverse:

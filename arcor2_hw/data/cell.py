@@ -63,7 +63,7 @@ def read_cell(path: Path) -> Cell:
     """Read a cell.yaml.
 
     Raises:
-        NotFound: There is no such file.
+        NotFound: The file does not exist.
         InvalidData: The file is invalid; the message names the file, the device and the error.
     """
     try:
@@ -73,7 +73,7 @@ def read_cell(path: Path) -> Cell:
             )
         return msgspec.yaml.decode(path.read_bytes(), type=Cell)
     except FileNotFoundError:
-        raise NotFound("there is no {path}", path=path) from None
+        raise NotFound("{path} does not exist", path=path) from None
     except OSError as error:
         raise InvalidData("{path} cannot be read: {reason}", path=path, reason=error.strerror) from None
     except msgspec.DecodeError as error:  # also raised for a wrong value

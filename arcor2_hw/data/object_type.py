@@ -95,7 +95,7 @@ class ObjectModel(Data, frozen=True):
         for model in (self.box, self.cylinder, self.sphere, self.mesh):
             if not isinstance(model, Unset):
                 return model
-        raise ValueError("there is no model")
+        raise ValueError("an object model of type None contains no model")
 
     @classmethod
     def of(cls, model: Models) -> "ObjectModel":

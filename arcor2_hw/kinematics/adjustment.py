@@ -52,7 +52,7 @@ def with_origins(description: Description, origins: Mapping[str, Array]) -> Desc
         origins: Origin (4, 4) by joint name, from a calibration.
 
     Raises:
-        ModelError: There is no such joint.
+        ModelError: The joint does not exist.
     """
     if unknown := origins.keys() - {joint.name for joint in description.joints}:
         raise ModelError("{name} has no joint {unknown}.", name=description.name, unknown=", ".join(sorted(unknown)))

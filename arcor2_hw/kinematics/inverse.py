@@ -77,7 +77,7 @@ class InverseKinematics:
             check: Collision check; solutions in collision are skipped.
 
         Raises:
-            OutOfReach: There is no solution.
+            OutOfReach: No solution was found.
             OnlyInCollision: All solutions are in collision; the message names the contact of the nearest one.
         """
         near = self._checked(target, seed)

@@ -90,7 +90,7 @@ class RobotModel(JointSet):
         """Return a model with other origins of joints in their parent links, (4, 4) each.
 
         Raises:
-            ModelError: There is no such joint.
+            ModelError: The joint does not exist.
         """
         moved = adjustment.with_origins(self.description, origins)
         return type(self)(moved, self._package, self._beside, self._mesh_use)
@@ -108,7 +108,7 @@ class RobotModel(JointSet):
             tool: Pose of a tool's tip in the frame of the link, (4, 4).
 
         Raises:
-            NotFound: There is no such link.
+            NotFound: The link does not exist.
             ModelError: No joint moves it.
         """
         if end_effector not in self.description.links:

@@ -48,7 +48,7 @@ class Package:
             if source.is_dir():
                 return cls._of_folder(source, name)
             if not source.is_file():
-                raise ModelError("There is no robot model {name}.", name=name)
+                raise ModelError("Robot model {name} does not exist.", name=name)
             if source.stat().st_size > MAX_PACKAGE:
                 raise UnsafeDescription(
                     "{name} is larger than {max_package} bytes.", name=name, max_package=MAX_PACKAGE
@@ -141,7 +141,7 @@ class Package:
         """Return path and content of the URDF file.
 
         Raises:
-            ModelError: There is no URDF file, or several.
+            ModelError: The package contains no URDF file, or several.
             UnsafeDescription: The file is too large.
         """
         found = [name for name in self.names if name.lower().endswith(".urdf") and not name.startswith("__MACOSX/")]
@@ -171,7 +171,7 @@ class Package:
 
         Raises:
             UnsafeDescription: The path is outside of the package, or has another scheme.
-            MissingMesh: There is no such file.
+            MissingMesh: The file does not exist.
         """
         scheme, _, rest = reference.partition("://")
         if not rest:

@@ -132,7 +132,7 @@ class Generic(abc.ABC):
         """Acknowledge the alarm `code`.
 
         Raises:
-            NotFound: There is no such active alarm.
+            NotFound: No such alarm is active.
         """
         raise NotFound("{name} has no active alarm {code}", name=self.name, code=code)
 

@@ -151,7 +151,7 @@ class Robot(GenericWithPose):
         """Compute joint values that reach a pose in the world, nearest to `start_joints`.
 
         Raises:
-            KinematicsException: There are none.
+            KinematicsException: The pose cannot be reached.
         """
         raise Arcor2NotImplemented("inverse_kinematics")
 

@@ -29,7 +29,7 @@ class RobotTools:
         made_of: Settings, package and calibration. When they change, a new object is created.
 
     Raises:
-        Refused: There is no package, or the extra `kinematics` is not installed.
+        Refused: The robot has no package, or the extra `kinematics` is not installed.
         ModelError: The model cannot be used, or the calibration belongs to another robot.
     """
 
@@ -51,7 +51,7 @@ class RobotTools:
         """Return the chain to an end effector.
 
         Raises:
-            NotFound: There is no such end effector.
+            NotFound: The end effector does not exist.
         """
         if end_effector not in self._arms:
             self._arms[end_effector] = self.model.arm(end_effector)
@@ -61,7 +61,7 @@ class RobotTools:
         """Return the inverse kinematics of an end effector.
 
         Raises:
-            NotFound: There is no such end effector.
+            NotFound: The end effector does not exist.
         """
         from arcor2_hw.kinematics.inverse import InverseKinematics
 

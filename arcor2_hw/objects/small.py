@@ -142,7 +142,7 @@ class HasPoints(Protocol):
         """Read a point.
 
         Raises:
-            OutOfRange: There is no such point.
+            OutOfRange: The point does not exist.
             Stale: No recent value is known.
             ConnectionLost: The connection is lost.
             DeviceTimeout: The device did not answer in time.

@@ -154,7 +154,7 @@ class StateObserver(Generic[T]):
             go_on: Check of the work that waits, from `begin`.
 
         Raises:
-            DeviceTimeout: There was no such state in time.
+            DeviceTimeout: The awaited state was not reached in time.
             ConnectionLost: The connection was lost.
             Cancelled: The work was stopped.
         """

@@ -67,7 +67,7 @@ class UrdfRobot(Robot):
         """Return the pose of an end effector in the world at the present joint values.
 
         Raises:
-            NotFound: There is no such end effector.
+            NotFound: The end effector does not exist.
             Stale: No recent joint values are known.
         """
         return self.forward_kinematics(end_effector, self.robot_joints())
@@ -88,7 +88,7 @@ class UrdfRobot(Robot):
         """Compute the pose in the world for joint values.
 
         Raises:
-            NotFound: There is no such end effector.
+            NotFound: The end effector does not exist.
             InvalidData: Joints are missing.
         """
         self._check_end_effector(end_effector_id)
@@ -100,8 +100,8 @@ class UrdfRobot(Robot):
         """Compute joint values that reach a pose in the world, nearest to `start_joints`.
 
         Raises:
-            KinematicsException: There are none; the message says why.
-            NotFound: There is no such end effector.
+            KinematicsException: The pose cannot be reached; the message says why.
+            NotFound: The end effector does not exist.
             InvalidData: A value is not finite.
         """
         self._check_end_effector(end_effector_id)
@@ -118,7 +118,7 @@ class UrdfRobot(Robot):
         obstacle comes into its path.
 
         Raises:
-            KinematicsException: There is no path; the message says why.
+            KinematicsException: No path was found; the message says why.
             PathBlocked: An obstacle came into the path; the message names it.
             OutOfRange: `speed` is out of range.
             Refused: The robot is moving already.

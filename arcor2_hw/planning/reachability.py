@@ -53,7 +53,7 @@ class _Candidate:
     Attributes:
         q: Joint values of the arm.
         whole: Joint values of the model.
-        reservation: Why other joint values would be better; None before that is known, empty when there is no reason.
+        reservation: Why other joint values would be better; unset before that is known, None if they are good.
         box: Bounding box of the arm, (2, 3).
         state: State of the robot for which the box holds.
     """

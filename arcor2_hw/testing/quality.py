@@ -108,13 +108,13 @@ def read(path: Path) -> Quality:
     """Read a quality.yaml.
 
     Raises:
-        NotFound: There is no such file.
+        NotFound: The file does not exist.
         InvalidData: It is invalid; the message names folder, key and error.
     """
     try:
         return msgspec.yaml.decode(path.read_bytes(), type=Quality)
     except FileNotFoundError:
-        raise NotFound("there is no {file} in {name}", file=FILE, name=path.parent.name) from None
+        raise NotFound("{name}/{file} does not exist", file=FILE, name=path.parent.name) from None
     except OSError as error:
         raise InvalidData(
             "{name}/{file} cannot be read: {reason}", name=path.parent.name, file=FILE, reason=error.strerror

@@ -181,7 +181,7 @@ class _Session:
 
     def _subscribe(self, to: str = "truth", rate: float = 0.0) -> None:
         if to not in self._sources:
-            raise ValueError(f"no source {to!r}; there are {', '.join(sorted(self._sources))}")
+            raise ValueError(f"source {to!r} does not exist; available: {', '.join(sorted(self._sources))}")
         if not 0.0 <= rate <= MAX_RATE:
             raise ValueError(f"rate is 0 to {MAX_RATE:g} Hz")
         self._unsubscribe(to)

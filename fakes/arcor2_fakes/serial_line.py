@@ -184,7 +184,7 @@ class TcpLine:
 def _point(link: Path, target: str) -> None:
     """Replace the link atomically, so that a host always finds a valid one."""
     if link.exists() and not link.is_symlink():
-        raise FileExistsError(f"{link} exists and is no symbolic link")
+        raise FileExistsError(f"{link} exists and is not a symbolic link")
     new = link.with_name(f"{link.name}.{os.getpid()}")
     new.symlink_to(target)
     new.replace(link)

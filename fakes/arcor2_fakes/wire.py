@@ -54,7 +54,7 @@ class Faults:
     def set(self, fault: str, seconds: float = 1.0) -> None:
         """Apply one of `FAULTS`; the transport implements reset and refuse."""
         if fault not in (*FAULTS, CHECKSUM):
-            raise ValueError(f"no fault {fault!r}; there are {', '.join(FAULTS)}")
+            raise ValueError(f"fault {fault!r} does not exist; available: {', '.join(FAULTS)}")
         if fault == "silence":
             self.silent = True
         elif fault == "half_frame":
@@ -88,7 +88,7 @@ def register_faults(control: ControlServer, wires: dict[str, Faulty], checked: C
 
     async def apply(kind: str, among: dict[str, Faulty], wire: str | None, seconds: float) -> None:
         if wire is not None and wire not in among:
-            raise ValueError(f"no wire {wire!r}; there are {', '.join(among)}")
+            raise ValueError(f"wire {wire!r} does not exist; available: {', '.join(among)}")
         for name, faulty in among.items():
             if wire in (None, name):
                 await faulty.fault(kind, seconds)

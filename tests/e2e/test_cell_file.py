@@ -145,7 +145,7 @@ async def test_a_device_lost_online_refuses_its_actions(tmp_path: Path, scale: F
         assert "lost" in refused.error
 
         scale.control.do("heal")
-        await on.state(C.BACK, C.ONLINE)  # told once: whatever follows is no second loss
+        await on.state(C.BACK, C.ONLINE)  # the loss is reported only once
         assert (await on.execute()).results, "the scene went on, and the device is there again"
         await on.stop()
         await on.state(C.ONLINE, C.OFFLINE)
@@ -239,7 +239,7 @@ async def test_a_device_of_another_type_is_not_started(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "status", "said"),
     [
-        (None, 9, "there is no"),
+        (None, 9, "cell.yaml does not exist"),
         ("devices: [", 11, "cell.yaml"),
         ("devices: [{name: a, type: T, port: 1}]", 11, "port"),
         ("devices: [{name: a, type: T}, {name: a, type: T}]", 11, "several devices have the same name: a"),

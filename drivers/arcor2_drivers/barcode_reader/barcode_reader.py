@@ -199,5 +199,5 @@ class BarcodeReader(LineDevice, Reader):
         """Return the code that code_present found: once, and not after another reading has started."""
         code, self._present_code = self._present_code, ""
         if not code:
-            raise Refused("{device}: there is no new code. Call code_present first.", device=self.who)
+            raise Refused("{device}: no new code has been read. Call code_present first.", device=self.who)
         return code

@@ -84,7 +84,7 @@ class Places:
 
     def _index(self, row: int, column: int) -> int:
         if not (0 <= row < self.rows and 0 <= column < self.columns):
-            raise IndexError(f"there is no row {row}, column {column} in {self.rows} rows and {self.columns} columns")
+            raise IndexError(f"row {row}, column {column} is outside of the {self.rows} x {self.columns} places")
         return row * self.columns + column
 
     def _change(self, new: list[bool]) -> None:

@@ -101,7 +101,7 @@ def power(statusword: int) -> Power:
     for mask, value, state in _STATES:
         if statusword & mask == value:
             return state
-    raise ValueError(f"status word {statusword:04X}h is no state of CiA 402")
+    raise ValueError(f"status word {statusword:04X}h is not a state of CiA 402")
 
 
 class State(NamedTuple):

@@ -281,7 +281,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
         now = self.current()
         return [
             ("control is taken", self.in_control),
-            ("there is no fault", now.power not in FAULTY and not self._unit.aborted),
+            ("no fault is active", now.power not in FAULTY and not self._unit.aborted),
             ("the drive is enabled", now.power is Power.ENABLED),
             ("the belt is stopped", self._motion.is_stopped(now)),
         ]

@@ -72,11 +72,11 @@ class SocketcandBus(can.BusABC):
         if end < 0:
             if len(self._buffer) > LONGEST:
                 self._buffer = b""
-                raise ValueError("no message of socketcand")
+                raise ValueError("not a socketcand message: too long")
             return None
         text, self._buffer = self._buffer[: end + 1].strip(), self._buffer[end + 1 :]
         if not text.startswith(b"<") or len(text) > LONGEST:
-            raise ValueError(f"no message of socketcand: {text[:40]!r}")
+            raise ValueError(f"not a socketcand message: {text[:40]!r}")
         return text.decode("ascii")
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:

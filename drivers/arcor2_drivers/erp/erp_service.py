@@ -158,7 +158,7 @@ class ErpService(Connected, Generic):
         """Acknowledge refused results (code results_refused): they stay in the outbox and are not sent.
 
         Raises:
-            NotFound: There is no such alarm, or it ends only with its cause.
+            NotFound: The alarm does not exist, or ends only with its cause.
         """
         if code != REFUSED or not self._outbox.acknowledge_refused():
             raise NotFound("{device} has no alarm {code!r} that can be acknowledged", device=self.who, code=code)

@@ -216,7 +216,7 @@ class TwoAxisRobot(SingleArm):
 
         Raises:
             InvalidData: No person is named.
-            Refused: There is no hardware error.
+            Refused: No servo has a hardware error.
             DeviceTimeout: A servo does not answer after the reboot.
             DeviceFault: The error is active again.
         """

@@ -60,7 +60,7 @@ class SuctionGripper(Connected, Suction):
         """Wait until the carrier is connected, and check that it has the points; nothing is switched.
 
         Raises:
-            NotFound: There is no such carrier.
+            NotFound: The carrier does not exist.
             InvalidData: The carrier does not have the points.
             DeviceError: NotConnected, ConnectionLost or DeviceTimeout.
         """

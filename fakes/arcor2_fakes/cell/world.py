@@ -259,7 +259,7 @@ class World:
         belt = self._layout.belt
         wired = [barrier.input for barrier in belt.barriers] if belt is not None else []
         if number not in wired:
-            raise ValueError(f"no light barrier at input {number}; there are {', '.join(map(str, wired)) or 'none'}")
+            raise ValueError(f"input {number} has no light barrier; connected: {', '.join(map(str, wired)) or 'none'}")
         if value is None:
             self._barriers_stuck.pop(number, None)
         else:
@@ -270,11 +270,11 @@ class World:
         """Remove a board by hand, permanently.
 
         Raises:
-            ValueError: There is no such board, or it cannot be reached.
+            ValueError: The board does not exist or cannot be reached.
         """
         thing = next((thing for thing in self._things if thing.board.code == code), None)
         if thing is None:
-            raise ValueError(f"no board {code}")
+            raise ValueError(f"board {code} does not exist")
         if thing is self._in_tester and (refused := await self.clear_tester()) is not None:
             raise ValueError(refused)
         if thing.place in ("feeder", "belt"):

@@ -114,7 +114,7 @@ class Planning:
             self._method(request, "GET")
             return 200, {"service": NAME, "version": VERSION}
         if request.path not in ("/orders/next", "/results", "/orders/close"):
-            raise Problem(404, f"there is no {request.path}")
+            raise Problem(404, f"path {request.path} does not exist")
         self._method(request, "POST")
         key = request.headers.get("idempotency-key", "")
         if not 0 < len(key) <= LONGEST_KEY:
@@ -172,7 +172,7 @@ class Planning:
 
     def _find(self, order: str) -> Order:
         if order not in self.orders:
-            raise Problem(404, f"there is no order {order}")
+            raise Problem(404, f"order {order} does not exist")
         if order in self.forbidden:
             raise Problem(422, f"the order {order} is forbidden")
         return self.orders[order]

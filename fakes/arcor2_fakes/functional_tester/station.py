@@ -333,7 +333,7 @@ class Station:
         self.advance()
         self._reach_in()
         if self._board is None:
-            raise Refusal("there is no board in the fixture")
+            raise Refusal("the fixture is empty")
         board, self._board = self._board, None
         return board
 

@@ -80,7 +80,7 @@ def round_body(radius: float, length: float, ball: bool) -> Solid:
 def _dictionary(name: str) -> Any:
     number = getattr(cv2.aruco, name, None) if name.startswith("DICT_") else None
     if not isinstance(number, int):
-        raise ValueError(f"no dictionary {name}")
+        raise ValueError(f"marker dictionary {name} does not exist")
     return cv2.aruco.getPredefinedDictionary(number)
 
 

@@ -48,7 +48,7 @@ def register_commands(fake: Fake, bus: Bus) -> None:
 
     def at(number: int) -> Servo:
         if number not in bus.servos:
-            raise ValueError(f"no servo {number}; there are {', '.join(map(str, bus.servos))}")
+            raise ValueError(f"servo {number} does not exist; available: {', '.join(map(str, bus.servos))}")
         return bus.servos[number]
 
     def byte(name: str, value: int) -> int:

@@ -142,7 +142,7 @@ class Chain:
 
     def __init__(self, model: str = "ur5e") -> None:
         if model not in MODELS:
-            raise ValueError(f"no model {model!r}; there are {', '.join(MODELS)}")
+            raise ValueError(f"model {model!r} does not exist; available: {', '.join(MODELS)}")
         self.geometry = MODELS[model]
         self.tcp = IDENTITY
         self._flange_from_tcp = IDENTITY

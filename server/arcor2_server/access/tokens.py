@@ -152,7 +152,7 @@ class TokenFile:
         with self._changing() as tokens:
             revoked = [token for token in tokens if which in (token.id, token.name)]
             if not revoked:
-                raise NotFound("There is no token {which!r}.", which=which)
+                raise NotFound("Token {which!r} does not exist.", which=which)
             tokens[:] = [token for token in tokens if token not in revoked]
         return revoked
 

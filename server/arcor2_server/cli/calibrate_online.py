@@ -145,7 +145,7 @@ async def _record(client: Client, name: str, key: str) -> CalibrationRecord:
     """Return the calibration with an id, else the newest one of the object with a pose.
 
     Raises:
-        NotFound: there is no such calibration.
+        NotFound: the calibration does not exist.
         InvalidData: it belongs to another object.
     """
     if key:

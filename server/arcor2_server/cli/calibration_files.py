@@ -37,7 +37,7 @@ def content_of(path: Path, largest: int) -> bytes:
             raise InvalidData("{path} is larger than {largest} bytes.", path=path, largest=largest)
         return path.read_bytes()
     except FileNotFoundError:
-        raise NotFound("There is no file {path}.", path=path) from None
+        raise NotFound("File {path} does not exist.", path=path) from None
     except OSError as error:
         raise InvalidData("{path} cannot be read: {reason}.", path=path, reason=error.strerror) from None
 

@@ -97,16 +97,16 @@ WIRES: Final = {
 RANGES: Final = {"baud_rate": "Annotated[int, Range(300, 921600)]"}
 """Types of settings with a range."""
 UNSUITABLE: Final = {
-    Base.ROBOT: "there is no template for robots; see docs/how-to/add-a-robot.md and start from a similar driver, such "
+    Base.ROBOT: "robots have no template; see docs/how-to/add-a-robot.md and start from a similar driver, such "
     "as drivers/arcor2_drivers/dobot_magician or universal_robots",
-    Base.CAMERA: "there is no template for cameras; they need the library of the manufacturer. Start from "
+    Base.CAMERA: "cameras have no template; they need the library of the manufacturer. Start from "
     "drivers/arcor2_drivers/oak_d",
 }
 NO_CAN: Final = (
-    "there is no template for CAN; its object dictionary depends on the device. Start from "
+    "CAN has no template; its object dictionary depends on the device. Start from "
     "drivers/arcor2_drivers/conveyor, which uses SDO, PDO, heartbeat and EMCY of CANopen"
 )
-NO_TEMPLATE: Final = "there is no template for this base; use --base generic, or start from a similar driver"
+NO_TEMPLATE: Final = "this base has no template; use --base generic, or start from a similar driver"
 
 
 def refusal(base: Base, bus: Bus) -> str:

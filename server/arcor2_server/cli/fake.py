@@ -54,7 +54,7 @@ def run(
     """Run a simulated device until Ctrl-C, and print the addresses of its interfaces and its control channel."""
     found = {fake.name: fake for fake in installed_fakes()}
     if name not in found:
-        reason = f"there is no fake {name}; installed: {', '.join(found) or 'none'}"
+        reason = f"fake {name} does not exist; installed: {', '.join(found) or 'none'}"
         return fail("fake run", reason, ExitStatus.NOT_FOUND)
     if found[name].problem:
         return fail("fake run", found[name].problem, ExitStatus.FAILED)

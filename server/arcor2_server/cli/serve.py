@@ -179,7 +179,7 @@ def check_access(settings: ServerSettings) -> None:
     raise CannotServe(
         ExitStatus.NO_TOKENS,
         f"other machines can connect to {settings.host}{' through a proxy' if settings.trusted_proxies else ''}, "
-        "but there is no token yet. "
+        "but no token exists yet. "
         "Create one with `arcor2-hw token add NAME --role programmer`, or use --insecure",
     )
 

@@ -56,5 +56,5 @@ def report_errors(world: Mapping[str, Any], erp: Mapping[str, Any]) -> list[str]
         right, wrong = reports.pop((code, good), 0), reports.pop((code, not good), 0)
         if right != 1 or wrong:
             errors.append(f"board {code} was reported {right} times correctly and {wrong} times wrongly")
-    errors += [f"{serial} was reported, but there is no such board" for serial, _ in reports]
+    errors += [f"board {serial} was reported, but does not exist" for serial, _ in reports]
     return errors

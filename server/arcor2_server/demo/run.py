@@ -214,7 +214,7 @@ class Demo:
                 event: Event = await client.next_event(timeout=BOARD_TIMEOUT)
             except DeviceTimeout:
                 raise ProgramFailed(
-                    "The program is stuck: there was no event for {board_timeout:g} s.", board_timeout=BOARD_TIMEOUT
+                    "The program is stuck: no event was received for {board_timeout:g} s.", board_timeout=BOARD_TIMEOUT
                 ) from None
             match event.event:
                 case "ActionStateBefore" if event.data.action_id in actions:

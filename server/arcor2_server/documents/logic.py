@@ -44,7 +44,7 @@ def check_logic_item(
     _check_otherwise(document, start, [item, *siblings])
     if not isinstance(item.condition, Unset):
         if start == START:
-            raise InvalidData("The step from START cannot have a condition: there is no result yet.")
+            raise InvalidData("The step from START cannot have a condition, because no action has a result yet.")
         _check_condition(document, meta_of, item.condition)
         if any(_same(item.condition, other.condition) for other in siblings):
             raise InvalidData("Another step from {name} has the same condition.", name=_name(document, start))

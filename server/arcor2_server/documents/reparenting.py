@@ -21,7 +21,7 @@ def check_parent(lookup: ProjectLookup, parent_id: str, name: str) -> None:
 
     Raises:
         InvalidData: The object has no pose.
-        NotFound: There is no such object or action point.
+        NotFound: The object or action point does not exist.
     """
     try:
         lookup.action_point(parent_id)

@@ -230,7 +230,7 @@ def read(path: Path) -> Archive:
         StorageError: The file cannot be read.
     """
     if not path.is_file():
-        raise NotFound("There is no file {path}.", path=path)
+        raise NotFound("File {path} does not exist.", path=path)
     files = package.from_zip(path, _wanted, MAX_SIZE)
     if HEAD not in files:
         if {SCRIPT, PROJECT} <= files.keys():

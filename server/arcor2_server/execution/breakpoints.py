@@ -39,7 +39,7 @@ class SharedBreakpoints:
         """Return the active breakpoints of an open or saved project.
 
         Raises:
-            NotFound: there is no such project.
+            NotFound: the project does not exist.
             StorageError: the breakpoints cannot be read.
         """
         async with self._lock:
@@ -54,7 +54,7 @@ class SharedBreakpoints:
         """Set and remove breakpoints, and publish them.
 
         Raises:
-            NotFound: there is no such project.
+            NotFound: the project does not exist.
             RequestRefused: an item does not exist, or there are too many breakpoints.
             StorageError: the breakpoints cannot be stored.
         """

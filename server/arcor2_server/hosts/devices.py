@@ -132,7 +132,7 @@ class DeviceBoard:
     def object(self, object_id: str) -> SceneObject:
         """Return an object of the scene. Raise NotFound if there is none."""
         if (found := self._objects.get(object_id)) is None:
-            raise NotFound("There is no online object with the id {object_id!r}.", object_id=object_id)
+            raise NotFound("No object with the id {object_id!r} is online.", object_id=object_id)
         return found
 
     def changed(self, message: DeviceChanged) -> None:

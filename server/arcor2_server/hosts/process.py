@@ -163,7 +163,7 @@ class CellHost:
 
         Raises:
             ConnectionLost: the host ended.
-            TimeoutError: there was no message within the time limit.
+            TimeoutError: no message was received within the time limit.
         """
         future: asyncio.Future[T] = asyncio.get_running_loop().create_future()
         if self.reason:

@@ -30,7 +30,7 @@ def set_up(level: str = "info") -> None:
     """Write the log of the server and its libraries to standard error.
 
     Raises:
-        KeyError: there is no level of this name.
+        KeyError: the level does not exist.
     """
     number = logging.getLevelNamesMapping()[level.upper()]
     shared: list[structlog.typing.Processor] = [

@@ -262,7 +262,7 @@ class ObjectTypes(TypeCatalog):
 
         Raises:
             InvalidData: The type is a base class, or installed.
-            NotFound: There is no such type.
+            NotFound: The type does not exist.
         """
         self.require_deletable(name)
         meta = self.meta(name)

@@ -42,7 +42,7 @@ class Undo:
         """Return the edit that a user can undo or redo: the one with a number, else the latest.
 
         Raises:
-            RequestRefused: there is no such edit.
+            RequestRefused: the edit does not exist.
         """
         history = self._session.history
         if isinstance(number, Unset):
@@ -52,7 +52,7 @@ class Undo:
             return latest
         edit = history.find(number)
         if edit is None:
-            raise RequestRefused("There is no edit {number}, or it is no longer stored.", number=number)
+            raise RequestRefused("Edit {number} does not exist or is too old.", number=number)
         if edit.user != user:
             raise RequestRefused("Edit {number} was made by {user}.", number=number, user=edit.user)
         if not (history.can_undo(user, number) if kind is EditKind.UNDO else history.can_redo(user, number)):

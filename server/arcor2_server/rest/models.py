@@ -84,7 +84,7 @@ class ModelOperations:
         try:
             kind = Model3dType(model_type.capitalize())
         except ValueError:
-            raise InvalidData("There is no model type {model_type!r}.", model_type=model_type[:40]) from None
+            raise InvalidData("Model type {model_type!r} does not exist.", model_type=model_type[:40]) from None
         return await self._of_kind(model_id, kind)
 
     @operation("GET", "/models/{model_id}/box", STORAGE, Role.OPERATOR)

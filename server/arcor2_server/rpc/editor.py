@@ -93,7 +93,7 @@ class SharedStateRequests:
             if (item := document.find(kind, args.id)) is not None:
                 break
         else:
-            raise NotFound("There is no object, action point, orientation or joints {id!r}.", id=args.id)
+            raise NotFound("No object, action point, orientation or joints have the id {id!r}.", id=args.id)
         if item.kind in OF_SCENE and context.client.role < Role.TECHNICIAN:
             raise RequestRefused("Moving an object needs the role technician or a higher one.")
         if item.kind is Kind.JOINTS and not (isinstance(args.position, Unset) and isinstance(args.orientation, Unset)):

@@ -26,7 +26,7 @@ def require_mesh(assets: AssetStore, model: Models) -> None:
     """Raise RequestRefused if the mesh of a collision model is not an asset."""
     if isinstance(model, Mesh) and not assets.exists(model.asset_id):
         raise RequestRefused(
-            "The mesh of {id} does not exist: there is no asset {asset_id!r}.", asset_id=model.asset_id, id=model.id
+            "Asset {asset_id!r}, the mesh of {id}, does not exist.", asset_id=model.asset_id, id=model.id
         )
 
 

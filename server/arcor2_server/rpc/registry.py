@@ -34,7 +34,7 @@ def rpc(name: str) -> Callable[[F], F]:
 
 
 def cached(name: str) -> Callable[[F], F]:
-    """Declare a method that returns the cached answer of a request without arguments, None if there is none."""
+    """Declare a method that returns the cached answer of a request without arguments (see CachedAnswer)."""
     if RPCS[name].args is not None:
         raise KeyError(f"{name} has arguments.")
 

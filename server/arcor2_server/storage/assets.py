@@ -106,7 +106,7 @@ class AssetStore:
         """Return the record of an asset. Raise NotFound if there is none."""
         found = self._assets.get(key) or self._offered.get(key)
         if found is None:
-            raise NotFound("There is no asset {key!r}.", key=key)
+            raise NotFound("Asset {key!r} does not exist.", key=key)
         return found
 
     def file(self, key: str) -> Path:
@@ -189,7 +189,7 @@ class AssetStore:
         """Delete an asset. Running downloads are completed.
 
         Raises:
-            NotFound: There is no such asset.
+            NotFound: The asset does not exist.
             Conflict: It belongs to an installed distribution.
         """
         async with self._changing:

@@ -121,7 +121,7 @@ class Database:
     async def one(session: AsyncSession, table: type[Any], key: str, what: str) -> Any:
         """Return the row with a key. Raise NotFound naming `what` if there is none."""
         if (row := await session.get(table, key)) is None:
-            raise NotFound("There is no {what} {key!r}.", what=what, key=key)
+            raise NotFound("The {what} {key!r} does not exist.", what=what, key=key)
         return row
 
     async def with_ids(self, table: type[Any], keys: Sequence[str], decode: Any) -> list[Any]:

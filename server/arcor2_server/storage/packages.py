@@ -57,7 +57,7 @@ class Packages:
         """Return the directory of a package. Raise NotFound if there is none."""
         path = self.path_of(package_id)
         if not (path / "script.py").is_file():
-            raise NotFound("There is no package {package_id}.", package_id=package_id)
+            raise NotFound("Package {package_id} does not exist.", package_id=package_id)
         return path
 
     def all(self) -> list[PackageSummary]:
@@ -84,7 +84,7 @@ class Packages:
         """Rename a package.
 
         Raises:
-            NotFound: There is no such package.
+            NotFound: The package does not exist.
             InvalidPackage: The name is empty.
             StorageError: The package cannot be written.
         """

@@ -62,7 +62,7 @@ class DisplayModels:
         """Return a converted asset. Concurrent callers share one conversion.
 
         Raises:
-            NotFound: There is no such asset.
+            NotFound: The asset does not exist.
             InvalidData: The asset is neither a mesh nor a robot model.
             StorageError: The result cannot be stored.
             ComputeStopped, ComputeTimeout, ComputeBusy, NotInstalled: The worker failed.

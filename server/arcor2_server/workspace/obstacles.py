@@ -42,13 +42,13 @@ class ObstacleRegistry:
     def get(self, key: str) -> Obstacle:
         """Return an obstacle. Raise NotFound if there is none."""
         if (obstacle := self._obstacles.get(key)) is None:
-            raise NotFound("There is no collision model {key!r}.", key=key)
+            raise NotFound("Collision model {key!r} does not exist.", key=key)
         return obstacle
 
     def remove(self, key: str) -> None:
         """Remove an obstacle. Raise NotFound if there is none."""
         if self._obstacles.pop(key, None) is None:
-            raise NotFound("There is no collision model {key!r}.", key=key)
+            raise NotFound("Collision model {key!r} does not exist.", key=key)
         self._removed([key])
 
     def stop(self) -> None:

@@ -150,11 +150,11 @@ class SceneRobots:
         """Return the model in the asset that a URI names, by its id or its address on this server.
 
         Raises:
-            NotFound: There is no such asset. Other servers are not contacted.
+            NotFound: The asset does not exist. Other servers are not contacted.
         """
         path = urlsplit(uri).path
         found = _ASSET.search(path)
         for name in (uri, unquote(found[1]) if found else unquote(path.rsplit("/", 1)[-1])):
             if self._assets.exists(name):
                 return RobotSource(StoredFile(str(self._assets.file(name)), name))
-        raise NotFound("There is no asset {uri!r} with the model of the robot.", uri=uri)
+        raise NotFound("Asset {uri!r} with the model of the robot does not exist.", uri=uri)

@@ -209,7 +209,7 @@ class SceneCollisions:
         """Attach an obstacle to a link of a robot at their present poses.
 
         Raises:
-            NotFound: There is no such obstacle or link.
+            NotFound: The obstacle or link does not exist.
             Conflict: It is attached already, or the robot has no model or unknown joints.
         """
         obstacle = self._collisions.get(key)
@@ -222,7 +222,7 @@ class SceneCollisions:
         """Detach an obstacle and return its pose, which stays as it is.
 
         Raises:
-            NotFound: There is no such obstacle.
+            NotFound: The obstacle does not exist.
             Conflict: It is not attached, or the joints of the robot are unknown.
         """
         obstacle = self._collisions.get(key)

@@ -76,7 +76,7 @@ def test_a_code_is_consumed_once(fake: FakeProcess, reader: BarcodeReader) -> No
     fake.control.do("present", code=None)
     assert reader.trigger(0.3) == NoRead("timeout")
     assert not reader.code_present(0.1)
-    with pytest.raises(Refused, match=f"^reader at {fake.ready['port']}: there is no new code"):
+    with pytest.raises(Refused, match=f"^reader at {fake.ready['port']}: no new code has been read"):
         reader.last_code()
     fake.control.do("present", code="TWICE")
     assert reader.code_present(1.0)

@@ -102,7 +102,7 @@ def test_an_aborted_belt_runs_only_after_clear(fake: FakeProcess, belt: Conveyor
     belt.run(0.2)
     belt.abort()
     assert belt.stop_reason().endswith("aborted by command")
-    assert ("there is no fault", False) in belt.permissives()
+    assert ("no fault is active", False) in belt.permissives()
     for act in (lambda: belt.run(0.1), lambda: belt.move_by(0.1), belt.home):
         with pytest.raises(Refused, match="is refused in state Aborted: clear it first"):
             act()

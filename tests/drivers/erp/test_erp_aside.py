@@ -34,7 +34,7 @@ def test_refused_results_are_stored_separately_and_named(fake: FakeProcess, erp:
     refused = erp.refused()
     assert [(each.order_id, each.why) for each in refused] == [
         ("A-1", "422: the order A-1 is forbidden"),
-        ("C-9", "404: there is no order C-9"),
+        ("C-9", "404: order C-9 does not exist"),
     ]
     (alarm,) = erp.alarms()
     assert alarm.code == "results_refused"

@@ -100,7 +100,7 @@ def test_program_out_of_range_sends_nothing(fake: FakeProcess, loaded: Functiona
 
 # ------------------------------------------------------------------------------------------------ refusals
 def test_start_is_refused_without_board_or_with_the_door_open(fake: FakeProcess, tester: FunctionalTester) -> None:
-    with pytest.raises(Refused, match="start is refused in state Idle: there is no board in the fixture"):
+    with pytest.raises(Refused, match="start is refused in state Idle: the fixture is empty"):
         tester.test()
     tester.open_door()
     assert dict(tester.permissives())["door closed"] is False

@@ -212,7 +212,7 @@ async def test_a_stuck_light_barrier_reports_a_wrong_state() -> None:
     await cell.run(0.8)
     assert (0, False) not in cell.devices.barriers[3:]
     await cell.world.stick_barrier(0, None)
-    with pytest.raises(ValueError, match="no light barrier at input 7; there are 0, 3"):
+    with pytest.raises(ValueError, match="input 7 has no light barrier; connected: 0, 3"):
         await cell.world.stick_barrier(7, True)
 
 

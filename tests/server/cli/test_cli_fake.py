@@ -123,7 +123,7 @@ def test_a_fake_in_the_foreground_prints_its_address_and_ends_cleanly(number: si
 def test_run_reports_errors() -> None:
     unknown = arcor2_hw_fake("run", "toaster")
     assert unknown.returncode == 9
-    assert unknown.stderr.startswith("arcor2-hw fake run: there is no fake toaster; installed: ")
+    assert unknown.stderr.startswith("arcor2-hw fake run: fake toaster does not exist; installed: ")
     assert arcor2_hw_fake("run", "conveyor", "--", "--node", "700").returncode == 2
     assert arcor2_hw_fake("run", "conveyor", "--", "--host", "203.0.113.1").returncode == 1
 
@@ -155,7 +155,7 @@ def test_without_a_fault_the_available_ones_are_listed(tester: Running) -> None:
     ("words", "status", "says"),
     [
         (["toast"], 1, "refuses: toast: unknown command"),
-        (["silence", "--wire", "toast"], 1, "no wire 'toast'; there are modbus"),
+        (["silence", "--wire", "toast"], 1, "wire 'toast' does not exist; available: modbus"),
         (["slow", "--seconds", "1000"], 1, "seconds is 0 to 600"),
         (["put_board"], 1, "code"),
         (["put_board", "PCB-1"], 2, "'PCB-1' must be key=value"),

@@ -93,7 +93,7 @@ class RecordedTypes:
         try:
             return self._metas[name]
         except KeyError:
-            raise NotFound(f"There is no object type {name!r}.") from None
+            raise NotFound(f"Object type {name!r} does not exist.") from None
 
     def derives_from(self, name: str, base: str) -> bool:
         while name:

@@ -68,7 +68,7 @@ def read(source: str) -> Script:
                     node=excerpt(node),
                 )
     if main is None:
-        raise NotUnderstood(1, "there is no function main")
+        raise NotUnderstood(1, "the function main is missing")
     _main(script, main)
     return script
 
