@@ -1,7 +1,8 @@
 """Messages for users: the English text, and the template and values from which clients translate it."""
 
+from collections.abc import Sequence
 from string import Formatter
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from msgspec import Struct
 
@@ -14,6 +15,14 @@ def key_of(template: str) -> str:
         literal.replace("{", "{{").replace("}", "}}") + ("" if name is None else f"{{{name}}}")
         for literal, name, _, _ in _FORMATTER.parse(template)
     )
+
+
+_T = TypeVar("_T")
+
+
+def translatable(texts: _T) -> _T:
+    """Return the texts. The call marks a text, or those of a table, for the extraction of translations."""
+    return texts
 
 
 class Message(Struct, frozen=True, omit_defaults=True):
@@ -58,6 +67,12 @@ class Message(Struct, frozen=True, omit_defaults=True):
                 used[name] = inner if whole else formatted  # type: ignore[assignment]
                 text.append(formatted)
         return cls("".join(text), key_of(template), used)
+
+    @classmethod
+    def joined(cls, messages: Sequence["Message"]) -> "Message":
+        """Return messages as one, separated by spaces. Clients translate each as a part of it."""
+        parts = {f"part{number}": message for number, message in enumerate(messages, 1)}
+        return cls.of(" ".join(f"{{{name}}}" for name in parts), **parts) if len(parts) != 1 else messages[0]
 
     def translation(self) -> dict[str, Any]:
         """Return the fields `key` and `values` that are sent next to the text; empty if the text itself is the key."""

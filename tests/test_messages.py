@@ -4,6 +4,8 @@ import pickle
 
 import pytest
 
+from arcor2_hw.data.device import Connection
+from arcor2_hw.data.events import ObjectStateData
 from arcor2_hw.exceptions import Arcor2Error, DeviceFault, DeviceTimeout, InvalidData, SafetyStop
 from arcor2_hw.messages import Message
 from arcor2_server.build.reading.errors import NotUnderstood
@@ -42,6 +44,21 @@ def test_translation_contains_what_is_sent_next_to_the_text() -> None:
     made = Message.of("{name} is unknown.", name="x")
     assert made.translation() == {"key": "{name} is unknown.", "values": {"name": "x"}}
     assert Message.of("It is unknown.").translation() == {}
+
+
+def test_joined_messages_stay_translatable_one_by_one() -> None:
+    first, second = Message.of("{name} is unknown.", name="x"), Message.of("It is {state}.", state="off")
+    joined = Message.joined([first, second])
+    assert (joined.text, joined.key) == ("x is unknown. It is off.", "{part1} {part2}")
+    assert joined.values == {"part1": first, "part2": second}
+    assert Message.joined([first]) is first
+
+
+def test_data_without_its_translation_is_otherwise_equal() -> None:
+    plain = ObjectStateData("obj", Connection.LOST, "Scale: off")
+    translated = ObjectStateData("obj", Connection.LOST, "Scale: off", key="{device}: off", values={"device": "Scale"})
+    assert translated.untranslated() == plain
+    assert plain.untranslated() is plain
 
 
 def test_a_missing_value_is_an_error() -> None:

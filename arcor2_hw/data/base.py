@@ -4,9 +4,10 @@ import builtins
 import keyword
 import uuid
 from datetime import UTC, datetime
-from typing import Annotated
+from typing import Annotated, Self
 
 from msgspec import UNSET, Meta, Struct, UnsetType
+from msgspec.structs import replace
 
 from arcor2_hw.messages import Message
 
@@ -25,6 +26,10 @@ class TranslatableData(Data, frozen=True, kw_only=True):
 
     key: str | UnsetType = UNSET
     values: dict[str, str | Message] | UnsetType = UNSET
+
+    def untranslated(self) -> Self:
+        """Return this data without `key` and `values`."""
+        return self if self.key is UNSET and self.values is UNSET else replace(self, key=UNSET, values=UNSET)
 
 
 class MutableData(Struct, dict=True):

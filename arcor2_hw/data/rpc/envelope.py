@@ -27,7 +27,7 @@ class Rpc(Struct, frozen=True):
 class Request(Data, frozen=True):
     """The envelope of a request; `args` is decoded when the request is known.
 
-    `codes`: whether a refusal contains its reason and what is needed to translate its message.
+    `codes`: whether a refusal contains its reason, and every answer what is needed to translate its messages.
     """
 
     id: int
