@@ -8,6 +8,7 @@ from arcor2_hw.analysis.constants import enum_kind
 from arcor2_hw.analysis.module import ClassInfo, Module
 from arcor2_hw.analysis.source import Broken
 from arcor2_hw.analysis.symbols import External, Resolver, Symbol, framework_name
+from arcor2_hw.parsing import parse_expression
 
 _SCALARS: Final = {"builtins.bool", "builtins.int", "builtins.float", "builtins.str"}
 _PICTURE: Final = "PIL.Image.Image"
@@ -21,7 +22,7 @@ def plain(hint: ast.expr, module: Module) -> ast.expr:
     """
     if isinstance(hint, ast.Constant) and isinstance(hint.value, str):
         try:
-            return ast.copy_location(ast.parse(hint.value.strip(), mode="eval").body, hint)
+            return ast.copy_location(parse_expression(hint.value.strip()), hint)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise module.problem(f"{hint.value[:40]!r} is not a type hint", hint.lineno) from None
     return hint

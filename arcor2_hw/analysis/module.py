@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from arcor2_hw.analysis.source import Broken, SourceFile
+from arcor2_hw.parsing import parse
 
 FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -72,7 +73,7 @@ class Module:
         self.imports: list[Import] = []
         self.path = file.path or f"{file.module.replace('.', '/')}.py"
         try:
-            tree = ast.parse(file.source)
+            tree = parse(file.source)
         except SyntaxError as error:
             raise self.problem(f"this is not valid Python: {error.msg}", error.lineno or 1) from None
         except (RecursionError, MemoryError):

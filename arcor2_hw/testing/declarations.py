@@ -18,6 +18,7 @@ from arcor2_hw.analysis.library import NO_DESCRIPTION
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.parsing import parse
 from arcor2_hw.testing import quality
 
 STOCK: Final = "arcor2_hw.objects."
@@ -110,7 +111,7 @@ def _of_an_action(action: ObjectAction) -> list[str]:
 
 
 def _declares_reaction(source: str | bytes) -> bool:
-    classes = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef))
+    classes = (node for node in ast.walk(parse(source)) if isinstance(node, ast.ClassDef))
     return any(
         isinstance(target, ast.Name) and target.id == "loss_reaction"
         for each in classes

@@ -15,6 +15,7 @@ from arcor2_hw.data.project import Action, Project
 from arcor2_hw.data.project_index import ProjectIndex
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidData, InvalidProject, NotFound
+from arcor2_hw.parsing import parse
 from arcor2_server.build import expressions
 from arcor2_server.build.naming import Names
 from arcor2_server.build.points import PointNames, names_of
@@ -94,12 +95,12 @@ class Frame:
     # ------------------------------------------------------------------------------------------------ module
     def module(self, loop: list[ast.stmt]) -> str:
         """Return the source code of the script, with `loop` after the objects and project parameters."""
-        main, entry = ast.parse(_FRAME).body
+        main, entry = parse(_FRAME).body
         assert isinstance(main, ast.FunctionDef)
         objects = [
             statement
             for obj in self.scene.objects
-            for statement in ast.parse(f"{self.objects[obj.id]}: {self.classes[obj.id]} = res.objects[{obj.id!r}]").body
+            for statement in parse(f"{self.objects[obj.id]}: {self.classes[obj.id]} = res.objects[{obj.id!r}]").body
         ]
         constants: list[ast.stmt] = [
             expressions.assign(self.parameters[parameter.id], self._constant(parameter))

@@ -16,6 +16,7 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import InvalidPackage, TextTooLong
+from arcor2_hw.parsing import parse
 from arcor2_server.build import package, snapshot
 
 T = TypeVar("T")
@@ -98,7 +99,7 @@ def _class_in(path: str, source: str) -> tuple[str, _Kind]:
     """
     stem = PurePosixPath(path).stem
     try:
-        tree = ast.parse(source)
+        tree = parse(source)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise InvalidPackage("{path} of the package is not valid Python: {reason}", path=path, reason=error) from error
     for node in tree.body:

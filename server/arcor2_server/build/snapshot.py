@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 from arcor2_hw.analysis import Enumeration
 from arcor2_hw.exceptions import InvalidProject
+from arcor2_hw.parsing import parse
 from arcor2_server.build.naming import Names
 from arcor2_server.build.style import docstring
 from arcor2_server.object_types.catalog import PackageType
@@ -29,7 +30,7 @@ class _Imports(NamedTuple):
 def _imports(source: bytes) -> _Imports:
     """Return the imports of a source."""
     try:
-        tree = ast.parse(source)
+        tree = parse(source)
     except (SyntaxError, ValueError):
         return _Imports(frozenset(), 0)  # the analysis reports the error
     found: set[str] = set()

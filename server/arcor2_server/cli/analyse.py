@@ -10,6 +10,7 @@ from rich.table import Table
 from arcor2_hw.analysis import Library, SourceFile, TypeAnalysis
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
+from arcor2_hw.parsing import parse
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.cli.tables import console
 
@@ -26,7 +27,7 @@ def analyse(file: Path, *, type_name: str | None = None) -> int:
     """
     try:
         source = file.read_bytes()
-        names = [node.name for node in ast.parse(source, str(file)).body if isinstance(node, ast.ClassDef)]
+        names = [node.name for node in parse(source, str(file)).body if isinstance(node, ast.ClassDef)]
     except OSError as error:
         return fail("analyse", f"{file}: {error.strerror}", ExitStatus.NOT_FOUND)
     except (SyntaxError, ValueError, RecursionError) as error:

@@ -8,6 +8,8 @@ from typing import Final
 
 from msgspec import Struct
 
+from arcor2_hw.parsing import parse
+
 GROUP: Final = "arcor2_hw.fakes"
 """The entry point group of fakes: `tester = "package.module"`. The module is run with `python -m`."""
 
@@ -36,7 +38,7 @@ def _read(point: EntryPoint) -> InstalledFake:
     if file is None:
         return InstalledFake(point.name, point.value, problem=f"the module {point.value} is not installed")
     try:
-        tree = ast.parse(file.read_bytes())
+        tree = parse(file.read_bytes())
     except (OSError, SyntaxError, ValueError) as error:
         return InstalledFake(point.name, point.value, problem=f"{file} cannot be read: {error}")
     wire = next(

@@ -9,6 +9,7 @@ from cyclopts import App, Parameter
 from arcor2_hw.analysis import Library, SourceFile, TypeAnalysis, module_name
 from arcor2_hw.client import Rest
 from arcor2_hw.data.base import Unset, is_valid_name
+from arcor2_hw.parsing import parse
 from arcor2_server.cli import export_files
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.server_connection import HERE, Failed, Server, run
@@ -32,7 +33,7 @@ def _class_in(source: str, file: Path, name: str | None) -> str:
     without an object type has the name of the file.
     """
     try:
-        names = [node.name for node in ast.parse(source).body if isinstance(node, ast.ClassDef)]
+        names = [node.name for node in parse(source).body if isinstance(node, ast.ClassDef)]
     except SyntaxError as error:
         raise Failed(ExitStatus.ANALYSIS_PROBLEMS, f"{file}:{error.lineno}: {error.msg}") from error
     if name is None:

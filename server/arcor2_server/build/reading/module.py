@@ -4,6 +4,7 @@ import ast
 from dataclasses import dataclass, field
 from typing import Final
 
+from arcor2_hw.parsing import parse
 from arcor2_server.build.reading.errors import NotUnderstood, excerpt
 
 _LIBRARIES: Final = ("arcor2_hw", "arcor2", "arcor2_runtime", "object_types", "__future__", "typing")
@@ -44,7 +45,7 @@ class Script:
 def read(source: str) -> Script:
     """Read a script. Raise NotUnderstood if it does not follow the conventions."""
     try:
-        module = ast.parse(source, "script.py")
+        module = parse(source, "script.py")
     except SyntaxError as error:
         raise NotUnderstood(error.lineno or 1, error.msg, error.text or "") from error
     except (ValueError, RecursionError, MemoryError) as error:
