@@ -25,7 +25,6 @@ class Job:
         "_claim",
         "_gate",
         "arguments",
-        "epoch",
         "error",
         "function",
         "given_up",
@@ -33,6 +32,7 @@ class Job:
         "method",
         "notify",
         "since",
+        "stop_token",
         "value",
     )
 
@@ -51,8 +51,8 @@ class Job:
         self.notify = notify
         self.value: Any = None
         self.error: BaseException | None = None
-        self.since = 0.0
-        self.epoch = 0
+        self.since = time.monotonic()
+        self.stop_token: object = None
         self.given_up = False
         self._claim = threading.Lock()
         self._gate = threading.Lock()
@@ -84,10 +84,10 @@ class Job:
 
     def wait(self, timeout: float | None) -> bool:
         """Wait until the call has ended, at most `timeout` s. Return False on timeout."""
-        if self._gate.acquire(timeout=-1 if timeout is None else max(timeout, 0.0)):
+        ended = self._gate.acquire() if timeout is None else self._gate.acquire(timeout=max(timeout, 0.0))
+        if ended:
             self._gate.release()
-            return True
-        return False
+        return ended
 
     def outcome(self) -> Any:
         """Return the result of a call that has ended, or raise its error."""
@@ -107,7 +107,7 @@ class Lane:
         self.device = device
         self._queue: SimpleQueue[Job | None] = SimpleQueue()
         self._current: Job | None = None
-        self._epoch = 0  # number of stops so far; a call that was queued before a stop is cancelled
+        self._stop_token = object()  # replaced by each stop; a call that was queued under another one is cancelled
         self._thread = threading.Thread(target=self._run, name=f"{device} {purpose}".strip(), daemon=True)
         self._thread.start()
 
@@ -129,7 +129,9 @@ class Lane:
             return function(*arguments, **keywords)
         job = Job(method, function, arguments, keywords)
         self.submit(job)
-        if not job.wait(deadline) and deadline is not None:
+        if deadline is None:
+            job.wait(None)
+        elif not job.wait(deadline):
             self.expire(job, deadline)
         return job.outcome()
 
@@ -138,7 +140,7 @@ class Lane:
         current = self._current
         if current is not None and current.given_up:
             raise self._hung(current)
-        job.epoch = self._epoch
+        job.stop_token = self._stop_token
         self._queue.put(job)
 
     def submit_or_fail(self, job: Job) -> bool:
@@ -178,7 +180,7 @@ class Lane:
 
     def interrupt(self) -> Job | None:
         """Cancel the queued calls. Mark the running call, so that it ends as Cancelled, and return it."""
-        self._epoch += 1
+        self._stop_token = object()
         current = self._current
         self.cancel_waiting()
         return current
@@ -200,7 +202,7 @@ class Lane:
         if job is None:
             return
         job.since = time.monotonic()
-        if job.ended or job.epoch != self._epoch:
+        if job.ended or job.stop_token is not self._stop_token:
             raise Cancelled("{device}: {method} was stopped before it began", device=self.device, method=job.method)
 
     # -------------------------------------------------------------------------------- state
@@ -261,7 +263,7 @@ class Lane:
         while (job := self._queue.get()) is not None:
             job.since = time.monotonic()
             self._current = job  # before the check, so that `expire` on another thread sees it
-            if job.ended or job.epoch != self._epoch:
+            if job.ended or job.stop_token is not self._stop_token:
                 self._current = None
                 job.finish(
                     None,
@@ -274,7 +276,7 @@ class Lane:
                 value = job.function(*job.arguments, **job.keywords)
             except BaseException as caught:  # noqa: BLE001 - the caller receives every error
                 error = caught
-            if job.epoch != self._epoch and not isinstance(error, Arcor2Error):
+            if job.stop_token is not self._stop_token and not isinstance(error, Arcor2Error):
                 error = Cancelled(
                     "{device}: {method} was stopped",
                     "" if error is None else repr(error),

@@ -9,7 +9,7 @@ import pytest
 
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout
 from arcor2_hw.runtime.lane import Job, Lane, on_any_lane
-from arcor2_hw.testing.own_time import own_time
+from tests.waiting import WITHIN, wait_for
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def lane() -> Iterator[Lane]:
     lane = Lane("arm")
     yield lane
     lane.close()
-    assert lane.join(5)
+    assert lane.join(WITHIN)
 
 
 def test_calls_run_in_order_on_one_thread(lane: Lane) -> None:
@@ -31,7 +31,7 @@ def test_calls_run_in_order_on_one_thread(lane: Lane) -> None:
     jobs = [Job("number", number, (n,)) for n in range(100)]
     for job in jobs:
         lane.submit(job)
-    assert [job.wait(5) and job.outcome() for job in jobs] == list(range(100))
+    assert [job.wait(WITHIN) and job.outcome() for job in jobs] == list(range(100))
     assert len(threads) == 1
     assert not on_any_lane()
 
@@ -48,25 +48,23 @@ def test_the_caller_receives_errors(lane: Lane) -> None:
 
 def test_a_late_result_is_dropped_and_the_lane_is_usable_again(lane: Lane) -> None:
     gate = threading.Event()
-    with pytest.raises(DeviceTimeout, match=r"arm: slow did not finish within 0\.05 s"):
-        lane.call("slow", lambda: gate.wait(5), deadline=0.05)
+    lane.call("first", lambda: None)  # the thread is running
+    with pytest.raises(DeviceTimeout, match=r"arm: slow did not finish within 0\.5 s"):
+        lane.call("slow", gate.wait, deadline=0.5)
     assert lane.hung
-    began = own_time()
     with pytest.raises(DeviceTimeout, match="still busy with slow"):
-        lane.call("next", lambda: 1, deadline=5.0)
-    assert own_time() - began < 1.0
+        lane.call("next", lambda: 1)  # without a deadline: it would wait for the gate
     gate.set()
-    deadline = time.monotonic() + 5
-    while lane.hung and time.monotonic() < deadline:
-        time.sleep(0.001)
-    assert lane.call("next", lambda: 2, deadline=5.0) == 2
+    wait_for(lambda: not lane.hung)
+    assert lane.call("next", lambda: 2, deadline=WITHIN) == 2
 
 
 def test_a_queued_call_that_expired_never_runs(lane: Lane) -> None:
     gate = threading.Event()
     ran: list[int] = []
-    first = Job("first", lambda: gate.wait(5))
+    first = Job("first", gate.wait)
     lane.submit(first)
+    wait_for(lambda: lane.current is first)
     with pytest.raises(DeviceTimeout, match="busy with first"):
         lane.call("second", lambda: ran.append(1), deadline=0.05)
     gate.set()
@@ -80,17 +78,17 @@ def test_a_stop_cancels_queued_and_running_calls(lane: Lane) -> None:
 
     def move() -> str:
         begun.set()
-        gate.wait(5)
+        gate.wait(WITHIN)
         return "arrived"
 
     moving, waiting = Job("move", move), Job("wait", lambda: ran.append(1))
     for job in (moving, waiting):
         lane.submit(job)
-    assert begun.wait(5)
+    assert begun.wait(WITHIN)
     assert lane.interrupt() is moving
-    assert waiting.wait(1)
+    assert waiting.wait(WITHIN)
     gate.set()
-    assert moving.wait(5)
+    assert moving.wait(WITHIN)
     for job in (moving, waiting):
         assert isinstance(job.error, Cancelled)
     assert ran == []
@@ -102,15 +100,15 @@ def test_a_stopped_call_keeps_the_error_of_the_device(lane: Lane) -> None:
 
     def move() -> None:
         begun.set()
-        gate.wait(5)
+        gate.wait(WITHIN)
         raise DeviceFault("drive 3")
 
     job = Job("move", move)
     lane.submit(job)
-    begun.wait(5)
+    begun.wait(WITHIN)
     lane.interrupt()
     gate.set()
-    assert job.wait(5)
+    assert job.wait(WITHIN)
     assert isinstance(job.error, DeviceFault)
 
 
@@ -132,7 +130,7 @@ def test_no_call_from_before_a_stop_runs_after_it(lane: Lane) -> None:
             pass
         lane.interrupt()
         stopped = time.perf_counter()
-        assert all(job.wait(5) for job in jobs)
+        assert all(job.wait(WITHIN) for job in jobs)
         late = [n for n, moment in began.items() if moment > stopped]
         assert len(late) <= 1
         assert all(isinstance(jobs[n].error, Cancelled) for n in late)
@@ -169,7 +167,7 @@ def test_a_driver_can_check_whether_its_call_is_still_wanted(lane: Lane) -> None
     def act(*, wait: bool) -> str:
         if wait:
             begun.set()
-            gate.wait(5)
+            gate.wait(WITHIN)
         lane.check_wanted()
         return "acted"
 
@@ -177,10 +175,10 @@ def test_a_driver_can_check_whether_its_call_is_still_wanted(lane: Lane) -> None
 
     stopped = Job("act", act, keywords={"wait": True})
     lane.submit(stopped)
-    assert begun.wait(5)
+    assert begun.wait(WITHIN)
     lane.interrupt()
     gate.set()
-    assert stopped.wait(5)
+    assert stopped.wait(WITHIN)
     with pytest.raises(Cancelled, match=r"act was stopped before it began"):
         stopped.outcome()
 
@@ -190,17 +188,19 @@ def test_a_call_that_was_given_up_is_not_wanted_either(lane: Lane) -> None:
     reactions: list[BaseException] = []
 
     def act() -> None:
-        gate.wait(5)
+        gate.wait(WITHIN)
         try:
             lane.check_wanted()
         except Cancelled as error:
             reactions.append(error)
 
-    with pytest.raises(DeviceTimeout):
-        lane.call("act", act, deadline=0.02)
+    job = Job("act", act)
+    lane.submit(job)
+    wait_for(lambda: lane.current is job)
+    lane.expire(job, 0.02)
+    assert isinstance(job.error, DeviceTimeout)
     gate.set()
-    while lane.hung:
-        time.sleep(0.001)
+    wait_for(lambda: not lane.hung)
     assert len(reactions) == 1
 
 
@@ -213,18 +213,46 @@ def test_the_running_method_is_known(lane: Lane) -> None:
 
 def test_calls_behind_a_hung_one_fail_at_once_and_say_since_when_it_hangs(lane: Lane) -> None:
     gate = threading.Event()
-    hanging, waiting = Job("slow", lambda: gate.wait(5)), Job("next", lambda: 1)
+    hanging, waiting = Job("slow", gate.wait), Job("next", lambda: 1)
     lane.submit(hanging)
-    while lane.current is not hanging:
-        time.sleep(0.001)
+    wait_for(lambda: lane.current is hanging)
     lane.submit(waiting)
+    hanging.since = time.monotonic() - 5
     lane.expire(hanging, 0.5)
+    refused = Job("refused", lambda: 1)
+    assert not lane.submit_or_fail(refused)
     try:
-        assert waiting.wait(5)
-        assert isinstance(waiting.error, DeviceTimeout)
-        assert float(waiting.error.detail.split()[2]) < 60
+        for job in (waiting, refused):
+            assert job.wait(WITHIN)
+            assert isinstance(job.error, DeviceTimeout)
+            assert 5 <= float(job.error.detail.split()[2]) < 60
     finally:
         gate.set()
+
+
+def test_a_job_is_queued_while_the_lane_works(lane: Lane) -> None:
+    job = Job("act", lambda: 1)
+    assert lane.submit_or_fail(job)
+    assert job.wait(WITHIN)
+    assert job.outcome() == 1
+
+
+@pytest.mark.parametrize(("purpose", "name"), [("", "arm"), ("observing", "arm observing")])
+def test_the_thread_is_named_and_does_not_keep_the_process_alive(purpose: str, name: str) -> None:
+    lane = Lane("arm", purpose)
+    thread = lane.call("act", threading.current_thread)
+    assert (thread.name, thread.daemon) == (name, True)
+    lane.close()
+    assert lane.join(WITHIN)
+
+
+@pytest.mark.parametrize("timeout", [0.0, -0.5])
+def test_a_wait_without_time_returns_at_once(timeout: float) -> None:
+    job = Job("act", lambda: 1)
+    assert not job.wait(timeout)
+    job.finish()
+    assert job.wait(timeout)
+    assert job.wait(None)
 
 
 def test_giving_up_returns_whether_it_ended_the_call() -> None:
@@ -240,15 +268,14 @@ def test_giving_up_returns_whether_it_ended_the_call() -> None:
 
 def test_a_stop_after_closing_does_not_keep_the_thread_alive() -> None:
     lane, gate = Lane("arm"), threading.Event()
-    running = Job("act", lambda: gate.wait(5))
+    running = Job("act", gate.wait)
     lane.submit(running)
-    while lane.current is not running:
-        time.sleep(0.001)
+    wait_for(lambda: lane.current is running)
     lane.close()
     lane.cancel_waiting()
     assert not lane.join(0)
     gate.set()
-    assert lane.join(5)
+    assert lane.join(WITHIN)
 
 
 @pytest.mark.parametrize(("error", "detail"), [(None, ""), (ValueError("bad"), "ValueError('bad')")])
@@ -259,15 +286,15 @@ def test_a_stopped_call_names_the_error_that_the_driver_raised(
 
     def act() -> None:
         begun.set()
-        gate.wait(5)
+        gate.wait(WITHIN)
         if error is not None:
             raise error
 
     job = Job("act", act)
     lane.submit(job)
-    assert begun.wait(5)
+    assert begun.wait(WITHIN)
     lane.interrupt()
     gate.set()
-    assert job.wait(5)
+    assert job.wait(WITHIN)
     assert isinstance(job.error, Cancelled)
     assert job.error.detail == detail
