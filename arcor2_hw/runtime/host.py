@@ -16,7 +16,6 @@ import socket
 import sys
 import threading
 import types
-from datetime import UTC, datetime
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Final
@@ -33,8 +32,8 @@ from arcor2_hw.runtime.creation import write_sources
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.holding import Holds
 from arcor2_hw.runtime.link import Link
-from arcor2_hw.runtime.package import put_on_path
 from arcor2_hw.runtime.program import Program, set_current, traceback_text
+from arcor2_hw.runtime.script import execute, save_traceback
 from arcor2_hw.runtime.stopping import wait_stopped
 from arcor2_hw.runtime.streaming import RatedStreams, Streams
 from arcor2_hw.runtime.teaching import TEACHING_PERIOD, Teaching
@@ -215,7 +214,7 @@ class Host:
         directory = Path(message.directory)
         handled = True
         try:
-            _execute(directory, program)
+            execute(directory, program)
         except (ProgramFinished, ProgramStopped):
             pass
         except SystemExit as error:
@@ -227,7 +226,7 @@ class Host:
         program.ended = True
         failed = program.stop_requested or program.error is not None
         if program.error is not None and not (handled and isinstance(program.error, Arcor2Error)):
-            _save_traceback(directory, program.error)
+            save_traceback(directory, program.error)
         problem = program.settle(failed)
         self._calls.settle()  # before the devices are closed
         problem = program.cell.close() or problem
@@ -353,29 +352,6 @@ class Host:
 
 
 _MAIN: Final = threading.main_thread().ident or 0
-
-
-def _execute(directory: Path, program: Program) -> None:
-    """Run script.py as `__main__` in its directory."""
-    put_on_path(directory)
-    os.chdir(directory)
-    script = directory / "script.py"
-    sys.argv = [str(script)]
-    module = types.ModuleType("__main__")
-    module.__file__ = str(script)
-    sys.modules["__main__"] = module
-    code = compile(script.read_bytes(), str(script), "exec")
-    try:
-        program.inside = False
-        exec(code, module.__dict__)  # noqa: S102 - this process exists to run the script
-    finally:
-        program.inside = True
-
-
-def _save_traceback(directory: Path, error: BaseException) -> None:
-    path = directory / f"traceback-{datetime.now(UTC):%Y-%m-%dT%H-%M-%S}.txt"
-    with contextlib.suppress(OSError):
-        path.write_text(traceback_text(error), encoding="utf-8")
 
 
 def main() -> None:

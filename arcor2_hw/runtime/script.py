@@ -1,0 +1,35 @@
+"""The script of a package: executes it, and stores the traceback of its failure."""
+
+import contextlib
+import os
+import sys
+import types
+from datetime import UTC, datetime
+from pathlib import Path
+
+from arcor2_hw.runtime.package import put_on_path
+from arcor2_hw.runtime.program import Program, traceback_text
+
+
+def execute(directory: Path, program: Program) -> None:
+    """Run script.py as `__main__` in its directory."""
+    put_on_path(directory)
+    os.chdir(directory)
+    script = directory / "script.py"
+    sys.argv = [str(script)]
+    module = types.ModuleType("__main__")
+    module.__file__ = str(script)
+    sys.modules["__main__"] = module
+    code = compile(script.read_bytes(), str(script), "exec")
+    try:
+        program.inside = False
+        exec(code, module.__dict__)  # noqa: S102 - this process exists to run the script
+    finally:
+        program.inside = True
+
+
+def save_traceback(directory: Path, error: BaseException) -> None:
+    """Write the traceback of a failed program next to its script. A full disk is ignored."""
+    path = directory / f"traceback-{datetime.now(UTC):%Y-%m-%dT%H-%M-%S}.txt"
+    with contextlib.suppress(OSError):
+        path.write_text(traceback_text(error), encoding="utf-8")
