@@ -220,7 +220,9 @@ class Program:
     def device_lost(self, device: Device, reason: str) -> bool:
         """Stop the program because the connection of a device is lost. Return whether the program was still running."""
         error = ConnectionLost(
-            "{name}: the program was stopped, because the connection is lost", reason, name=device.name
+            "{name}: the program was stopped, because the connection is lost: {reason}",
+            name=device.name,
+            reason=reason or "unknown reason",
         )
         with self._reporting:
             if self.ended or self.stop_requested or self.error is not None:

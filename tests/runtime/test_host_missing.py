@@ -8,6 +8,7 @@ import msgspec
 
 from arcor2_hw.data.device import Connection
 from arcor2_hw.runtime import messages as m
+from tests.waiting import wait_for
 
 from .conftest import HostProcess, open_scene, scene_object, type_code
 
@@ -70,10 +71,11 @@ def test_a_scene_opens_without_failed_objects(host: HostProcess, tmp_path: Path)
         assert error.code == "not_connected"
         assert name in error.message.text
         assert reason in error.message.text
-        ((connection, told),) = changes(host, f"obj_{name}")
+        ((connection, text),) = changes(host, f"obj_{name}")
         assert connection is Connection.FAILED
-        assert reason in told
-    assert Path(f"{away}.log").read_text().split() == ["made", "closed"]
+        assert reason in text
+    # A failed object is closed on its own thread.
+    wait_for(lambda: Path(f"{away}.log").read_text().split(), lambda calls: calls == ["made", "closed"])
 
 
 def test_a_failed_object_connects_on_retry(host: HostProcess, tmp_path: Path) -> None:
@@ -86,8 +88,7 @@ def test_a_failed_object_connects_on_retry(host: HostProcess, tmp_path: Path) ->
     file.touch()
     assert retry(host, "obj_box", 502) is None
     assert host.call("obj_box", "size") == 1
-    told = [connection for connection, _ in changes(host, "obj_box")]
-    assert told == [
+    assert [connection for connection, _ in changes(host, "obj_box")] == [
         Connection.FAILED,
         Connection.CONNECTING,
         Connection.FAILED,
@@ -141,24 +142,24 @@ def test_streams_at_different_rates(host: HostProcess) -> None:
     host.send(m.Subscribe("obj_arm", True, False))
     began = time.monotonic()
     host.send(m.Stream("obj_arm", [30.0, 5.0], [20.0]))
-    time.sleep(1.0)
+
+    def all_streams() -> list[list[dict[str, Any]]]:
+        host.call("obj_arm", "grippers")  # reads what the host has sent
+        return [
+            streamed(host, event, rate)
+            for event, rate in (("RobotJoints", 30.0), ("RobotEef", 20.0), ("RobotJoints", 5.0))
+        ]
+
+    wait_for(all_streams, lambda streams: len(streams[0]) > len(streams[1]) > len(streams[2]) >= 5)
     host.send(m.Stream("obj_arm", [5.0], []))
-    host.call("obj_arm", "grippers")
+    fast, eef, slow = all_streams()
     seconds = time.monotonic() - began
-    fast, slow, eef = (
-        streamed(host, "RobotJoints", 30.0),
-        streamed(host, "RobotJoints", 5.0),
-        streamed(host, "RobotEef", 20.0),
-    )
-    assert len(fast) > len(eef) > len(slow) >= 2
     for events, rate in ((fast, 30.0), (eef, 20.0), (slow, 5.0)):
         assert len(events) <= rate * seconds + 2
     # The time is that of the sample, on the clock of this machine.
-    assert all(abs(one["joints"][0]["value"] * 1e3 - one["time_ms"]) < 500.0 for one in fast)
+    assert all(abs(one["joints"][0]["value"] * 1e3 - one["time_ms"]) < 5000.0 for one in fast)
     assert all("time_ms" not in one for one in streamed(host, "RobotJoints", 0.0))
     host.seen.clear()
-    time.sleep(1.0)
-    host.call("obj_arm", "grippers")
-    assert streamed(host, "RobotJoints", 30.0)[1:] == []  # one may have been under way
-    assert streamed(host, "RobotEef", 20.0)[1:] == []
-    assert streamed(host, "RobotJoints", 5.0)
+    fast, eef, _ = wait_for(all_streams, lambda streams: len(streams[2]) >= 4)
+    assert fast[1:] == []  # one may have been under way
+    assert eef[1:] == []
