@@ -68,6 +68,9 @@ class Holds:
     # -------------------------------------------------------------------------------- leases
     def lease(self, message: m.Lease) -> None:
         """Start, renew or end a hold. CallDone, with the scale of a jog, or CallFailed answers it."""
+        former = self._held.get(message.object_id)
+        if former is not None and message.until != 0.0:
+            self._check_expired(former)  # after a delay of this process the lease may arrive before the clock's call
         try:
             hold = self._register(message)
         except Arcor2Error as error:
@@ -107,7 +110,7 @@ class Holds:
             return hold
 
     def _check_expired(self, hold: _Hold) -> None:
-        """End a hold whose lease has expired. Runs on the clock thread."""
+        """End a hold whose lease has expired."""
         if hold.newest.until <= time.monotonic():
             what = "jog" if hold.kind is HoldKind.JOG else "hold"
             self.end(hold, Cancelled("{name}: the {what} was not renewed in time", name=hold.device.name, what=what))

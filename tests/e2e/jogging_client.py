@@ -13,22 +13,23 @@ PERIOD = 0.05
 
 
 async def main(url: str, robot_id: str) -> None:
-    """Lock the robot, jog it up; tell each answer on standard output."""
+    """Lock the robot and jog it up. Print each answer after the monotonic time at which the request was sent, s."""
     async with Client(url, "jogger", reconnect=False) as client:
         await client.call("WriteLock", WriteLockArgs(robot_id))
 
         async def renew() -> None:
+            sent = time.monotonic()
             try:
                 await client.jog_robot(
                     robot_id=robot_id,
                     hold=1,
-                    sent_ms=time.monotonic() * 1e3,
+                    sent_ms=sent * 1e3,
                     valid_ms=VALID_MS,
                     linear=Position(0.0, 0.0, 0.1),
                 )
-                sys.stdout.write("granted\n")
+                sys.stdout.write(f"{sent} granted\n")
             except RequestFailed as error:
-                sys.stdout.write(f"refused {error}\n")
+                sys.stdout.write(f"{sent} refused {error}\n")
             sys.stdout.flush()
 
         async with asyncio.TaskGroup() as tasks:

@@ -1,6 +1,8 @@
 """Hold-to-run in the cell host: leases, their expiry, speed and joint limits, hand teaching."""
 
+import contextlib
 import os
+import re
 import signal
 import time
 from collections.abc import Iterator
@@ -23,7 +25,7 @@ class Arm(Robot):
 
     def __init__(self, obj_id, name, pose, settings=None):
         super().__init__(obj_id, name, pose, settings)
-        self.told = []
+        self.calls = []
         self.owner = None
         self.taking = 0.0
         self.hangs = 0.0
@@ -31,10 +33,10 @@ class Arm(Robot):
         self.fault = ""
         self.hand = False
 
-    def note(self, what, *more): self.told.append([what, time.monotonic(), *more])
-    def report(self): return self.told
+    def note(self, what, *more): self.calls.append([what, time.monotonic(), *more])
+    def report(self): return self.calls
     def forget(self):
-        self.told, self.taking, self.hangs, self.at, self.fault = [], 0.0, 0.0, 0.0, ""
+        self.calls, self.taking, self.hangs, self.at, self.fault = [], 0.0, 0.0, 0.0, ""
     def set(self, key: str, value: float): setattr(self, key, value)
     def set_fault(self, fault: str): self.fault = fault
     def lose_control(self): self.owner = None
@@ -63,8 +65,12 @@ class Arm(Robot):
         if self.fault: raise SafetyStop(self.fault)
         self.note("jog", twist, joint_velocities, frame, valid_for, end_effector_id)
         time.sleep(self.hangs)
+        self.note("jogged")
 """
 OBJ = "obj_arm"
+LONG = 2.0
+"""Validity of a lease that is to last until it is renewed or the button is released, s. Joints slow down so long before
+their limits."""
 ALONG_X = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -76,7 +82,7 @@ class Holder:
         self.hold = 0
         self._number = 10_000
 
-    def lease(self, valid: float = 0.3, *, kind: HoldKind = HoldKind.JOG, new: bool = False, **more: Any) -> int:
+    def lease(self, valid: float = LONG, *, kind: HoldKind = HoldKind.JOG, new: bool = False, **more: Any) -> int:
         self.hold += new
         self._number += 1
         if kind is HoldKind.JOG and valid and "joints" not in more:
@@ -85,21 +91,44 @@ class Holder:
         self.host.send(m.Lease(self._number, OBJ, self.hold, kind, until, **more))
         return self._number
 
-    def granted(self, valid: float = 0.3, **more: Any) -> float:
+    def granted(self, valid: float = LONG, **more: Any) -> float:
         answer = self.host.answer(self.lease(valid, **more))
         assert isinstance(answer, dict), answer
         return float(answer["scale"])
 
-    def refused(self, valid: float = 0.3, **more: Any) -> m.ErrorData:
+    def refused(self, valid: float = LONG, **more: Any) -> m.ErrorData:
         answer = self.host.answer(self.lease(valid, **more))
         assert isinstance(answer, m.ErrorData), answer
         return answer
+
+    def hold_once(self, valid: float) -> float:
+        """Send one lease of a new hold. Return when, by the monotonic clock, after the host has accepted it.
+
+        A lease that expires on its way, on a busy computer, is repeated by another hold.
+        """
+        while True:
+            began = time.monotonic()
+            answer = self.host.answer(self.lease(valid, new=True))
+            if not isinstance(answer, m.ErrorData) or "had expired" not in answer.message.text:
+                return began
+
+    @contextlib.contextmanager
+    def frozen(self) -> Iterator[None]:
+        """Suspend the host in this context."""
+        pid = self.host.process.pid
+        os.kill(pid, signal.SIGSTOP)
+        while psutil.Process(pid).status() != psutil.STATUS_STOPPED:
+            time.sleep(0.001)
+        try:
+            yield
+        finally:
+            os.kill(pid, signal.SIGCONT)
 
     def ended(self) -> m.HoldEnded:
         known = [e for e in self.host.seen if isinstance(e, m.HoldEnded) and e.hold == self.hold]
         return known[0] if known else self.host.expect(m.HoldEnded, lambda e: e.hold == self.hold)
 
-    def told(self, *what: str) -> list[list[Any]]:
+    def calls(self, *what: str) -> list[list[Any]]:
         return [one for one in self.host.call(OBJ, "report") if not what or one[0] in what]
 
 
@@ -122,29 +151,28 @@ def holder(hosted: Holder) -> Holder:
 def test_the_robot_moves_while_leases_are_renewed(holder: Holder) -> None:
     assert holder.granted(new=True) == 1.0
     for _ in range(8):
-        time.sleep(0.1)
+        time.sleep(0.3)
         holder.granted()
     assert holder.host.answer(holder.lease(0.0)) is None
     ended = holder.ended()
     assert ended.error is None
-    jogs, stops = holder.told("jog"), holder.told("stop")
+    jogs, stops = holder.calls("jog"), holder.calls("stop")
     assert len(jogs) == 9
-    assert all(tuple(jog[2]) == ALONG_X and jog[4] == "world" and 0.1 < jog[5] <= 0.3 for jog in jogs)
+    assert all(tuple(jog[2]) == ALONG_X and jog[4] == "world" and 0.1 < jog[5] <= LONG for jog in jogs)
     assert len(stops) == 1
     assert stops[0][1] > jogs[-1][1]
 
 
 def test_an_expired_hold_stops_and_does_not_start_again(holder: Holder) -> None:
-    began = time.monotonic()
-    holder.granted(0.15, new=True)
+    began = holder.hold_once(0.15)
     ended = holder.ended()
     assert ended.error is not None
     assert "not renewed in time" in ended.error.message.text
     assert "arm" in ended.error.message.text
-    (stop,) = holder.told("stop")
-    assert 0.15 <= stop[1] - began < 0.5  # the machine may be busy; the figure is in the benchmarks
+    (stop,) = holder.calls("stop")
+    assert stop[1] - began >= 0.15
     assert "has ended" in holder.refused().message.text
-    assert len(holder.told("jog")) == 1
+    assert len(holder.calls("jog")) == 1
     holder.granted(new=True)
     holder.lease(0.0)
     holder.ended()
@@ -152,18 +180,27 @@ def test_an_expired_hold_stops_and_does_not_start_again(holder: Holder) -> None:
 
 def test_a_late_lease_is_refused(holder: Holder) -> None:
     """The host hangs longer than the duration of the queued leases."""
-    pid = holder.host.process.pid
-    os.kill(pid, signal.SIGSTOP)
-    while psutil.Process(pid).status() != psutil.STATUS_STOPPED:
-        time.sleep(0.001)
-    late = [holder.lease(0.1, new=True)] + [holder.lease(0.1) for _ in range(4)]
-    time.sleep(0.3)
-    os.kill(pid, signal.SIGCONT)
+    with holder.frozen():
+        late = [holder.lease(0.1, new=True)] + [holder.lease(0.1) for _ in range(4)]
+        time.sleep(0.3)
     for number in late:
         error = holder.host.answer(number)
         assert isinstance(error, m.ErrorData)
         assert "had expired" in error.message.text
-    assert holder.told("jog") == []
+    assert holder.calls("jog") == []
+
+
+def test_a_lease_that_arrives_after_a_freeze_does_not_resume_an_expired_hold(holder: Holder) -> None:
+    for _ in range(4):  # either the thread that reads leases or the one that ends them runs first
+        holder.hold_once(0.5)
+        with holder.frozen():
+            time.sleep(0.6)
+            renewal = holder.lease()
+        error = holder.host.answer(renewal)
+        assert isinstance(error, m.ErrorData)
+        assert re.search("not renewed in time|this hold has ended", error.message.text)
+        holder.ended()
+    assert len(holder.calls("jog")) == 4
 
 
 def test_a_second_hold_of_a_robot_is_refused(holder: Holder) -> None:
@@ -183,26 +220,28 @@ def test_motion_starts_after_slow_control_only_if_the_hold_continues(holder: Hol
         time.sleep(0.1)
         numbers.append(holder.lease())
     assert all(holder.host.answer(number) == {"scale": 1.0} for number in numbers)
-    assert len(holder.told("jog")) < len(numbers)  # the leases that came meanwhile are told as one
+    assert len(holder.calls("jog")) < len(numbers)  # the leases that came meanwhile are passed on as one
     holder.lease(0.0)
     holder.ended()
 
     holder.host.call(OBJ, "forget")
     holder.host.call(OBJ, "set", key="taking", value=0.6)
     holder.host.call(OBJ, "lose_control")
-    assert "not renewed" in holder.refused(0.2, new=True).message.text
-    holder.ended()
-    assert holder.told("jog") == []
+    holder.hold_once(0.2)
+    error = holder.ended().error
+    assert error is not None
+    assert "not renewed" in error.message.text
+    assert holder.calls("jog") == []
 
 
 def test_a_stop_reaches_a_robot_whose_driver_hangs(holder: Holder) -> None:
-    holder.host.call(OBJ, "set", key="hangs", value=0.8)
-    began = time.monotonic()
-    holder.lease(0.2, new=True)
+    holder.host.call(OBJ, "set", key="hangs", value=1.5)
+    began = holder.hold_once(0.2)
     ended = holder.ended()
     assert ended.error is not None
-    stops = holder.told("stop")
-    assert 0.2 <= stops[0][1] - began < 0.6
+    calls = holder.calls()
+    assert [call[0] for call in calls[:3]] == ["jog", "stop", "jogged"]
+    assert calls[1][1] - began >= 0.2
 
 
 def test_a_stop_ends_the_hold(holder: Holder) -> None:
@@ -222,7 +261,7 @@ def test_an_error_of_the_driver_ends_the_hold(holder: Holder) -> None:
     ended = holder.ended()
     assert ended.error is not None
     assert (ended.error.code, ended.error.object_id) == ("safety_stop", OBJ)
-    assert holder.told("stop")
+    assert holder.calls("stop")
     assert "protective stop" in holder.refused(new=True).message.text
     holder.ended()
 
@@ -232,7 +271,7 @@ def test_the_end_effector_never_exceeds_the_reduced_speed(holder: Holder) -> Non
     assert holder.granted(joints=[Joint("turn", 0.1)]) == 1.0
     scale = holder.granted(joints=[Joint("turn", 1.0)])
     assert 0.9 * 0.25 <= scale * 1.0 * 0.8 <= 0.25
-    first, _, last = holder.told("jog")
+    first, _, last = holder.calls("jog")
     assert first[2] == pytest.approx([0.15, 0.0, 0.2, 0.0, 0.0, 0.5])
     assert last[2] is None
     assert last[3] == pytest.approx([scale, 0.0])
@@ -243,7 +282,7 @@ def test_the_end_effector_never_exceeds_the_reduced_speed(holder: Holder) -> Non
 def test_a_joint_slows_down_before_its_limit_and_stops_there(holder: Holder) -> None:
     holder.host.call(OBJ, "set", key="at", value=0.95)
     scale = holder.granted(new=True, joints=[Joint("turn", 0.25)])
-    assert 0.0 < scale * 0.25 * 0.3 < 0.05
+    assert 0.0 < scale * 0.25 * LONG < 0.05
     assert holder.granted(joints=[Joint("turn", -0.25)]) == 1.0
     holder.host.call(OBJ, "set", key="at", value=0.995)
     error = holder.refused(joints=[Joint("turn", 0.25)])
@@ -280,16 +319,15 @@ def test_a_twist_slows_down_before_a_joint_limit(holder: Holder) -> None:
 def test_unknown_joints_and_end_effectors_are_refused(holder: Holder, more: Any, text: str) -> None:
     assert text in holder.refused(new=True, **more).message.text
     holder.ended()
-    assert holder.told("jog") == []
+    assert holder.calls("jog") == []
 
 
 def test_hand_teaching_lasts_while_it_is_held(holder: Holder) -> None:
-    for _ in range(3):
-        holder.granted(0.3, kind=HoldKind.HAND_TEACHING, new=not holder.told())
-        time.sleep(0.1)
+    for number in range(3):
+        holder.granted(1.5, kind=HoldKind.HAND_TEACHING, new=number == 0)
     ended = holder.ended()
     assert ended.error is not None
-    assert [one[2] for one in holder.told("hand")] == [True, False]
+    assert [one[2] for one in holder.calls("hand")] == [True, False]
     assert holder.host.call(OBJ, "get_hand_teaching_mode") is False
     holder.granted(kind=HoldKind.HAND_TEACHING, new=True)
     assert holder.host.answer(holder.lease(0.0, kind=HoldKind.HAND_TEACHING)) is None
@@ -303,20 +341,20 @@ class Arms(MultiArmRobot):
     _ABSTRACT = False
     def __init__(self, obj_id, name, pose, settings=None):
         super().__init__(obj_id, name, pose, settings)
-        self.told = []
-    def report(self): return self.told
+        self.calls = []
+    def report(self): return self.calls
     def get_arm_ids(self): return {"left", "right"}
     def get_end_effectors_ids(self, arm_id=None): return {"claw", "cup"} if arm_id == "right" else {"claw"}
     def get_end_effector_pose(self, end_effector, arm_id=None): return Pose()
     def robot_joints(self, include_gripper=False, arm_id=None): return [Joint(f"{arm_id}_turn", 0.0)]
     def grippers(self, arm_id=None): return set()
     def suctions(self, arm_id=None): return set()
-    def stop(self, arm_id=None): self.told.append(["stop"])
+    def stop(self, arm_id=None): self.calls.append(["stop"])
     def get_hand_teaching_mode(self, arm_id=None): return False
-    def set_hand_teaching_mode(self, enabled, arm_id=None): self.told.append(["hand", enabled, arm_id])
+    def set_hand_teaching_mode(self, enabled, arm_id=None): self.calls.append(["hand", enabled, arm_id])
     def tcp_speed(self, joint_velocities, end_effector_id=None, arm_id=None): return 0.5 * abs(joint_velocities[0])
     def jog(self, twist=None, joint_velocities=None, frame="world", valid_for=0.2, end_effector_id=None, arm_id=None):
-        self.told.append(["jog", twist, joint_velocities, end_effector_id, arm_id])
+        self.calls.append(["jog", twist, joint_velocities, end_effector_id, arm_id])
 """
 
 
@@ -336,11 +374,11 @@ def test_one_of_several_arms_is_held(host: HostProcess) -> None:
     holder.granted(kind=HoldKind.HAND_TEACHING, new=True, arm_id="right")
     holder.lease(0.0, kind=HoldKind.HAND_TEACHING)
     holder.ended()
-    told = [one for one in host.call(OBJ, "report") if one[0] != "stop"]
-    assert [one[-1] for one in told] == ["left", "left", "right", "right", "right"]
-    assert told[1][2] == pytest.approx([0.475])
-    assert told[2][3] == "cup"
-    assert told[3:] == [["hand", True, "right"], ["hand", False, "right"]]
+    calls = [call for call in host.call(OBJ, "report") if call[0] != "stop"]
+    assert [call[-1] for call in calls] == ["left", "left", "right", "right", "right"]
+    assert calls[1][2] == pytest.approx([0.475])
+    assert calls[2][3] == "cup"
+    assert calls[3:] == [["hand", True, "right"], ["hand", False, "right"]]
 
 
 def test_the_host_stops_held_robots_when_the_server_ends() -> None:
@@ -349,8 +387,8 @@ def test_the_host_stops_held_robots_when_the_server_ends() -> None:
         host.send(open_scene([type_code("Arm", ARM)], scene_object("arm", "Arm", pose=True)))
         host.expect(m.SceneOpened)
         holder = Holder(host)
-        holder.granted(0.3, new=True)
+        holder.granted(new=True)
         host.socket.close()
-        assert host.gone(5.0) == 0
+        assert host.gone() == 0
     finally:
         host.end()
