@@ -27,7 +27,7 @@ def _encode_other(value: Any) -> Any:
             return file.getvalue().decode("latin-1")
     if callable(getattr(value, "tolist", None)):
         return value.tolist()
-    raise NotImplementedError(f"a {type(value).__name__} cannot be converted to JSON")
+    raise TypeError(f"a {type(value).__name__} cannot be converted to JSON")
 
 
 def _notes(picture: Any) -> Any:
@@ -52,7 +52,7 @@ def encode(value: Any) -> str:
     """
     try:
         return _encoder.encode(value).decode()
-    except (TypeError, ValueError, NotImplementedError, OverflowError, RecursionError, OSError) as error:
+    except (TypeError, ValueError, OverflowError, RecursionError, OSError) as error:
         raise InvalidData("the value cannot be converted to JSON: {reason}", reason=error) from error
 
 

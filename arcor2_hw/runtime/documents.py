@@ -1,5 +1,6 @@
 """Reading of the JSON documents in the folder of a package, for the cell host and the server."""
 
+import contextlib
 from pathlib import Path
 from typing import TypeVar
 
@@ -9,6 +10,21 @@ import msgspec
 from arcor2_hw.exceptions import InvalidPackage
 
 T = TypeVar("T")
+
+
+def decode_document(raw: bytes, kind: type[T]) -> T:
+    """Decode a JSON document whose keys are in snake_case or camelCase.
+
+    Raises:
+        MsgspecError: The document is damaged.
+        RecursionError: It is nested too deeply.
+    """
+    try:
+        return msgspec.json.decode(raw, type=kind)
+    except (msgspec.MsgspecError, RecursionError):
+        with contextlib.suppress(msgspec.MsgspecError, ValueError, RecursionError):
+            return msgspec.convert(humps.decamelize(msgspec.json.decode(raw)), kind)
+        raise
 
 
 def read_document(path: Path, kind: type[T]) -> T:
@@ -24,11 +40,8 @@ def read_document(path: Path, kind: type[T]) -> T:
             "{name} of the package is missing or cannot be read", str(error), name=path.name
         ) from error
     try:
-        return msgspec.json.decode(raw, type=kind)
-    except msgspec.MsgspecError as error:
-        try:
-            return msgspec.convert(humps.decamelize(msgspec.json.decode(raw)), kind)
-        except (msgspec.MsgspecError, ValueError):
-            raise InvalidPackage(
-                "{name} of the package is damaged: {reason}", str(path), name=path.name, reason=error
-            ) from error
+        return decode_document(raw, kind)
+    except (msgspec.MsgspecError, RecursionError) as error:
+        raise InvalidPackage(
+            "{name} of the package is damaged: {reason}", str(path), name=path.name, reason=error
+        ) from error

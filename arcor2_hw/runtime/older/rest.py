@@ -200,7 +200,7 @@ def _other(value: Any) -> Any:
     to_dict = getattr(value, "to_dict", None)
     if callable(to_dict):
         return to_dict()
-    raise NotImplementedError(f"a {type(value).__name__} has no form in JSON")
+    raise TypeError(f"a {type(value).__name__} has no form in JSON")
 
 
 def _without_none(value: Any) -> Any:

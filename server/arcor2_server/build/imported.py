@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Final, Literal, TypeVar
 
-import humps
 import msgspec
 from msgspec import UNSET, field
 
@@ -17,6 +16,7 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import InvalidPackage, TextTooLong
 from arcor2_hw.parsing import parse
+from arcor2_hw.runtime.documents import decode_document
 from arcor2_server.build import package, snapshot
 
 T = TypeVar("T")
@@ -68,12 +68,9 @@ def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
     except KeyError:
         raise InvalidPackage("The package has no {path}.", path=path) from None
     try:
-        found = msgspec.json.decode(raw, type=kind)
+        found = decode_document(raw, kind)
     except (msgspec.MsgspecError, RecursionError) as error:
-        try:
-            found = msgspec.convert(humps.decamelize(msgspec.json.decode(raw)), kind)
-        except (msgspec.MsgspecError, ValueError, RecursionError):
-            raise InvalidPackage("{path} of the package is damaged: {reason}", path=path, reason=error) from error
+        raise InvalidPackage("{path} of the package is damaged: {reason}", path=path, reason=error) from error
     try:
         check_texts(found)
     except TextTooLong as error:

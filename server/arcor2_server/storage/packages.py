@@ -12,7 +12,6 @@ from io import BytesIO
 from pathlib import Path, PurePosixPath
 from typing import IO, Any, Final
 
-import humps
 import msgspec
 import structlog
 
@@ -20,6 +19,7 @@ from arcor2_hw.data.base import UNSET, Unset, now
 from arcor2_hw.data.package import PackageMeta, PackageSummary, ProjectMeta
 from arcor2_hw.data.project import BareProject
 from arcor2_hw.exceptions import InvalidPackage, NotFound, StorageError
+from arcor2_hw.runtime.documents import decode_document
 from arcor2_server.files import replace_file
 
 log = structlog.get_logger(__name__)
@@ -266,17 +266,12 @@ def inside(entry: zipfile.ZipInfo) -> PurePosixPath:
 
 def _project_meta(path: Path) -> ProjectMeta | Unset:
     try:
-        raw = path.read_bytes()
+        project = decode_document(path.read_bytes(), BareProject)
     except OSError:
         return UNSET
-    try:
-        project = msgspec.json.decode(raw, type=BareProject)
-    except msgspec.MsgspecError:
-        try:
-            project = msgspec.convert(humps.decamelize(msgspec.json.decode(raw)), BareProject)
-        except (msgspec.MsgspecError, ValueError):
-            log.warning("package with a damaged project", file=str(path))
-            return UNSET
+    except (msgspec.MsgspecError, RecursionError):
+        log.warning("package with a damaged project", file=str(path))
+        return UNSET
     if isinstance(project.modified, Unset):
         return UNSET
     return ProjectMeta(project.id, project.name, project.description, project.modified)
