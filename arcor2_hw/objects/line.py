@@ -146,14 +146,16 @@ class Line:
             self.waiting()
             self.send(question)
             deadline, received = time.monotonic() + limit, b""
-            while time.monotonic() < deadline:
+            late = False
+            while not late:
+                late = time.monotonic() >= deadline  # then read once more: this process may have been suspended
                 if data := self.receive():
                     received = (received + data)[-LONGEST_ANSWER:]
                     if (found := answer(received)) is not None:
                         return found
         how = "gave no valid answer to" if received else "did not answer"
-        late = f"{self.who} {how} {name} within {limit:.3g} s"
-        raise self.broken(DeviceTimeout(late, repr(received[-200:])))
+        message = f"{self.who} {how} {name} within {limit:.3g} s"
+        raise self.broken(DeviceTimeout(message, repr(received[-200:])))
 
     def ask_text(self, question: str, end: bytes = b"\r") -> str:
         """Send a line of ASCII text and return the line of the answer, both without `end`."""

@@ -25,6 +25,7 @@ class ModbusDevice(PolledControl[T]):
 
     def open_link(self, timeout: float) -> Snapshot[T]:
         """Open the connection and read the first state within `timeout` s."""
+        self.link.load()
         deadline = time.monotonic() + timeout
         self.link.open(timeout)
         left = (deadline - time.monotonic()) / REQUESTS_TO_OPEN

@@ -100,8 +100,18 @@ class ModbusLink:
         self._drained_at = 0.0
 
     # -------------------------------------------------------------------------------- life
+    def load(self) -> None:
+        """Import pymodbus, which takes seconds on a busy computer. Raises NotConnected if it is not installed."""
+        try:
+            import arcor2_hw.objects.modbus_client  # noqa: F401
+        except ImportError as error:
+            raise NotConnected(
+                "{device}: pymodbus is not installed. Install arcor2-hw[modbus].", str(error), device=self.who
+            ) from error
+
     def open(self, timeout: float) -> None:
         """Open the connection within `timeout` s without sending a request. Raises NotConnected, DeviceTimeout."""
+        self.load()
         with self._one_request:
             self._close()
             self._open(timeout)
@@ -129,12 +139,8 @@ class ModbusLink:
             self._timeout = usual
 
     def _open(self, timeout: float) -> None:
-        try:
-            from arcor2_hw.objects import modbus_client
-        except ImportError as error:
-            raise NotConnected(
-                "{device}: pymodbus is not installed. Install arcor2-hw[modbus].", str(error), device=self.who
-            ) from error
+        from arcor2_hw.objects import modbus_client
+
         client: Client
         if self._serial_port:
             client = modbus_client.SerialClient(self._serial_port, *self._format, timeout)

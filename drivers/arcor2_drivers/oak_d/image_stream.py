@@ -4,7 +4,8 @@ import atexit
 import os
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from arcor2_hw.data.device import Health, Severity
@@ -149,8 +150,9 @@ class ImageStream(Connected):
     # -------------------------------------------------------------------------------- on the observing thread
     def open_link(self, timeout: float) -> None:
         """Open the camera and receive its first image."""
+        source = self._load_source()
         deadline = time.monotonic() + timeout
-        feed = self._feed = self._open_feed(timeout)
+        feed = self._feed = source(timeout)
         shot = None
         while shot is None or time.monotonic() - shot.monotonic > self._config.max_age:
             if (left := deadline - time.monotonic()) <= 0.0:
@@ -165,17 +167,20 @@ class ImageStream(Connected):
             except Refused:
                 self._exposure = None
 
-    def _open_feed(self, timeout: float) -> "Feed":
-        """Open the source that the settings name; this imports depthai."""
+    def _load_source(self) -> "Callable[[float], Feed]":
+        """Return the function that opens the source in the settings.
+
+        It imports depthai, which takes seconds on a busy computer and does not count as time of the camera.
+        """
         os.environ.setdefault("DEPTHAI_LEVEL", "error")  # it warns of missing USB, which is normal in a container
         try:
             if self._config.network is not None:
                 from .network_feed import NetworkFeed
 
-                return NetworkFeed(self.who, self.name, self._config, timeout)
+                return partial(NetworkFeed, self.who, self.name, self._config)
             from .device_feed import DeviceFeed
 
-            return DeviceFeed(self.who, self._config, timeout)
+            return partial(DeviceFeed, self.who, self._config)
         except ModuleNotFoundError as e:
             raise NotConnected(
                 "{device}: depthai is not installed. Install the extra `depthai`: arcor2-hw[depthai].",

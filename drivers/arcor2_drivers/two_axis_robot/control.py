@@ -4,6 +4,7 @@ import contextlib
 import logging
 import math
 import time
+from functools import partial
 from typing import Final
 
 from arcor2_hw.data.base import now
@@ -89,12 +90,13 @@ class Control:
             for register, value in reg.wanted_setup(self._settings, joint).items():
                 if has[register] != value:  # the memory wears
                     bus.write(number, register, value)
-            setups[joint] = reg.decode_setup(bus.read(number, reg.EEPROM))
+            setups[joint] = reg.decode_setup(bus.again(partial(bus.read, number, reg.EEPROM)))
             self._observer.setups = tuple(setups)
 
     def _enable(self, bus: Bus) -> None:
         self._observer.start_keep_alive()
-        for number, block in zip(self._ids, bus.sync_read(self._ids, reg.STATE), strict=True):
+        state = bus.again(partial(bus.sync_read, self._ids, reg.STATE))
+        for number, block in zip(self._ids, state, strict=True):
             bus.write(number, reg.BUS_WATCHDOG, 0)  # a tripped one refuses goals
             bus.write(number, reg.GOAL, reg.decode(block).position)  # else the joint would jump
             bus.write(number, reg.BUS_WATCHDOG, self._watchdog())
