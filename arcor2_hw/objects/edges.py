@@ -1,9 +1,10 @@
-"""Edges of digital points, debouncing, and listeners."""
+"""Edges of digital points: debouncing, and listeners."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from arcor2_hw.data.base import Data, Timestamp, now
+from arcor2_hw.objects.small import IOPoint, PointKind
 
 log = logging.getLogger(__name__)
 
@@ -32,8 +33,14 @@ class Debounced:
         """Forget the value, because changes may have been missed."""
         self.value = self._changed = None
 
-    def take(self, raw: bool, at: float) -> Edge | None:
-        """Process a sample taken at the time `at` (monotonic, s). Return the edge that it completes, or None."""
+    def take(self, raw: bool, at: float, sampled: Timestamp | None = None) -> Edge | None:
+        """Process a sample, and return the edge that it completes, or None.
+
+        Args:
+            raw: The value.
+            at: Time of the sample on the monotonic clock, s.
+            sampled: Time of the sample in UTC; None: now.
+        """
         if self.value is None:
             self.value = raw
             return None
@@ -41,7 +48,7 @@ class Debounced:
             self._changed = None
             return None
         if self._changed is None:
-            self._changed = (at, now())
+            self._changed = (at, sampled or now())
         since, stamp = self._changed
         if at - since < self._debounce:
             return None
@@ -73,3 +80,34 @@ class EdgeListeners:
                     listener(edge)
                 except Exception:
                     log.exception("A listener of the point %s failed.", edge.name)
+
+
+class DigitalPoints(EdgeListeners):
+    """Debounced values of the digital points among some points, and listeners to their edges."""
+
+    def __init__(self, points: Iterable[IOPoint]) -> None:
+        super().__init__()
+        digital = (point for point in points if point.kind is PointKind.DIGITAL)
+        self._debounced = {point.name: Debounced(point.name, point.debounce) for point in digital}
+        self._edges: list[Edge] = []
+        self.names = tuple(self._debounced)
+
+    def forget(self) -> None:
+        """Forget all values, because changes may have been missed."""
+        for point in self._debounced.values():
+            point.forget()
+
+    def value(self, name: str) -> bool | None:
+        """Return the debounced value of a point; None before the first sample."""
+        return self._debounced[name].value
+
+    def take(self, name: str, raw: bool, at: float, sampled: Timestamp | None = None) -> None:
+        """Process a sample of a point; see `Debounced.take`. Call `notify_edges` afterwards."""
+        if (edge := self._debounced[name].take(raw, at, sampled)) is not None:
+            self._edges.append(edge)
+
+    def notify_edges(self) -> None:
+        """Call the listeners of the edges found so far."""
+        edges, self._edges = self._edges, []
+        for edge in edges:
+            self.notify(edge)

@@ -4,6 +4,7 @@ import abc
 import enum
 from typing import ClassVar
 
+from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import Arcor2NotImplemented
 
 
@@ -27,6 +28,28 @@ class MachineState(enum.IntEnum):
     RESETTING = 15
     COMPLETING = 16
     COMPLETE = 17
+
+
+class MachineStateName(StrEnum):
+    """The states of a machine (PackML, ISA-TR88.00.02)."""
+
+    CLEARING = "clearing"
+    STOPPED = "stopped"
+    STARTING = "starting"
+    IDLE = "idle"
+    SUSPENDED = "suspended"
+    EXECUTE = "execute"
+    STOPPING = "stopping"
+    ABORTING = "aborting"
+    ABORTED = "aborted"
+    HOLDING = "holding"
+    HELD = "held"
+    UNHOLDING = "unholding"
+    SUSPENDING = "suspending"
+    UNSUSPENDING = "unsuspending"
+    RESETTING = "resetting"
+    COMPLETING = "completing"
+    COMPLETE = "complete"
 
 
 class MachineCommand(enum.IntEnum):

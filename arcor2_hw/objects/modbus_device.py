@@ -30,7 +30,7 @@ class ModbusDevice(PolledControl[T]):
         self.link.open(timeout)
         left = (deadline - time.monotonic()) / REQUESTS_TO_OPEN
         with self.link.limited(max(left, SHORTEST_REQUEST)):
-            return Snapshot.by(self.read_state)
+            return self.snapshot()
 
     def identify(self) -> Identity:
         """Read the identification of the device (function 43/14)."""

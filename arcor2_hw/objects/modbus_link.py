@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from arcor2_hw.data.device import Identity
-from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected
+from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
 from arcor2_hw.objects.settings import check_serial_port
 
 if TYPE_CHECKING:
@@ -219,6 +219,18 @@ class ModbusLink:
             f"a write to register {int(address)}",
             timeout,
         )
+
+    def write_verified(self, address: int, *values: int) -> None:
+        """Write holding registers and read them back. Raises Refused if the device did not accept the values."""
+        self.write_registers(address, *values)
+        if (stored := self.read_holding_registers(address, len(values))) != [*values]:
+            raise Refused(
+                "{device}: registers from {address} contain {stored} after {values} was written",
+                device=self.who,
+                address=int(address),
+                stored=stored,
+                values=[*map(int, values)],
+            )
 
     # -------------------------------------------------------------------------------- requests
     def _words(self, method: str, address: int, count: int, timeout: float | None) -> list[int]:

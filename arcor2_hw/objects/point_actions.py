@@ -9,7 +9,7 @@ from arcor2_hw.data.device import Quality, Reading
 from arcor2_hw.exceptions import DeviceFault, OutOfRange, Refused
 from arcor2_hw.objects.edges import Edge, EdgeListeners
 from arcor2_hw.objects.settings import within
-from arcor2_hw.objects.small import IOPoint, PointKind
+from arcor2_hw.objects.small import IOPoint, PointDirection, PointKind
 
 LONGEST_WAIT: Final = 600.0
 """Longest time a program may wait for a point in one call, s."""
@@ -18,7 +18,11 @@ MARGIN: Final = 20.0
 
 
 class PointActions(abc.ABC):
-    """Read, write and observe points by name. A driver sets `io_points` in `__init__`."""
+    """Read, write and observe points by name.
+
+    A driver sets `io_points` and `edge_listeners` in `__init__`, and implements `read`, `raw_value`, `write_raw` and
+    `await_point`.
+    """
 
     DYNAMIC_PARAMS: ClassVar[dict[str, tuple[str, set[str]]]] = {"name": ("point_names", set())}
     who: str
@@ -60,9 +64,35 @@ class PointActions(abc.ABC):
     def read(self, name: str) -> Reading[bool | float]:
         """Read a point."""
 
-    @abc.abstractmethod
     def write(self, name: str, value: bool | float) -> None:
-        """Write an output."""
+        """Write an output, in its unit. Raises Refused for an input, OutOfRange with the range, and as `write_raw`."""
+        point = self.require_output(name)
+        raw: bool | float = bool(value)
+        if point.kind is PointKind.ANALOG:
+            try:
+                raw = self.raw_value(name, float(value))
+            except ValueError as error:
+                reason = f"{error} {point.unit}".rstrip()
+                raise OutOfRange(
+                    "{device}: {name} {reason}, not {value!r}", device=self.who, name=name, reason=reason, value=value
+                ) from None
+        self.write_raw(name, raw)
+
+    def require_output(self, name: str) -> IOPoint:
+        """Return a point. Raises Refused for an input."""
+        point = self.require_point(name)
+        if point.direction is not PointDirection.OUTPUT:
+            label = self.point_label(name)
+            raise Refused("{device}: {name} is an input ({label})", device=self.who, name=name, label=label)
+        return point
+
+    def raw_value(self, name: str, value: float) -> float:
+        """Return the raw value of an analogue output. Raises ValueError with the range, as "must be 0 to 5"."""
+        raise NotImplementedError
+
+    def write_raw(self, name: str, raw: bool | float) -> None:
+        """Write the raw value of an output. Raises NotInControl, ConnectionLost, DeviceTimeout."""
+        raise NotImplementedError
 
     @abc.abstractmethod
     def await_point(self, name: str, value: bool, timeout: float) -> None:

@@ -76,11 +76,18 @@ class PolledControl(Connected, typing.Generic[T]):
     def open_link(self, timeout: float) -> Snapshot[T]:
         """Open the connection within `timeout` s and return the first state."""
         self._link.open(timeout)
-        return Snapshot.by(self.read_state)
+        return self.snapshot()
 
     def read_state(self) -> T:
-        """Read the state of the device."""
+        """Read the state of the device. Raise DeviceError, or ValueError for values that are invalid."""
         return self._read()
+
+    def snapshot(self) -> Snapshot[T]:
+        """Read the state now. Raises DeviceFault for invalid values, and as `read_state`."""
+        try:
+            return Snapshot.by(self.read_state)
+        except ValueError as error:
+            raise DeviceFault("{device} sent invalid values: {reason}", device=self.who, reason=error) from error
 
     def close_link(self) -> None:
         """Close the connection."""
@@ -286,7 +293,7 @@ class _Observer(StateObserver[T]):
         return self._device.open_link(timeout)
 
     def read(self) -> T | None:
-        return self._device.read_state()
+        return self._device.snapshot().value
 
     def close(self) -> None:
         self._device.close_link()

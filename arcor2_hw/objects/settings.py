@@ -10,6 +10,7 @@ import os
 import stat
 import typing
 import urllib.parse
+from collections.abc import Collection
 from pathlib import Path
 
 from arcor2_hw.data.address import HOST
@@ -37,6 +38,13 @@ def within(name: str, value: float, low: float, high: float, unit: str = "") -> 
             unit=unit and " " + unit,
             value=value,
         )
+
+
+def one_of(name: str, value: object, allowed: Collection[object]) -> None:
+    """Raise OutOfRange, which names the parameter, unless a value is one of those allowed."""
+    if value not in allowed:
+        choices = ", ".join(map(str, allowed))
+        raise OutOfRange("{name} must be one of {choices}, not {value!r}", name=name, choices=choices, value=value)
 
 
 @dataclasses.dataclass

@@ -6,9 +6,10 @@ import logging
 import cyclopts
 
 from arcor2_drivers.remote_io.settings import TowerLightSettings
-from arcor2_drivers.remote_io.tower_light import ShownState, TowerLight
+from arcor2_drivers.remote_io.tower_light import TowerLight
 from arcor2_hw.client import Client, EventsMissed
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.objects.machine import MachineStateName
 
 # An error, a program running, one paused; without a program: a scene online, none online, no server.
 LAMPS = "aborted=red blinking; execute=green; held=amber; idle=green blinking; stopped=off; suspended=amber blinking"
@@ -18,7 +19,7 @@ PROGRAM = {"pausing": "held", "paused": "held", "stopped": "", "undefined": ""} 
 def show(light: TowerLight, state: str) -> None:
     """Show a state; control of the lamps is taken first, also again after the block was away."""
     light.take_control()
-    light.show_state(ShownState(state))
+    light.show_state(MachineStateName(state))
 
 
 async def follow(client: Client, light: TowerLight) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated, Final
 from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
-from arcor2_hw.objects.settings import Range, check_serial_port, check_url, within
+from arcor2_hw.objects.settings import Range, check_serial_port, check_url, one_of, within
 
 LONGEST_HEARTBEAT: Final = 1000
 """Longest heartbeat time, ms; the type declares it in `loss_reaction`."""
@@ -16,6 +16,8 @@ LONGEST_RAMP: Final = 0.5
 """Longest quick stop from the highest speed, s; part of the declared reaction to a loss."""
 LONGEST_MOVE: Final = 600.0
 """Longest move, s."""
+BITRATES: Final = (10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000, 1000000)
+"""Bit rates of CiA 301, bit/s."""
 _INT32: Final = (1 << 31) - 1
 _NETWORK_INTERFACE: Final = re.compile(r"[\w.-]{1,15}")
 
@@ -77,8 +79,7 @@ class ConveyorSettings(Settings):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._check_channel()
-        if self.bitrate not in (10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000, 1000000):
-            raise OutOfRange("bitrate must be one of CiA 301 such as 500000, not {bitrate!r}", bitrate=self.bitrate)
+        one_of("bitrate", self.bitrate, BITRATES)
         if self.master_id == self.node_id:
             raise OutOfRange("master_id must not be the drive's node_id {node_id}", node_id=self.node_id)
         within("counts_per_metre", abs(self.counts_per_metre), 1.0, 1e8)

@@ -23,20 +23,17 @@ class AsciiLink(Line):
         super().__init__(f"{name} at {host}:{port}", f"socket://{host}:{port}", answer_timeout=request_timeout)
 
     def read(self) -> Status:
-        """Read all variables. Raise DeviceTimeout, ConnectionLost or DeviceFault."""
+        """Read all variables. Raise DeviceTimeout, ConnectionLost, DeviceFault, or ValueError for an invalid status."""
         values = {name: self._get(name) for name in _ORDER}
-        try:
-            return Status(
-                act=bool(values["ACT"]),
-                go_to=bool(values["GTO"]),
-                activation=Activation(values["STA"]),
-                object=Object(values["OBJ"]),
-                fault=values["FLT"] & 0x0F,
-                echo=values["PRE"],
-                position=values["POS"],
-            )
-        except ValueError as error:
-            raise DeviceFault("{device} sent an invalid status: {reason}", device=self.who, reason=error) from error
+        return Status(
+            act=bool(values["ACT"]),
+            go_to=bool(values["GTO"]),
+            activation=Activation(values["STA"]),
+            object=Object(values["OBJ"]),
+            fault=values["FLT"] & 0x0F,
+            echo=values["PRE"],
+            position=values["POS"],
+        )
 
     def write(self, command: Command) -> None:
         """Set variables in one line. Raise Refused, DeviceTimeout or ConnectionLost."""

@@ -2,7 +2,6 @@
 
 from typing import Final
 
-from arcor2_hw.exceptions import DeviceFault
 from arcor2_hw.objects.modbus_link import ModbusLink
 
 from .status import Activation, Command, Object, Status
@@ -45,12 +44,8 @@ class RtuLink(ModbusLink):
         self._requests = [0] * COUNT
 
     def read(self) -> Status:
-        """Read the status. Raise DeviceTimeout, ConnectionLost or DeviceFault."""
-        registers = self.read_holding_registers(STATUS, COUNT)
-        try:
-            return decode(registers)
-        except ValueError as error:
-            raise DeviceFault("{device} sent an invalid status: {reason}", device=self.who, reason=error) from error
+        """Read the status. Raise DeviceTimeout, ConnectionLost, DeviceFault, or ValueError for an invalid status."""
+        return decode(self.read_holding_registers(STATUS, COUNT))
 
     def write(self, command: Command) -> None:
         """Write all request registers; never repeated."""

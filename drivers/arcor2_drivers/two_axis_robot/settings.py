@@ -6,7 +6,7 @@ from typing import Annotated, Final
 
 from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
-from arcor2_hw.objects.settings import Range, check_serial_port
+from arcor2_hw.objects.settings import Range, check_serial_port, one_of
 
 BAUD_RATES: Final = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
 QUARTER: Final = math.pi / 2.0
@@ -62,19 +62,9 @@ class TwoAxisRobotSettings(Settings):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_serial_port("port", self.port, sockets=False)
-        if self.baud_rate not in BAUD_RATES:
-            raise OutOfRange(
-                "baud_rate must be one of {baud_rates}, not {baud_rate!r}",
-                baud_rates=", ".join(map(str, BAUD_RATES)),
-                baud_rate=self.baud_rate,
-            )
+        one_of("baud_rate", self.baud_rate, BAUD_RATES)
         for joint in (1, 2):
-            if getattr(self, f"direction_{joint}") not in (1, -1):
-                raise OutOfRange(
-                    "direction_{joint} must be 1 or -1, not {value!r}",
-                    joint=joint,
-                    value=getattr(self, f"direction_{joint}"),
-                )
+            one_of(f"direction_{joint}", getattr(self, f"direction_{joint}"), (1, -1))
             if getattr(self, f"lower_{joint}") >= getattr(self, f"upper_{joint}"):
                 raise OutOfRange("lower_{joint} must be below upper_{joint}", joint=joint)
         if self.id_1 == self.id_2:
