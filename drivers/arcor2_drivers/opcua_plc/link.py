@@ -73,11 +73,30 @@ class _Handler:
         """Ignore that the server ended the subscription; `Link.broken` detects it."""
 
 
+class _Loop(asyncio.SelectorEventLoop):
+    """An event loop that can close the connections that were opened in it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._opened: list[asyncio.Transport] = []
+
+    async def create_connection(self, *arguments: Any, **options: Any) -> Any:
+        """Open a connection and record it."""
+        opened = await super().create_connection(*arguments, **options)
+        self._opened.append(opened[0])
+        return opened
+
+    def abort(self) -> None:
+        """Close the connections, also those that opened after asyncua had given up and that it does not close."""
+        for transport in self._opened:
+            transport.abort()
+
+
 class Link:
-    """A connection, which is opened once and closed once.
+    """A connection to a server.
 
     Args:
-        who: Name and address of the PLC, for errors.
+        name: Name of the PLC, for errors.
         settings: The settings.
         nodes: Node ids by name.
         watched: Names to subscribe to.
@@ -85,36 +104,42 @@ class Link:
     """
 
     def __init__(
-        self, who: str, settings: OpcUaPlcSettings, nodes: Mapping[str, str], watched: Sequence[str], changed: Changed
+        self, name: str, settings: OpcUaPlcSettings, nodes: Mapping[str, str], watched: Sequence[str], changed: Changed
     ) -> None:
-        self._who, self._settings, self._watched, self._changed = who, settings, watched, changed
+        self.who = f"{name} at {settings.url}"
         self.nodes = {name: ua.NodeId.from_string(text) for name, text in nodes.items()}
-        self._loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._run, name=f"OPC UA {who}", daemon=True)
+        self._settings, self._watched, self._changed = settings, watched, changed
+        self._sending = threading.Lock()
+        self._loop: _Loop | None = None
+        self._thread: threading.Thread | None = None
         self._client: Client | None = None
         self._subscription: Any = None
         self._up = False
 
     # -------------------------------------------------------------------------------- connection
-    def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
+    def _run(self, loop: _Loop) -> None:
+        asyncio.set_event_loop(loop)
         try:
-            self._loop.run_forever()
+            loop.run_forever()
         finally:
-            left = asyncio.all_tasks(self._loop)
+            left = asyncio.all_tasks(loop)
             for task in left:
                 task.cancel()
-            self._loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
-            self._loop.run_until_complete(self._loop.shutdown_default_executor())
-            self._loop.close()
+            loop.run_until_complete(asyncio.gather(*left, return_exceptions=True))
+            loop.abort()
+            loop.run_until_complete(loop.shutdown_default_executor())
+            loop.close()
 
     def open(self, timeout: float) -> None:
         """Open a session. Raises NotConnected, DeviceTimeout, Refused, DeviceFault."""
+        self._client = self._subscription = None
+        self._loop = _Loop()
+        self._thread = threading.Thread(target=self._run, args=(self._loop,), name=f"OPC UA {self.who}", daemon=True)
         self._thread.start()
         try:
-            self._call(self._connect(), timeout, f"connecting within {timeout:.1f} s")
+            self._call(self._connect, timeout, f"connecting within {timeout:.1f} s")
         except ConnectionLost as e:
-            raise NotConnected("{device} cannot be reached", e.detail, device=self._who) from e
+            raise NotConnected("{device} cannot be reached", e.detail, device=self.who) from e
         self._up = True
 
     async def _connect(self) -> None:
@@ -125,14 +150,14 @@ class Link:
         self._client = client
         if settings.user:
             client.set_user(settings.user)
-            client.set_password(await asyncio.to_thread(_password, self._who, settings.password_file))
+            client.set_password(await asyncio.to_thread(_password, self.who, settings.password_file))
         if settings.security is not Security.NONE:
             await self._secure(client)
         await client.connect()
 
     def watch(self) -> None:
         """Subscribe to the values of the watched names. Raises DeviceTimeout, ConnectionLost, DeviceFault."""
-        self._call(self._subscribe(), 2.0 * self._settings.request_timeout, "subscribing")
+        self._call(self._subscribe, 2.0 * self._settings.request_timeout, "subscribing")
 
     async def _subscribe(self) -> None:
         client = self._client
@@ -154,7 +179,7 @@ class Link:
                     "{device}: {name} ({to_string}) {result_name}",
                     "",
                     result.name,
-                    device=self._who,
+                    device=self.who,
                     name=names[node][0],
                     to_string=node.to_string(),
                     result_name=result.name,
@@ -181,26 +206,28 @@ class Link:
             )
         except (OSError, ValueError, TypeError, x509.ExtensionNotFound) as e:
             what = "client_certificate, client_key or server_certificate cannot be used"
-            raise NotConnected("{device}: {what}", str(e), device=self._who, what=what) from e
+            raise NotConnected("{device}: {what}", str(e), device=self.who, what=what) from e
 
     def close(self) -> None:
-        """Close; calls that wait for an answer end with ConnectionLost."""
-        if not self._thread.is_alive():
-            if not self._loop.is_closed():
-                self._loop.close()
+        """Close; calls that wait for an answer end with ConnectionLost. It does nothing when closed."""
+        thread, self._thread = self._thread, None
+        if thread is None:
             return
         up, self._up = self._up, False
         with contextlib.suppress(DeviceError):
-            self._call(self._leave(up), 2.0 * CLOSE_TIMEOUT, "leaving")
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join(JOIN)
+            self._call(lambda: self._leave(up), 2.0 * CLOSE_TIMEOUT, "leaving")
+        with self._sending:  # what was sent before is cancelled, later requests fail at once
+            loop, self._loop = self._loop, None
+            if loop is not None:
+                loop.call_soon_threadsafe(loop.stop)
+        thread.join(JOIN)
 
     async def _leave(self, up: bool) -> None:
         client = self._client
         if client is None:
             return
         try:
-            if up and self.broken is None:
+            if up and not self.broken:
                 async with asyncio.timeout(CLOSE_TIMEOUT):
                     await client.close_session()
                     await client.close_secure_channel()
@@ -210,12 +237,10 @@ class Link:
             client.disconnect_socket()
 
     @property
-    def broken(self) -> str | None:
-        """Return why the subscription has ended; None while it works."""
+    def broken(self) -> bool:
+        """Return whether the subscription has ended."""
         subscription = self._subscription
-        if subscription is not None and subscription.is_stale(3.0):
-            return "the subscription has ended"
-        return None
+        return subscription is not None and bool(subscription.is_stale(3.0))
 
     # -------------------------------------------------------------------------------- requests
     def read(self, names: Sequence[str], attribute: Any = ua.AttributeIds.Value) -> list[ua.DataValue]:
@@ -227,7 +252,7 @@ class Link:
             )
             return found
 
-        return self._call(ask(), self._settings.request_timeout, f"reading {', '.join(names[:5])}")
+        return self._call(ask, self._settings.request_timeout, f"reading {', '.join(names[:5])}")
 
     def read_standard(self, number: int) -> Any:
         """Read a variable of the standard (OPC 10000-5) by its number."""
@@ -236,7 +261,7 @@ class Link:
             (found,) = await self._session().read_attributes([ua.NodeId(ua.Int32(number))], ua.AttributeIds.Value)
             return None if found.Value is None else found.Value.Value
 
-        return self._call(ask(), self._settings.request_timeout, "reading about itself")
+        return self._call(ask, self._settings.request_timeout, "reading about itself")
 
     def write(self, values: Mapping[str, ua.Variant], timeout: float = 0.0) -> None:
         """Write values in order in one request. Raises Refused, which names the rejected value."""
@@ -249,12 +274,12 @@ class Link:
             return found
 
         limit = timeout or self._settings.request_timeout
-        for name, status in zip(values, self._call(ask(), limit, f"writing {', '.join(values)}"), strict=True):
+        for name, status in zip(values, self._call(ask, limit, f"writing {', '.join(values)}"), strict=True):
             if not status.is_good():
                 raise Refused(
                     "{device}: writing {name} ({to_string}): {status_name}",
                     status.name,
-                    device=self._who,
+                    device=self.who,
                     name=name,
                     to_string=self.nodes[name].to_string(),
                     status_name=status.name,
@@ -262,19 +287,18 @@ class Link:
 
     def _session(self) -> Any:
         if self._client is None:
-            raise NotConnected("{device} is not connected", device=self._who)
+            raise NotConnected("{device} is not connected", device=self.who)
         return self._client.uaclient
 
-    def _call(self, work: Coroutine[Any, Any, T], timeout: float, what: str) -> T:
+    def _call(self, work: Callable[[], Coroutine[Any, Any, T]], timeout: float, what: str) -> T:
         async def limited() -> T:
             async with asyncio.timeout(timeout):
-                return await work
+                return await work()
 
-        try:
+        with self._sending:
+            if self._loop is None:
+                raise ConnectionLost("{device}: the connection was closed", device=self.who)
             future = asyncio.run_coroutine_threadsafe(limited(), self._loop)
-        except RuntimeError as e:  # the loop is closed
-            work.close()
-            raise ConnectionLost("{device}: the connection was closed", device=self._who) from e
         try:
             return future.result(timeout + JOIN)
         except DeviceError:
@@ -282,25 +306,25 @@ class Link:
         except TimeoutError as e:  # the future's own and asyncio's are the same class
             future.cancel()
             raise DeviceTimeout(
-                "{device}: {what}: no answer within {timeout:g} s", str(e), device=self._who, what=what, timeout=timeout
+                "{device}: {what}: no answer within {timeout:g} s", str(e), device=self.who, what=what, timeout=timeout
             ) from e
         except (concurrent.futures.CancelledError, OSError) as e:
-            raise ConnectionLost("{device}: {what}: the connection broke", str(e), device=self._who, what=what) from e
+            raise ConnectionLost("{device}: {what}: the connection broke", str(e), device=self.who, what=what) from e
         except ua.UaStatusCodeError as e:
             raise self._typed(type(e).__name__, what, e) from e
         except ua.UaError as e:
             raise ConnectionLost(
-                "{device}: {what}: invalid answer", f"{type(e).__name__}: {e}", device=self._who, what=what
+                "{device}: {what}: invalid answer", f"{type(e).__name__}: {e}", device=self.who, what=what
             ) from e
 
     def _typed(self, name: str, what: str, error: Exception) -> DeviceError:
         if name == "BadTimeout" or name == "BadRequestTimeout":
-            return DeviceTimeout("{device}: {what}: no answer in time", str(error), device=self._who, what=what)
+            return DeviceTimeout("{device}: {what}: no answer in time", str(error), device=self.who, what=what)
         if name.startswith(_BROKEN):
-            return ConnectionLost("{device}: {what}: the connection broke", str(error), device=self._who, what=what)
+            return ConnectionLost("{device}: {what}: the connection broke", str(error), device=self.who, what=what)
         if name.startswith(_UNAUTHORIZED):
-            return Refused("{device} rejected the credentials: {name}", str(error), device=self._who, name=name)
-        return DeviceFault("{device}: {what}: {name}", str(error), name, device=self._who, what=what, name=name)
+            return Refused("{device} rejected the credentials: {name}", str(error), device=self.who, name=name)
+        return DeviceFault("{device}: {what}: {name}", str(error), name, device=self.who, what=what, name=name)
 
 
 def _properties(file: str) -> uacrypto.CertProperties:

@@ -47,6 +47,16 @@ def quality(value: ua.DataValue) -> Quality:
     return (Quality.GOOD, Quality.UNCERTAIN, Quality.BAD, Quality.BAD)[severity]
 
 
+def content(value: ua.DataValue) -> Any:
+    """Return what a value contains; None if it contains nothing."""
+    return None if value.Value is None else value.Value.Value
+
+
+def is_bad(value: ua.DataValue) -> bool:
+    """Return whether a value is missing or its quality is bad."""
+    return content(value) is None or quality(value) is Quality.BAD
+
+
 def stamp(value: ua.DataValue) -> Timestamp:
     """Return the time stamp of the source, or else of the server, or else the present time."""
     time: Any = value.SourceTimestamp or value.ServerTimestamp

@@ -6,7 +6,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import psutil
 import pytest
+from asyncua.client.ua_client import UaClient, UaClientState
 
 from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
 from arcor2_hw.data.device import Connection, Health
@@ -20,7 +22,6 @@ from arcor2_hw.exceptions import (
     Stale,
 )
 from arcor2_hw.objects.edges import Edge
-from arcor2_hw.testing.own_time import own_time
 from tests.drivers.benches.opcua_plc_bench import ORPHAN
 from tests.drivers.opcua_plc.conftest import HANDSHAKE, POINTS, BackgroundCall
 from tests.fakes.conftest import FakeProcess
@@ -37,11 +38,11 @@ def test_a_loss_during_a_job(
     running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
     fake.control.do(fault)
-    assert isinstance(running.outcome(10.0), DeviceError)
-    wait_for(lambda: plc.connection, lambda state: state not in (Connection.ONLINE,), 5.0)
-    fake.control.wait_until(lambda t: not t["moving"], 5.0)
+    assert isinstance(running.outcome(), DeviceError)
+    wait_for(lambda: plc.connection, lambda state: state not in (Connection.ONLINE,))
+    fake.control.wait_until(lambda t: not t["moving"])
     fake.control.do("heal")
-    wait_for(lambda: plc.connection, lambda state: state is Connection.BACK, 10.0)
+    wait_for(lambda: plc.connection, lambda state: state is Connection.BACK)
     assert plc.control_owner() != "us"
     with pytest.raises(NotInControl, match="control ended when the connection was lost"):
         plc.write_digital("lamp", True)
@@ -56,18 +57,42 @@ def test_a_loss_during_a_job(
     assert sum(" restored after " in record.message for record in caplog.records) == 1
 
 
+def test_a_socket_that_is_connected_too_late_is_closed(
+    fake: FakeProcess, make: Callable[..., OpcUaPlc], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """asyncua leaves such a socket open when the time limit, or a disconnect, and the connection coincide."""
+    connect = UaClient.connect_socket
+
+    async def too_late(client: UaClient, host: str, port: int) -> None:
+        await connect(client, host, port)
+        client._set_state(UaClientState.DISCONNECTED)
+        client.protocol = None
+        raise TimeoutError
+
+    def sockets() -> list[Any]:
+        port = int(fake.ready["url"].rpartition(":")[2])
+        return [each for each in psutil.Process().net_connections() if each.raddr and each.raddr.port == port]
+
+    before = len(sockets())
+    plc = make(fake.ready["url"])
+    with monkeypatch.context() as patched:
+        patched.setattr(UaClient, "connect_socket", too_late)
+        with pytest.raises(DeviceTimeout):
+            plc.connect()
+    assert len(sockets()) == before
+    plc.connect()
+
+
 def test_outputs_and_job_end_with_the_life_sign(fake: FakeProcess) -> None:
     process = subprocess.Popen([sys.executable, "-c", ORPHAN, fake.ready["url"], POINTS, HANDSHAKE])
     try:
-        fake.control.wait_until(lambda t: t["moving"], 20.0)
+        fake.control.wait_until(lambda t: t["moving"])
         fake.control.do("set", name="Lamp", value=True)
         fake.control.do("set", name="Valve", value=True)
     finally:
         process.kill()
         process.wait()
-    began = own_time()
-    truth = fake.control.wait_until(lambda t: not t["moving"], 5.0)
-    assert own_time() - began < 2.5
+    truth = fake.control.wait_until(lambda t: not t["moving"])
     truth = fake.control.wait_until(lambda t: t["owner"] == 0)
     assert (truth["points"]["Lamp"], truth["points"]["Valve"]) == (False, True), "off and hold, as declared"
     assert truth["code"] == 91
@@ -87,7 +112,7 @@ def test_a_stopped_plc_program_makes_values_stale(fake: FakeProcess, plc: OpcUaP
     running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
     fake.control.do("live", on=False)
-    assert isinstance(running.outcome(5.0), DeviceError)
+    assert isinstance(running.outcome(), DeviceError)
     with pytest.raises(Stale, match=r"plc at opc.tcp.*program of the PLC is stopped"):
         plc.read("level")
     assert plc.connection in UP, "the server answers"
@@ -114,14 +139,12 @@ def test_a_power_cycle_ends_control(fake: FakeProcess, plc: OpcUaPlc, wait_for: 
 
 def test_a_slow_server_times_out(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
     fake.control.do("slow", seconds=1.0)
-    began = own_time()
     with pytest.raises((DeviceTimeout, ConnectionLost), match=r"plc at opc.tcp"):
         plc.read("level")
-    assert own_time() - began < 1.5
     fake.control.do("heal")
-    wait_for(lambda: plc.connection, lambda state: state in UP, 10.0)
+    wait_for(lambda: plc.connection, lambda state: state in UP)
     fake.control.do("set", name="Level", value=42)
-    wait_for(lambda: _level(plc), lambda level: level == pytest.approx(0.042), 10.0)
+    wait_for(lambda: _level(plc), lambda level: level == pytest.approx(0.042))
 
 
 def _level(plc: OpcUaPlc) -> float:

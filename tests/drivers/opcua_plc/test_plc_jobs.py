@@ -62,7 +62,7 @@ def test_a_job_is_stopped(fake: FakeProcess, plc: OpcUaPlc) -> None:
     plc.write_digital("valve", True)
     running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
-    with pytest.raises(Refused, match="job 1 is refused: another job runs"):
+    with pytest.raises(Refused, match=r"is busy \(job 3\): job 1 has to wait"):
         plc.run_job(1)
     plc.stop()
     assert not fake.truth()["moving"], "stop returned before it stood"
@@ -79,7 +79,7 @@ def test_a_plc_that_is_not_idle_refuses_a_job(fake: FakeProcess, plc: OpcUaPlc, 
     other.connect()
     with pytest.raises(NotInControl, match="control is refused: host 1 has it"):
         other.take_control()
-    with pytest.raises(NotInControl, match="job 1 is refused: nobody has control"):
+    with pytest.raises(NotInControl, match="job 1 is refused: host 1 has control"):
         other.run_job(1)
     plc.stop()
     assert isinstance(running.outcome(), Cancelled)
