@@ -11,7 +11,7 @@ from arcor2_hw.analysis.hierarchy import Hierarchy
 from arcor2_hw.analysis.hints import meaning, parameter_type_of, plain, unannotated, without_none
 from arcor2_hw.analysis.module import ClassInfo, Value
 from arcor2_hw.analysis.source import Broken
-from arcor2_hw.analysis.symbols import External, framework_name, is_framework
+from arcor2_hw.analysis.symbols import External, is_framework
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.object_type import ParameterMeta
 from arcor2_hw.data.secret import HIDDEN, is_secret_name
@@ -71,7 +71,7 @@ class SettingsReader:
         keyword_only: set[str] = set()
         for each in reversed(list(self._hierarchy.ancestors(info))):
             decorator = self._decorator(each)
-            if decorator is None or framework_name(each) is not None:
+            if decorator is None:
                 continue
             after = _keyword(decorator, "kw_only")
             descriptions = described_parameters(ast.get_docstring(each.node, clean=False))

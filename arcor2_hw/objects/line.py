@@ -7,7 +7,7 @@ import threading
 import time
 import urllib.parse
 from collections.abc import Callable, Iterator
-from typing import Final, Protocol, TypeVar
+from typing import Any, Final, Protocol, TypeVar
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
 from arcor2_hw.objects.settings import check_serial_port
@@ -35,15 +35,29 @@ class Line:
         port: Path of the serial port, or `socket://host:port`.
         baud_rate: Bits per second of the serial port.
         answer_timeout: Time in which the device has to answer, s.
+        parity: Parity of the serial port: N, E or O.
+        stopbits: Number of its stop bits.
+        data_bits: Number of its data bits, 7 or 8.
     """
 
-    def __init__(self, who: str, port: str, baud_rate: int = 9600, answer_timeout: float = 0.5) -> None:
+    def __init__(
+        self,
+        who: str,
+        port: str,
+        baud_rate: int = 9600,
+        answer_timeout: float = 0.5,
+        *,
+        parity: str = "N",
+        stopbits: int = 1,
+        data_bits: int = 8,
+    ) -> None:
         check_serial_port("port", port)
         self.who = who
         self.answer_timeout = answer_timeout
         self.loss: DeviceError | None = None
         """Error that broke the line; None after it was opened again."""
-        self._port, self._baud_rate = port, baud_rate
+        self._port = port
+        self._format = {"baudrate": baud_rate, "parity": parity, "stopbits": stopbits, "bytesize": data_bits}
         self._open: _Port | None = None
         self._one_user = threading.RLock()
 
@@ -60,7 +74,7 @@ class Line:
             if self._port.startswith("socket://"):
                 self._open = _Socket(self._port, timeout)
             else:
-                self._open = _Serial(self._port, self._baud_rate)
+                self._open = _Serial(self._port, self._format)
         except TimeoutError:
             raise DeviceTimeout(
                 "{device} cannot be reached within {timeout:.1f} s", device=self.who, timeout=timeout
@@ -231,11 +245,11 @@ class _Socket:
 
 
 class _Serial:
-    def __init__(self, path: str, baud_rate: int) -> None:
+    def __init__(self, path: str, format_: dict[str, Any]) -> None:
         import serial
 
         self._too_late = serial.SerialTimeoutException
-        self._serial = serial.Serial(path, baud_rate, timeout=READ_PERIOD, write_timeout=WRITE_TIMEOUT, exclusive=True)
+        self._serial = serial.Serial(path, timeout=READ_PERIOD, write_timeout=WRITE_TIMEOUT, exclusive=True, **format_)
 
     def read(self) -> bytes:
         data: bytes = self._serial.read(1)

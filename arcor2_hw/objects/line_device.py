@@ -30,9 +30,19 @@ class LineDevice(Connected):
     """Time between two calls of `poll`, s."""
     line: Line
 
-    def use_line(self, port: str, baud_rate: int, answer_timeout: float) -> None:
-        """Create the line without opening it."""
-        self.line = Line(f"{self.name} at {port}", port, baud_rate, answer_timeout)
+    def use_line(
+        self,
+        port: str,
+        baud_rate: int,
+        answer_timeout: float,
+        *,
+        parity: str = "N",
+        stopbits: int = 1,
+        data_bits: int = 8,
+    ) -> None:
+        """Create the line without opening it; see `Line` for the arguments."""
+        who = f"{self.name} at {port}"
+        self.line = Line(who, port, baud_rate, answer_timeout, parity=parity, stopbits=stopbits, data_bits=data_bits)
         self.keep_connection(self.line.who)
         self._ending = False
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from arcor2_hw.data.device import Identity
 from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.objects.modbus_settings import ModbusSettings
 from arcor2_hw.objects.settings import check_serial_port
 
 if TYPE_CHECKING:
@@ -98,6 +99,22 @@ class ModbusLink:
         self._usable = False
         self._loss: ConnectionLost | None = None
         self._drained_at = 0.0
+
+    @classmethod
+    def of(cls, name: str, settings: ModbusSettings, *, exceptions: Mapping[int, str] = EXCEPTIONS) -> "ModbusLink":
+        """Return the link to a device with these settings."""
+        return cls(
+            name,
+            settings.host,
+            settings.port,
+            settings.unit_id,
+            settings.request_timeout,
+            serial_port=settings.serial_port,
+            baudrate=settings.baudrate,
+            parity=settings.parity[0].upper(),
+            stopbits=settings.stopbits,
+            exceptions=exceptions,
+        )
 
     # -------------------------------------------------------------------------------- life
     def load(self) -> None:

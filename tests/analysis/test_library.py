@@ -663,6 +663,31 @@ def test_settings_are_ordered_as_in_dataclasses() -> None:
     assert lib.analyse("Heir").meta.settings == derived
 
 
+def test_settings_may_derive_from_those_of_the_library() -> None:
+    lib = library(
+        Press="""
+        import dataclasses
+        from arcor2_hw.objects.modbus_settings import ModbusSettings
+        @dataclasses.dataclass
+        class PressSettings(ModbusSettings):
+            '''Ours.
+
+            :param force: of the press, N
+            '''
+            port: int = 1502
+            force: float = 10.0
+        class Press(Generic):
+            def __init__(self, obj_id: str, name: str, settings: PressSettings) -> None: ...
+        """
+    )
+    shown = {s.name: (s.type, s.default_value) for s in lib.analyse("Press").meta.settings}
+    assert list(shown)[:2] == ["host", "port"]
+    assert shown["port"] == ("integer", "1502")
+    assert shown["parity"] == ("string_enum", '"none"')
+    assert shown["force"] == ("double", "10.0")
+    assert all(s.description for s in lib.analyse("Press").meta.settings if s.name != "port")
+
+
 def test_secret_settings_are_marked() -> None:
     lib = library(
         Bank="""
@@ -701,6 +726,7 @@ def test_secret_settings_are_marked() -> None:
         "token": (msgspec.UNSET, '"part"'),
         "pin": (msgspec.UNSET, "3"),
         "empty_secret": (True, '""'),
+        "mass": (msgspec.UNSET, "-1.0"),
     }
     declared = {
         each.name: each.address for each in lib.analyse("Bank").meta.settings if each.address is not msgspec.UNSET
@@ -764,7 +790,7 @@ def test_a_robot_with_several_arms() -> None:
                 self.soft()
     """)
     assert found.problem is not None
-    assert "robot_type must be a member of RobotType" in found.problem.text
+    assert "robot_type must be a member of RobotType" in found.problem.what.text
     good = analyse("""
         class T(MultiArmRobot):
             _ABSTRACT = False
@@ -818,10 +844,10 @@ def test_a_robot_with_several_arms() -> None:
 def test_problems_are_named_with_file_and_line(source: str, text: str, line: int) -> None:
     found = analyse(source)
     assert found.problem is not None
-    assert text in found.problem.text
+    assert text in found.problem.what.text
     assert (found.problem.path, found.problem.line) == ("object_types/T.py", line)
     assert found.meta.disabled
-    assert found.meta.problem == str(found.problem) == f"object_types/T.py:{line}: {found.problem.text}"
+    assert found.meta.problem == str(found.problem) == f"object_types/T.py:{line}: {found.problem.what.text}"
 
 
 def test_a_problem_in_another_file_names_that_file() -> None:

@@ -6,9 +6,10 @@ from typing import Annotated, Final
 
 from arcor2_hw.actions import StrEnum
 from arcor2_hw.exceptions import OutOfRange
-from arcor2_hw.objects import MachineState, Settings
+from arcor2_hw.objects.machine import MachineStateName
+from arcor2_hw.objects.modbus_settings import ModbusSettings
 from arcor2_hw.objects.point_list import entries, io_point
-from arcor2_hw.objects.settings import Range, check_host, check_serial_port, within
+from arcor2_hw.objects.settings import Range, one_of, within
 
 from .points import Point, parse_address, parse_points
 from .registers import WATCHDOGS
@@ -19,10 +20,10 @@ LONGEST_REQUEST: Final = 0.5
 """Longest timeout of a request, s: disconnecting may have to wait for a request."""
 BAUDRATES: Final = (9600, 19200, 38400, 57600, 115200)
 DEFAULT_PATTERNS: Final = (
-    "execute=green; starting=green blinking; completing=green; complete=green blinking; "
-    "idle=white; resetting=white blinking; held=amber; holding=amber blinking; unholding=amber blinking; "
-    "suspended=amber; suspending=amber blinking; unsuspending=amber blinking; stopped=amber; "
-    "stopping=amber blinking; aborting=red blinking; aborted=red blinking; clearing=red"
+    "execute=green; starting=green blinking; completing=green; complete=green blinking; idle=white; "
+    "resetting=white blinking; held=amber; holding=amber blinking; unholding=amber blinking; suspended=amber; "
+    "suspending=amber blinking; unsuspending=amber blinking; stopped=amber; stopping=amber blinking; "
+    "aborting=red blinking; aborted=red blinking; clearing=red"
 )
 """Default patterns; those with missing colours are left out (meaning of colours: IEC 60204-1, 10.3)."""
 Pattern = Mapping[str, bool]
@@ -40,44 +41,19 @@ class LampColor(StrEnum):
 
 
 @dataclasses.dataclass
-class BlockSettings(Settings):
+class BlockSettings(ModbusSettings):
     """Address of a block, its watchdog, and time limits.
 
-    :param host: address or name of the block on Modbus TCP; empty for a serial line
-    :param port: port of its Modbus TCP server
-    :param serial_port: serial port of a block on Modbus RTU; empty for TCP
-    :param baudrate: bits per second on the serial line (8 data bits, no parity, 1 stop bit)
-    :param unit_id: Modbus unit id
     :param watchdog: number of the watchdog to use; objects on the same block must use different ones
     :param watchdog_ms: time without a request after which the block switches our outputs to their safe state, ms
-    :param request_timeout: time the block has to answer one request, s
     """
 
-    host: str = ""
-    port: int = 502
-    serial_port: str = ""
-    baudrate: int = 19200
-    unit_id: int = 1
     watchdog: Annotated[int, Range(0, WATCHDOGS - 1)] = 0
     watchdog_ms: Annotated[int, Range(200, LONGEST_WATCHDOG, "ms")] = 1000
-    request_timeout: float = 0.25
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.serial_port = self.serial_port.strip()
-        if bool(self.host.strip()) == bool(self.serial_port):
-            raise OutOfRange("host must be the address of the block, or serial_port its serial port; set one of them")
-        if self.serial_port:
-            check_serial_port("serial_port", self.serial_port)
-        else:
-            check_host(self.host, self.port)
-        if self.baudrate not in BAUDRATES:
-            raise OutOfRange(
-                "baudrate must be one of {baudrates}, not {baudrate!r}",
-                baudrates=", ".join(map(str, BAUDRATES)),
-                baudrate=self.baudrate,
-            )
-        within("unit_id", self.unit_id, 1 if self.serial_port else 0, 247 if self.serial_port else 255)
+        one_of("baudrate", self.baudrate, BAUDRATES)
         # A repeated reading takes two timeouts, and one more to drain a serial line; the watchdog must not expire then.
         within("request_timeout", self.request_timeout, 0.05, min(LONGEST_REQUEST, self.watchdog_ms / 4000.0), "s")
 
@@ -142,41 +118,37 @@ class TowerLightSettings(BlockSettings):
     def points(self) -> dict[str, Point]:
         """Return lamps and buzzer as points. Raises OutOfRange, which names the parameter."""
         points: dict[str, Point] = {}
-        for name in (*LampColor, "buzzer"):
-            if not (terminal := getattr(self, name)):
-                continue
+        outputs = {name: terminal for name in (*LampColor, "buzzer") if (terminal := getattr(self, name))}
+        for name, terminal in outputs.items():
             kind, channel = parse_address(terminal, name)
             if kind != "DO":
                 raise OutOfRange(
                     "{name} must be a digital output such as DO0, not {terminal}", name=name, terminal=terminal
                 )
-            if terminal in (point.address for point in points.values()):
+            if any(point.channel == channel for point in points.values()):
                 raise OutOfRange("{name} must not use {terminal}: another lamp uses it", name=name, terminal=terminal)
             options = ["on_loss=on"] if name == self.on_loss else []
-            points[name] = Point(io=io_point(name, kind, options, name), kind=kind, channel=channel)
+            points[name] = Point(io_point(name, kind, options, name), kind, channel)
         return points
 
 
 def parse_patterns(text: str, fitted: Collection[str]) -> dict[str, Pattern]:
     """Return the pattern of each state in "execute=green; aborted=red+amber blinking; idle=off". Raises OutOfRange."""
-    given = bool(text.strip())
+    given, known = bool(text.strip()), ", ".join(fitted)
     patterns: dict[str, Pattern] = {}
     for state, (lamps, *words) in entries(text if given else DEFAULT_PATTERNS, ";", "patterns").items():
         if words not in ([], ["blinking"]):
             raise OutOfRange(
                 "patterns: {state} may be followed only by blinking, not {words}", state=state, words=" ".join(words)
             )
-        if state.upper() not in MachineState.__members__:
-            states = ", ".join(MachineState.__members__).lower()
-            raise OutOfRange("patterns must name a state of {states}, not {state!r}", states=states, state=state)
+        if state not in (states := list(MachineStateName)):
+            names = ", ".join(states)
+            raise OutOfRange("patterns must name a state of {names}, not {state!r}", names=names, state=state)
         colors = [] if lamps == "off" else lamps.split("+")
         unknown = [color for color in colors if color not in fitted]
         if unknown and given:
             raise OutOfRange(
-                "patterns: {color!r} for {state} is not one of {colors}, off",
-                color=unknown[0],
-                state=state,
-                colors=", ".join(fitted),
+                "patterns: {color!r} for {state} is not one of {known}, off", color=unknown[0], state=state, known=known
             )
         if not unknown:
             patterns[state] = dict.fromkeys(colors, bool(words))
