@@ -9,8 +9,9 @@ from typing import ClassVar, Final
 
 from arcor2_hw.data.device import Alarm, LossReaction
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, Refused
+from arcor2_hw.messages import translatable
 from arcor2_hw.objects.connected import AlarmText
-from arcor2_hw.objects.edges import Debounced, EdgeListeners
+from arcor2_hw.objects.edges import DigitalPoints
 from arcor2_hw.objects.modbus_device import ModbusDevice
 from arcor2_hw.objects.modbus_link import ModbusLink
 from arcor2_hw.objects.polled_control import US
@@ -22,9 +23,8 @@ from .points import Point
 from .registers import Image, WatchdogState
 from .settings import LONGEST_WATCHDOG, BlockSettings
 
-REFUSALS: Final = {4: "an expired watchdog holds the output"}
+REFUSALS: Final = translatable({4: "an expired watchdog holds the output"})
 """Meaning of Modbus exceptions at this block, where it differs from the usual."""
-DIAGNOSES: Final = {registers.SUPPLY_MISSING: "supply_missing", registers.OVERLOAD: "overload"}
 
 
 class Block(ModbusDevice[Image]):
@@ -40,24 +40,13 @@ class Block(ModbusDevice[Image]):
     def use_block(self, settings: BlockSettings, points: Mapping[str, Point]) -> None:
         """Prepare the connection; called in `__init__`."""
         self._s, self.block_points = settings, points
-        self.link = ModbusLink(
-            self.name,
-            settings.host,
-            settings.port,
-            settings.unit_id,
-            settings.request_timeout,
-            serial_port=settings.serial_port,
-            baudrate=settings.baudrate,
-            exceptions=REFUSALS,
-        )
+        self.link = ModbusLink.of(self.name, settings, exceptions=REFUSALS)
         # Two readings, each repeated once after draining the line.
         self.answers_within = 6.0 * settings.request_timeout
         self.use_link(self.link)
-        self.edge_listeners = EdgeListeners()
+        self.digital_points = DigitalPoints(point.io for point in points.values())
         self._watchdog = registers.WATCHDOG + registers.WATCHDOG_SIZE * settings.watchdog
         self._number = random.randint(1, 0xFFFF)  # distinguishes our watchdog from another host's
-        digital = {name: point for name, point in points.items() if point.kind in ("DI", "DO")}
-        self._digital = {name: Debounced(name, point.io.debounce) for name, point in digital.items()}
         self._one_pulse = threading.Lock()
         self._pulsing: set[int] = set()
         self._triggered = 0.0
@@ -65,59 +54,50 @@ class Block(ModbusDevice[Image]):
     # -------------------------------------------------------------------------------- state
     def open_link(self, timeout: float) -> Snapshot[Image]:
         """Open the connection and forget the values of the points."""
-        for each in self._digital.values():
-            each.forget()
+        self.digital_points.forget()
         return super().open_link(timeout)
 
     def read_state(self) -> Image:
         """Read the process image."""
-        try:
-            return registers.decode(self.link.read_input_registers(0, registers.IMAGE_COUNT))
-        except ValueError as error:
-            raise DeviceFault("{device} sent invalid values: {reason}", device=self.who, reason=error) from error
+        return registers.decode(self.link.read_input_registers(0, registers.IMAGE_COUNT))
 
     def on_state(self, snapshot: Snapshot[Image]) -> None:
-        """Debounce the digital points."""
-        self._edges = []
-        for name, each in self._digital.items():
+        """Debounce the digital points, and set the alarms of the diagnosis bits."""
+        for bit, code in registers.DIAGNOSES.items():
+            self.set_alarm(code, bool(snapshot.value.diagnosis & bit))
+        for name in self.digital_points.names:
             point = self.block_points[name]
-            if (edge := each.take(snapshot.value.digital(point.kind, point.channel), snapshot.asked)) is not None:
-                self._edges.append(edge)
+            self.digital_points.take(name, snapshot.value.digital(point.kind, point.channel), snapshot.asked)
 
     def after_reading(self) -> None:
         """Notify listeners of edges, and trigger the watchdog."""
-        for edge in self._edges:
-            self.edge_listeners.notify(edge)
+        self.digital_points.notify_edges()
         if self.in_control and time.monotonic() - self._triggered >= self._s.watchdog_ms / 5000.0:
             self.retry_once(lambda: self.link.write_registers(self._watchdog + registers.TRIGGER, self._number))
             self._triggered = time.monotonic()
 
-    def fault_of(self, state: Image) -> int:
-        """Return the diagnosis bits."""
-        return state.diagnosis
-
     def alarms(self) -> list[Alarm]:
-        """Return an alarm for each diagnosis bit that is set."""
-        diagnosis = self.fresh().diagnosis
-        for bit, code in DIAGNOSES.items():
-            self.set_alarm(code, bool(diagnosis & bit))
+        """Return the alarms of the present diagnosis."""
+        self.fresh()
         return super().alarms()
 
     # -------------------------------------------------------------------------------- control
     def arm(self) -> None:
-        """Start the watchdog with the safe state of each output; no output is written."""
+        """Start the watchdog with the safe state of each output, and read that it runs; no output is written.
+
+        Raises:
+            DeviceFault: The watchdog does not run, so nothing may be switched on.
+            Refused: The block did not store the settings of the watchdog.
+        """
         armed = registers.arming(self.block_points.values(), self._s.watchdog_ms, self._number)
         self.link.write_registers(self._watchdog + registers.COMMAND, registers.ACKNOWLEDGE)
-        self.link.write_registers(self._watchdog, *armed)
-        stored = self.link.read_holding_registers(self._watchdog, len(armed))
-        if stored != armed:
-            raise Refused(
-                "{device}: the watchdog contains {stored} after {armed} was written",
-                device=self.who,
-                stored=stored,
-                armed=armed,
-            )
+        self.link.write_verified(self._watchdog, *armed)
         self._triggered = time.monotonic()
+        if problem := self.why_control_ended(self.snapshot().value):
+            with contextlib.suppress(DeviceError):
+                self.disarm()
+            self.drop_control(problem)
+            raise DeviceFault("{device}: control is refused: {reason}", "", "watchdog", device=self.who, reason=problem)
 
     def disarm(self) -> None:
         """Switch our outputs to their safe state and the watchdog off."""
@@ -133,16 +113,17 @@ class Block(ModbusDevice[Image]):
     def why_control_ended(self, state: Image) -> str:
         """Return why the watchdog does not run for us any more; empty while it does."""
         running, _ = state.watchdog(self._s.watchdog)
+        register = f"input register {registers.WATCHDOG_STATES + self._s.watchdog} is {running}"
         if running is WatchdogState.EXPIRED:
-            return "the block's watchdog has expired; its outputs are in their safe state until control is taken"
+            return f"watchdog {self._s.watchdog} has expired ({register}); the outputs are safe until control is taken"
         if running is WatchdogState.OFF:
-            return "the block's watchdog is off: it was switched off and on, or another host changed it"
+            return f"watchdog {self._s.watchdog} does not run ({register}): the block or another host switched it off"
         return super().why_control_ended(state)
 
     # -------------------------------------------------------------------------------- outputs
     def digital(self, name: str) -> bool:
         """Return the debounced value of a digital point."""
-        value = self._digital[name].value
+        value = self.digital_points.value(name)
         if value is None:
             self.observing.check()
             raise ConnectionLost("{device}: the value of {name} is not known yet", device=self.who, name=name)
@@ -161,15 +142,13 @@ class Block(ModbusDevice[Image]):
 
     def pulse_output(self, name: str, duration: float) -> None:
         """Switch a digital output on for `duration` s, timed by the block, and wait until it is off again."""
-        within(f"{self.who}: duration", duration, 0.01, registers.LONGEST_PULSE, "s")
-        channel, what = self.block_points[name].channel, f"the pulse of {name}"
+        who, channel, what = self.who, self.block_points[name].channel, f"the pulse of {name}"
+        within(f"{who}: duration", duration, 0.01, registers.LONGEST_PULSE, "s")
         self.require_control(f"pulsing {name}")
         go_on = self.begin(what)
         with self._one_pulse:
             if channel in self._pulsing:
-                raise Refused(
-                    "{device}: pulsing {name} is refused while it is being pulsed", device=self.who, name=name
-                )
+                raise Refused("{device}: pulsing {name} is refused while it is being pulsed", device=who, name=name)
             self._pulsing.add(channel)
 
         def over(image: Image) -> bool:

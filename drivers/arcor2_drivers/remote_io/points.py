@@ -34,32 +34,28 @@ class Point(Data, frozen=True):
         """Return the raw value of a physical one. Raises ValueError with the range when there is none."""
         limit = RAW_MAX * abs(self.io.scale)
         if not (math.isfinite(value) and abs(value) <= limit):
-            raise ValueError(f"must be {-limit:g} to {limit:g} {self.io.unit}".rstrip())
+            raise ValueError(f"must be {-limit:g} to {limit:g}")
         return max(-RAW_MAX, min(RAW_MAX, round(value / self.io.scale)))
 
 
-def parse_points(text: str, parameter: str = "points") -> dict[str, Point]:
-    """Return the points by name. Raises OutOfRange naming the parameter and the entry."""
+def parse_points(text: str) -> dict[str, Point]:
+    """Return the points of the setting `points` by name. Raises OutOfRange naming the entry."""
     points: dict[str, Point] = {}
-    for name, (terminal, *words) in entries(text, ";", parameter).items():
-        kind, channel = parse_address(terminal, parameter)
-        safe = tuple(OnLoss) if kind == "DO" else (OnLoss.HOLD, OnLoss.OFF)
-        point = Point(io=io_point(name, kind, words, parameter, safe_states=safe), kind=kind, channel=channel)
-        for other in points.values():
-            if other.address == point.address:
-                names = f"{other.io.name!r} and {name!r}"
-                raise OutOfRange(
-                    "{parameter} must use each terminal once: {address} is {names}",
-                    parameter=parameter,
-                    address=point.address,
-                    names=names,
-                )
-        points[name] = point
+    names: dict[str, str] = {}
+    for name, (terminal, *words) in entries(text, ";", "points").items():
+        kind, channel = parse_address(terminal, "points")
+        safe_states = tuple(OnLoss) if kind == "DO" else (OnLoss.HOLD, OnLoss.OFF)
+        point = points[name] = Point(io_point(name, kind, words, "points", safe_states=safe_states), kind, channel)
+        first = names.setdefault(point.address, name)
+        if first != name:
+            raise OutOfRange(
+                "points must use each terminal once: {terminal} is {first!r} and {name!r}",
+                terminal=terminal,
+                first=first,
+                name=name,
+            )
     if not points:
-        raise OutOfRange(
-            "{parameter} must name at least one point, as in part_present=DI0; lamp=DO4 on_loss=off",
-            parameter=parameter,
-        )
+        raise OutOfRange("points must name at least one point, as in part_present=DI0; lamp=DO4 on_loss=off")
     return points
 
 
@@ -72,11 +68,8 @@ def parse_address(text: str, parameter: str) -> tuple[str, int]:
         )
     kind, channel = match[1], int(match[2])
     if channel >= CHANNELS[kind]:
+        last = f"{kind}{CHANNELS[kind] - 1}"
         raise OutOfRange(
-            "{parameter} must use {type}0 to {type}{channels}, not {text}",
-            parameter=parameter,
-            type=kind,
-            channels=CHANNELS[kind] - 1,
-            text=text,
+            "{parameter} must use {kind}0 to {last}, not {text}", parameter=parameter, kind=kind, last=last, text=text
         )
     return kind, channel

@@ -18,15 +18,17 @@ PULSE: Final = 16
 """Holding register of the pulse of DO0."""
 LONGEST_PULSE: Final = 60.0
 """Longest pulse of the block, s."""
+WATCHDOG_STATES: Final = 9
+"""Input register of the state of watchdog 0."""
 WATCHDOG: Final = 64
 WATCHDOG_SIZE: Final = 16
-"""First holding register of watchdog 0, and number of registers of a watchdog."""
+"""First holding register of watchdog 0, and number of registers of a watchdog; below, two of their offsets."""
 TRIGGER: Final = 1
 COMMAND: Final = 2
 ACKNOWLEDGE: Final = 1
 RELEASE: Final = 2
-SUPPLY_MISSING: Final = 1
-OVERLOAD: Final = 2
+DIAGNOSES: Final = {1: "supply_missing", 2: "overload"}
+"""Codes of the alarms by diagnosis bit."""
 
 
 class WatchdogState(enum.IntEnum):
@@ -58,7 +60,7 @@ class Image(NamedTuple):
 
     def watchdog(self, index: int) -> tuple[WatchdogState, int]:
         """Return the state of a watchdog, and the number of the host that triggers it."""
-        return WatchdogState(self.words[9 + index]), self.words[13 + index]
+        return WatchdogState(self.words[WATCHDOG_STATES + index]), self.words[13 + index]
 
 
 def decode(words: Sequence[int]) -> Image:

@@ -4,11 +4,10 @@ from typing import ClassVar
 
 from arcor2_hw.actions import action
 from arcor2_hw.data.device import Quality, Reading
-from arcor2_hw.exceptions import DeviceFault, NotFound, OutOfRange, Refused
+from arcor2_hw.exceptions import DeviceFault
 from arcor2_hw.objects import IOBlock
 from arcor2_hw.objects.point_actions import MARGIN, PointActions
-from arcor2_hw.objects.small import PointDirection, PointKind
-from arcor2_hw.objects.state_observer import Snapshot
+from arcor2_hw.objects.small import PointKind
 
 from .block import Block
 from .points import parse_points
@@ -23,12 +22,11 @@ class RemoteIO(PointActions, Block, IOBlock):
     display_name = "Remote I/O"
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"wait_for": "stop", "pulse": "stop"}
 
-    def __init__(self, obj_id: str, name: str, settings: RemoteIOSettings | None = None) -> None:
+    def __init__(self, obj_id: str, name: str, settings: RemoteIOSettings) -> None:
         super().__init__(obj_id, name, settings)
-        if settings is None:
-            raise NotFound("{name} has no settings. Set host or serial_port to the address of the block.", name=name)
         self.use_block(settings, parse_points(settings.points))
         self.io_points = {name: point.io for name, point in self.block_points.items()}
+        self.edge_listeners = self.digital_points
 
     def point_label(self, name: str) -> str:
         """Return the terminal of a point."""
@@ -39,14 +37,13 @@ class RemoteIO(PointActions, Block, IOBlock):
 
         Raises OutOfRange for an unknown name, NotConnected, ConnectionLost, DeviceTimeout.
         """
-        self.require_point(name)
-        point = self.block_points[name]
-        if point.io.debounce:
+        io, point = self.require_point(name), self.block_points[name]
+        if io.debounce:
             _, asked, stamp = self._polled.fresh()
             return Reading(self.digital(name), stamp, asked)
         self.observing.check()
-        image, asked, stamp = Snapshot.by(self.read_state)
-        if point.io.kind is PointKind.DIGITAL:
+        image, asked, stamp = self.snapshot()
+        if io.kind is PointKind.DIGITAL:
             return Reading(image.digital(point.kind, point.channel), stamp, asked)
         raw = image.analog(point.kind, point.channel)
         quality = Quality.BAD if point.kind == "AI" and raw == BROKEN_WIRE else Quality.GOOD
@@ -54,33 +51,20 @@ class RemoteIO(PointActions, Block, IOBlock):
 
     def bad_reading(self, name: str) -> DeviceFault:
         """Return the error for an input with a broken wire."""
-        text = f"{self.who}: {name} ({self.point_label(name)}) has a broken wire"
-        return DeviceFault(text, fault_code="broken_wire")
+        point = f"{name} ({self.point_label(name)})"
+        return DeviceFault("{device}: {point} has a broken wire", "", "broken_wire", device=self.who, point=point)
 
-    def write(self, name: str, value: bool | float) -> None:
-        """Write an output. Raises Refused for an input, NotInControl, OutOfRange, ConnectionLost, DeviceTimeout."""
-        self.require_output(name)
+    def raw_value(self, name: str, value: float) -> int:
+        """Return the raw value of an analogue output. Raises ValueError with the range."""
+        return self.block_points[name].raw(value)
+
+    def write_raw(self, name: str, raw: bool | float) -> None:
+        """Write an output. Raises NotInControl, ConnectionLost, DeviceTimeout."""
         point = self.block_points[name]
         if point.kind == "DO":
-            self.switch(name, bool(value))
+            self.switch(name, bool(raw))
         else:
-            try:
-                raw = point.raw(float(value))
-            except ValueError as error:
-                raise OutOfRange(
-                    "{device}: {name} {reason}, not {value!r}", device=self.who, name=name, reason=error, value=value
-                ) from None
-            self.send(f"writing {name}", lambda: self.link.write_registers(point.channel, raw & 0xFFFF))
-
-    def require_output(self, name: str) -> None:
-        """Raise Refused for an input."""
-        if self.require_point(name).direction is not PointDirection.OUTPUT:
-            raise Refused(
-                "{device}: {name} is {point_label}, an input",
-                device=self.who,
-                name=name,
-                point_label=self.point_label(name),
-            )
+            self.send(f"writing {name}", lambda: self.link.write_registers(point.channel, int(raw) & 0xFFFF))
 
     def await_point(self, name: str, value: bool, timeout: float) -> None:
         """Return when a digital point has the value."""

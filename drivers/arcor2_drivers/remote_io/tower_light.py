@@ -5,41 +5,17 @@ import threading
 import time
 from collections.abc import Mapping
 from functools import partial
-from typing import ClassVar, Final
+from typing import ClassVar
 
-from arcor2_hw.actions import StrEnum, action
-from arcor2_hw.exceptions import NotFound, NotInControl, OutOfRange
+from arcor2_hw.actions import action
+from arcor2_hw.exceptions import NotInControl, OutOfRange
 from arcor2_hw.objects import Generic
+from arcor2_hw.objects.machine import MachineStateName
 from arcor2_hw.objects.point_actions import MARGIN
 
 from .block import Block
 from .registers import LONGEST_PULSE
 from .settings import LampColor, Pattern, TowerLightSettings, parse_patterns
-
-DARK: Final[Pattern] = {}
-"""The pattern with all lamps off."""
-
-
-class ShownState(StrEnum):
-    """The states of a machine (PackML, ISA-TR88.00.02)."""
-
-    CLEARING = "clearing"
-    STOPPED = "stopped"
-    STARTING = "starting"
-    IDLE = "idle"
-    SUSPENDED = "suspended"
-    EXECUTE = "execute"
-    STOPPING = "stopping"
-    ABORTING = "aborting"
-    ABORTED = "aborted"
-    HOLDING = "holding"
-    HELD = "held"
-    UNHOLDING = "unholding"
-    SUSPENDING = "suspending"
-    UNSUSPENDING = "unsuspending"
-    RESETTING = "resetting"
-    COMPLETING = "completing"
-    COMPLETE = "complete"
 
 
 class TowerLight(Block, Generic):
@@ -51,15 +27,13 @@ class TowerLight(Block, Generic):
     icon = "light"
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"buzz": "stop"}
 
-    def __init__(self, obj_id: str, name: str, settings: TowerLightSettings | None = None) -> None:
+    def __init__(self, obj_id: str, name: str, settings: TowerLightSettings) -> None:
         super().__init__(obj_id, name, settings)
-        if settings is None:
-            raise NotFound("{name} has no settings. Set host or serial_port to the address of the block.", name=name)
         self._lamps = settings.lamps()
         self._patterns = parse_patterns(settings.patterns, self._lamps)
         self._half_period = settings.blink_period / 2.0
         self._showing = threading.RLock()
-        self._pattern: Pattern = DARK
+        self._pattern: Pattern = {}
         self._lit: dict[str, bool] = {}
         self._since = 0.0
         self.use_block(settings, settings.points())
@@ -67,7 +41,7 @@ class TowerLight(Block, Generic):
     def arm(self) -> None:
         """Take control; a pattern from before a connection loss is not shown again."""
         with self._showing:
-            self._pattern, self._lit = DARK, {}
+            self._pattern, self._lit = {}, {}
         super().arm()
 
     def lit(self) -> dict[str, bool]:
@@ -84,16 +58,14 @@ class TowerLight(Block, Generic):
         :param blinking: whether the lamp blinks
         """
         if color not in self._lamps:
+            lamps = ", ".join(self._lamps)
             raise OutOfRange(
-                "{device} has no {color} lamp; there are {lamps}",
-                device=self.who,
-                color=color,
-                lamps=", ".join(self._lamps),
+                "{device} has no {color} lamp; there are {lamps}", device=self.who, color=color, lamps=lamps
             )
         self._show({str(color): blinking}, f"showing {color}")
 
     @action
-    def show_state(self, state: ShownState, *, an: str | None = None) -> None:
+    def show_state(self, state: MachineStateName, *, an: str | None = None) -> None:
         """Show the state of a machine by its pattern.
 
         :param state: state of the machine
@@ -105,7 +77,7 @@ class TowerLight(Block, Generic):
     @action
     def off(self, *, an: str | None = None) -> None:
         """Turn all lamps off."""
-        self._show(DARK, "switching the lamps off")
+        self._show({}, "switching the lamps off")
 
     @action(deadline=LONGEST_PULSE + MARGIN)
     def buzz(self, duration: float, *, an: str | None = None) -> None:

@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings, TowerLightSettings
-from arcor2_drivers.remote_io.tower_light import LampColor, ShownState, TowerLight
+from arcor2_drivers.remote_io.tower_light import LampColor, TowerLight
 from arcor2_hw.objects import Generic
+from arcor2_hw.objects.machine import MachineStateName
 from arcor2_hw.testing.bench import Bench, Check
 from arcor2_hw.testing.frames import ModbusTcp
 from arcor2_hw.testing.tcp_wire import TcpWire
@@ -197,7 +198,7 @@ class TowerLightBench(RemoteIOBench):
         assert isinstance(device, TowerLight)
         return {
             "a colour that is not fitted": lambda: device.show(LampColor.BLUE),
-            "a state that it has no pattern for": lambda: device.show_state(ShownState.ABORTED),
+            "a state that it has no pattern for": lambda: device.show_state(MachineStateName.ABORTED),
         }
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:

@@ -7,10 +7,11 @@ import pytest
 
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import TowerLightSettings
-from arcor2_drivers.remote_io.tower_light import LampColor, ShownState, TowerLight
+from arcor2_drivers.remote_io.tower_light import LampColor, TowerLight
 from arcor2_hw.data.device import Connection
-from arcor2_hw.exceptions import NotInControl, OutOfRange
+from arcor2_hw.exceptions import DeviceFault, NotInControl, OutOfRange
 from arcor2_hw.objects import MachineState
+from arcor2_hw.objects.machine import MachineStateName
 from tests.fakes.conftest import FakeProcess
 
 LAMPS = {"red": "DO0", "amber": "DO1", "green": "DO2", "buzzer": "DO3"}
@@ -66,14 +67,14 @@ def test_colours_blink(fake: FakeProcess, tower: TowerLight, wait_for: Callable[
 
 def test_patterns_follow_states(fake: FakeProcess, tower: TowerLight, wait_for: Callable[..., Any]) -> None:
     tower.take_control()
-    tower.show_state(ShownState.EXECUTE)
+    tower.show_state(MachineStateName.EXECUTE)
     assert lamps(fake) == [False, False, True]
-    tower.show_state(ShownState.ABORTED)
+    tower.show_state(MachineStateName.ABORTED)
     wait_for(lambda: lamps(fake), lambda lit: lit == [False, False, False])
     wait_for(lambda: lamps(fake), lambda lit: lit == [True, False, False])
     with pytest.raises(OutOfRange, match="no pattern for the state idle"):  # it wants a white lamp
-        tower.show_state(ShownState.IDLE)
-    assert {state.value for state in ShownState} == {state.name.lower() for state in MachineState}
+        tower.show_state(MachineStateName.IDLE)
+    assert {state.value for state in MachineStateName} == {state.name.lower() for state in MachineState}
 
 
 def test_the_safe_pattern_is_shown_after_a_loss(
@@ -90,6 +91,16 @@ def test_the_safe_pattern_is_shown_after_a_loss(
     tower.show(LampColor.GREEN)
     tower.disconnect()
     assert lamps(fake) == [True, False, False]
+
+
+def test_a_tower_without_a_running_watchdog_stays_dark(fake: FakeProcess, tower: TowerLight) -> None:
+    fake.control.do("watchdogs_start", on=False)
+    with pytest.raises(DeviceFault, match=r"watchdog 1 does not run \(input register 10 is 0\)"):
+        tower.take_control()
+    for act in (lambda: tower.show(LampColor.GREEN), lambda: tower.buzz(0.1)):
+        with pytest.raises(NotInControl, match="watchdog 1 does not run"):
+            act()
+    assert fake.truth()["history"] == []
 
 
 def test_a_tower_light_and_a_block_share_a_device(
