@@ -101,7 +101,7 @@ class DobotMagician(HoldsParts, SingleArm):
         for code in sorted(self._observer.sample().alarms):
             text, remedy, severity = alarms.describe(code)
             if (since := self._observer.since.get(code)) is not None:
-                found.append(Alarm(alarms.title(code), severity, text, remedy, since))
+                found.append(Alarm.of(alarms.title(code), severity, text, remedy, since))
         return found
 
     def acknowledge(self, code: str) -> None:
@@ -121,7 +121,7 @@ class DobotMagician(HoldsParts, SingleArm):
 
     def acknowledge_all(self) -> None:
         """Clear all alarms, after a person has dealt with them. Raise Refused while a cause persists."""
-        self._observer.set(Command.CLEAR_ALARMS)
+        self._observer.set(Command.ALARMS)
         if left := alarms.codes(self._observer.raw(Command.ALARMS)):
             names = ", ".join(map(alarms.title, sorted(left)))
             raise Refused(
@@ -250,7 +250,7 @@ class DobotMagician(HoldsParts, SingleArm):
     # -------------------------------------------------------------------------------- actions
     @action(deadline=LONGEST_HOMING)
     def home(self, *, an: str | None = None) -> None:
-        """Home the arm: move to its switches and back. Keep clear of it."""
+        """Home the arm: move to its switches, then to the home position stored in the arm. Keep clear of it."""
         self._motion.home(self._control.stops.guard())
 
     @action

@@ -16,14 +16,17 @@ LONGEST: Final = 0xFF - 2
 
 
 class Command(enum.IntEnum):
-    """Ids of the commands in use."""
+    """Ids of the commands in use.
+
+    A write to ALARMS clears all alarms. Source: ClearAllAlarmsState in the vendor's DobotDll (id 20, rw 1). Some
+    clients use id 21 instead, which the vendor's list of ids does not contain.
+    """
 
     SERIAL_NUMBER = 0
     NAME = 1
     VERSION = 2
     POSE = 10
     ALARMS = 20
-    CLEAR_ALARMS = 21
     HOME = 31
     END_EFFECTOR = 60
     SUCTION_CUP = 62

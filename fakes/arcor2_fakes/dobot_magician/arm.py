@@ -16,7 +16,8 @@ QUEUE = 32
 HOMING = 5.0  # s: duration of each half at speed 1, to the switches and back
 SWITCHES: Four = (-85.0, 5.0, -5.0, 0.0)
 FOLDED: Four = (0.0, 45.0, 45.0, 0.0)
-RESET, PLANNING_SINGULAR, PLANNING_LIMIT, MOVING_LIMIT = 0x00, 0x10, 0x11, 0x21
+RESET, PLANNING_UNREACHABLE, PLANNING_LIMIT = 0x00, 0x11, 0x12
+MOVING_UNREACHABLE, MOVING_LIMIT = 0x21, 0x22
 
 
 @dataclasses.dataclass
@@ -124,7 +125,7 @@ class Arm:
             self.motions += 1
         joints, ended = self._motion.advance(seconds * self.pace)
         if joints is None or (not self._homing and (limit_alarm(joints) is not None)):
-            self.raise_alarm(MOVING_LIMIT)
+            self.raise_alarm(MOVING_UNREACHABLE if joints is None else MOVING_LIMIT)
             return
         self.joints = joints
         if ended:
@@ -164,7 +165,7 @@ class Arm:
         by_angles = mode in (3, 4, 5, 6)
         end = target if by_angles else joints_for(target, self.settings.bias)
         if end is None or not all(map(math.isfinite, end)):
-            self._refuse(PLANNING_SINGULAR if end is None else PLANNING_LIMIT)
+            self._refuse(PLANNING_UNREACHABLE)
             return None
         code = limit_alarm(end)
         if code is not None:
@@ -188,7 +189,7 @@ class Arm:
         over, above = (*here[:2], top, here[3]), (*goal[:2], top, goal[3])
         first, last = joints_for(over, self.settings.bias), joints_for(above, self.settings.bias)
         if first is None or last is None:
-            self._refuse(PLANNING_LIMIT)
+            self._refuse(PLANNING_UNREACHABLE)
             return None
         across = self._straight_part(over, above) if straight else self._joint_part(first, last)
         return Motion([self._straight_part(here, over), across, self._straight_part(above, goal)])

@@ -1,4 +1,8 @@
-"""Effects and answers of the ids of the protocol."""
+"""Effects and answers of the ids of the protocol.
+
+A write to id 20 clears the alarms, as in the vendor's DobotDll; so does a write to id 21, which pydobot lists. Homing
+(31) is executed with and without its reserved parameter: pydobot sends none.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +70,8 @@ class Commands:
     def _motion(self, command: int, data: bytes) -> Callable[[], Motion | None] | None:
         arm = self._arm
         if command == 31:
-            struct.unpack("<I", data)
+            if data:
+                struct.unpack("<I", data)
             return arm.home
         if command == 84:
             mode, *target = struct.unpack("<B4f", data)
@@ -119,7 +124,7 @@ class Commands:
     def _write(self, command: int, data: bytes) -> bool:
         arm, settings = self._arm, self._arm.settings
         match command:
-            case 21:
+            case 20 | 21:
                 arm.alarms.clear()
             case 30:
                 settings.home = struct.unpack("<4f", data)

@@ -14,7 +14,7 @@ FRAMES = [
     # Written out by hand by the rule of the protocol's format, not by the code under test.
     (Frame(10, 0, b""), "aa aa 02 0a 00 f6"),
     (Frame(20, 0, b""), "aa aa 02 14 00 ec"),
-    (Frame(21, 1, b""), "aa aa 02 15 01 ea"),
+    (Frame(20, 1, b""), "aa aa 02 14 01 eb"),
     (Frame(31, 3, b"\0\0\0\0"), "aa aa 06 1f 03 00 00 00 00 de"),
     (Frame(62, 1, b"\x01\x01"), "aa aa 04 3e 01 01 01 bf"),
     (Frame(63, 1, b"\x01\x00"), "aa aa 04 3f 01 01 00 bf"),
@@ -68,8 +68,8 @@ def test_alarm_bits_are_decoded() -> None:
     bits = bytearray(16)
     bits[0], bits[2], bits[8], bits[10] = 0x01, 0x02, 0x80, 0x02
     assert alarms.codes(bytes(bits)) == {0x00, 0x11, 0x47, 0x51}
-    assert alarms.describe(0x47)[0] == "joint 4 is at its negative limit"
-    assert "7Fh" in alarms.describe(0x7F)[0]
+    assert str(alarms.describe(0x47)[0]) == "joint 4 is at its negative limit"
+    assert "7Fh" in str(alarms.describe(0x7F)[0])
 
 
 def test_inverse_kinematics_inverts_forward_kinematics() -> None:

@@ -15,7 +15,7 @@ class Line:
     """A host that counts its own checksums."""
 
     def __init__(self, port: str) -> None:
-        self.serial = serial.Serial(port, 115200, timeout=0.4)
+        self.serial = serial.Serial(port, 115200, timeout=30.0)
 
     def send(self, command: int, control: int, layout: str = "", *values: float) -> None:
         payload = bytes((command, control)) + struct.pack("<" + layout, *values)
@@ -55,7 +55,7 @@ def test_frames_match_examples(line: Line) -> None:
     line.serial.timeout = 0.1
     line.serial.write(bytes.fromhex("aa aa 02 0a 00 f5"))  # a wrong checksum gets no answer
     assert line.serial.read(1) == b""
-    line.serial.timeout = 0.4
+    line.serial.timeout = 30.0
     x, y, z, r, *angles = struct.unpack("<8f", line.ask(10, 0))
     assert (x, y, z, r) == pytest.approx((259.104, 0.0, -8.485, 0.0), abs=0.01)
     assert angles == pytest.approx([0, 45, 45, 0])
@@ -112,7 +112,7 @@ def test_a_line_is_straight_and_a_jump_rises(fake: FakeProcess, line: Line) -> N
 
 @pytest.mark.parametrize(
     ("mode", "target", "alarm"),
-    [(1, (500, 0, 0, 0), 0x10), (1, (60, 0, 100, 0), 0x11), (4, (95, 45, 45, 0), 0x40), (4, (0, 45, -20, 0), 0x45)],
+    [(1, (500, 0, 0, 0), 0x11), (1, (60, 0, 100, 0), 0x12), (4, (95, 45, 45, 0), 0x40), (4, (0, 45, -20, 0), 0x45)],
 )
 def test_exceeded_limits_are_alarms(
     start_fake: Callable[..., FakeProcess], mode: int, target: tuple[float, ...], alarm: int
@@ -126,9 +126,33 @@ def test_exceeded_limits_are_alarms(
     bits = int.from_bytes(line.ask(20, 0), "little")
     assert bits == 1 << alarm
     assert (truth["moving"], truth["motions"]) == (False, 0)
-    line.ask(21, 1)
-    assert line.ask(20, 0) == bytes(16)
     line.serial.close()
+
+
+@pytest.mark.parametrize("clear", ["aa aa 02 14 01 eb", "aa aa 02 15 01 ea"], ids=["DobotDll", "pydobot"])
+def test_alarms_are_cleared_by_the_frames_in_use(fake: FakeProcess, line: Line, clear: str) -> None:
+    fake.control.do("alarm", code=0x51)
+    assert line.ask(20, 0) == bytes(10) + b"\x02" + bytes(5)
+    line.serial.write(bytes.fromhex(clear))
+    assert line.serial.read(6) == bytes.fromhex(clear)  # an empty answer with the same id and control
+    assert line.ask(20, 0) == bytes(16)
+    line.ask(240, 1)
+    line.move(10, 45, 45, 0)
+    fake.control.wait_until(lambda truth: truth["index"] == 1)
+
+
+@pytest.mark.parametrize("reserved", ["", "00 00 00 00"], ids=["pydobot", "DobotDll"])
+def test_homing_uses_the_stored_position(fake: FakeProcess, line: Line, reserved: str) -> None:
+    line.ask(240, 1)
+    payload = bytes.fromhex("1f 03" + reserved)
+    line.serial.write(b"\xaa\xaa" + bytes((len(payload),)) + payload + bytes((-sum(payload) & 255,)))
+    assert line.serial.read(14) == bytes.fromhex("aa aa 0a 1f 03 01 00 00 00 00 00 00 00 dd")
+    truth = fake.control.wait_until(lambda truth: truth["homed"])
+    assert truth["tool"] == pytest.approx([259.1, 0.0, -8.5, 0.0], abs=0.1)  # as delivered
+    line.ask(30, 3, "4f", 220.0, 40.0, 10.0, 0.0)
+    second = struct.unpack("<Q", line.ask(31, 3))[0]
+    truth = fake.control.wait_until(lambda truth: truth["index"] == second)
+    assert truth["tool"] == pytest.approx([220.0, 40.0, 10.0, 0.0], abs=0.1)
 
 
 def test_outputs_and_parameters_are_stored(fake: FakeProcess, line: Line) -> None:
