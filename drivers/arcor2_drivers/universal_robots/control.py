@@ -93,14 +93,19 @@ class Control:
             )
         if missing := self.obstacles(sample, control):
             raise Refused("{name} cannot be controlled: {missing}", name=name, missing=", ".join(missing))
-        session = ControlSession(observer, self.uses_upper_registers(), self._arm.settings.watchdog_frequency)
-        session.open(TAKE_TIMEOUT, self._pendant.available)
-        try:
-            self.send_tool(session, tool)
-            self._await_samples()
-        except BaseException:
-            session.end(NotInControl("Control of {name} was not taken.", name=name))
-            raise
+        for last in (False, True):
+            session = ControlSession(observer, self.uses_upper_registers(), self._arm.settings.watchdog_frequency)
+            session.open(TAKE_TIMEOUT, self._pendant.available)
+            try:
+                self.send_tool(session, tool)
+                self._await_samples()
+                break
+            except BaseException as e:
+                session.end(NotInControl("Control of {name} was not taken.", name=name))
+                if last or not session.too_slow:
+                    raise
+                log.info("%s: taking control again: %s", name, e)
+                session.await_end()
         self.teaching = self._retake = False
         self.session = session
         observer.observing.settled()
@@ -206,11 +211,11 @@ class Control:
     @staticmethod
     def send_tool(session: ControlSession, tool: Tool) -> None:
         """Send TCP and payload to the controller."""
-        session.do("the tool center point", "setTcp", to_vector(tool.tcp))
+        session.set("the tool center point", "setTcp", to_vector(tool.tcp))
         if tool.inertia is None:
-            session.do("the payload", "setPayload", tool.mass, list(tool.cog))
+            session.set("the payload", "setPayload", tool.mass, list(tool.cog))
         else:
-            session.do("the payload", "setTargetPayload", tool.mass, list(tool.cog), list(tool.inertia))
+            session.set("the payload", "setTargetPayload", tool.mass, list(tool.cog), list(tool.inertia))
 
     def _await_samples(self) -> None:
         """Wait for two samples: the second was taken after now, and so with the tool that was sent."""

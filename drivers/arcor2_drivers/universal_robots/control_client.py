@@ -48,7 +48,12 @@ class ControlClient:
             start_new_session=True,  # its own share of a busy computer
         )
         self.pid, self.kill = self._process.pid, self._process.kill
-        threading.Thread(target=self._listen, name=f"control answers {who}", daemon=True).start()
+        self._listening = threading.Thread(target=self._listen, name=f"control answers {who}", daemon=True)
+        self._listening.start()
+
+    def wait(self, timeout: float) -> None:
+        """Wait at most `timeout` s until the process has ended, and with it its connections."""
+        self._listening.join(timeout)
 
     def request(self, command: str, arguments: tuple[Any, ...]) -> "Future[Any]":
         """Send a command and return the future of its result."""

@@ -144,26 +144,34 @@ class ControlProgram:
 
     def do(self, command: str, arguments: list[Any]) -> Any:
         """Execute a command and return the result of the library."""
+        self._exit_if_too_slow()
         if command in MOTIONS and self._jogs:
             self.do("speedStop", [])
         if command == "speedStop":
             self._jog_ends = math.inf
         try:
-            return self._commands[command](*arguments)
+            result = self._commands[command](*arguments)
+            if result is False and command in COMMANDS:
+                self._exit_if_too_slow()  # the watchdog tripped during the command
+            return result
         finally:
             self._written = time.monotonic()
 
     def keep_alive(self) -> float:
         """End an expired jog and signal the watchdog, if due. Return the time until the next call, s."""
+        self._exit_if_too_slow()
         now = time.monotonic()
-        if now - self._written > 1.0 / self._frequency:
-            os._exit(TOO_SLOW)  # the controller has stopped the program
         if now >= self._jog_ends:
             self.do("speedStop", [])
         elif now >= self._written + self._period:
             (self._registers.kick if self._own else self._control.kickWatchdog)()
             self._written = time.monotonic()
         return max(min(self._written + self._period, self._jog_ends) - time.monotonic(), 0.0)
+
+    def _exit_if_too_slow(self) -> None:
+        """Exit if the watchdog has tripped: the library would deny commands without telling why."""
+        if time.monotonic() - self._written > 1.0 / self._frequency:
+            os._exit(TOO_SLOW)
 
     def last_stop(self) -> None:
         """Stop the program: the host has ended."""

@@ -183,6 +183,11 @@ class Motion:
         # The control program accepts the next command only then.
         once_within(lambda: session.own is None or session.ended is not None, REST_WITHIN, POLL)
 
+    def end_jog(self, session: ControlSession) -> None:
+        """End a jog and wait for standstill, where a path can be planned. Raise DeviceFault or DeviceTimeout."""
+        if session.end_jog():
+            self.wait_rest(session)
+
     def wait_rest(self, session: ControlSession) -> None:
         """Wait for standstill; use the dashboard when it takes too long. Raise DeviceTimeout."""
         until, dashboard_at = time.monotonic() + REST_WITHIN, time.monotonic() + REST_WITHIN / 2
@@ -219,14 +224,18 @@ class Motion:
 
 
 class Budget:
-    """Remaining time of a motion. It elapses more slowly while the speed slider is down."""
+    """Remaining time of a motion, by the controller's clock: this process may be delayed.
+
+    It elapses more slowly while the speed slider is down.
+    """
 
     def __init__(self, seconds: float) -> None:
-        self._left, self._last = seconds, time.monotonic()
+        self._left = seconds
+        self._last: float | None = None
 
     def exceeded(self, sample: Sample) -> bool:
-        """Subtract the time since the last call; return whether none is left."""
-        now = time.monotonic()
-        self._left -= (now - self._last) * max(sample.speed_fraction, SLOWEST_FRACTION)
-        self._last = now
+        """Subtract the time between this sample and that of the last call; return whether none is left."""
+        if self._last is not None:
+            self._left -= (sample.timestamp - self._last) * max(sample.speed_fraction, SLOWEST_FRACTION)
+        self._last = sample.timestamp
         return self._left < 0.0

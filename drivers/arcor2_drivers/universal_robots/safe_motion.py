@@ -37,6 +37,7 @@ class SafeMotion:
         vector = self._arm.vector(target)
         with self._motion.exclusive():
             session = self._control.current()
+            self._motion.end_jog(session)
             q = self._motion.solve(session, vector, self._observer.sample().q)
             if not linear:
                 self._go_around(self._free(target, named_joints(JOINTS, q)), speed, guard)
@@ -48,7 +49,7 @@ class SafeMotion:
         """Move to joint values. Raise PathBlocked if no path is free of collisions."""
         self._arm.check_speed(speed)
         with self._motion.exclusive():
-            self._control.current()
+            self._motion.end_jog(self._control.current())
             self._go_around(named_joints(JOINTS, q), speed, guard)
 
     def inverse(self, pose: Pose, near: list[float], avoid_collisions: bool) -> list[Joint]:

@@ -57,6 +57,8 @@ class ControlSession:
         self.upper = upper
         self.registers = Registers.of(upper)
         self.ended: DeviceError | None = None
+        self.too_slow = False
+        """Whether it ended because this computer was too busy for the watchdog."""
         self.own: int | None = None
         """Number of the run of a motion program that plays, or has just ended, in place of the control program."""
         self._observer = observer
@@ -97,9 +99,11 @@ class ControlSession:
         error: DeviceError
         try:
             result_within(process.opened, timeout)
-        except (TimeoutError, DeviceFault) as e:
+        except (TimeoutError, DeviceError) as e:
             if isinstance(e, DeviceFault):
                 error = self._refusal(e.detail)
+            elif isinstance(e, DeviceError):
+                error = e
             else:
                 error = DeviceTimeout(
                     "{device} did not start the control program within {timeout:g} s.", device=self.who, timeout=timeout
@@ -143,6 +147,8 @@ class ControlSession:
         with contextlib.suppress(DeviceError):
             self.call("the end of control", "stopScript", timeout=wait)
         self.end(reason)
+        if self._process is not None:  # until its connections are closed, its registers are in use
+            self._process.wait(timing.PROCESS_ENDS)
 
     def await_end(self) -> None:
         """Wait until the guard of an ended session has finished: its last stop must not stop the next program."""
@@ -184,12 +190,20 @@ class ControlSession:
             raise error from None
 
     def ask(self, what: str, question: str, *arguments: Any) -> Any:
-        """Execute a command that changes nothing; twice if the library fails, as it may on a busy computer."""
+        """Execute a repeatable command; twice if the library fails or denies, as it may on a busy computer."""
         try:
-            return self.call(what, question, *arguments)
+            if answer := self.call(what, question, *arguments):
+                return answer
+            reason = f"the answer was {answer}"
         except DeviceFault as e:
-            log.info("%s: asking again for %s: %s", self.who, what, e.detail)
-            return self.call(what, question, *arguments)
+            reason = e.detail
+        log.info("%s: asking again for %s: %s", self.who, what, reason)
+        return self.call(what, question, *arguments)
+
+    def set(self, what: str, command: str, *arguments: Any) -> None:
+        """Execute a command that sets values and returns whether it was accepted; twice, as `ask`. Raise as `do`."""
+        if not self.ask(what, command, *arguments):
+            self._not_accepted(what)
 
     def do(self, what: str, command: str, *arguments: Any, **options: Any) -> None:
         """Execute a command that returns whether it was accepted. Raise DeviceFault if not, else as `call`."""
@@ -197,7 +211,7 @@ class ControlSession:
             self._not_accepted(what)
 
     def _not_accepted(self, what: str) -> NoReturn:
-        once_within(self._ending.is_set, 2.0 * timing.PROGRAM_GONE, timing.GUARD_PERIOD)
+        once_within(self._ending.is_set, 2.0 * timing.PROGRAM_GONE + timing.PROCESS_ENDS, timing.GUARD_PERIOD)
         if self.ended is not None:
             raise self.ended  # the guard was about to find the cause
         raise DeviceFault("{device} did not accept {what}.", device=self.who, what=what)
@@ -219,6 +233,14 @@ class ControlSession:
                     valid_for=valid_for,
                 )
             self._not_accepted("a jog")
+
+    def end_jog(self) -> bool:
+        """End a jog. Return whether one was running. Raise as `do`."""
+        if time.monotonic() >= self._jogs_until + timing.SPEED_STOPPED:
+            return False
+        self._jogs_until = 0.0
+        self.do("the end of a jog", "speedStop")
+        return True
 
     def set_output(self, number: int, on: bool) -> None:
         """Switch an output: 0 to 7 standard, 8 to 15 configurable, 16 and 17 at the tool."""
@@ -307,6 +329,7 @@ class ControlSession:
         detail = f"The control process of {self.who} ended with status {status}."
         error = ConnectionLost(detail)
         if status in _TOO_SLOW:
+            self.too_slow = True
             error = ConnectionLost(
                 "{device}: {too_slow}",
                 f"{_TOO_SLOW[status]}. {detail}",

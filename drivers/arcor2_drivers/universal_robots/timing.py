@@ -17,8 +17,8 @@ ROTATION_SPEED: Final = 0.5
 
 STREAM_FREQUENCY: Final = 100.0
 """Frequency of ur_rtde's stream, Hz: a command takes 20 ms instead of 4, the process 5 % of a core instead of 10."""
-TAKE_TIMEOUT: Final = 5.0
-"""Time the controller may take to start the control program, s."""
+TAKE_TIMEOUT: Final = 8.0
+"""Time the controller may take to start the control program, s; 0.3 s on an idle computer, over 4 s on a busy one."""
 CALL_TIMEOUT: Final = 2.0
 """Time for a command that moves nothing, s; 0.03 s on an idle computer. The library itself waits 4 to 300 s."""
 RESUME_TIMEOUT: Final = 4.0
@@ -36,8 +36,9 @@ LAST_STOP: Final = 0.3
 PROGRAM_GONE: Final = 0.1
 """Time for which our program may be reported as not playing before the session ends, s of the controller's clock: two
 streams report it at different times."""
-PROCESS_ENDS: Final = 0.2
-"""Time for the control process to report why our program is not playing, s."""
+PROCESS_ENDS: Final = 0.6
+"""Time for the control process to report why our program is not playing, and to end after it was killed, s. The guard
+does not signal during this time, so it is below the 0.8 s after which the cell host counts as frozen."""
 POLL: Final = 0.005
 """Time between two checks for the end of a motion, s."""
 REST_WITHIN: Final = 2.0

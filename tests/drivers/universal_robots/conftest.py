@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 import textwrap
-import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -17,6 +16,7 @@ from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_hw.data.geometry import Pose
 from tests.drivers.background_call import BackgroundCall as BackgroundCall
 from tests.fakes.conftest import FakeProcess
+from tests.waiting import wait_for
 
 HOME = [0.0, -1.5707963267948966, 1.5707963267948966, -1.5707963267948966, -1.5707963267948966, 0.0]
 _numbers = itertools.count(1)
@@ -82,7 +82,7 @@ def make(host: str, pose: Pose | None = None, **settings: Any) -> UR5e:
 def robot(fake: FakeUr) -> Iterator[UR5e]:
     """Connected, control not taken."""
     robot = make(fake.host)
-    robot.connect(3.0)
+    robot.connect(30.0)
     yield robot
     robot.disconnect()
 
@@ -96,14 +96,7 @@ def ready(robot: UR5e) -> UR5e:
 
 def moving(fake: FakeUr) -> None:
     """Return when the arm really moves."""
-    wait(lambda: max(map(abs, fake.truth()["qd"])) > 0.05)
-
-
-def wait(holds: Callable[[], bool], within: float = 20.0) -> None:
-    until = time.monotonic() + within
-    while not holds():
-        assert time.monotonic() < until, f"not within {within} s"
-        time.sleep(0.005)
+    wait_for(lambda: max(map(abs, fake.truth()["qd"])) > 0.05)
 
 
 @pytest.fixture
@@ -116,7 +109,7 @@ def owner(fake: FakeUr) -> Iterator[Callable[[], "subprocess.Popen[bytes]"]]:
         from arcor2_drivers.universal_robots.ur5e import UR5e
         from arcor2_hw.data.geometry import Pose
         robot = UR5e("obj_1", "ur", Pose(), UrSettings({fake.host!r}, payload_mass=1.0))
-        robot.connect(3.0)
+        robot.connect(30.0)
         robot.take_control()
         joints = robot.robot_joints()
         joints[0].value += 3.0

@@ -112,7 +112,7 @@ def test_a_stop_between_waypoints_ends_the_move(ready: UR5e, around: BoxSurround
     moving(fake)
     ready.stop()
     with pytest.raises(Cancelled):
-        doing.result(2.0)
+        doing.result()
     q = fake.truth()["q"]
     assert math.dist(q, BESIDE) > 0.3
     assert not fake.truth()["moving"]

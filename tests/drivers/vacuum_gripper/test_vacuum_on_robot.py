@@ -10,7 +10,8 @@ from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
 from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
 from arcor2_hw.exceptions import NotFound, NotInControl
-from tests.drivers.universal_robots.conftest import BackgroundCall, FakeUr, make, moving, wait
+from tests.drivers.universal_robots.conftest import BackgroundCall, FakeUr, make, moving
+from tests.waiting import wait_for
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def ur() -> Iterator[FakeUr]:
 def robot(ur: FakeUr) -> Iterator[UR5e]:
     ur.reset()
     robot = make(ur.host)
-    robot.connect(3.0)
+    robot.connect(30.0)
     yield robot
     ur.do("set_input", bit=16, on=False)
     robot.disconnect()
@@ -70,7 +71,7 @@ def test_gripping_during_a_move_keeps_the_part_at_a_stop(robot: UR5e, gripper: S
         going.result()
     assert ur.truth()["digital_outputs"] >> 16 & 1
     ur.do("set_input", bit=16, on=False)
-    wait(lambda: bool(gripper.alarms()))
+    wait_for(lambda: bool(gripper.alarms()))
     gripper.off()
     assert not ur.truth()["digital_outputs"] >> 16 & 1
     began = time.monotonic()
