@@ -94,6 +94,11 @@ class Observing:
         """Return whether the device is being observed."""
         return self._state in (Connection.ONLINE, Connection.BACK)
 
+    @property
+    def stopping(self) -> bool:
+        """Return whether `stop` was called, so that a driver that waits while it reconnects gives up."""
+        return self._stopping.is_set()
+
     def settled(self) -> None:
         """Change the state from "back" to "online", because a client has noticed the reconnect."""
         with self._state_lock:
@@ -145,6 +150,7 @@ class Observing:
                 return
             deadline = time.monotonic() + timeout
             self._await_previous(timeout)
+            self._stopping = threading.Event()
             self._enter(Connection.CONNECTING)
             try:
                 self._open(max(deadline - time.monotonic(), 0.001))
@@ -154,7 +160,6 @@ class Observing:
                 self._enter(Connection.FAILED)
                 raise
             self._reason = None
-            self._stopping = threading.Event()
             self._pause = FIRST_PAUSE
             self._enter(Connection.ONLINE)
             self._thread = threading.Thread(

@@ -49,13 +49,19 @@ class Carrier:
             ) from e
 
     # -------------------------------------------------------------------------------- connection
-    def open(self, timeout: float) -> None:
-        """Find the carrier and wait at most `timeout` s until it is connected.
+    def open(self, point: str, timeout: float, abandoned: Callable[[], bool]) -> None:
+        """Find the carrier and wait until it is connected and its points can be read.
+
+        Args:
+            point: A point that is read; whether it exists is checked by `require`.
+            timeout: Time limit, s.
+            abandoned: Returns whether the gripper is being disconnected, which ends the wait.
 
         Raises:
             NotFound: The scene has no object of its name.
             InvalidData: The object has no points.
-            NotConnected: It is not connected in time.
+            NotConnected: It is not connected in time, or the wait was abandoned.
+            DeviceTimeout: It does not answer.
         """
         reason = ""
 
@@ -67,9 +73,20 @@ class Carrier:
                 reason = str(e)
                 return False
             reason = f"{self.name} is {self._found.connection.value}"
-            return self._found.connection in ONLINE
+            return self._found.connection in ONLINE and readable()
 
-        if not once_within(online, timeout, POLL):
+        def readable() -> bool:
+            nonlocal reason
+            try:
+                self.read(point)
+            except (ConnectionLost, NotConnected) as e:  # it is about to reconnect
+                reason = str(e)
+                return False
+            except OutOfRange:  # the carrier has no such point
+                pass
+            return True
+
+        if not once_within(lambda: abandoned() or online(), timeout, POLL) or abandoned():
             raise NotConnected(
                 "{gripper}: {carrier} is not connected. Connect it first.",
                 reason,

@@ -65,7 +65,7 @@ class SuctionGripper(Connected, Suction):
             DeviceError: NotConnected, ConnectionLost or DeviceTimeout.
         """
         carrier, settings = self._carrier, self._set
-        carrier.open(timeout)
+        carrier.open(settings.vacuum_output, timeout, lambda: self.observing.stopping)
         carrier.require_holding(settings.vacuum_output)
         if settings.blow_output:
             carrier.require(settings.blow_output, PointDirection.OUTPUT, PointKind.DIGITAL)
@@ -73,7 +73,6 @@ class SuctionGripper(Connected, Suction):
             carrier.require(settings.part_input, PointDirection.INPUT, PointKind.DIGITAL)
         if settings.vacuum_input:
             carrier.require(settings.vacuum_input, PointDirection.INPUT, PointKind.ANALOG)
-        carrier.read(settings.vacuum_output)
 
     def watch(self, stopping: threading.Event) -> None:
         """Watch the carrier, and a gripped part."""

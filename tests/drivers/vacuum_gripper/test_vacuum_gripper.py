@@ -25,9 +25,10 @@ from arcor2_hw.exceptions import (
     Refused,
     Stale,
 )
-from arcor2_hw.testing.own_time import own_time
+from arcor2_hw.objects import Generic
 from tests.drivers.surroundings import Carrier
 from tests.fakes.conftest import FakeProcess
+from tests.waiting import wait_for
 
 from .conftest import Make
 
@@ -49,17 +50,10 @@ class BackgroundCall:
         self._thread = threading.Thread(target=run)
         self._thread.start()
 
-    def end(self, within: float = 5.0) -> Arcor2Error | None:
+    def end(self, within: float = 30.0) -> Arcor2Error | None:
         self._thread.join(within)
         assert not self._thread.is_alive(), "it is still at it"
         return self.error
-
-
-def wait_for(holds: Callable[[], bool], within: float = 5.0) -> None:
-    until = time.monotonic() + within
-    while not holds():
-        assert time.monotonic() < until, f"not within {within} s"
-        time.sleep(0.005)
 
 
 def part(fake: FakeProcess, there: bool) -> None:
@@ -182,12 +176,12 @@ def test_a_stop_ends_an_action_and_keeps_the_part(gripper: SuctionGripper, fake:
     doing = BackgroundCall(gripper.grip)
     wait_for(lambda: output(fake, VACUUM))
     gripper.stop()
-    assert isinstance(doing.end(1.0), Cancelled)
+    assert isinstance(doing.end(), Cancelled)
     assert output(fake, VACUUM)
     doing = BackgroundCall(gripper.blow_off)
     wait_for(lambda: output(fake, BLOW))
     gripper.stop()
-    assert isinstance(doing.end(1.0), Cancelled)
+    assert isinstance(doing.end(), Cancelled)
     assert not output(fake, BLOW)
 
 
@@ -266,7 +260,7 @@ def test_an_output_that_does_not_hold_on_loss_is_refused(make: Make) -> None:
 
 
 @pytest.mark.parametrize(
-    ("settings", "told"),
+    ("settings", "problem"),
     [
         ({"carrier": "nobody"}, "nobody"),
         ({"vacuum_output": "part2"}, "no digital output 'part2'; it has vacuum, blow, falls"),
@@ -275,22 +269,54 @@ def test_an_output_that_does_not_hold_on_loss_is_refused(make: Make) -> None:
         ({"vacuum_input": "falls"}, "no analog input 'falls'"),
     ],
 )
-def test_missing_points_of_the_carrier_are_named(make: Make, settings: dict[str, str], told: str) -> None:
-    with pytest.raises((InvalidData, NotFound), match=told):
+def test_missing_points_of_the_carrier_are_named(make: Make, settings: dict[str, str], problem: str) -> None:
+    with pytest.raises((InvalidData, NotFound), match=problem):
         make(**settings).connect(0.3)
 
 
 def test_connecting_waits_for_the_carrier(make: Make, block: RemoteIO) -> None:
     block.disconnect()
     gripper = make()
-    began = own_time()
     with pytest.raises(NotConnected, match="gripper: block is not connected"):
         gripper.connect(0.2)
-    assert own_time() - began < 1.0
     doing = BackgroundCall(lambda: gripper.connect(10.0))
     time.sleep(0.1)
     block.connect()
     assert doing.end() is None
+    assert gripper.connection is Connection.ONLINE
+
+
+def test_connecting_waits_for_a_carrier_that_is_about_to_reconnect(
+    make: Make, block: RemoteIO, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read, failures = block.read, [NotConnected("the link is being opened again"), ConnectionLost("no answer")]
+
+    def failing_first(name: str) -> Any:
+        if failures:
+            raise failures.pop()
+        return read(name)
+
+    monkeypatch.setattr(block, "read", failing_first)
+    gripper = make()
+    gripper.connect(5.0)
+    assert not failures
+    assert gripper.connection is Connection.ONLINE
+
+
+def test_disconnecting_ends_the_wait_for_a_lost_carrier(gripper: SuctionGripper, block: RemoteIO) -> None:
+    searched = threading.Event()
+
+    def find(name: str) -> Generic:
+        searched.set()
+        return block
+
+    gripper.attach(find)
+    block.disconnect()
+    assert searched.wait(30.0), "the gripper does not wait for its carrier"
+    gripper.disconnect()
+    assert f"observing {gripper.who}" not in {thread.name for thread in threading.enumerate()}
+    block.connect()
+    gripper.connect()
     assert gripper.connection is Connection.ONLINE
 
 
