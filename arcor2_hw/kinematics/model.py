@@ -14,13 +14,14 @@ import numpy as np
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.kinematics import adjustment, shapes
 from arcor2_hw.kinematics.arm import Arm, Step
-from arcor2_hw.kinematics.description import Description, EndEffector, Geometry, Joint, MeshFile, describe
+from arcor2_hw.kinematics.description import Description, EndEffector, Geometry, Joint, MeshFile
 from arcor2_hw.kinematics.errors import ZeroLength
 from arcor2_hw.kinematics.joints import JointSet
 from arcor2_hw.kinematics.meshes import read_mesh
 from arcor2_hw.kinematics.model_package import MAX_MESH, Package
 from arcor2_hw.kinematics.shapes import Array, MeshUse, Shape
 from arcor2_hw.kinematics.tree import Tree
+from arcor2_hw.kinematics.urdf import describe
 
 _PARALLEL: Final = 1e-6
 _TOUCHING: Final = 1e-5
