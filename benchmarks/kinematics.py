@@ -36,6 +36,7 @@ async def run(report: Report) -> None:
     model = RobotModel.load(UR5E)
     chance = np.random.default_rng(SEED)
     report.add(forward(model, chance))
+    report.add(nearest(model))
     for metric in (*inverse(model, chance), *checks(model, chance), *reachability(model, chance)):
         report.add(metric)
     for metric in (*planning.metrics(model), *safe_moves.metrics()):
@@ -62,6 +63,35 @@ def forward(model: RobotModel, chance: np.random.Generator) -> Metric:
     arm = model.arm("tcp")
     taken = each(arm.forward, chance.uniform(-np.pi, np.pi, (2000, 6)), 51)
     return Metric("kinematics_forward_us", taken * 1e6, 51 * 2000, f"load {os.getloadavg()[0]:.1f}, seed {SEED}")
+
+
+def nearest(model: RobotModel) -> Metric:
+    """Compare the processor time of the nearest solution with that of a solver in C++, called from Python."""
+    from ur_analytic_ik import ur5e
+
+    arm, chance = model.arm("tcp"), np.random.default_rng(SEED)
+    solve, reference = InverseKinematics(arm).solve, ur5e.inverse_kinematics_closest
+    joints, seeds = chance.uniform(-np.pi, np.pi, (2, 200, 6))
+    targets = [arm.forward(q) for q in joints]
+    poses = [ur5e.forward_kinematics(*q) for q in joints]  # with the frames of the manufacturer's DH parameters
+    for pose, seed in zip(poses, seeds, strict=True):
+        if not np.allclose(ur5e.forward_kinematics(*reference(pose, *seed)[0]), pose, atol=1e-6):
+            raise AssertionError("The solver that is compared does not reach its pose.")
+    here, there = [], []
+    for _ in range(51):
+        began = time.thread_time()
+        for target, seed in zip(targets, seeds, strict=True):
+            solve(target, seed)
+        between = time.thread_time()
+        for pose, seed in zip(poses, seeds, strict=True):
+            reference(pose, *seed)
+        here.append((between - began) / len(joints))
+        there.append((time.thread_time() - between) / len(joints))
+    ratio = median([one / other for one, other in zip(here, there, strict=True)])
+    note = (
+        f"{median(here) * 1e6:.1f} µs, in C++ {median(there) * 1e6:.1f} µs; load {os.getloadavg()[0]:.1f}, seed {SEED}"
+    )
+    return Metric("kinematics_inverse_per_cpp", ratio, len(here) * len(joints), note)
 
 
 def inverse(model: RobotModel, chance: np.random.Generator) -> list[Metric]:

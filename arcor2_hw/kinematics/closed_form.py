@@ -9,8 +9,10 @@ of the parallel axes, and a triangle remains; for the second kind, the triangle 
 the wrist remain. The axes of a calibrated arm are not exactly parallel: results are then approximate.
 """
 
+import cmath
 import math
 from collections.abc import Iterator
+from operator import itemgetter
 from typing import Final, Self
 
 import numpy as np
@@ -20,19 +22,20 @@ from arcor2_hw.kinematics.subproblems import (
     SINGULAR,
     TINY,
     Rows,
-    Six,
+    Values,
     Vector,
     add,
+    around,
     between,
-    cross,
     dot,
     folded,
     level,
     nearest_points,
+    nearest_turn,
     product,
     rotation,
     rows_of,
-    scaled,
+    solved,
     spun,
     subtract,
     transposed,
@@ -43,99 +46,132 @@ from arcor2_hw.kinematics.subproblems import (
 NEARLY: Final = 0.02
 """Maximum deviation of the axes from the ideal geometry, rad and m; calibrations deviate less."""
 
+_Started = tuple[float, float, float, float, float, complex]
+"""Squared distance of joints 1, 5 and 6 from the seed; these joints; the sum of joints 2 to 4; joint 4 from joint 2."""
+
 
 class ThreeParallel:
-    """Geometry of an arm with three parallel axes. Created by `of`; `solve` returns up to eight configurations.
+    """Geometry of an arm with three parallel axes. Created by `of`; `nearest` yields up to eight configurations.
 
-    It consists of unit axes h, and points p on each axis relative to the previous one, at zero angles.
+    It is computed from unit axes h, and points p on each axis, at zero angles. Joints 2 to 4 rotate in a plane, about
+    the z axis of a frame in which the x axis is in the plane of h2 and h5; joint 6 rotates about the z axis of the last
+    link, of which the x axis is in the plane of h5 and h6. Vectors across such an axis are complex numbers.
     """
 
     def __init__(self, axes: Array, points: Array, tip: Array) -> None:
-        self._h1, self._h2, _, _, self._h5, self._h6 = (vector(axis) for axis in axes)
-        # Points are moved along the axes so that 1 and 2, and 5 and 6, share an origin where they can. An axis in the
-        # opposite direction changes the sign of the angle.
+        h1, h2, _, _, h5, h6 = axes
+        # An axis in the opposite direction changes the sign of the angle.
         self._sign3, self._sign4 = (1.0 if axes[1] @ axes[i] > 0.0 else -1.0 for i in (2, 3))
-        self._origin = vector(points[0])
-        self._p12, self._p23, self._p34, self._p45 = (vector(points[i + 1] - points[i]) for i in range(4))
-        self._tip = np.array(tip)
-        self._p6t = points[5] - tip[:3, 3]
-        self._beside = dot(self._h2, add(self._p12, self._p23, self._p34, self._p45))
-        self._offset = vector(tip[:3, :3].T @ self._p6t)
-        self._tip_turn = rows_of(tip[:3, :3])
+        plane, last = _frame(h2, h5), _frame(h6, h5)
+        links = np.diff(points[:5], axis=0) @ plane
+        # What remains when joint 1 is rotated back is linear in the target, its cosine and its sine: the columns of the
+        # rotation and the position in the plane, and their heights above it.
+        along = np.outer(h1, h1)
+        before = np.zeros((3, 3, 4))
+        before[:, :, :3] = plane.T @ (np.eye(3) - along), plane.T @ np.cross(h1, np.eye(3)), plane.T @ along
+        before[:, :, 3] = -before[:, :, :3] @ points[0]
+        # The position remains relative to joint 2. Its height must be that of joint 5, which no other joint changes.
+        before[2, :, 3] -= *links[0, :2], links[:, 2].sum()
+        after = np.eye(4)
+        after[:3, :3] = tip[:3, :3].T @ last
+        after[:3, 3] = tip[:3, :3].T @ (points[5] - tip[:3, 3])
+        linear = np.einsum("nik,lj->nijkl", before, after).reshape(3, 3, 4, 16)
+        columns, heights = linear[:, :2].swapaxes(1, 2), linear[:, 2].reshape(3, 2, 2, 16)
+        self._linear = np.concatenate((columns, heights), axis=1).reshape(36, 16)
+        # Joint 5 is determined by the height of the last axis.
+        across = np.cross(h5, h6)
+        self._height5 = float((h2 @ h5) * (h5 @ h6))
+        height = complex(h2 @ np.cross(across, h5), h2 @ across)
+        self._middle5, self._size5 = cmath.phase(height), abs(height)
+        # Joint 6 is determined by the axes of joints 2 to 4 in the last link.
+        back = h2 - h5 * (h2 @ h5), np.cross(h2, h5), h5 * (h2 @ h5)
+        self._cosine6, self._sine6, self._constant6 = (complex(*(last.T @ each)[:2]) for each in back)
+        self._across5, _, self._along5 = (last.T @ h5).tolist()
+        # Joints 2 to 4 form a triangle.
+        self._inner, self._outer, self._tail = (complex(*link[:2]) for link in links[1:])
+        self._middle3 = cmath.phase(self._inner * self._outer.conjugate())
+        self._product = 2.0 * abs(self._inner) * abs(self._outer)
+        self._squares = abs(self._inner) ** 2 + abs(self._outer) ** 2
 
     @classmethod
     def of(cls, axes: Array, points: Array, tip: Array) -> Self | None:
-        """Read the geometry from axes (6, 3), points on them (6, 3) and the tip (4, 4), all at zero angles.
-
-        Returns:
-            None when the arm is not of this kind.
-        """
-        if len(axes) != 6:
-            return None
-        parallel = all(np.linalg.norm(np.cross(axes[1], axes[i])) < NEARLY for i in (2, 3))
-        across = all(abs(axes[i] @ axes[j]) < 1.0 - NEARLY for i, j in ((0, 1), (3, 4), (4, 5)))
-        if not parallel or not across:
+        """Read the geometry; see `closed_form`. Return None when the arm is not of this kind."""
+        if len(axes) != 6 or any(abs(axes[i] @ axes[j]) > 1.0 - NEARLY for i, j in ((0, 1), (3, 4), (4, 5))):
             return None
         moved = np.array(points, dtype=np.float64)
         gap, moved[4], _ = nearest_points(points[4], axes[4], points[5], axes[5])
-        if gap > NEARLY:
-            return None
         moved[5] = moved[4]
-        return cls(axes, moved, tip)
+        deviation = max(gap, *(float(np.linalg.norm(np.cross(axes[1], axes[i]))) for i in (2, 3)))
+        return cls(axes, moved, tip) if deviation < NEARLY else None
 
-    def solve(self, target: Array, seed: Array) -> list[Six]:
-        """Return the configurations, angles from -pi to pi, that move the tip to a pose (4, 4).
+    def nearest(self, target: Array, seed: Values, lower: Values, upper: Values) -> Iterator[Values]:
+        """Yield the configurations that move the tip to a pose (4, 4), nearest to the seed first.
 
-        At a singularity, where only the sum of two joints is determined, one of them is taken from the seed.
+        Each angle is shifted by whole turns, as `nearest_turn` does. At a singularity, where only the sum of two joints
+        is determined, one of them is taken from the seed. The distance of joints 1, 5 and 6 from the seed shows for
+        which of them the other joints have to be computed before the next result is known.
         """
-        turn = product(rows_of(target[:3, :3]), transposed(self._tip_turn))
-        position = (float(target[0, 3]), float(target[1, 3]), float(target[2, 3]))
-        wrist = subtract(add(position, turned(rows_of(target[:3, :3]), self._offset)), self._origin)
-        return list(self._all(turn, wrist, float(seed[0]), float(seed[5])))
+        started = sorted(self._started(target, seed, lower, upper), key=itemgetter(0))
+        ready: list[tuple[float, Values]] = []
+        for number, (distance, q1, q5, q6, q14, to) in enumerate(started, 1):
+            for q3 in around(self._middle3, (abs(to) ** 2 - self._squares) / self._product):
+                q2 = cmath.phase(to * (self._inner + self._outer * cmath.rect(1.0, q3)).conjugate())
+                q4 = nearest_turn(self._sign4 * (q14 - q2 - q3), seed[3], lower[3], upper[3])
+                q3 = nearest_turn(self._sign3 * q3, seed[2], lower[2], upper[2])
+                q2 = nearest_turn(q2, seed[1], lower[1], upper[1])
+                more = (q2 - seed[1]) ** 2 + (q3 - seed[2]) ** 2 + (q4 - seed[3]) ** 2
+                ready.append((distance + more, (q1, q2, q3, q4, q5, q6)))
+            ready.sort(reverse=True)
+            enough = started[number][0] if number < len(started) else math.inf
+            while ready and ready[-1][0] <= enough:
+                yield ready.pop()[1]
 
-    def _all(self, turn: Rows, wrist: Vector, q1_if_free: float, q6_if_free: float) -> Iterator[Six]:
-        h1, h2, h5, h6 = self._h1, self._h2, self._h5, self._h6
-        for q1 in level(h1, wrist, h2, self._beside, q1_if_free, backwards=True):
-            rest_of_turn = product(rotation(h1, -q1), turn)  # of joints 2 to 6
-            back = turned(transposed(rest_of_turn), h2)
-            shoulder = subtract(spun(h1, -q1, wrist), self._p12)
-            for q5 in level(h5, h6, h2, dot(h2, turned(rest_of_turn, h6)), 0.0):
-                for q6 in self._last(q5, back, q6_if_free, rest_of_turn, shoulder):
-                    q14 = between(h2, h5, turned(rest_of_turn, spun(h6, -q6, h5)), 0.0)
-                    rest = subtract(shoulder, spun(h2, q14, self._p45))
-                    for q3 in folded(h2, self._p34, self._p23, rest):
-                        bent = add(self._p23, spun(h2, q3, self._p34))
-                        q2 = between(h2, bent, rest, 0.0)
-                        q4 = math.remainder(q14 - q2 - q3, math.tau)
-                        yield q1, q2, self._sign3 * q3, self._sign4 * q4, q5, q6
+    def _started(self, target: Array, seed: Values, lower: Values, upper: Values) -> Iterator[_Started]:
+        """Yield joints 1, 5 and 6, and what remains for joints 2 to 4."""
+        numbers = self._linear.dot(target.reshape(16)).view(np.complex128).tolist()
+        cosine, sine, constant = numbers[:6], numbers[6:12], numbers[12:]
+        for q1 in solved(cosine[5].imag, sine[5].imag, -constant[5].imag, seed[0]):
+            c, s = math.cos(q1), math.sin(q1)
+            x, y, z, shoulder, across, last = [
+                c * a + s * b + d for a, b, d in zip(cosine, sine, constant, strict=True)
+            ]
+            q1 = nearest_turn(q1, seed[0], lower[0], upper[0])
+            for q5 in around(self._middle5, (last.real - self._height5) / self._size5):
+                axis = self._cosine6 * math.cos(q5) + self._sine6 * math.sin(q5) + self._constant6
+                q5 = nearest_turn(q5, seed[4], lower[4], upper[4])
+                apart = axis * across.conjugate()
+                if abs(apart) >= SINGULAR:
+                    sixth: Values = (cmath.phase(apart),)
+                else:
+                    sixth = self._free(x, y, z, shoulder, last.real, seed[5])
+                for q6 in sixth:
+                    q14 = self._sum(x, y, z, q6)
+                    to = shoulder - self._tail * cmath.rect(1.0, q14)
+                    q6 = nearest_turn(q6, seed[5], lower[5], upper[5])
+                    distance = (q1 - seed[0]) ** 2 + (q5 - seed[4]) ** 2 + (q6 - seed[5]) ** 2
+                    yield distance, q1, q5, q6, q14, to
 
-    def _last(self, q5: float, back: Vector, if_free: float, rest_of_turn: Rows, shoulder: Vector) -> list[float]:
-        """Return the angles of joint 6. It is undetermined where its axis is parallel to those of joints 2 to 4.
+    def _sum(self, x: complex, y: complex, z: complex, q6: float) -> float:
+        """Return the angle by which joints 2 to 4 rotate together, for one of joint 6."""
+        out = cmath.rect(self._across5, -q6)
+        return cmath.phase(x * out.real + y * out.imag + z * self._along5)
 
-        Then the result is `if_free`, and the angles at which the links just reach, since they may not with the former.
+    def _free(self, x: complex, y: complex, z: complex, shoulder: complex, height: float, if_free: float) -> Values:
+        """Return angles of joint 6 where its axis is parallel to those of joints 2 to 4, and only their sum counts.
+
+        These are `if_free`, and the angles at which the links just reach, since they may not with the former.
         """
-        h2, h5, h6 = self._h2, self._h5, self._h6
-        v = spun(h5, -q5, h2)
-        across = cross(h6, v)
-        sine, cosine = dot(across, back), dot(cross(across, h6), back)
-        if math.hypot(sine, cosine) >= SINGULAR:
-            return [-math.atan2(sine, cosine)]
-        q14 = between(h2, h5, turned(rest_of_turn, spun(h6, -if_free, h5)), 0.0)
-        to, tail = (subtract(each, scaled(h2, dot(h2, each))) for each in (shoulder, self._p45))
-        far, short = math.hypot(*to), math.hypot(*tail)
-        longest = math.hypot(*self._p23) + math.hypot(*self._p34)
-        found = [if_free]
-        if min(far, short) > TINY:
-            share = (far * far + short * short - longest * longest) / (2.0 * far * short)
-            middle, half = between(h2, tail, to, 0.0), math.acos(max(-1.0, min(1.0, share)))
-            sign = math.copysign(1.0, dot(h2, spun(h5, q5, h6)))
-            # Joints 2 to 4 and joint 6 rotate about parallel axes, so that their angles add up.
-            found += [math.remainder(if_free + sign * (q14 - middle - part * half), math.tau) for part in (-1, 0, 1)]
-        return found
+        far, short = abs(shoulder), abs(self._tail)
+        if min(far, short) < TINY:
+            return (if_free,)
+        longest = abs(self._inner) + abs(self._outer)
+        half = math.acos(max(-1.0, min(1.0, (far * far + short * short - longest * longest) / (2.0 * far * short))))
+        more = self._sum(x, y, z, if_free) - cmath.phase(shoulder * self._tail.conjugate())
+        return (if_free, *(if_free + math.copysign(1.0, height) * (more - part * half) for part in (-1, 0, 1)))
 
 
 class SphericalWrist:
-    """Geometry of an arm with a spherical wrist. Created by `of`; `solve` returns up to eight configurations."""
+    """Geometry of an arm with a spherical wrist. Created by `of`; `nearest` yields up to eight configurations."""
 
     def __init__(self, axes: Array, points: Array, wrist: Array, tip: Array) -> None:
         self._h1, self._h2, _, self._h4, self._h5, self._h6 = (vector(axis) for axis in axes)
@@ -151,31 +187,29 @@ class SphericalWrist:
 
     @classmethod
     def of(cls, axes: Array, points: Array, tip: Array) -> Self | None:
-        """Read the geometry from axes (6, 3), points on them (6, 3) and the tip (4, 4), all at zero angles.
-
-        Returns:
-            None when the arm is not of this kind.
-        """
-        if len(axes) != 6 or np.linalg.norm(np.cross(axes[1], axes[2])) > NEARLY:
-            return None
-        if any(abs(axes[i] @ axes[j]) > 1.0 - NEARLY for i, j in ((0, 1), (3, 4), (4, 5))):
+        """Read the geometry; see `closed_form`. Return None when the arm is not of this kind."""
+        if len(axes) != 6 or any(abs(axes[i] @ axes[j]) > 1.0 - NEARLY for i, j in ((0, 1), (3, 4), (4, 5))):
             return None
         gap, wrist, _ = nearest_points(points[3], axes[3], points[4], axes[4])
         other_gap, other, _ = nearest_points(points[4], axes[4], points[5], axes[5])
-        if max(gap, other_gap, float(np.linalg.norm(other - wrist))) > NEARLY:
-            return None
-        return cls(axes, points, wrist, tip)
+        parallel = float(np.linalg.norm(np.cross(axes[1], axes[2])))
+        deviation = max(gap, other_gap, float(np.linalg.norm(other - wrist)), parallel)
+        return cls(axes, points, wrist, tip) if deviation < NEARLY else None
 
-    def solve(self, target: Array, seed: Array) -> list[Six]:
-        """Return the configurations, angles from -pi to pi, that move the tip to a pose (4, 4).
+    def nearest(self, target: Array, seed: Values, lower: Values, upper: Values) -> Iterator[Values]:
+        """Yield the configurations that move the tip to a pose (4, 4), nearest to the seed first.
 
-        At a singularity, where only the sum of two joints is determined, one of them is taken from the seed.
+        Each angle is shifted by whole turns, as `nearest_turn` does. At a singularity, where only the sum of two joints
+        is determined, one of them is taken from the seed.
         """
         turn = product(rows_of(target[:3, :3]), transposed(self._tip_turn))
         wrist = subtract(add(vector(target[:3, 3]), turned(rows_of(target[:3, :3]), self._offset)), self._origin)
-        return list(self._all(turn, wrist, float(seed[0]), float(seed[3])))
+        found = [
+            tuple(map(nearest_turn, angles, seed, lower, upper)) for angles in self._all(turn, wrist, seed[0], seed[3])
+        ]
+        yield from sorted(found, key=lambda q: math.dist(q, seed))
 
-    def _all(self, turn: Rows, wrist: Vector, q1_if_free: float, q4_if_free: float) -> Iterator[Six]:
+    def _all(self, turn: Rows, wrist: Vector, q1_if_free: float, q4_if_free: float) -> Iterator[Values]:
         h1, h2 = self._h1, self._h2
         for q1 in level(h1, wrist, h2, self._beside, q1_if_free, backwards=True):
             shoulder = subtract(spun(h1, -q1, wrist), self._p12)
@@ -195,5 +229,21 @@ class SphericalWrist:
 
 
 def closed_form(axes: Array, points: Array, tip: Array) -> ThreeParallel | SphericalWrist | None:
-    """Recognize the kind of an arm by axes (6, 3), points on them (6, 3) and the tip (4, 4); None for others."""
+    """Recognize the kind of an arm.
+
+    Args:
+        axes: Unit axes of its joints at zero angles, (6, 3).
+        points: Points on the axes at zero angles, (6, 3), m.
+        tip: Pose of its tip at zero angles, (4, 4).
+
+    Returns:
+        None for other kinds.
+    """
     return ThreeParallel.of(axes, points, tip) or SphericalWrist.of(axes, points, tip)
+
+
+def _frame(z: Array, towards: Array) -> Array:
+    """Return a frame (3, 3) with a z axis and another vector in the plane of its x and z axes."""
+    x = towards - z * (z @ towards)
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(z, x), z))

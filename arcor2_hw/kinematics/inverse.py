@@ -7,6 +7,8 @@ same answer.
 """
 
 import itertools
+import math
+import operator
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
@@ -17,6 +19,7 @@ from arcor2_hw.kinematics.arm import Arm
 from arcor2_hw.kinematics.closed_form import NEARLY, SphericalWrist, ThreeParallel, closed_form
 from arcor2_hw.kinematics.errors import OnlyInCollision, OutOfReach
 from arcor2_hw.kinematics.shapes import Array
+from arcor2_hw.kinematics.subproblems import Values, nearest_turn
 
 CollisionCheck = Callable[[Array], str]
 """Function from joint values of the arm to the first contact as text, empty when there is none."""
@@ -52,7 +55,13 @@ class InverseKinematics:
         self._rows = arm.rows
         self._tolerance = arm.end_effector.position_tolerance, arm.end_effector.orientation_tolerance
         self._turning = np.array([not prismatic for prismatic in arm.prismatic])
+        self._centre = arm.centre.tolist()
+        self._limits = arm.lower.tolist(), arm.upper.tolist()
         self._form = _closed_form(arm) if len(self._rows) == 6 else None
+        # A computed solution may be slightly beyond a limit, and be moved within by refinement.
+        self._loose, self._tight = (
+            ((arm.lower - slack).tolist(), (arm.upper + slack).tolist()) for slack in (NEARLY, _SLACK)
+        )
         lower, upper = arm.lower.copy(), arm.upper.copy()
         wide = self._turning & (upper - lower > 2.0 * np.pi)
         # Whole turns lead to the same place, so starts within one turn are enough.
@@ -111,18 +120,18 @@ class InverseKinematics:
         found = [q for q in self._nearest_first(target, near, everything=True) if not (check and check(q))]
         if turns:
             found = [other for q in found for other in self._all_turns(q)]
-        return sorted(found, key=lambda q: float(np.sum((q - near) ** 2)))
+        return sorted(found, key=lambda q: _apart(q, near))
 
     def candidates(self, target: Array, seed: Array | None = None) -> Iterator[Array]:
         """Yield solutions for a pose, nearest to `seed` first, each computed when needed."""
         return self._nearest_first(target, self._checked(target, seed))
 
     def _checked(self, target: Array, seed: Array | None) -> Array:
-        if target.shape != (4, 4) or not np.isfinite(target).all():
+        if target.shape != (4, 4) or not _is_finite(target):
             raise OutOfReach("The pose for {name} has numbers that are not finite.", name=self.arm.model.name)
         if seed is None:
             seed = self.arm.middle()
-        if seed.shape != (self.arm.dof,) or not np.isfinite(seed).all():
+        if seed.shape != (self.arm.dof,) or not _is_finite(seed):
             raise OutOfReach(
                 "{name} needs {dof} finite joint values as a seed.", name=self.arm.model.name, dof=self.arm.dof
             )
@@ -130,33 +139,53 @@ class InverseKinematics:
 
     # -------------------------------------------------------------------------------- candidates
     def _nearest_first(self, target: Array, seed: Array, everything: bool = False) -> Iterator[Array]:
-        if float(np.linalg.norm(target[:3, 3] - self.arm.centre)) > self.arm.reach + self._tolerance[0]:
-            return
-        if self._form is not None:
-            raw = np.array(self._form.solve(target, seed)).reshape(-1, 6)
-            near = self._near(raw, seed, NEARLY)  # refinement may move it within the limits
-            some = False
-            for q in self._computed(pin.SE3(target), near, seed):
-                some = True
-                yield q
-            if some or not len(near):
-                return
+        if math.dist(target[:3, 3].tolist(), self._centre) > self.arm.reach + self._tolerance[0]:
+            return iter(())
+        if self._form is None:
+            return self._searched(target, seed, everything, STARTS)
+        return self._computed(self._form, target, seed, everything)
+
+    def _computed(
+        self, form: ThreeParallel | SphericalWrist, target: Array, seed: Array, everything: bool
+    ) -> Iterator[Array]:
+        """Yield the solutions in closed form, nearest first, refined where they are not exact or beyond a limit."""
+        some = False
+        given: list[Array] = []
+        late: list[Array] = []
+        for values in form.nearest(target, seed.tolist(), *self._loose):
+            some, is_late = True, False
+            q = np.array(values)
+            if not (self._is_exact(target, q) and self._is_within(values)):
+                refined = self._refined(pin.SE3(target), q, rounds=12, clamp=False)
+                if refined is None:
+                    continue
+                q = self._near(refined, seed)
+                if not self.arm.within(q, _SLACK):
+                    continue
+                q = np.clip(q, self.arm.lower, self.arm.upper)
+                is_late = math.dist(q.tolist(), values) > 1.0  # still beyond a limit, thus turned away from the seed
+            if self._known(q, given):
+                continue
+            given.append(q)
+            if is_late:
+                late = sorted((*late, q), key=lambda each: _apart(each, seed))
+                continue
+            while late and _apart(late[0], seed) < _apart(q, seed):
+                yield late.pop(0)
+            yield q
+        yield from late
+        if some and not given:
             # At the edge of the workspace, and where axes meet, the closed form may be too inexact to be refined.
             yield from self._searched(target, seed, everything, _FEW)
-        else:
-            yield from self._searched(target, seed, everything, STARTS)
 
-    def _computed(self, goal: Any, near: Array, seed: Array) -> Iterator[Array]:
-        given: list[Array] = []
-        for i in np.argsort(((near - seed) ** 2).sum(axis=1)):
-            q = self._refined(goal, near[i], rounds=12, clamp=False)
-            if q is None:
-                continue
-            q = self._near(q, seed)
-            if self.arm.within(q, _SLACK) and not self._known(q, given):
-                q = np.clip(q, self.arm.lower, self.arm.upper)
-                given.append(q)
-                yield q
+    def _is_exact(self, target: Array, q: Array) -> bool:
+        """Return whether the error is below EXACT. The norm of a small difference of rotations is above their angle."""
+        apart = self.arm.forward(q) - target
+        return float(np.vdot(apart, apart)) < EXACT * EXACT
+
+    def _is_within(self, values: Values) -> bool:
+        lower, upper = self._limits
+        return all(map(operator.le, lower, values)) and all(map(operator.le, values, upper))
 
     def _searched(self, target: Array, seed: Array, everything: bool, starts: int) -> Iterator[Array]:
         """Yield the solution found from the seed, then those found from other starts, nearest first."""
@@ -179,26 +208,23 @@ class InverseKinematics:
                 idle = 0
             if not everything and found and idle >= STARTS // 5:
                 break
-        yield from sorted(found, key=lambda q: float(np.sum((q - seed) ** 2)))
+        yield from sorted(found, key=lambda q: _apart(q, seed))
 
     def _known(self, q: Array, given: list[Array]) -> bool:
-        for other in given:
-            apart = q - other
-            apart = np.where(self._turning, np.remainder(apart + np.pi, 2.0 * np.pi) - np.pi, apart)
-            if np.abs(apart).max() < SAME:
-                return True
-        return False
+        values = q.tolist()
+        return any(
+            all(
+                abs(math.remainder(one - two, math.tau) if turning else one - two) < SAME
+                for one, two, turning in zip(values, other.tolist(), self._turning, strict=True)
+            )
+            for other in given
+        )
 
     # -------------------------------------------------------------------------------- turns
-    def _near(self, q: Array, seed: Array, slack: float = _SLACK) -> Array:
-        """Shift joint values, (n) or (m, n), by whole turns as near to the seed as the limits allow."""
-        turned = q + np.where(self._turning, 2.0 * np.pi * np.round((seed - q) / (2.0 * np.pi)), 0.0)
-        over, under = turned > self.arm.upper + slack, turned < self.arm.lower - slack
-        if over.any() or under.any():
-            back = np.where(over, np.ceil((turned - self.arm.upper - slack) / (2.0 * np.pi)), 0.0)
-            forth = np.where(under, np.ceil((self.arm.lower - slack - turned) / (2.0 * np.pi)), 0.0)
-            turned = turned + np.where(self._turning, 2.0 * np.pi * (forth - back), 0.0)
-        return np.asarray(turned)
+    def _near(self, q: Array, seed: Array) -> Array:
+        """Shift joint values by whole turns as near to the seed as the limits allow."""
+        shifted = map(nearest_turn, q.tolist(), seed.tolist(), *self._tight)
+        return np.where(self._turning, list(shifted), q)
 
     def _all_turns(self, q: Array) -> Iterator[Array]:
         choices = []
@@ -266,6 +292,16 @@ class InverseKinematics:
             turn = (-y * factor, x * factor) if across > 1e-12 or z > 0.0 else (np.pi, 0.0)
             error = np.concatenate((missing.translation, turn))
         return error, float(np.sqrt(error @ error))
+
+
+def _apart(q: Array, other: Array) -> float:
+    """Return the distance between joint values."""
+    return math.dist(q.tolist(), other.tolist())
+
+
+def _is_finite(array: Array) -> bool:
+    """Return whether all numbers are finite; for few numbers this is faster than with NumPy."""
+    return all(map(math.isfinite, array.ravel().tolist()))
 
 
 def _closed_form(arm: Arm) -> ThreeParallel | SphericalWrist | None:

@@ -4,6 +4,7 @@ The canonical subproblems of B. Paden and W. Kahan, on plain floats, which are f
 """
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -18,27 +19,45 @@ BEYOND: Final = 0.02
 
 Vector = tuple[float, float, float]
 Rows = tuple[Vector, Vector, Vector]
-Six = tuple[float, float, float, float, float, float]
+Values = Sequence[float]
+
+
+# ------------------------------------------------------------------------------------------------ angles
+def nearest_turn(angle: float, seed: float, lower: float, upper: float) -> float:
+    """Shift an angle by whole turns as near to the seed as the limits allow; beyond a limit if no turn is within."""
+    if not -math.pi <= angle - seed <= math.pi:
+        angle += math.tau * round((seed - angle) / math.tau)
+    if angle > upper:
+        angle -= math.tau * math.ceil((angle - upper) / math.tau)
+    elif angle < lower:
+        angle += math.tau * math.ceil((lower - angle) / math.tau)
+    return angle
+
+
+def around(middle: float, cosine: float) -> Values:
+    """Return the angles, on both sides of `middle`, of which the distance from it has a cosine."""
+    if not abs(cosine) <= 1.0 + BEYOND:
+        return ()
+    half = math.acos(max(-1.0, min(1.0, cosine)))
+    return (middle + half, middle - half) if half > TINY else (middle,)
+
+
+def solved(cosine: float, sine: float, height: float, if_free: float) -> Values:
+    """Return the angles of which the cosine and sine, multiplied by factors, add up to a height."""
+    size = math.hypot(cosine, sine)
+    if size < TINY:
+        return (if_free,) if abs(height) < BEYOND else ()
+    return around(math.atan2(sine, cosine), height / size)
 
 
 def level(
     axis: Vector, turned: Vector, along: Vector, height: float, if_free: float, *, backwards: bool = False
-) -> list[float]:
+) -> Values:
     """Return the angles about `axis` by which `turned` reaches a height along `along`; with `backwards`, negated."""
     across = cross(axis, turned)
-    a = dot(along, cross(across, axis))
-    b = dot(along, across)
-    constant = dot(along, axis) * dot(axis, turned)
-    size = math.hypot(a, b)
-    if size < TINY:
-        return [if_free] if abs(height - constant) < BEYOND else []
-    share = (height - constant) / size
-    if abs(share) > 1.0 + BEYOND:
-        return []
-    middle, half = math.atan2(b, a), math.acos(max(-1.0, min(1.0, share)))
-    sign = -1.0 if backwards else 1.0
-    angles = (middle + half, middle - half) if half > TINY else (middle,)
-    return [math.remainder(sign * angle, math.tau) for angle in angles]
+    sine = dot(along, across)
+    height -= dot(along, axis) * dot(axis, turned)
+    return solved(dot(along, cross(across, axis)), -sine if backwards else sine, height, if_free)
 
 
 def between(axis: Vector, one: Vector, other: Vector, if_free: float) -> float:
@@ -50,17 +69,11 @@ def between(axis: Vector, one: Vector, other: Vector, if_free: float) -> float:
     return math.atan2(sine, cosine)
 
 
-def folded(axis: Vector, outer: Vector, inner: Vector, to: Vector) -> list[float]:
+def folded(axis: Vector, outer: Vector, inner: Vector, to: Vector) -> Values:
     """Return the angles about `axis` between two links at which both together span the length of `to`."""
     outer, inner, to = (subtract(each, scaled(axis, dot(axis, each))) for each in (outer, inner, to))
-    a, b = dot(inner, outer), dot(inner, cross(axis, outer))
-    size = math.hypot(a, b)
-    share = (dot(to, to) - dot(inner, inner) - dot(outer, outer)) / (2.0 * size)
-    if abs(share) > 1.0 + BEYOND:
-        return []
-    middle, half = math.atan2(b, a), math.acos(max(-1.0, min(1.0, share)))
-    angles = (middle + half, middle - half) if half > TINY else (middle,)
-    return [math.remainder(angle, math.tau) for angle in angles]
+    height = (dot(to, to) - dot(inner, inner) - dot(outer, outer)) / 2.0
+    return solved(dot(inner, outer), dot(inner, cross(axis, outer)), height, 0.0)
 
 
 def nearest_points(one: Array, along: Array, other: Array, other_along: Array) -> tuple[float, Array, Array]:

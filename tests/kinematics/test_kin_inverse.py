@@ -12,7 +12,7 @@ from arcor2_drivers.dobot_magician import kinematics as dobot_kinematics
 from arcor2_drivers.two_axis_robot import kinematics as two_axis_kinematics
 from arcor2_fakes.ur.kinematics import Chain
 from arcor2_hw.collision.world import CollisionWorld, collision_check
-from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.kinematics.arm import Arm
 from arcor2_hw.kinematics.dh import DhRow, calibrated
 from arcor2_hw.kinematics.errors import OnlyInCollision, OutOfReach
@@ -73,6 +73,32 @@ def test_configurations_match_an_independent_solver(values: tuple[float, ...]) -
     assert is_among(q, found)
 
 
+def test_solutions_are_sorted_by_their_distance_from_the_seed() -> None:
+    """Compared with those of an independent solver, each with the turn nearest to the seed within the limits."""
+    arm, chain, chance = ur().arm("tcp"), Chain("ur5e"), np.random.default_rng(4)
+    arm.lower[2], arm.upper[2] = -4.0, 1.0
+    inverse = InverseKinematics(arm)
+    compared = 0
+    for _ in range(200):
+        q = chance.uniform(-math.pi, math.pi, 6)
+        seed = chance.uniform(-7.0, 7.0, 6) if chance.random() < 0.5 else q + chance.uniform(-0.2, 0.2, 6)
+        configurations = np.array(chain.solutions(chain.forward(q.tolist())))
+        if any(arm.dexterity(each).near_singularity for each in configurations):
+            continue
+        turns = configurations[:, :, None] + 2.0 * math.pi * np.arange(-2, 3)
+        turns[(turns < arm.lower[:, None]) | (turns > arm.upper[:, None])] = np.inf
+        best = np.abs(turns - seed[:, None]).argmin(axis=2)
+        nearest = np.take_along_axis(turns, best[:, :, None], axis=2)[:, :, 0]
+        expected = sorted(nearest[np.isfinite(nearest).all(axis=1)].tolist(), key=lambda each: math.dist(each, seed))
+        target = arm.forward(q)
+        found = inverse.solutions(target, seed)
+        assert np.allclose(found, np.array(expected), atol=1e-6)
+        assert np.array_equal(inverse.solve(target, seed), found[0])
+        assert all(np.array_equal(*pair) for pair in zip(inverse.candidates(target, seed), found, strict=True))
+        compared += len(found)
+    assert compared > 600
+
+
 def test_poses_at_and_near_singularities_are_reached() -> None:
     arm = ur().arm("tcp", Pose(Position(0.01, -0.03, 0.12)).matrix())
     inverse = InverseKinematics(arm)
@@ -82,6 +108,18 @@ def test_poses_at_and_near_singularities_are_reached() -> None:
         q = chance.choice(quarter, 6) + chance.choice((0.0, 1e-3, -1e-5, 1e-7, 1e-9, 0.5, -1.3), 6)
         q = np.clip(q, arm.lower, arm.upper)
         target = arm.forward(q)
+        assert_there(arm, inverse.solve(target, chance.uniform(-6.0, 6.0, 6)), target)
+
+
+def test_poses_slightly_out_of_reach_are_reached_within_the_tolerance() -> None:
+    """Near a singularity, an error of a pose changes a joint by its square root, and with it what the others reach."""
+    arm = ur().arm("tcp")
+    inverse, chance = InverseKinematics(arm), np.random.default_rng(1)
+    for _ in range(200):
+        q = chance.choice((-math.pi, -math.pi / 2.0, 0.0, math.pi / 2.0, math.pi), 6) + chance.choice((0.0, 1e-3), 6)
+        q[2] = chance.choice((0.0, 1e-3))
+        error = Orientation.from_rotation_vector(*chance.uniform(-2e-6, 2e-6, 3))
+        target = arm.forward(q) @ Pose(Position(*chance.uniform(-3e-7, 3e-7, 3)), error).matrix()
         assert_there(arm, inverse.solve(target, chance.uniform(-6.0, 6.0, 6)), target)
 
 
@@ -108,7 +146,7 @@ def test_all_turns_are_given_on_request_and_the_nearest_otherwise() -> None:
     assert len(all_of_them) == 8 * 2**6  # each joint has two turns within +-360 degrees
     assert np.allclose(all_of_them[0], q, atol=1e-6)
     assert all(arm.within(each) for each in all_of_them)
-    distances = [float(np.sum((each - q) ** 2)) for each in all_of_them]
+    distances = [math.dist(each, q) for each in all_of_them]
     assert distances == sorted(distances)
     far = q + (2.0 * math.pi) * np.array((-1, 0, -1, 1, 0, 0))
     assert np.allclose(inverse.solve(arm.forward(q), far), far, atol=1e-6)
