@@ -1,10 +1,9 @@
-"""Geometric paths: straight lines of an end effector, and rounded corners.
+"""Geometric paths: straight lines of an end effector.
 
 A path is a list of waypoints, joint values of the arm. Between two of them all joints move in proportion.
 """
 
-import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -25,10 +24,6 @@ PIECE: Final = 0.05
 TURN: Final = 0.2
 """Rotation between two waypoints before it is subdivided where needed, rad."""
 _HALVINGS: Final = 10
-_ROUNDED: Final = 0.4
-"""Maximum share of the shorter segment at a corner that is used for rounding."""
-_CORNER_POINTS: Final = 8
-_TRIES: Final = 4
 
 
 def interpolate(a: Pose, b: Pose, share: float) -> Pose:
@@ -137,47 +132,3 @@ def require_free(sweep: Sweep, way: Sequence[Array], name: str) -> None:
         raise MotionInCollision(
             "{name} cannot go straight: {place} it is in collision: {what}.", name=name, place=where, what=hit.what
         )
-
-
-# ------------------------------------------------------------------------------------------------ corners
-def round_corners(
-    way: Sequence[Array], scale: Array, is_free: Callable[[Array, Array], bool] | None = None
-) -> list[list[Array]]:
-    """Round the corners of a path where that is free of collision.
-
-    Corners become parabolic arcs inside the triangle of the corner and its neighbours.
-
-    Args:
-        way: Waypoints.
-        scale: Weight of each joint when lengths are compared.
-        is_free: Returns whether a short motion is free; None: every motion is.
-
-    Returns:
-        Pieces of the path. The arm has to stop between two pieces.
-    """
-    pieces: list[list[Array]] = [[way[0]]]
-    for before, corner, after in zip(way, way[1:], way[2:], strict=False):
-        arc = _arc(before, corner, after, scale, is_free)
-        pieces[-1] += arc or [corner]
-        if not arc:
-            pieces.append([corner])
-    pieces[-1].append(way[-1])
-    return pieces
-
-
-def _arc(
-    before: Array, corner: Array, after: Array, scale: Array, is_free: Callable[[Array, Array], bool] | None
-) -> list[Array]:
-    one, two = (float(np.linalg.norm((q - corner) * scale)) for q in (before, after))
-    if min(one, two) <= 0.0:
-        return []
-    size = _ROUNDED * min(one, two)
-    for _ in range(_TRIES):
-        a, b = corner + (before - corner) * (size / one), corner + (after - corner) * (size / two)
-        arc = [
-            (1.0 - s) ** 2 * a + 2.0 * s * (1.0 - s) * corner + s**2 * b for s in np.linspace(0.0, 1.0, _CORNER_POINTS)
-        ]
-        if is_free is None or all(is_free(q, r) for q, r in itertools.pairwise(arc)):
-            return arc
-        size /= 2.0
-    return []

@@ -2,7 +2,6 @@
 
 import bisect
 import itertools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -14,7 +13,6 @@ from ruckig import Trajectory as RuckigTrajectory
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.kinematics.arm import Arm
 from arcor2_hw.kinematics.shapes import Array
-from arcor2_hw.planning.paths import round_corners
 
 RAMP: Final = 0.4
 """Time in which a joint reaches its maximum velocity, s. A URDF states no accelerations."""
@@ -23,7 +21,6 @@ JERK_RAMP: Final = 0.1
 FASTEST: Final = 10.0
 """Velocity of a joint without a velocity limit, rad/s or m/s."""
 _STANDS: Final = 1e-7
-_KNOTS: Final = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +61,7 @@ class MotionLimits:
 
 
 class Trajectory:
-    """Joint values over time, created by `point_to_point`, `with_stops`, `smooth` or `along_line`.
+    """Joint values over time, created by `point_to_point`, `with_stops` or `along_line`.
 
     Attributes:
         duration: Duration, s.
@@ -124,30 +121,6 @@ def _segment(start: Array, goal: Array, limits: MotionLimits) -> tuple[float, Ca
 
 
 # ------------------------------------------------------------------------------------------------ waypoints
-def smooth(
-    way: Sequence[Array], limits: MotionLimits, is_free: Callable[[Array, Array], bool] | None = None
-) -> Trajectory:
-    """Return a trajectory through waypoints that rounds corners where that is free, and stops where it is not.
-
-    The result is checked again with `is_free`; if it is not free, the arm stops at each waypoint instead.
-
-    Args:
-        way: Waypoints.
-        limits: Limits of the joints.
-        is_free: Returns whether a short motion is free; None: every motion is.
-    """
-    if len(way) < 3:
-        return with_stops(way, limits)
-    pieces = round_corners(way, 1.0 / limits.velocity, is_free)
-    timed = Trajectory([_along(_with_knots(piece), limits) for piece in pieces])
-    if is_free is not None:
-        count = max(2, math.ceil(timed.duration / 0.02))
-        driven = [timed.at(time)[0] for time in np.linspace(0.0, timed.duration, count)]
-        if not all(is_free(a, b) for a, b in itertools.pairwise(driven)):
-            return with_stops(way, limits)
-    return timed
-
-
 def along_line(
     way: Sequence[Array], limits: MotionLimits, lengths: Sequence[float], speed: float, acceleration: float
 ) -> Trajectory:
@@ -175,20 +148,6 @@ def along_line(
         return q[:-1], rate[:-1]
 
     return Trajectory([(duration, without)])
-
-
-def _with_knots(piece: Sequence[Array]) -> list[Array]:
-    """Add points on longer segments, so that a spline through all points stays close to the segments."""
-    lengths = [float(np.linalg.norm(b - a)) for a, b in itertools.pairwise(piece)]
-    short = min((length for length in lengths if length > _STANDS), default=1.0)
-    found = [piece[0]]
-    for (a, b), length in zip(itertools.pairwise(piece), lengths, strict=True):
-        if length > 2.0 * short:
-            ends = [short / length * (n + 1) / _KNOTS for n in range(_KNOTS)]
-            shares = sorted({*ends, 0.5, *(1.0 - end for end in ends)})
-            found += [a + share * (b - a) for share in shares]
-        found.append(b)
-    return found
 
 
 def _along(way: Sequence[Array], limits: MotionLimits) -> tuple[float, Callable[[float], tuple[Array, Array]]]:

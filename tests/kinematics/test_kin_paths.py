@@ -1,4 +1,4 @@
-"""Straight lines, rounded corners and timing, against independent arithmetic."""
+"""Straight lines and timing, against independent arithmetic."""
 
 import itertools
 
@@ -12,8 +12,8 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.kinematics.errors import MotionInCollision, NoStraightLine, OutOfReach
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array, Box
-from arcor2_hw.planning.paths import OFF_LINE, OFF_TURN, free_line, interpolate, round_corners, straight_line
-from arcor2_hw.planning.timing import MotionLimits, Trajectory, along_line, point_to_point, smooth, with_stops
+from arcor2_hw.planning.paths import OFF_LINE, OFF_TURN, free_line, interpolate, straight_line
+from arcor2_hw.planning.timing import MotionLimits, Trajectory, along_line, point_to_point, with_stops
 from tests.kinematics import kin_robots
 
 READY = np.array((0.0, -1.57, 1.57, -1.57, -1.57, 0.0))
@@ -136,36 +136,6 @@ def test_motion_with_stops_rests_at_each_waypoint() -> None:
     assert np.allclose(timed.at(timed.duration + 9.0)[0], way[2])
     q, _, _ = rates(timed)
     assert np.minimum(np.abs(q[:, 1]), np.abs(q[:, 0] - 0.5)).max() < 1e-9
-
-
-def test_smooth_motion_is_faster_within_limits_and_near_the_path() -> None:
-    way = [np.array(q) for q in ((0.0, 0.0), (0.9, 0.0), (0.9, 1.8), (0.0, 1.8))]
-    timed = smooth(way, LIMITS, lambda a, b: True)
-    q, v, a = rates(timed)
-    assert timed.duration < 0.95 * with_stops(way, LIMITS).duration
-    assert (np.abs(v).max(axis=0) <= LIMITS.velocity * 1.01).all()
-    assert (np.abs(a).max(axis=0) <= LIMITS.acceleration * 1.1).all()
-    assert np.allclose(q[0], way[0])
-    assert np.allclose(timed.at(timed.duration)[0], way[-1], atol=1e-6)
-    moving = np.linalg.norm(v, axis=1)[50:-50]
-    assert moving.min() > 0.05
-    # It leaves the segments only by what the rounding of the corners takes.
-    off = np.min([np.abs(q[:, 1]), np.abs(q[:, 0] - 0.9), np.abs(q[:, 1] - 1.8)], axis=0)
-    assert 0.02 < off.max() < 0.25
-
-
-def test_a_corner_without_room_becomes_a_stop() -> None:
-    way = [np.array(q) for q in ((0.0, 0.0), (0.9, 0.0), (0.9, 1.8))]
-
-    def free(a: Array, b: Array) -> bool:
-        return all(min(abs(q[1]), abs(q[0] - 0.9)) < 0.001 for q in (a, (a + b) / 2.0, b))
-
-    assert [len(piece) for piece in round_corners(way, np.ones(2), free)] == [2, 2]
-    timed = smooth(way, LIMITS, free)
-    q, v, _ = rates(timed)
-    assert np.minimum(np.abs(q[:, 1]), np.abs(q[:, 0] - 0.9)).max() < 0.001
-    nearest = np.argmin(np.linalg.norm(q - way[1], axis=1))
-    assert np.linalg.norm(v[min(nearest, len(v) - 1)]) < 0.05
 
 
 def test_a_line_has_the_requested_tip_speed() -> None:

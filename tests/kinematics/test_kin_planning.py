@@ -13,7 +13,6 @@ from arcor2_hw.kinematics.errors import GoalInCollision, NoPath, OnlyInCollision
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array, Box, Sphere
 from arcor2_hw.planning.planner import Planner
-from arcor2_hw.testing.own_time import own_time
 from tests.kinematics import kin_robots
 
 READY = np.array((0.0, -1.57, 1.57, -1.57, -1.57, 0.0))
@@ -125,12 +124,10 @@ def test_without_a_path_the_obstacle_is_named() -> None:
     """No link gets past the fence; an approximate planner would stop in front of it."""
     world = world_of(RobotModel.load(kin_robots.TWO_AXIS), fence=((0.17, 0.0, 0.0), (0.26, 0.006, 0.1)))
     start, goal = np.array((-1.2, 0.3)), np.array((1.2, -0.3))
-    began = own_time()
     with pytest.raises(NoPath, match=r"within 0\.3 s; the direct path meets arm/link_\d and fence"):
         Planner(Sweep(world, "arm", world.robot("arm").model.arm("tcp"), 0.004), "mini").to_joints(
             start, goal, within=0.3
         )
-    assert own_time() - began < 10.0
 
 
 def test_a_joint_slightly_beyond_its_limit_can_return() -> None:
