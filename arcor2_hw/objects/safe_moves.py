@@ -27,6 +27,10 @@ RESOLUTION: Final = 0.01
 """Maximum travel of any point of the robot between two checked configurations, m."""
 WITHIN: Final = 2.0
 """Time limit of planning, s."""
+MOST_TIME: Final = 4
+"""Maximum factor of the time limit after repeated failures."""
+FAILURES: Final = 100
+"""Maximum number of goals whose failures are remembered; the oldest is dropped."""
 TCP_RAMP: Final = 4.0
 """Acceleration along a line divided by the speed along it, 1/s."""
 
@@ -35,7 +39,11 @@ Way = MotionPath  # object types in older packages use this name
 
 
 class SafeMoves(RobotKinematics):
-    """Safe moves of one robot, and its kinematics: plan paths that are free of obstacles, and monitor them."""
+    """Safe moves of one robot, and its kinematics: plan paths that are free of obstacles, and monitor them.
+
+    If no path to a goal is found within WITHIN, each repeat searches twice as long, at most MOST_TIME times WITHIN, and
+    with another seed.
+    """
 
     def __init__(
         self,
@@ -44,6 +52,7 @@ class SafeMoves(RobotKinematics):
         tool: Callable[[], Tool | None] = lambda: None,
     ) -> None:
         super().__init__(robot, settings, tool)
+        self._failures: dict[tuple[str, bytes], int] = {}
 
     # -------------------------------------------------------------------------------- paths
     def to_joints(
@@ -76,8 +85,8 @@ class SafeMoves(RobotKinematics):
                 return self._way(arm, [arm.values(now), arm.values(goal)], speed)
 
             def planned(world: "CollisionWorld", around: ObstacleSnapshot) -> MotionPath:
-                planner = self._planner(world, arm)
-                way = planner.to_joints(arm.values(now), arm.values(goal), within=WITHIN, stopped=stopped)
+                search = self._planner(world, arm).to_joints
+                way = self._search(search, arm, arm.values(now), arm.values(goal), stopped)
                 return self._way(arm, way, speed, around, world.margin)
 
             return self._with_margin(now, planned)
@@ -101,7 +110,7 @@ class SafeMoves(RobotKinematics):
                 return self._way(arm, [start, tools.inverse(end_effector).solve(target, start)], speed)
 
             def planned(world: "CollisionWorld", around: ObstacleSnapshot) -> MotionPath:
-                way = self._planner(world, arm).to_pose(start, target, within=WITHIN, stopped=stopped)
+                way = self._search(self._planner(world, arm).to_pose, arm, start, target, stopped)
                 return self._way(arm, way, speed, around, world.margin)
 
             return self._with_margin(now, planned)
@@ -183,6 +192,23 @@ class SafeMoves(RobotKinematics):
 
         planned = None if around is None else PlannedPath(self._tools(), arm, points, around, margin)
         return MotionPath([arm.named(q) for q in points], speed, line, timed, planned)
+
+    def _search(
+        self, search: "Callable[..., list[Array]]", arm: "Arm", start: "Array", goal: "Array", stopped: Stopped | None
+    ) -> "list[Array]":
+        """Search a path, with more time and another seed after each failure to find one to the same goal."""
+        from arcor2_hw.kinematics.errors import NoPath
+
+        key = (arm.end_effector.link, goal.tobytes())
+        failures = self._failures.get(key, 0)
+        within = WITHIN * min(2**failures, MOST_TIME)
+        try:
+            return search(start, goal, within=within, seed=failures, stopped=stopped)
+        except NoPath:
+            self._failures[key] = failures + 1
+            if len(self._failures) > FAILURES:
+                self._failures.pop(next(iter(self._failures)), None)
+            raise
 
     def _planner(self, world: "CollisionWorld", arm: "Arm") -> Any:
         from arcor2_hw.planning.planner import Planner

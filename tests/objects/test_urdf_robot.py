@@ -21,6 +21,7 @@ from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Box
 from arcor2_hw.objects import safe_moves
 from arcor2_hw.objects.surroundings import Obstacle
+from arcor2_hw.planning import planner
 
 from .conftest import ACROSS, BASE, READY, SOURCE, URDF, WALL, Around, joints, made, moved, values
 
@@ -292,6 +293,70 @@ def test_a_move_without_a_path_is_refused(arm: Any, around: Around, monkeypatch:
     assert arm.ways == []
 
 
+def test_a_repeat_after_no_path_has_more_time_and_another_seed(
+    arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(safe_moves, "WITHIN", 0.05)
+    seeds: list[int] = []
+    plan = planner.Planner.to_any
+
+    def recorded(*args: Any, seed: int, **options: Any) -> Any:
+        seeds.append(seed)
+        return plan(*args, seed=seed, **options)
+
+    monkeypatch.setattr(planner.Planner, "to_any", recorded)
+    fences(around)
+    arm.now = joints(BEFORE)
+    for within in (r"0\.05", r"0\.1", r"0\.2", r"0\.2"):
+        with pytest.raises(arm.KinematicsException, match=f"within {within} s"):
+            arm.move_to_joints(joints(BEHIND), 0.5)
+    assert seeds == [0, 1, 2, 3]
+    arm.move_to_joints(joints((0.9, *READY[1:])), 0.5)
+    assert seeds[-1] == 0
+    with pytest.raises(arm.KinematicsException, match=r"within 0\.05 s"):
+        arm.move_to_joints(joints((0.9 + np.pi, *READY[1:])), 0.5)
+    around.things.clear()
+    arm.move_to_joints(joints(BEHIND), 0.5)
+    assert seeds[-1] == 4
+    assert len(arm.ways) == 2
+
+
+class Steps:
+    """A clock that advances by a second whenever it is read, so that time limits are numbers of steps of the search."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def monotonic(self) -> float:
+        self.now += 1.0
+        return self.now
+
+
+def test_a_repeat_finds_a_path_that_was_not_found_in_time(
+    arm: Any, around: Around, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Seed 0 needs 152 steps and seed 1 needs 50: the repeat needs another seed as well as more time."""
+    monkeypatch.setattr(planner, "time", Steps())
+    monkeypatch.setattr(safe_moves, "WITHIN", 42.0)
+    around.box("wall", *WALL)
+    start, goal = joints((2.3, -1.2, *READY[2:])), joints(READY)
+    plan = planner.Planner.to_any
+    for forced in ({"seed": 0, "within": 84.0}, {"seed": 1, "within": 42.0}):
+        other = made(folder, around, "other")
+        other.now = start
+        with monkeypatch.context() as only:
+            only.setattr(planner.Planner, "to_any", lambda *a, forced=forced, **options: plan(*a, **options | forced))
+            with pytest.raises(other.KinematicsException, match="found no collision-free path"):
+                other.move_to_joints(goal, 0.5)
+    arm.now = start
+    with pytest.raises(arm.KinematicsException, match="within 42 s"):
+        arm.move_to_joints(goal, 0.5)
+    assert arm.ways == []
+    arm.move_to_joints(goal, 0.5)
+    assert np.allclose(values(arm.now), READY)
+    assert_free(arm, around, arm.ways[-1].waypoints)
+
+
 def test_a_stop_ends_planning(arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(safe_moves, "WITHIN", 60.0)
     fences(around)
@@ -313,7 +378,7 @@ def test_a_stop_ends_planning(arm: Any, around: Around, monkeypatch: pytest.Monk
         assert arm.move_in_progress
     finally:
         arm.stop()
-        thread.join(10.0)
+        thread.join(30.0)
     assert [type(error) for error in ended] == [Cancelled]
     assert arm.ways == []
 
