@@ -7,11 +7,12 @@ from typing import Final
 import numpy as np
 
 from arcor2_hw.calibration.boards import CORNER_DEVIATION, board_of, check_layout, measured_board, seen_of_board
+from arcor2_hw.calibration.diagnosis import check_not_mirrored, check_visible, glare_of, wanted_markers
 from arcor2_hw.calibration.edges import Measured
 from arcor2_hw.calibration.layout import CharucoBoard, Layout, MarkerDictionary
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.markers import detect, measured
-from arcor2_hw.calibration.pictures import Grey, sharpness_of
+from arcor2_hw.calibration.pictures import Grey
 from arcor2_hw.calibration.pose_problem import Seen
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 
@@ -55,8 +56,8 @@ def detect_layout(
     """Find the targets of a layout in images.
 
     Raises:
-        CalibrationRefused: No target is visible (NO_MARKER), images are blurred (BLURRED), or a marker appears twice
-            (IMPLAUSIBLE).
+        CalibrationRefused: No target is visible (NO_MARKER; MIRRORED, OVEREXPOSED or COVERED where that is the reason),
+            images are blurred (BLURRED), or a marker appears twice (IMPLAUSIBLE).
         InvalidData: The layout is invalid.
         Conflict: A marker is listed twice.
     """
@@ -73,7 +74,7 @@ def detect_layout(
         contents.append(content)
     seen = [each for content in contents for each in content.seen]
     if not seen:
-        raise CalibrationRefused(_missing(layout, contents), reason=Reason.NO_MARKER)
+        raise _missing(greys, layout, contents)
     blurs = [blur for content in contents for blur in content.blurs]
     return Detection(seen, float(np.median(blurs)) if blurs else 0.0)
 
@@ -97,13 +98,7 @@ def _check_sharp(grey: Grey, content: _ImageContent, name: str, blur_threshold: 
     # Sharp edges were measured, or something was at least recognized: sharpness is not what is missing.
     if content.blurs or ((content.strangers or content.pieces) and not content.unclear):
         return
-    if (sharpness := sharpness_of(grey)) < blur_threshold:
-        raise CalibrationRefused(
-            "{name} is blurred, or shows nothing. Check the focus, the lens and the light.",
-            f"variance of the Laplacian {sharpness:.0f}, at least {blur_threshold:.0f}",
-            Reason.BLURRED,
-            name=name,
-        )
+    check_visible(grey, name, blur_threshold, largest_blur)
 
 
 def _in_picture(grey: Grey, picture: int, lens: Lens, layout: Layout, name: str) -> _ImageContent:
@@ -199,23 +194,30 @@ def _seen_marker(each: Measured, origin_from_marker: Array, size: float, picture
     )
 
 
-def _missing(layout: Layout, contents: Sequence[_ImageContent]) -> str:
-    """Return a message that no target was visible, and what was visible instead."""
+def _missing(greys: Sequence[Grey], layout: Layout, contents: Sequence[_ImageContent]) -> CalibrationRefused:
+    """Return the refusal that says why no target could be used, and what was visible instead.
+
+    Raises:
+        CalibrationRefused: The image is mirrored.
+    """
     wanted = [f"marker {marker.marker_id}" for marker in layout.markers[:8]]
     wanted += [f"a board of {board.columns} × {board.rows} squares" for board in layout.boards]
     unclear = sorted({number for content in contents for number in content.unclear})
     others = sorted({number for content in contents for number in content.strangers})
+    glare = glare_of(greys[0])
     if unclear:
-        return (
-            f"Marker {', '.join(map(str, unclear))} was recognized, but its edges cannot be measured. Check "
-            "that it is large enough in the image, flat and not covered."
-        )
-    if any(content.pieces for content in contents):
-        return (
-            f"Too little is seen of {' and '.join(wanted)}: only some of its markers. Move the camera "
-            "nearer, and uncover it."
-        )
-    text = f"No configured marker or board is visible: {', '.join(wanted)}."
-    if others:
-        text += f" The image has markers that are not configured: {', '.join(map(str, others[:8]))}."
-    return text
+        text = f"Marker {', '.join(map(str, unclear))} was recognized, but its edges cannot be measured."
+    elif any(content.pieces for content in contents):
+        text = f"Too little is seen of {' and '.join(wanted)}: only some of its markers."
+    else:
+        check_not_mirrored(greys[0], wanted_markers(layout))
+        text = f"No configured marker or board is visible: {', '.join(wanted)}."
+        if others:
+            text += f" The image has markers that are not configured: {', '.join(map(str, others[:8]))}."
+    if glare:
+        text += f" {glare:.0%} of the image is overexposed: avoid glare, and reduce the light or the exposure time."
+        return CalibrationRefused(text, reason=Reason.OVEREXPOSED)
+    if not others:
+        text += " The image is sharp. Check that the markers are not covered, are flat, have a white margin, and are"
+        text += " large enough in the image."
+    return CalibrationRefused(text, reason=Reason.NO_MARKER)

@@ -67,7 +67,8 @@ class Measured:
     Attributes:
         corners: (4, 2), px.
         information: (8, 8), inverse of their covariance, px⁻².
-        blur: Standard deviation of an edge, px.
+        blur: Standard deviation of the edges of the more blurred direction, px; motion blurs only edges that it
+            crosses.
         cell: Width of a cell, px.
         shift: Distance by which edges are shifted towards the light side, px.
         contrast: Contrast as a fraction of the range.
@@ -141,10 +142,11 @@ def measure(
             view = _edge_view(h, chart, slopes)
         else:
             at = lens.pixels(_mapped(h, chart.points))
-        step = _crossings(picture, at - first, view, blur)
+        step = _crossings(picture, at - first, view, chart.across, blur)
         if step is None:
             return None
-        offsets, valid, blur, contrast = step
+        offsets, valid, blurs, contrast = step
+        blur = float(np.mean(blurs))
         wanted = np.column_stack((view.by_h, np.ones(len(offsets))))
         residual = offsets - shift
         weights = _tukey(residual, valid)
@@ -180,7 +182,7 @@ def measure(
     pixels, corner_slopes = lens.pixels_and_slopes(corner_rays)
     by_corner = np.einsum("nij,njk->nik", corner_slopes, _by_h(h, chart.corners, corner_rays)).reshape(8, 8)
     covariance = by_corner @ covariance_h @ by_corner.T + _CORNER_FLOOR**2 * np.eye(8)
-    return Measured(number, pixels, np.linalg.inv(covariance), blur, _median(view.cell), shift, contrast)
+    return Measured(number, pixels, np.linalg.inv(covariance), max(blurs), _median(view.cell), shift, contrast)
 
 
 def _mapped(h: Array, points: Array) -> Array:
@@ -245,9 +247,13 @@ def _edge_view(h: Array, chart: Chart, slopes: Array) -> _EdgeView:
 
 
 def _crossings(
-    picture: npt.NDArray[np.float32], at: Array, view: _EdgeView, blur: float
-) -> tuple[Array, npt.NDArray[np.bool_], float, float] | None:
-    """Measure the offsets of edges along their normals; return offsets, their validity, the blur and the contrast."""
+    picture: npt.NDArray[np.float32], at: Array, view: _EdgeView, axes: npt.NDArray[np.intp], blur: float
+) -> tuple[Array, npt.NDArray[np.bool_], list[float], float] | None:
+    """Measure the offsets of edges along their normals.
+
+    Returns:
+        The offsets, their validity, the blur of the edges of each direction, and the contrast.
+    """
     reach = np.minimum(np.maximum(0.45 * view.cell, _NARROWEST), max(_WIDEST, 3.0 * blur) / np.maximum(view.slant, 0.3))
     across = reach[:, None] * _UNIT
     map_x = (at[:, 0:1] + view.ways[:, 0:1] * across).astype(np.float32)
@@ -275,9 +281,13 @@ def _crossings(
     parts = (values - dark[:, None]) / np.where(valid, difference, 1.0)[:, None]
     offsets = reach * (1.0 - parts @ _WEIGHTS) * view.slant
     share = valid / np.maximum(reach * view.slant, 0.1)
-    mean = share @ parts
-    steepest = float(np.max(mean[2:] - mean[:-2])) / ((_UNIT[2] - _UNIT[0]) * max(np.count_nonzero(valid), 1))
-    return offsets, valid, 1.0 / (max(steepest, 1e-3) * math.sqrt(math.tau)), contrast
+    blurs = []
+    for chosen in (valid & (axes == 0), valid & (axes == 1)):
+        if (count := np.count_nonzero(chosen)) >= ALONG:
+            mean = (share * chosen) @ parts
+            steepest = float(np.max(mean[2:] - mean[:-2])) / ((_UNIT[2] - _UNIT[0]) * count)
+            blurs.append(1.0 / (max(steepest, 1e-3) * math.sqrt(math.tau)))
+    return offsets, valid, blurs, contrast
 
 
 def _tukey(residual: Array, valid: npt.NDArray[np.bool_]) -> Array:

@@ -25,8 +25,16 @@ class Reason(enum.StrEnum):
     """No configured marker or board is in the image, or none is configured."""
     BLURRED = "blurred"
     """The image is not sharp enough."""
+    COVERED = "covered"
+    """The image shows nothing: the lens is covered, or it is dark."""
+    MIRRORED = "mirrored"
+    """Markers are recognized in the mirror image only."""
+    OVEREXPOSED = "overexposed"
+    """No marker is recognized, and parts of the image are saturated by glare or too much light."""
     IMPLAUSIBLE = "implausible"
     """The measurement contradicts the configuration: a marker is elsewhere or appears twice, or the camera moved."""
+    WRONG_LENS = "wrong_lens"
+    """The measurement contradicts the intrinsics of the camera."""
 
 
 class CalibrationRefused(Arcor2Error):
