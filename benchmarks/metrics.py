@@ -66,6 +66,7 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "camera_pose_three_p99_mm": ("mm", "<= 3"),
     "camera_pose_three_deg": ("°", "<= 0.1"),
     "camera_pose_three_ms": ("ms", "<= 15"),
+    "camera_pose_three_per_opencv": ("x", "<= 1.3"),
     "camera_pose_three_refused": ("%", ""),
     "camera_pose_three_wrong": ("%", "<= 1"),
     "camera_pose_one_mm": ("mm", "<= 3"),

@@ -8,7 +8,7 @@ import numpy as np
 from arcor2_hw.calibration.camera_results import PoseOptions
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.pose_problem import Hints, PoseProblem, Seen
-from arcor2_hw.calibration.pose_search import Found, covariance_of, intrinsics_deviations, solve
+from arcor2_hw.calibration.pose_search import Found, covariance_of, lens_changes, solve
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.rigid import inverted, mean_rotation, motion
 from arcor2_hw.exceptions import InvalidData
@@ -34,14 +34,14 @@ def averaged(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOption
         CalibrationRefused: No marker has an unambiguous pose, or two markers contradict each other.
         InvalidData: All weights are zero.
     """
-    deviations = intrinsics_deviations(lens, options)
+    changes = lens_changes(lens, options)
     refusal: CalibrationRefused | None = None
     left_out: set[tuple[str, int]] = set()
     poses: list[Array] = []
     weights: list[float] = []
     covariances: list[Array] = []
     for each in seen:
-        problem = PoseProblem(lens, [each], hints, deviations)
+        problem = PoseProblem(lens, [each], hints, changes)
         try:
             solution = solve(problem, options)
         except CalibrationRefused as error:
@@ -62,7 +62,7 @@ def averaged(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOption
     spread = stacked[:, :3, 3] - pose[:3, 3]
     covariance = np.einsum("n,nij->ij", share**2, np.stack(covariances))
     covariance[:3, :3] += np.einsum("n,ni,nj->ij", share**2, spread, spread)
-    everything = PoseProblem(lens, seen, hints, deviations)
+    everything = PoseProblem(lens, seen, hints, changes)
     errors = everything.errors(inverted(pose), everything.unchanged)
     if errors is None:
         raise CalibrationRefused(
@@ -77,4 +77,4 @@ def averaged(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOption
                 Reason.IMPLAUSIBLE,
                 name=each.name.capitalize(),
             )
-    return Found(inverted(pose), covariance, list(seen), errors, lens.parameters, left_out)
+    return Found(inverted(pose), everything.unchanged, covariance, list(seen), errors, lens.parameters, left_out)

@@ -9,11 +9,13 @@ import numpy as np
 
 from arcor2_hw.calibration.averaging import averaged, weight_of
 from arcor2_hw.calibration.boards import check_pose
-from arcor2_hw.calibration.camera_results import CameraPose, MarkerError, PoseOptions
-from arcor2_hw.calibration.detection import detect_layout
+from arcor2_hw.calibration.camera_results import CameraPose, LensCheck, LensState, MarkerError, PoseOptions
+from arcor2_hw.calibration.detection import Detection, detect_layout
+from arcor2_hw.calibration.diagnosis import check_not_mirrored, wanted_markers
 from arcor2_hw.calibration.drawing import GOOD, Canvas, error_picture
 from arcor2_hw.calibration.layout import Layout
 from arcor2_hw.calibration.lens import Array, Lens
+from arcor2_hw.calibration.lens_check import Checked, check_of_lens
 from arcor2_hw.calibration.pictures import Picture, grey_of, one_by_one
 from arcor2_hw.calibration.pose_problem import Hints, Seen
 from arcor2_hw.calibration.pose_search import Found, search
@@ -51,6 +53,45 @@ def find_camera_pose(
             not at its configured place, or the camera moved between the images).
     """
     options = options or PoseOptions()
+    hints, lens, detection = _detected(pictures, parameters, layout, options)
+    find = averaged if options.method == "averaged" else search
+    try:
+        found = find(lens, detection.seen, hints, options)
+    except CalibrationRefused as error:
+        if error.reason == Reason.IMPLAUSIBLE:  # some markers are taken for others in a mirror image
+            check_not_mirrored(grey_of(pictures[0]), wanted_markers(layout))
+        raise
+    checked = check_of_lens(lens, found, hints, options)
+    return _result(found, checked, layout, options, detection.blur, len(pictures))
+
+
+def check_lens(
+    pictures: Sequence[Picture], parameters: CameraParameters, layout: Layout, options: PoseOptions | None = None
+) -> LensCheck:
+    """Check the focal length of a camera by markers of known pose, even where no pose is reliable.
+
+    Args:
+        pictures: As in `find_camera_pose`.
+        parameters: The parameters to check.
+        layout: Markers and boards that may be visible.
+        options: Standard deviations of the intrinsics, hints and limits.
+
+    Raises:
+        InvalidPicture: As in `find_camera_pose`.
+        InvalidData: As in `find_camera_pose`.
+        Conflict: As in `find_camera_pose`.
+        CalibrationRefused: The image is blurred, shows no marker, or shows markers away from their configured poses.
+    """
+    options = options or PoseOptions()
+    hints, lens, detection = _detected(pictures, parameters, layout, options)
+    found = search(lens, detection.seen, hints, options)
+    return check_of_lens(lens, found, hints, options).lens
+
+
+def _detected(
+    pictures: Sequence[Picture], parameters: CameraParameters, layout: Layout, options: PoseOptions
+) -> tuple[Hints, Lens, Detection]:
+    """Return prior knowledge, the lens, and the targets detected in images."""
     hints = _hints(options)
     if not 1 <= len(pictures) <= MOST_PICTURES:
         raise InvalidData(
@@ -60,11 +101,7 @@ def find_camera_pose(
     lens = Lens(parameters, greys[0].shape[1], greys[0].shape[0])
     detection = detect_layout(greys, lens, layout, options.blur_threshold, options.largest_blur)
     _check_still(detection.seen)
-    if options.method == "averaged":
-        found = averaged(lens, detection.seen, hints, options)
-    else:
-        found = search(lens, detection.seen, hints, options)
-    return _result(found, detection.seen, layout, options, detection.blur, len(pictures))
+    return hints, lens, detection
 
 
 def _hints(options: PoseOptions) -> Hints:
@@ -115,13 +152,15 @@ def _check_still(seen: list[Seen]) -> None:
 
 
 def _result(
-    found: Found, seen: list[Seen], layout: Layout, options: PoseOptions, blur: float, pictures: int
+    found: Found, checked: Checked, layout: Layout, options: PoseOptions, blur: float, pictures: int
 ) -> CameraPose:
     """Return the result with its verdict, or refuse it."""
-    covariance = found.covariance
+    seen, covariance = found.seen, found.covariance
+    if np.trace(checked.covariance[:3, :3]) > np.trace(covariance[:3, :3]):
+        covariance = checked.covariance
     position = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
     orientation = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
-    _check_known(found, position, options)
+    _check_known(found, checked.lens, position, options)
     origin_from_camera = inverted(found.pose)
     errors = []
     for each, left in zip(seen, found.errors, strict=True):
@@ -143,7 +182,7 @@ def _result(
     used = [e for e in errors if e.used]
     residual = math.sqrt(sum(e.residual**2 * e.corners for e in used) / sum(e.corners for e in used))
     places = {each.key for each in seen} - found.left_out
-    grade, verdict = _verdict(places, position, orientation, residual, errors, found.parameters.fx)
+    grade, verdict = _verdict(places, position, orientation, residual, errors, found.parameters.fx, checked, options)
     total = len(layout.markers) + len(layout.boards)
     weights = {each.key: weight_of(found.pose, each, options) for each in seen}
     return CameraPose(
@@ -160,10 +199,11 @@ def _result(
         pictures=pictures,
         grade=grade,
         verdict=verdict,
+        lens=checked.lens,
     )
 
 
-def _check_known(found: Found, position: float, options: PoseOptions) -> None:
+def _check_known(found: Found, lens: LensCheck, position: float, options: PoseOptions) -> None:
     """Require that the pose is certain enough and agrees with the hints.
 
     Raises:
@@ -171,7 +211,15 @@ def _check_known(found: Found, position: float, options: PoseOptions) -> None:
     """
     if math.isfinite(position) and position <= options.largest_deviation:
         return
-    only = len({each.key for each in found.seen} - found.left_out) == 1
+    if lens.state == LensState.CONTRADICTED:
+        raise CalibrationRefused(
+            "The markers contradict the lens, which moves the camera by {position:.0f} mm. {verdict}",
+            f"factor {lens.factor:.4f}, standard deviation {lens.deviation:.4f}, misfit {lens.misfit:.1f}",
+            Reason.WRONG_LENS,
+            position=position * 1000,
+            verdict=lens.verdict,
+        )
+    only = len({each.key for each in found.used}) == 1
     first = found.seen[0]
     what = (
         f"Only {first.name} is visible, from nearly straight ahead or far away" if only else "The markers are far away"
@@ -193,6 +241,8 @@ def _verdict(
     residual: float,
     errors: list[MarkerError],
     f: float,
+    checked: Checked,
+    options: PoseOptions,
 ) -> tuple[Grade, str]:
     """Return how good a pose is, and what a technician should check."""
     markers = sum(kind == "marker" for kind, _ in places)
@@ -200,9 +250,11 @@ def _verdict(
     parts = [f"{n} {name}{'s' if n > 1 else ''}" for n, name in ((markers, "marker"), (boards, "board")) if n]
     text = (
         f"The camera's position is known to {position * 1000:.1f} mm and its direction to "
-        f"{math.degrees(orientation):.2f}° (standard deviations; {' and '.join(parts)}, residual {residual:.2f} px)."
+        f"{math.degrees(orientation):.2f}° (standard deviations; {' and '.join(parts)}, residual {residual:.2f} px), "
+        f"if the focal length is right to {options.focal_deviation:.2%}. {checked.lens.verdict}"
     )
-    grade = Grade.GOOD if position <= _GOOD else Grade.USABLE
+    confirmed = checked.lens.state == LensState.CONFIRMED
+    grade = Grade.GOOD if position <= _GOOD and confirmed and not checked.misfit else Grade.USABLE
     for name in sorted({e.name for e in errors if not e.used}):
         worst = max((e for e in errors if e.name == name), key=lambda e: e.residual)
         text += (
@@ -217,6 +269,11 @@ def _verdict(
         off = max(e.residual * e.distance / f for e in errors if e.used)
         text += f" The poses of the markers differ from each other by about {off * 1000:.1f} mm."
         grade = Grade.USABLE
+    elif checked.misfit and checked.lens.state != LensState.CONTRADICTED:
+        text += (
+            f" The residual is {checked.lens.misfit:.0f} times what the sharpness of the edges allows: "
+            "check the poses and sizes of the markers, and the lens."
+        )
     return grade, text
 
 

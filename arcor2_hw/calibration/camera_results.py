@@ -3,6 +3,7 @@
 Lengths are in m, angles in rad, image errors in px. The centre of a pixel has integer coordinates.
 """
 
+import enum
 from typing import Literal
 
 from arcor2_hw.calibration.results import Grade
@@ -81,6 +82,38 @@ class MarkerError(Data, frozen=True):
     used: bool = True
 
 
+class LensState(enum.StrEnum):
+    """Whether the markers of a view agree with the lens."""
+
+    CONFIRMED = "confirmed"
+    """The focal length fits the markers."""
+    UNCHECKED = "unchecked"
+    """The view does not determine the focal length."""
+    CONTRADICTED = "contradicted"
+    """Another focal length fits the markers better."""
+
+
+class LensCheck(Data, frozen=True):
+    """Comparison of a lens with the markers of a view.
+
+    Attributes:
+        factor: Focal length that fits the markers best, as a multiple of the given one.
+        deviation: Standard deviation of `factor`.
+        misfit: Ratio of the residuals to the measured noise of corners, about 1 when everything fits.
+        misfit_with_factor: The same with the focal length that fits best.
+        parameters: The given intrinsics with the focal length that fits best.
+        verdict: One or two sentences for the technician.
+    """
+
+    state: LensState
+    factor: float
+    deviation: float
+    misfit: float
+    misfit_with_factor: float
+    parameters: CameraParameters
+    verdict: str
+
+
 class CameraPose(Data, frozen=True):
     """The pose of a camera, and how certain it is.
 
@@ -94,7 +127,8 @@ class CameraPose(Data, frozen=True):
         orientation_deviation: Standard deviation about the worst axis, rad.
         blur: Standard deviation of edges, px; 0 where it could not be measured.
         parameters: Intrinsics that explain the image best within their standard deviations.
-        verdict: One or two sentences for the operator.
+        lens: Comparison of the lens with the markers.
+        verdict: A few sentences for the operator.
     """
 
     pose: Pose
@@ -110,6 +144,7 @@ class CameraPose(Data, frozen=True):
     grade: Grade
     verdict: str
     parameters: CameraParameters | Unset = UNSET
+    lens: LensCheck | Unset = UNSET
 
     def estimated(self, *, inverse: bool = False) -> EstimatedPose:
         """Return the result as the protocol has it; with `inverse`, the pose of the origin in the camera's frame."""

@@ -15,7 +15,6 @@ Array = npt.NDArray[np.float64]
 _UNDISTORTING: Final = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-12)
 _ROUND_TRIP: Final = 0.01
 """Maximum error of an image corner after conversion to a ray and back, px."""
-_STEP: Final = 1e-5
 _NOTHING: Final = np.zeros(3)
 
 
@@ -75,12 +74,11 @@ class Lens:
 
     def pixels_and_slopes(self, rays: Array) -> tuple[Array, Array]:
         """Return the pixels of rays, (n, 2), and their derivatives by x and y of the ray, (n, 2, 2)."""
-        count = len(rays)
-        moved = np.concatenate((rays, rays + np.array([_STEP, 0.0]), rays + np.array([0.0, _STEP])))
-        found = self.pixels(moved)
-        at = found[:count]
-        slopes = np.stack((found[count : 2 * count] - at, found[2 * count :] - at), axis=-1) / _STEP
-        return at, slopes
+        points = np.column_stack((rays, np.ones(len(rays))))
+        pixels: Any
+        pixels, derivatives = cv2.projectPoints(points, _NOTHING, _NOTHING, self.matrix, self.coefficients)[:2]
+        by_displacement = np.asarray(derivatives, dtype=np.float64).reshape(len(rays), 2, -1)[:, :, 3:5]
+        return np.asarray(pixels, dtype=np.float64).reshape(-1, 2), by_displacement
 
     def projected(self, points: Array, change: Array) -> Array:
         """Project points in the camera's frame with intrinsics changed by `change` (as `numbers`), (n, 2)."""

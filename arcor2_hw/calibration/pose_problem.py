@@ -98,12 +98,14 @@ class Solution:
     Attributes:
         covariance: (6, 6), of a small motion after the pose (rotation vector, displacement), including the uncertainty
             of the intrinsics.
+        lens_covariance: Of the change of the intrinsics, in standard deviations.
     """
 
     pose: Array
     change: Array
     cost: float
     covariance: Array
+    lens_covariance: Array
 
 
 class _Group:
@@ -123,22 +125,23 @@ class _Group:
 
 
 class PoseProblem:
-    """Everything that one camera sees from one place, with intrinsics known to `deviations` (as Lens.numbers).
+    """Everything that one camera sees from one place, with intrinsics known to some degree.
 
-    The intrinsics are unknowns with prior knowledge. Their errors that the image shows do not affect the pose; the
-    others increase the covariance of the pose.
+    `lens_changes` has one column for each way in which the intrinsics (as Lens.numbers) may differ, of one standard
+    deviation. The intrinsics are unknowns with prior knowledge. Their errors that the image shows do not affect the
+    pose; the others increase the covariance of the pose.
 
     Attributes:
         scale: Unit of standard deviations; above 1 where targets are not exactly where they should be.
     """
 
-    def __init__(self, lens: Lens, seen: Sequence[Seen], hints: Hints, deviations: Array) -> None:
+    def __init__(self, lens: Lens, seen: Sequence[Seen], hints: Hints, lens_changes: Array) -> None:
         self.lens = lens
         self.seen = list(seen)
         self.hints = hints
         self.scale = 1.0
-        self._deviations = deviations
-        self.unchanged: Array = np.zeros(len(deviations))
+        self.lens_changes = lens_changes
+        self.unchanged: Array = np.zeros(lens_changes.shape[1])
         self._points = np.concatenate([each.points for each in self.seen])
         self._pixels = np.concatenate([each.pixels for each in self.seen])
         counts = [len(each.points) for each in self.seen]
@@ -172,6 +175,16 @@ class PoseProblem:
             return float("inf")
         squares = [np.mean(group.white(errors) ** 2, axis=1) for group in self._groups]
         return float(np.sqrt(np.median(np.concatenate(squares))))
+
+    def goodness(self, pose: Array, change: Array) -> tuple[float, int]:
+        """Return chi square of a solution, with the measured noise of corners, and its degrees of freedom."""
+        errors = self._errors(pose, change)
+        hints, _ = self.hints.rows(pose)
+        freedom = self._pixels.size + len(hints) - 6
+        if errors is None:
+            return float("inf"), freedom
+        squares = sum(float(np.sum(group.white(errors) ** 2)) for group in self._groups)
+        return squares + float(hints @ hints + change @ change), freedom
 
     def cost(self, pose: Array, change: Array | None = None) -> float:
         """Return the robust cost of a pose."""
@@ -213,12 +226,16 @@ class PoseProblem:
                 break
         if cost > enough + _FAR_ABOVE:
             return None
+        return self.solution(pose, change, cost)
+
+    def solution(self, pose: Array, change: Array, cost: float) -> Solution:
+        """Return a solution with its covariance."""
         normal, _ = self._equations(pose, change)
         try:
-            covariance = np.asarray(np.linalg.inv(normal)[:6, :6], dtype=np.float64)
+            covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
         except np.linalg.LinAlgError:
-            covariance = np.full((6, 6), np.inf)
-        return Solution(pose, change, cost, covariance)
+            covariance = np.full(normal.shape, np.inf)
+        return Solution(pose, change, cost, covariance[:6, :6], covariance[6:, 6:])
 
     def errors(self, pose: Array, change: Array) -> list[Array] | None:
         """Return the errors of all targets at a pose, px, (n, 2) each; None where a point is behind the camera."""
@@ -229,15 +246,15 @@ class PoseProblem:
         camera = self._points @ pose[:3, :3].T + pose[:3, 3]
         if camera[:, 2].min() < 1e-3:
             return None
-        return np.asarray(self.lens.projected(camera, change * self._deviations) - self._pixels)
+        return np.asarray(self.lens.projected(camera, self.lens_changes @ change) - self._pixels)
 
     def _equations(self, pose: Array, change: Array) -> tuple[Array, Array]:
         """Return the normal equations at a pose: rotation, displacement, intrinsics in standard deviations."""
         camera = self._points @ pose[:3, :3].T + pose[:3, 3]
-        pixels, by_point, by_lens = self.lens.projected_with_slopes(camera, change * self._deviations)
+        pixels, by_point, by_lens = self.lens.projected_with_slopes(camera, self.lens_changes @ change)
         errors = pixels - self._pixels
         # A rotation by r moves a point p by r × p, and so a pixel by slope · (r × p) = r · (p × slope).
-        slopes = np.concatenate((_cross(camera[:, None, :], by_point), by_point, by_lens * self._deviations), axis=2)
+        slopes = np.concatenate((_cross(camera[:, None, :], by_point), by_point, by_lens @ self.lens_changes), axis=2)
         size = slopes.shape[2]
         normal, right = np.zeros((size, size)), np.zeros(size)
         residuals, rows = self.hints.rows(pose)

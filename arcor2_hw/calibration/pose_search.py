@@ -32,15 +32,22 @@ class Found:
     """A pose (camera_from_origin), errors in px, and the lens.
 
     Attributes:
+        change: Change of the intrinsics in standard deviations.
         covariance: Of the camera in the frame of the origin, m and rad.
     """
 
     pose: Array
+    change: Array
     covariance: Array
     seen: list[Seen]
     errors: list[Array]
     parameters: CameraParameters
     left_out: set[tuple[str, int]] = field(default_factory=set)
+
+    @property
+    def used(self) -> list[Seen]:
+        """Return the targets that were not excluded."""
+        return [each for each in self.seen if each.key not in self.left_out]
 
 
 def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions) -> Found:
@@ -50,11 +57,11 @@ def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions)
         CalibrationRefused: The result is ambiguous, implausible or missing.
     """
     left_out: set[tuple[str, int]] = set()
-    deviations = intrinsics_deviations(lens, options)
-    everything = PoseProblem(lens, seen, hints, deviations)
+    changes = lens_changes(lens, options)
+    everything = PoseProblem(lens, seen, hints, changes)
     while True:
         used = [each for each in seen if each.key not in left_out]
-        problem = PoseProblem(lens, used, hints, deviations) if left_out else everything
+        problem = PoseProblem(lens, used, hints, changes) if left_out else everything
         best = solve(problem, options)
         worst, worst_key = worst_of(problem, best)
         if worst <= options.largest_residual:
@@ -79,7 +86,8 @@ def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions)
     left = everything.errors(best.pose, best.change)
     if left is None:
         raise CalibrationRefused("The markers contradict each other.", reason=Reason.IMPLAUSIBLE)
-    return Found(best.pose, covariance_of(best), list(seen), left, lens.changed(best.change * deviations), left_out)
+    parameters = lens.changed(changes @ best.change)
+    return Found(best.pose, best.change, covariance_of(best), list(seen), left, parameters, left_out)
 
 
 def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
@@ -148,12 +156,13 @@ def covariance_of(solution: Solution) -> Array:
     return np.asarray(turn @ solution.covariance @ turn.T)
 
 
-def intrinsics_deviations(lens: Lens, options: PoseOptions) -> Array:
-    """Return the standard deviations of the intrinsics (as Lens.numbers)."""
+def lens_changes(lens: Lens, options: PoseOptions) -> Array:
+    """Return the intrinsics (as Lens.numbers) as independent unknowns, each with its standard deviation, (n, n)."""
     p = lens.parameters
     centre = options.centre_deviation
     coefficients = np.abs(lens.coefficients) * options.distortion_deviation
-    return np.array([options.focal_deviation * p.fx, options.focal_deviation * p.fy, centre, centre, *coefficients])
+    focal = options.focal_deviation * p.fx, options.focal_deviation * p.fy
+    return np.diag([*focal, centre, centre, *coefficients])
 
 
 def _minima(problem: PoseProblem, starts: list[Array]) -> list[Solution]:

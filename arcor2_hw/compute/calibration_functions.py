@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from arcor2_hw.calibration.camera_results import CameraPose, HandEye, Intrinsics
+from arcor2_hw.calibration.camera_results import CameraPose, HandEye, Intrinsics, LensCheck
 from arcor2_hw.calibration.results import RobotPose, TouchedFrame, TouchedOrientation, TouchedTip
 from arcor2_hw.compute import calibration_tasks as t
 from arcor2_hw.compute.worker_state import WorkerState
@@ -17,6 +17,14 @@ def camera_pose(task: t.FindCameraPose, state: WorkerState) -> CameraPose:
 
     state.progress(0.0, "searching for markers")
     return find_camera_pose(task.pictures, task.parameters, task.layout, task.options)
+
+
+def lens_check(task: t.CheckLens, state: WorkerState) -> LensCheck:
+    """Check the focal length of a camera by markers."""
+    from arcor2_hw.calibration.camera_pose import check_lens
+
+    state.progress(0.0, "searching for markers")
+    return check_lens(task.pictures, task.parameters, task.layout, task.options)
 
 
 def drawn_camera_pose(task: t.DrawCameraPose, _: WorkerState) -> bytes:

@@ -1,6 +1,6 @@
 """Tasks of the calibration worker. Imports no numerics, so that the server can use it."""
 
-from typing import ClassVar
+from typing import ClassVar, Generic
 
 from msgspec import field
 
@@ -11,13 +11,14 @@ from arcor2_hw.calibration.camera_results import (
     HandEyeSample,
     Intrinsics,
     IntrinsicsOptions,
+    LensCheck,
     Mounting,
     PoseOptions,
 )
 from arcor2_hw.calibration.layout import CharucoBoard, Layout, MarkerDictionary
 from arcor2_hw.calibration.results import RobotPose, TouchedFrame, TouchedOrientation, TouchedTip
 from arcor2_hw.collision.description import RobotSource
-from arcor2_hw.compute.task import Task, WorkerKind
+from arcor2_hw.compute.task import R, Task, WorkerKind
 from arcor2_hw.data.camera import CameraParameters, MarkerCorners
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
@@ -25,18 +26,31 @@ from arcor2_hw.data.robot import Joint
 _FUNCTIONS = "arcor2_hw.compute.calibration_functions"
 
 
-class FindCameraPose(Task[CameraPose], frozen=True):
-    """Find the pose of a camera from images of markers and boards."""
+class _MarkerView(Task[R], Generic[R], frozen=True):
+    """A task on images of markers and boards, taken by a camera from one pose."""
 
-    result_type: ClassVar = CameraPose
-    function: ClassVar = f"{_FUNCTIONS}:camera_pose"
     worker: ClassVar = WorkerKind.CALIBRATION
-    label: ClassVar = "the pose of a camera"
 
     pictures: list[bytes]
     parameters: CameraParameters
     layout: Layout
     options: PoseOptions = PoseOptions()
+
+
+class FindCameraPose(_MarkerView[CameraPose], frozen=True):
+    """Find the pose of a camera from images of markers and boards."""
+
+    result_type: ClassVar = CameraPose
+    function: ClassVar = f"{_FUNCTIONS}:camera_pose"
+    label: ClassVar = "the pose of a camera"
+
+
+class CheckLens(_MarkerView[LensCheck], frozen=True):
+    """Check the focal length of a camera by images of markers of known pose."""
+
+    result_type: ClassVar = LensCheck
+    function: ClassVar = f"{_FUNCTIONS}:lens_check"
+    label: ClassVar = "the check of a lens"
 
 
 class DrawCameraPose(Task[bytes], frozen=True):
@@ -189,6 +203,7 @@ class OrientationByPoints(Task[TouchedOrientation], frozen=True):
 
 CalibrationTask = (
     FindCameraPose
+    | CheckLens
     | DrawCameraPose
     | FindMarkers
     | FindHandEye

@@ -10,8 +10,8 @@ import numpy.typing as npt
 import pytest
 
 from arcor2_hw.calibration import lens as measuring
-from arcor2_hw.calibration.camera_pose import draw_camera_pose, find_camera_pose
-from arcor2_hw.calibration.camera_results import CameraPose, PoseMethod, PoseOptions
+from arcor2_hw.calibration.camera_pose import check_lens, draw_camera_pose, find_camera_pose
+from arcor2_hw.calibration.camera_results import CameraPose, LensCheck, LensState, PoseMethod, PoseOptions
 from arcor2_hw.calibration.edges import chart_of, measure
 from arcor2_hw.calibration.layout import CharucoBoard, Layout, Marker
 from arcor2_hw.calibration.markers import detect, find_marker_corners
@@ -154,6 +154,58 @@ def test_a_moved_marker_is_excluded_and_named() -> None:
     assert 6 <= stated <= 14
 
 
+# ------------------------------------------------------------------------------------------------ lens
+def with_focal_length(factor: float) -> CameraParameters:
+    return with_parameters(fx=600.0 * factor, fy=599.0 * factor, dist_coefs=list(LENS.coefficients))
+
+
+def test_a_lens_that_fits_is_confirmed_by_the_markers() -> None:
+    found = find_camera_pose([all_seen()], GIVEN, layout(PLACES))
+    assert isinstance(found.lens, LensCheck)
+    assert found.lens.state == LensState.CONFIRMED
+    assert found.lens.factor == pytest.approx(1.0, abs=4 * found.lens.deviation)
+    assert found.lens.misfit < 2.0
+    assert found.grade == Grade.GOOD
+    assert "if the focal length is right to 0.05%" in found.verdict
+
+
+@pytest.mark.parametrize("factor", [0.98, 1.02])
+def test_a_wrong_focal_length_is_refused_and_measured_by_the_lens_check(factor: float) -> None:
+    shown = with_focal_length(factor)
+    error = refused(lambda: find_camera_pose([all_seen()], shown, layout(PLACES)))
+    assert error.reason == Reason.WRONG_LENS
+    assert f"% {'smaller' if factor > 1 else 'larger'} (± 0.1%)" in str(error)
+    check = check_lens([all_seen()], shown, layout(PLACES))
+    assert check.state == LensState.CONTRADICTED
+    assert check.misfit > 3 * check.misfit_with_factor
+    assert check.factor * factor == pytest.approx(1.0, abs=4 * check.deviation)
+    assert check.parameters.fx == pytest.approx(600.0, rel=0.004)
+    assert off(find_camera_pose([all_seen()], check.parameters, layout(PLACES)), ASLANT)[0] < 1.5
+
+
+@pytest.mark.parametrize("factor", [0.98, 1.0, 1.02])
+def test_a_view_that_does_not_check_the_lens_is_not_good(factor: float) -> None:
+    """From straight above, another focal length is another distance."""
+    places = {number: place for number, place in PLACES.items() if number != 9}
+    camera = rendering.looking_at(np.array([0.0, 0.004, 0.7]), ORIGIN, 0.0)
+    found = find_camera_pose([picture(camera, places)], with_focal_length(factor), layout(places))
+    assert isinstance(found.lens, LensCheck)
+    assert found.lens.state == LensState.UNCHECKED
+    assert found.grade == Grade.USABLE
+    assert "an error of 1 % moves the camera by 7 mm" in found.verdict
+
+
+def test_markers_off_their_poses_are_not_good() -> None:
+    said = {number: place.copy() for number, place in PLACES.items()}
+    said[3][0, 3] += 0.0006
+    said[42][1, 3] -= 0.0006
+    found = find_camera_pose([all_seen()], GIVEN, layout(said))
+    assert found.residual < 0.5
+    assert found.grade == Grade.USABLE
+    assert "check the poses and sizes" in found.verdict
+    assert off(found, ASLANT)[0] < 4000 * found.position_deviation
+
+
 def test_several_pictures_are_averaged() -> None:
     noisy = [picture(ASLANT, {3: PLACES[3]}, Exposure(noise=12.0), seed) for seed in range(6)]
     options = PoseOptions(largest_deviation=1.0, focal_deviation=1e-6, centre_deviation=1e-6, distortion_deviation=0.0)
@@ -258,6 +310,18 @@ def test_edges_of_a_false_detection_are_not_measured() -> None:
         assert measure(light, (0.0, 0.0), lens, chart_of(0, other), other, corners) is None
 
 
+@pytest.mark.parametrize("count", [4, 5, 8, 12])
+def test_slopes_of_a_lens_match_small_displacements(count: int) -> None:
+    coefficients = [0.06, -0.1, 0.0005, -0.0004, 0.02, 0.03, -0.02, 0.01, 2e-4, 1e-4, 3e-4, -1e-4][:count]
+    lens = measuring.Lens(CameraParameters(600.0, 599.0, 322.0, 237.0, coefficients), 640, 480)
+    rays = np.random.default_rng(1).uniform(-0.4, 0.4, (50, 2))
+    pixels, slopes = lens.pixels_and_slopes(rays)
+    assert np.allclose(pixels, lens.pixels(rays), atol=1e-9)
+    for axis, step in enumerate(1e-6 * np.eye(2)):
+        difference = (lens.pixels(rays + step) - lens.pixels(rays - step)) / 2e-6
+        assert np.allclose(slopes[:, :, axis], difference, atol=1e-4)
+
+
 def test_a_board_that_is_mostly_hidden_is_refused() -> None:
     board = Layout(boards=[CharucoBoard(7, 5, 0.04, 0.03)])
     error = refused(lambda: find_camera_pose([one_ahead()], GIVEN, board))
@@ -265,11 +329,54 @@ def test_a_board_that_is_mostly_hidden_is_refused() -> None:
     assert "Too little is seen of a board of 7 × 5 squares" in str(error)
 
 
+def reason_of(grey: Grey) -> Reason:
+    return refused(lambda: find_camera_pose([grey], GIVEN, layout(PLACES))).reason
+
+
+def in_motion(grey: Grey, length: int, angle: float) -> Grey:
+    """Move during the exposure, by a length in px."""
+    at = np.linspace(-0.5, 0.5, 4 * length) * length
+    shifts = [np.array([[1.0, 0, d * math.cos(angle)], [0, 1.0, d * math.sin(angle)]]) for d in at]
+    size = grey.shape[::-1]
+    moved = [cv2.warpAffine(grey, shift, size, borderMode=cv2.BORDER_REPLICATE).astype(float) for shift in shifts]
+    return np.rint(np.mean(moved, axis=0)).astype(np.uint8)
+
+
 def test_a_blurred_picture_is_refused() -> None:
-    soft = cv2.GaussianBlur(all_seen(), (0, 0), 5.0).astype(np.uint8)
-    assert refused(lambda: find_camera_pose([soft], GIVEN, layout(PLACES))).reason == Reason.BLURRED
-    grey = np.full((480, 640), 120, np.uint8)
-    assert refused(lambda: find_camera_pose([grey], GIVEN, layout(PLACES))).reason == Reason.BLURRED
+    assert reason_of(cv2.GaussianBlur(all_seen(), (0, 0), 5.0).astype(np.uint8)) == Reason.BLURRED
+
+
+@pytest.mark.parametrize("degrees", [0, 30, 90, 135])
+@pytest.mark.parametrize("length", [9, 20])
+def test_motion_in_one_direction_is_refused_as_blur(degrees: int, length: int) -> None:
+    assert reason_of(in_motion(all_seen(), length, math.radians(degrees))) == Reason.BLURRED
+
+
+def spots(grey: Grey, radius: int, level: int) -> Grey:
+    """Cover the middle of every marker."""
+    covered = grey.copy()
+    for each in find_marker_corners(grey, GIVEN):
+        x, y = (sum(getattr(corner, axis) for corner in each.corners) / 4 for axis in "xy")
+        cv2.circle(covered, (round(x), round(y)), radius, level, -1, cv2.LINE_AA)
+    return covered
+
+
+@pytest.mark.parametrize(
+    ("change", "reason", "said"),
+    [
+        (lambda grey: spots(grey, 30, 90), Reason.NO_MARKER, "not covered"),
+        (lambda grey: spots(grey, 30, 255), Reason.OVEREXPOSED, "glare"),
+        (lambda grey: grey[:, ::-1].copy(), Reason.MIRRORED, "mirror image"),
+        (lambda grey: np.full_like(grey, 120), Reason.COVERED, "Uncover the lens"),
+        (lambda grey: grey // 50, Reason.COVERED, "is dark"),
+        (lambda grey: np.full_like(grey, 255), Reason.OVEREXPOSED, "is overexposed"),
+    ],
+    ids=["covered markers", "glare", "mirrored", "covered lens", "dark", "too much light"],
+)
+def test_a_refusal_names_the_reason(change: Callable[[Grey], Grey], reason: Reason, said: str) -> None:
+    error = refused(lambda: find_camera_pose([change(all_seen())], GIVEN, layout(PLACES)))
+    assert error.reason == reason
+    assert said in str(error)
 
 
 def test_a_camera_below_the_markers_is_refused() -> None:

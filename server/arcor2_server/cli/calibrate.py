@@ -1,6 +1,8 @@
 """`arcor2-hw calibrate`: compute the poses of cameras, robots and tools from files, or on a running server."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +12,15 @@ from msgspec import field
 from rich.console import Console
 from rich.table import Table
 
-from arcor2_hw.calibration.camera_results import CameraPose, HandEyeSample, IntrinsicsOptions, Mounting, PoseMethod
+from arcor2_hw.calibration.camera_results import (
+    CameraPose,
+    HandEyeSample,
+    IntrinsicsOptions,
+    LensState,
+    Mounting,
+    PoseMethod,
+    PoseOptions,
+)
 from arcor2_hw.calibration.configuration import read_configuration
 from arcor2_hw.calibration.layout import CharucoBoard, Layout
 from arcor2_hw.calibration.results import TouchedOrientation
@@ -55,19 +65,43 @@ Output = Annotated[Path | None, Parameter(name=["--output", "-o"], help="Write t
 
 
 # ------------------------------------------------------------------------------------------------ camera
+ViewPictures = Annotated[Path, Parameter(help="Pictures taken by the camera from the same pose.")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class MarkerView:
+    """A camera's view of markers with known poses."""
+
+    lens: Lens
+    markers: Annotated[Path, Parameter(help="YAML file with marker_size and the pose of each marker by id.")]
+    near: Annotated[
+        Path | None, Parameter(help="YAML file with the approximate camera pose, to choose between two solutions.")
+    ] = None
+    above: Annotated[float | None, Parameter(help="Minimum height of the camera above the origin, m.")] = None
+
+    def read(self, pictures: Sequence[Path]) -> tuple[list[bytes], CameraParameters, Layout, PoseOptions]:
+        """Return the content of the files. Raise NotFound or InvalidData if one cannot be read."""
+        if not pictures:
+            raise InvalidData("Specify at least one picture.")
+        configuration = read_configuration(self.markers)
+        options = configuration.options
+        if self.near is not None:
+            options = msgspec.structs.replace(options, expected=read_as(self.near, Pose))
+        if self.above is not None:
+            options = msgspec.structs.replace(options, lowest=self.above)
+        files = [picture_of(path) for path in pictures]
+        return files, read_as(self.lens, CameraParameters), configuration.layout, options
+
+
 @app.command
 def camera(
-    *pictures: Annotated[Path, Parameter(help="Pictures taken by the camera from the same pose.")],
-    lens: Lens,
-    markers: Annotated[Path, Parameter(help="YAML file with marker_size and the pose of each marker by id.")],
+    *pictures: ViewPictures,
+    view: MarkerView,
     method: Annotated[
         PoseMethod | None,
         Parameter(help="joint: solve for all corners together; averaged: average the poses from single markers."),
     ] = None,
-    near: Annotated[
-        Path | None, Parameter(help="YAML file with the approximate camera pose, to choose between two solutions.")
-    ] = None,
-    above: Annotated[float | None, Parameter(help="Minimum height of the camera above the origin, m.")] = None,
     json: AsJson = False,
     save: Save = None,
     output: Output = None,
@@ -79,21 +113,12 @@ def camera(
     """
 
     async def work() -> None:
-        if not pictures:
-            raise InvalidData("Specify at least one picture.")
-        configuration = read_configuration(markers)
-        options = configuration.options
+        files, parameters, layout, options = view.read(pictures)
         if method is not None:
             options = msgspec.structs.replace(options, method=method)
-        if near is not None:
-            options = msgspec.structs.replace(options, expected=read_as(near, Pose))
-        if above is not None:
-            options = msgspec.structs.replace(options, lowest=above)
-        parameters = read_as(lens, CameraParameters)
-        files = [picture_of(path) for path in pictures]
-        found = await compute(t.FindCameraPose(files, parameters, configuration.layout, options))
+        found = await compute(t.FindCameraPose(files, parameters, layout, options))
         if save is not None:
-            drawn = await compute(t.DrawCameraPose(files[0], parameters, configuration.layout, found))
+            drawn = await compute(t.DrawCameraPose(files[0], parameters, layout, found))
             write(save / f"{pictures[0].stem}-markers.png", drawn)
         if out := _report(found, found.pose, output, json):
             _show_camera(found, out)
@@ -117,6 +142,25 @@ def _show_camera(found: CameraPose, out: Console) -> None:
             "yes" if one.used else "[red]no: it is not at its stated pose",
         )
     out.print(table)
+
+
+@app.command
+def check_lens(*pictures: ViewPictures, view: MarkerView, json: AsJson = False, output: Output = None) -> int:
+    """Check the focal length of a camera by pictures of markers with known poses.
+
+    Prints whether the markers confirm it, and the one that fits best; -o writes the parameters with it. Fails with
+    status 19 if the markers contradict the given one.
+    """
+
+    async def work() -> ExitStatus:
+        found = await compute(t.CheckLens(*view.read(pictures)))
+        if out := _report(found, found.parameters, output, json):
+            out.print(f"fx {found.parameters.fx:.1f} px, fy {found.parameters.fy:.1f} px fit best")
+            out.print(f"that is {found.factor:.4f} ± {found.deviation:.4f} of the given focal length")
+            out.print(f"residual {found.misfit:.1f} times the noise of corners")
+        return ExitStatus.CALIBRATION_REFUSED if found.state is LensState.CONTRADICTED else ExitStatus.OK
+
+    return calibrated("check-lens", work)
 
 
 # ------------------------------------------------------------------------------------------------ robot

@@ -16,6 +16,7 @@ from arcor2_hw.calibration.camera_results import (
     HandEyeSample,
     Intrinsics,
     IntrinsicsOptions,
+    LensCheck,
     Mounting,
     PoseOptions,
 )
@@ -46,12 +47,17 @@ Points = Annotated[list[Position], Meta(max_length=MOST_POINTS)]
 
 
 # ------------------------------------------------------------------------------------------------ pictures
-class CameraArgs(Data, frozen=True):
-    """Camera parameters. markers, options: by default the configured ones. record: whether to store the result."""
+class LensArgs(Data, frozen=True):
+    """Camera parameters. markers, options: by default the configured ones."""
 
     camera_parameters: CameraParameters
     markers: CalibrationConfiguration | Unset = UNSET
     options: PoseOptions | Unset = UNSET
+
+
+class CameraArgs(LensArgs, frozen=True):
+    """Camera parameters as for the check of the lens. record: whether to store the result."""
+
     record: RecordAs | Unset = UNSET
 
 
@@ -163,12 +169,16 @@ class CalibrationMethodOperations:
     def _configured(self, given: CalibrationConfiguration | Unset) -> CalibrationConfiguration:
         return self._markers.configuration if isinstance(given, Unset) else given
 
+    def _view(self, args: LensArgs) -> tuple[CalibrationConfiguration, PoseOptions]:
+        """Return the markers and options of a request, by default the configured ones."""
+        configuration = self._configured(args.markers)
+        return configuration, configuration.options if isinstance(args.options, Unset) else args.options
+
     @operation("PUT", "/api/calibration/camera", CALIBRATION, Role.TECHNICIAN, **_PICTURE_UPLOAD)
     async def find_camera_pose(self, uploads: Uploads, person: str) -> CameraPose:
         """Return the pose of a camera from pictures of markers, with all errors."""
         args = read_args(uploads.fields["args"], CameraArgs)
-        configuration = self._configured(args.markers)
-        options = configuration.options if isinstance(args.options, Unset) else args.options
+        configuration, options = self._view(args)
         pictures = await _pictures(uploads)
         task = calibration_tasks.FindCameraPose(pictures, args.camera_parameters, configuration.layout, options)
         found = await self._compute.run(task)
@@ -176,6 +186,15 @@ class CalibrationMethodOperations:
         kind = CalibrationKind.CAMERA_POSE
         await self._store(person, args, kind, found, "px", after=found.pose, pictures=pictures, parameters=parameters)
         return found
+
+    @operation("PUT", "/api/calibration/lens", CALIBRATION, Role.TECHNICIAN, **_PICTURE_UPLOAD)
+    async def check_lens(self, uploads: Uploads) -> LensCheck:
+        """Return whether the focal length of a camera fits pictures of markers, and the one that fits best."""
+        args = read_args(uploads.fields["args"], LensArgs)
+        configuration, options = self._view(args)
+        pictures = await _pictures(uploads)
+        task = calibration_tasks.CheckLens(pictures, args.camera_parameters, configuration.layout, options)
+        return await self._compute.run(task)
 
     @operation(
         "PUT",

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from arcor2_hw.calibration.camera_results import CameraPose
+from arcor2_hw.calibration.camera_results import CameraPose, LensCheck
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.cell import read_cell
 from arcor2_hw.data.geometry import Orientation, Pose, Position
@@ -93,6 +93,24 @@ def test_a_camera_pose_is_calibrated(files: Path, tmp_path: Path, calibrate: Cli
     assert len(whole.markers) == 2
 
 
+def test_a_lens_is_checked(files: Path, tmp_path: Path, calibrate: Cli) -> None:
+    markers = ("--markers", files / "markers.yaml")
+    ran = calibrate("check-lens", files / "markers.png", "--lens", files / "lens.yaml", *markers, "--above", "0.1")
+    assert ran.status == ExitStatus.OK, ran
+    assert "of the given focal length" in ran.out
+    long = write(tmp_path / "long.yaml", msgspec.structs.replace(PARAMETERS, fx=660.0, fy=658.9))
+    told = ("--lens", long, *markers, "-o", tmp_path / "fitting.json")
+    ran = calibrate("check-lens", files / "markers.png", *told)
+    assert ran.status == ExitStatus.CALIBRATION_REFUSED, ran
+    assert "smaller" in ran.out
+    fitting = msgspec.json.decode((tmp_path / "fitting.json").read_bytes(), type=CameraParameters)
+    assert fitting.fx == pytest.approx(600.0, rel=0.02)
+    ran = calibrate("check-lens", files / "markers.png", *told, "--json")
+    assert msgspec.json.decode(ran.out, type=LensCheck).state == "contradicted"
+    ran = calibrate("check-lens", files / "empty.png", *told)
+    assert (ran.status, ran.out) == (ExitStatus.CALIBRATION_REFUSED, "")
+
+
 def test_errors_have_an_exit_status_and_one_line(files: Path, tmp_path: Path, calibrate: Cli) -> None:
     told = ("--lens", files / "lens.yaml", "--markers", files / "markers.yaml")
     twice = tmp_path / "twice.yaml"
@@ -100,7 +118,7 @@ def test_errors_have_an_exit_status_and_one_line(files: Path, tmp_path: Path, ca
     lens = write(tmp_path / "lens.yaml", {"fx": 1})
     others = write(tmp_path / "others.yaml", {"markers": [{"marker_id": 44, "pose": Pose()}]})
     cases: list[tuple[list[str | Path], ExitStatus, str]] = [
-        (["camera", files / "empty.png", *told], ExitStatus.CALIBRATION_REFUSED, "blurred"),
+        (["camera", files / "empty.png", *told], ExitStatus.CALIBRATION_REFUSED, "No configured marker"),
         (["camera", files / "markers.png", *told[:2], "--markers", others], ExitStatus.CALIBRATION_REFUSED, "marker"),
         (["camera", files / "none.png", *told], ExitStatus.NOT_FOUND, "none.png"),
         (["camera", files / "lens.yaml", *told], ExitStatus.DOCUMENT_PROBLEMS, "picture"),

@@ -104,6 +104,12 @@ async def test_complete_results_include_their_quality(http: httpx.AsyncClient, p
     assert len(kept["inputs"]) == 2
     assert kept["applied"] is False
 
+    lens = {"camera_parameters": PARAMETERS, "markers": MARKERS}
+    checked = granted(await http.put("/api/calibration/lens", files=parts(pictures, lens)))
+    assert checked == found["lens"]
+    assert checked["parameters"]["fx"] == pytest.approx(PARAMETERS["fx"] * checked["factor"])
+    refused(await http.put("/api/calibration/lens", files=parts([], args)), 400, "Argument", "image")
+
     options = {"lowest": 5.0}
     answer = await http.put("/api/calibration/camera", files=parts(pictures, args | {"options": options}))
     refused(answer, 409, "Invalid")
