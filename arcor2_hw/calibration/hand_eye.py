@@ -18,6 +18,7 @@ from arcor2_hw.calibration.camera_results import (
 )
 from arcor2_hw.calibration.detection import detect_layout
 from arcor2_hw.calibration.drawing import error_picture
+from arcor2_hw.calibration.hand_eye_check import check_of_hand_eye
 from arcor2_hw.calibration.hand_eye_methods import METHODS
 from arcor2_hw.calibration.hand_eye_problem import Mount, Station, refined
 from arcor2_hw.calibration.layout import Layout
@@ -220,6 +221,7 @@ def _result(
     lens: Lens,
 ) -> HandEye:
     """Return the result with its verdict, or refuse it."""
+    checked = check_of_hand_eye(lens, stations, best, (options.robot_position, options.robot_orientation))
     residual = _root_mean_square(np.concatenate(best.errors))
     if residual > options.largest_residual:
         raise CalibrationRefused(
@@ -234,8 +236,18 @@ def _result(
     turn[:3, :3] = -crossed(best.mount[:3, 3])
     turn[:3, 3:] = turn[3:, :3] = np.eye(3)
     covariance = turn @ best.covariance @ turn.T
+    if checked.contradicted:
+        covariance = covariance + np.outer(checked.shift, checked.shift)
     position = float(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1]))
     orientation = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
+    if checked.contradicted and not position <= options.largest_deviation:
+        raise CalibrationRefused(
+            "The camera's place would be off by {position:.0f} mm.{verdict}",
+            f"at most {options.largest_deviation * 1000:.1f} mm",
+            Reason.IMPLAUSIBLE,
+            position=position * 1000,
+            verdict=checked.verdict,
+        )
     if not position <= options.largest_deviation:
         raise CalibrationRefused(
             "The camera's place would be known to {position:.0f} mm only: more pictures are needed, with the "
@@ -256,7 +268,8 @@ def _result(
         f"The camera's position {where} is known to {position * 1000:.1f} mm and its direction to "
         f"{math.degrees(orientation):.2f}° (standard deviations; {count} pictures, residual {residual:.2f} px)."
     )
-    grade = Grade.GOOD if position <= _GOOD and count >= 8 else Grade.USABLE
+    verdict += checked.verdict
+    grade = Grade.GOOD if position <= _GOOD and count >= 8 and checked.is_good else Grade.USABLE
     if count < 8:
         verdict += " Ten pictures or more improve the result."
     if problems:

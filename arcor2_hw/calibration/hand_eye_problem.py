@@ -133,7 +133,7 @@ def _whiteners(
     variances = np.array([orientation**2] * 3 + [position**2] * 3)
     result = []
     for each in stations:
-        by_hand = _slopes(lens, each, mount, target)[:, :6]
+        by_hand = slopes_of(lens, each, mount, target)[:, :6]
         covariance = (by_hand * variances) @ by_hand.T
         first = 0
         for seen in each.seen:
@@ -158,7 +158,7 @@ def _cost(errors: Sequence[Array], whiteners: Sequence[Array], usual: float) -> 
     return total
 
 
-def _slopes(lens: Lens, each: Station, mount: Array, target: Array) -> Array:
+def slopes_of(lens: Lens, each: Station, mount: Array, target: Array) -> Array:
     """Return the derivatives of a station's pixels by small motions of mount and target (rotation, displacement)."""
     hand_from_parent, camera_from_hand = inverted(each.hand), inverted(mount)
     placed = each.points @ target[:3, :3].T + target[:3, 3]
@@ -183,7 +183,7 @@ def _equations(
     """Return the normal equations for small motions of mount and target (rotation, displacement)."""
     normal, right = np.zeros((12, 12)), np.zeros(12)
     for each, left, root in zip(stations, errors, whiteners, strict=True):
-        a = root @ _slopes(lens, each, mount, target)
+        a = root @ slopes_of(lens, each, mount, target)
         white = root @ left.ravel()
         weight = 1.0 / (1.0 + float(white @ white) / usual**2 / (_SOFT**2 * len(white))) / usual**2
         normal += weight * a.T @ a

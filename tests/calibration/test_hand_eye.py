@@ -2,6 +2,7 @@
 
 import functools
 import math
+import re
 from collections.abc import Callable
 
 import cv2
@@ -13,6 +14,7 @@ from arcor2_hw.calibration.hand_eye import find_hand_eye
 from arcor2_hw.calibration.hand_eye_methods import METHODS, Method
 from arcor2_hw.calibration.layout import CharucoBoard, Layout
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.calibration.results import Grade
 from arcor2_hw.calibration.rigid import inverted, motion, turned
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose, Position
@@ -201,3 +203,50 @@ def test_a_pose_with_nan_is_named() -> None:
     taken[2] = HandEyeSample(Pose(Position(math.inf)), taken[2].picture)
     with pytest.raises(InvalidData, match="sample 2"):
         find_hand_eye(taken, GIVEN, TARGET, "eye_in_hand")
+
+
+# ------------------------------------------------------------------------------------------------ goodness of fit
+@pytest.mark.parametrize("mounting", ["eye_in_hand", "eye_to_hand"])
+@pytest.mark.parametrize("size", [0.99, 1.03])
+def test_a_target_of_another_size_is_refused(mounting: Mounting, size: float) -> None:
+    """One percent of the size moves the camera by 4 mm; the corners alone fit as well as the right size."""
+    target = Layout(boards=[CharucoBoard(7, 5, 0.04 * size, 0.03 * size)])
+    error = refused(lambda: find_hand_eye(samples(mounting), GIVEN, target, mounting))
+    assert error.reason == Reason.IMPLAUSIBLE
+    wrong = f"{abs(1 / size - 1):.1%} {'smaller' if size > 1 else 'larger'}"
+    assert f"the target seems {wrong}" in str(error)
+
+
+def test_a_target_half_a_percent_off_is_not_good() -> None:
+    target = Layout(boards=[CharucoBoard(7, 5, 0.0402, 0.03015)])
+    found = find_hand_eye(samples("eye_in_hand"), GIVEN, target, "eye_in_hand")
+    assert found.grade == Grade.USABLE
+    assert "the target seems 0.5% smaller" in found.verdict
+    assert off(found.pose, FLANGE_FROM_CAMERA)[0] < 3 * found.position_deviation
+
+
+def test_a_focal_length_off_is_refused() -> None:
+    shown = CameraParameters(606.0, 605.0, 322.0, 237.0, list(LENS.coefficients))
+    error = refused(lambda: find_hand_eye(samples("eye_in_hand"), shown, TARGET, "eye_in_hand"))
+    assert "the focal length seems 1.0% smaller" in str(error)
+
+
+def test_the_verdict_states_the_effect_of_a_size_that_is_not_confirmed() -> None:
+    """A robot that is off by 0.5 mm hides a target that is 1 % too large; the verdict says how far the camera moves."""
+    noisy = samples("eye_in_hand", 1.7e-3)
+    right, larger = (
+        find_hand_eye(noisy, GIVEN, Layout(boards=[CharucoBoard(7, 5, 0.04 * size, 0.03 * size)]), "eye_in_hand")
+        for size in (1.0, 1.01)
+    )
+    assert larger.grade == Grade.USABLE
+    moved = 1000 * right.pose.position.distance_to(larger.pose.position)
+    assert moved > 2000 * larger.position_deviation
+    for found in (right, larger):
+        stated = re.search(r"1 % of the size moves the camera by ([\d.]+) mm", found.verdict)
+        assert stated is not None
+        assert float(stated[1]) == pytest.approx(moved, rel=0.1)
+
+
+def test_a_result_with_an_exact_robot_is_good() -> None:
+    assert in_hand().grade == Grade.GOOD
+    assert "confirm the size of the target" in in_hand().verdict
