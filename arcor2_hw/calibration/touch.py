@@ -27,6 +27,12 @@ ORIENTATION_SPREAD: Final = 0.12
 TIP_FITS: Final = 0.0005
 TIP_MISFIT: Final = 0.01
 """Root mean square residual above which the tip was not at one point, m."""
+ANGLE_GOOD: Final = math.radians(0.25)
+"""Standard deviation of a frame's orientation up to which it is good, rad: less than 1° in 4 standard deviations."""
+TOUCH_DEVIATION: Final = 0.0005
+"""Expected standard deviation of a touched coordinate, m."""
+TOUCH_FREEDOM: Final = 4
+"""Degrees of freedom that the expected deviation counts for against the residuals of the touched points."""
 TURN_FITS: Final = math.radians(0.5)
 TURN_MISFIT: Final = math.radians(5.0)
 _MOST: Final = 1000
@@ -61,11 +67,11 @@ def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]
         raise _on_one_line()
     checked = len(points) > 3
     middle = points.mean(axis=0)
+    _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
     if checked:
-        _, spread, axes = np.linalg.svd(points - middle, full_matrices=False)
         normal = axes[2] * math.copysign(1.0, float(axes[2] @ upward))
     else:
-        spread, normal, middle = np.ones(3), upward / np.linalg.norm(upward), points[0]
+        normal, middle = upward / np.linalg.norm(upward), points[0]
     heights = (points - middle) @ normal
     x = along - (along @ normal) * normal
     x /= np.linalg.norm(x)
@@ -74,9 +80,9 @@ def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]
     base_from_frame[:3, 3] = points[0] - heights[0] * normal
     residuals = np.abs(heights) if checked else np.zeros(len(points))
     _refuse_misfit(residuals, points, "The points are not in one plane")
-    deviation = 0.0
-    if checked:
-        deviation = float(np.sqrt((heights @ heights) / (len(points) - 3)) / spread[1])
+    # Tilt follows from all points of the plane, heading only from the two points of the x axis.
+    touch = _touch_deviation(residuals, len(points) - 3)
+    deviation = touch * max(1.0 / float(spread[1]), math.sqrt(2.0) / float(np.linalg.norm(along)))
     return _frame(base_from_frame, residuals, checked, deviation, "Touch a further point of the plane to check it.")
 
 
@@ -116,9 +122,9 @@ def frame_by_points(known: Sequence[Position], touched: Sequence[Position]) -> T
     base_from_frame = np.eye(4)
     base_from_frame[:3, :3] = rotation
     base_from_frame[:3, 3] = theirs.mean(axis=0) - rotation @ ours.mean(axis=0)
-    variance = float(residuals @ residuals) / (3 * len(ours) - 6)
     information = np.eye(3) * np.sum(a * a) - a.T @ a
-    deviation = float(np.sqrt(variance / np.linalg.eigvalsh(information)[0]))
+    touch = _touch_deviation(residuals, 3 * len(ours) - 6)
+    deviation = touch / math.sqrt(float(np.linalg.eigvalsh(information)[0]))
     return _frame(base_from_frame, residuals, True, deviation, "")
 
 
@@ -314,18 +320,33 @@ def _refuse_misfit(residuals: Floats, points: Floats, what: str) -> None:
         )
 
 
+def _touch_deviation(residuals: Floats, freedom: int) -> float:
+    """Return the standard deviation of a touched coordinate, m, from residuals and the expected deviation.
+
+    Few points can agree by chance, so the residuals are pooled with the expected deviation.
+
+    Source: A. Gelman et al., "Bayesian data analysis", 3rd ed. (2013), section 2.6: normal distribution with known mean
+    and unknown variance, scaled inverse chi-square prior.
+    """
+    squares = float(residuals @ residuals) + TOUCH_FREEDOM * TOUCH_DEVIATION**2
+    return math.sqrt(squares / (freedom + TOUCH_FREEDOM))
+
+
 def _frame(matrix: Floats, residuals: Floats, checked: bool, deviation: float, advice: str) -> TouchedFrame:
     residual, worst = _rms(residuals), int(np.argmax(residuals))
-    good = checked and residual <= FITS
+    good = checked and residual <= FITS and deviation <= ANGLE_GOOD
+    known = f"The frame's orientation is known to {math.degrees(deviation):.2f}° (standard deviation)."
     if not checked:
         verdict = f"The three points determine the frame, but cannot be checked. {advice}"
-    elif good:
-        verdict = f"The {len(residuals)} points agree to {residual * 1e3:.2f} mm."
-    else:
+    elif residual > FITS:
         verdict = (
             f"The {len(residuals)} points agree to {residual * 1e3:.1f} mm only; point {worst + 1} is"
-            f" {residuals[worst] * 1e3:.1f} mm off: touch it again."
+            f" {residuals[worst] * 1e3:.1f} mm off: touch it again. {known}"
         )
+    else:
+        verdict = f"The {len(residuals)} points agree to {residual * 1e3:.2f} mm. {known}"
+    if deviation > ANGLE_GOOD:
+        verdict += " Touch points that are farther apart."
     return TouchedFrame(
         pose=Pose.from_matrix(matrix),
         grade=Grade.GOOD if good else Grade.USABLE,

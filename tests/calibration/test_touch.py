@@ -59,6 +59,24 @@ def test_more_points_of_the_plane_reduce_and_measure_the_error() -> None:
     assert 0.3 < np.median(tilts) < 2.0  # the stated deviation is that of what happens
 
 
+@pytest.mark.parametrize("by", ["axes", "points"])
+def test_four_points_near_each_other_are_not_good(by: str) -> None:
+    """Four points within 30 mm agree to half a millimetre and still turn the frame by a degree."""
+    near = [Position(0, 0, 0), Position(0.03, 0, 0), Position(0.03, 0.03, 0), Position(0, 0.03, 0)]
+    turned = 0
+    for seed in range(20):
+        points = shaken([place(POSE, point) for point in near], 0.0005, seed)
+        if by == "axes":
+            found = touch.frame_by_axes(points[0], points[1], points[2:])
+        else:
+            found = touch.frame_by_points(near, points)
+        turned += off(found.pose, POSE)[1] > math.radians(1.0)
+        assert found.grade is Grade.USABLE
+        assert found.angle_deviation > math.radians(0.25)
+        assert "farther apart" in found.verdict
+    assert turned > 5
+
+
 def test_a_wrongly_touched_point_is_named() -> None:
     points = [place(POSE, point) for point in CORNERS]
     points[3] += Position(0.0, 0.0, 0.006)
