@@ -21,7 +21,14 @@ from arcor2_hw.calibration.robot_pose import find_robot_pose
 from arcor2_hw.data.geometry import Pose
 from benchmarks.metrics import Metric, Report, median, percentile
 from tests.calibration.depth_sensor import Block, Capsule, Sensor, arm, looking, shift, tool
-from tests.calibration.workplace import LARGE, View, drawn, joints_above_the_table, surface_of_arm, told
+from tests.calibration.workplace import (
+    LARGE,
+    View,
+    configured_parameters,
+    drawn,
+    joints_above_the_table,
+    surface_of_arm,
+)
 
 SEED: Final = 20261121
 VIEWS: Final = 30
@@ -103,5 +110,5 @@ def _impostors(count: int) -> list[View]:
         eye = looking(np.array([0, 0, 0.35]), np.array([1.1 * math.cos(around), 1.1 * math.sin(around), 0.9]))
         depth = sensor.take(eye, rng)
         poses = (Pose.from_matrix(eye), Pose.from_matrix(assumed), Pose())
-        views.append(View(surface_of_arm(modelled), depth, told(sensor), *poses))
+        views.append(View(surface_of_arm(modelled), depth, configured_parameters(sensor), *poses))
     return views

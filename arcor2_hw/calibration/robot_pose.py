@@ -84,7 +84,10 @@ def find_robot_pose(
     assumed: Pose,
     options: RobotPoseOptions | None = None,
 ) -> RobotPose:
-    """Find the pose of a robot's base in the world.
+    """Find the pose of a robot's base in the world, from one joint state.
+
+    The grade is never better than usable: a joint or a model that is slightly wrong moves the base by centimetres and
+    may still fit the image. `find_robot_pose_of_states` checks them.
 
     Args:
         surface: The robot at the joint values of the image.
@@ -126,15 +129,9 @@ def find_robot_pose(
     moved, turned = pose.position.distance_to(assumed.position), pose.orientation.angle_to(assumed.orientation)
     _refuse_ambiguous(surface, ends)
     agreed = ends[0].starts
-    good = (
-        deviations[0] <= GOOD[0]
-        and deviations[1] <= GOOD[1]
-        and compared.uneven <= UNEVEN[0]
-        and compared.contradicted <= limits.most_contradicted / 2.0
-    )
     return RobotPose(
         pose=pose,
-        grade=Grade.GOOD if good else Grade.USABLE,
+        grade=Grade.USABLE,
         verdict=_verdict(surface.name, compared, deviations, moved, turned),
         fitness=compared.confirmed,
         occluded=compared.occluded,
@@ -223,4 +220,4 @@ def _verdict(name: str, found: Compared, deviations: tuple[float, ...], moved: f
         sentence += f" Parts of it are {found.uneven * 1e3:.0f} mm off: check its joints and its model."
     if found.occluded > 0.2:
         sentence += f" {found.occluded:.0%} is hidden."
-    return sentence
+    return sentence + " One joint state does not check the joints and the model: compare several."

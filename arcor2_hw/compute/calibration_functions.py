@@ -74,22 +74,25 @@ def robot_pose(task: t.FindRobotPose, state: WorkerState) -> RobotPose:
     import numpy as np
 
     from arcor2_hw.calibration.depth import read_depth
-    from arcor2_hw.calibration.robot_pose import RobotPoseOptions, find_robot_pose
+    from arcor2_hw.calibration.robot_pose import RobotPoseOptions
+    from arcor2_hw.calibration.robot_states import JointState, find_robot_pose_of_states
     from arcor2_hw.calibration.surface import surface_of
 
-    if not task.depth:
-        raise InvalidData("The pose of a robot needs at least one depth image. Take one, then try again.")
-    state.progress(0.0, "reading the depth images")
-    depth = [read_depth(picture) for picture in task.depth]
-    if len({picture.shape for picture in depth}) > 1:
-        raise InvalidData("The depth images have different sizes. Take all of them with the same camera settings.")
-    state.progress(0.1, "reading the robot's model")
-    surface = surface_of(state.robot(task.robot), task.joints)
-    if task.robot.called:
-        surface = replace(surface, name=task.robot.called)
+    states = []
+    for index, each in enumerate([t.RobotState(task.joints, task.depth), *task.other_states]):
+        if not each.depth:
+            raise InvalidData("The pose of a robot needs at least one depth image. Take one, then try again.")
+        state.progress(0.3 * index / (len(task.other_states) + 1), "reading the depth images and the robot's model")
+        depth = [read_depth(picture) for picture in each.depth]
+        if len({picture.shape for picture in depth}) > 1:
+            raise InvalidData("The depth images have different sizes. Take all of them with the same camera settings.")
+        surface = surface_of(state.robot(task.robot), each.joints)
+        if task.robot.called:
+            surface = replace(surface, name=task.robot.called)
+        states.append(JointState(surface, np.stack(depth)))
     state.progress(0.3, "searching for the robot")
     options = RobotPoseOptions(within=task.distance, angle_within=task.angle)
-    return find_robot_pose(surface, np.stack(depth), task.parameters, task.camera_pose, task.robot.base, options)
+    return find_robot_pose_of_states(states, task.parameters, task.camera_pose, task.robot.base, options)
 
 
 # ------------------------------------------------------------------------------------------------ by touch

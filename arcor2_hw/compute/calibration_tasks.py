@@ -1,5 +1,6 @@
 """Tasks of the calibration worker. Imports no numerics, so that the server can use it."""
 
+from collections.abc import Sequence
 from typing import ClassVar, Generic
 
 from msgspec import field
@@ -19,9 +20,11 @@ from arcor2_hw.calibration.layout import CharucoBoard, Layout, MarkerDictionary
 from arcor2_hw.calibration.results import RobotPose, TouchedFrame, TouchedOrientation, TouchedTip
 from arcor2_hw.collision.description import RobotSource
 from arcor2_hw.compute.task import R, Task, WorkerKind
+from arcor2_hw.data.base import Data
 from arcor2_hw.data.camera import CameraParameters, MarkerCorners
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import InvalidData
 
 _FUNCTIONS = "arcor2_hw.compute.calibration_functions"
 
@@ -80,6 +83,29 @@ class FindMarkers(Task[list[MarkerCorners]], frozen=True):
     dictionary: MarkerDictionary = "4x4_50"
 
 
+class RobotState(Data, frozen=True):
+    """Joint values of a robot, and depth images (PNG, 16 bit, mm) with these values."""
+
+    joints: list[Joint]
+    depth: list[bytes]
+
+
+def states_of(joints: Sequence[list[Joint]], depth: Sequence[bytes]) -> list[RobotState]:
+    """Return joint states, each with an equal part of the depth images in their order.
+
+    Raises:
+        InvalidData: The images cannot be divided equally.
+    """
+    share, rest = divmod(len(depth), len(joints))
+    if rest or not share:
+        raise InvalidData(
+            "{count} joint states need an equal number of depth images each, not {images} in total.",
+            count=len(joints),
+            images=len(depth),
+        )
+    return [RobotState(each, list(depth[i * share : (i + 1) * share])) for i, each in enumerate(joints)]
+
+
 class FindRobotPose(Task[RobotPose], frozen=True):
     """Find the pose of a robot from depth images.
 
@@ -91,12 +117,13 @@ class FindRobotPose(Task[RobotPose], frozen=True):
         camera_pose: Pose of the camera in the world.
         distance: Maximum position error of the assumed pose, m.
         angle: Maximum orientation error of the assumed pose, rad.
+        other_states: Further joint states, which check the joints and the model.
     """
 
     result_type: ClassVar = RobotPose
     function: ClassVar = "arcor2_hw.compute.calibration_functions:robot_pose"
     worker: ClassVar = WorkerKind.CALIBRATION
-    timeout: ClassVar = 60.0
+    timeout: ClassVar = 180.0
     label: ClassVar = "the pose of a robot"
 
     robot: RobotSource
@@ -106,6 +133,7 @@ class FindRobotPose(Task[RobotPose], frozen=True):
     camera_pose: Pose
     distance: float = 0.08
     angle: float = 0.14
+    other_states: list[RobotState] = field(default_factory=list)
 
 
 class FindHandEye(Task[HandEye], frozen=True):

@@ -9,14 +9,16 @@ import pytest
 from arcor2_hw.calibration.depth import depth_view, mean_depth, read_depth
 from arcor2_hw.calibration.pictures import InvalidPicture
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
-from arcor2_hw.calibration.results import Grade
+from arcor2_hw.calibration.results import Grade, RobotPose
 from arcor2_hw.calibration.robot_pose import RobotPoseOptions, find_robot_pose
+from arcor2_hw.calibration.robot_states import JointState, find_robot_pose_of_states
 from arcor2_hw.calibration.surface import RobotSurface
+from arcor2_hw.compute.calibration_tasks import states_of
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import InvalidData
 from tests.calibration.depth_sensor import Block, Capsule, Floats, Sensor, arm, looking, shift, tool, triangles, turn
-from tests.calibration.workplace import View, drawn, surface_of_arm, told
+from tests.calibration.workplace import States, View, configured_parameters, drawn, states, surface_of_arm
 
 JOINTS = [0.3, -1.3, 1.4, -1.2, -1.5, 0.2]
 EYE = looking(np.array([0.0, 0.0, 0.4]), np.array([1.0, 0.7, 0.9]))
@@ -27,7 +29,7 @@ def seen(shapes: list[Block | Capsule], eye: Floats = EYE, joints: list[float] =
     sensor = Sensor(shapes=shapes, wall=-2.0)
     picture = sensor.take(eye, np.random.default_rng(3))
     poses = (Pose.from_matrix(eye), Pose.from_matrix(ASSUMED), Pose())
-    return View(surface_of_arm(joints), picture, told(sensor), *poses)
+    return View(surface_of_arm(joints), picture, configured_parameters(sensor), *poses)
 
 
 @pytest.fixture(scope="module")
@@ -64,8 +66,43 @@ def test_an_arm_is_found_from_50_mm_and_5_degrees_off(seed: int) -> None:
 def test_the_same_picture_gives_the_same_result(plain: View) -> None:
     first, second = solve(plain), solve(plain)
     assert first.pose == second.pose
-    assert first.grade is Grade.GOOD
+    assert first.grade is Grade.USABLE
     assert "confirms" in first.verdict
+    assert "One joint state does not check the joints" in first.verdict
+
+
+@pytest.fixture(scope="module")
+def three() -> States:
+    return states(0)
+
+
+def of_states(view: States, surfaces: list[RobotSurface]) -> RobotPose:
+    given = [JointState(surface, depth) for surface, depth in zip(surfaces, view.depths, strict=True)]
+    return find_robot_pose_of_states(given, view.parameters, view.camera, view.assumed)
+
+
+def test_joint_states_that_agree_are_good(three: States) -> None:
+    found = of_states(three, three.off(0, 0.0))
+    assert found.grade is Grade.GOOD
+    distance = found.pose.position.distance_to(three.true.position)
+    assert distance < min(0.003, 6.0 * found.position_deviation)
+    assert "The poses of 3 joint states differ by up to" in found.verdict
+
+
+def test_a_wrong_joint_is_refused_by_comparing_joint_states(three: States) -> None:
+    """Each state alone fits with half a millimetre stated, and is centimetres off."""
+    with pytest.raises(CalibrationRefused, match="zero positions") as caught:
+        of_states(three, three.off(1, math.radians(2.0)))
+    assert caught.value.reason is Reason.IMPLAUSIBLE
+
+
+def test_the_number_of_joint_states_is_checked(three: States) -> None:
+    with pytest.raises(InvalidData, match="not 0"):
+        find_robot_pose_of_states([], three.parameters, three.camera, three.assumed)
+    assert [len(each.depth) for each in states_of([[], []], [b""] * 6)] == [3, 3]
+    for images in (0, 5):
+        with pytest.raises(InvalidData, match=f"not {images} in total"):
+            states_of([[], []], [b""] * images)
 
 
 def test_averaged_pictures_reduce_the_error(plain: View) -> None:

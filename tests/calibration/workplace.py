@@ -13,7 +13,7 @@ from tests.calibration.depth_sensor import Floats, Sensor, arm, looking, moved, 
 
 LARGE = {"width": 1280, "height": 720, "fx": 912.5, "fy": 912.1, "cx": 642.3, "cy": 357.8}
 INTRINSICS_OFF = 0.0005
-"""Part by which fx and fy that the solver is told are wrong; cx and cy are wrong by a quarter of a pixel."""
+"""Relative error of the fx and fy that the solver receives. Its cx and cy are a quarter of a pixel off."""
 
 
 @dataclass(frozen=True)
@@ -65,16 +65,50 @@ def drawn(seed: int, distance: float = 0.05, angle: float = math.radians(5.0), l
     return View(
         surface_of_arm(joints),
         sensor.take(camera, rng),
-        told(sensor),
+        configured_parameters(sensor),
         Pose.from_matrix(camera),
         Pose.from_matrix(off_by(true, distance, angle, rng)),
         Pose.from_matrix(true),
     )
 
 
-def told(sensor: Sensor) -> CameraParameters:
-    """The sensor's parameters as a solver is told them."""
+def configured_parameters(sensor: Sensor) -> CameraParameters:
+    """Return the intrinsic parameters that the solver receives. They deviate from those of the sensor."""
     factor = 1.0 + INTRINSICS_OFF
     return CameraParameters(
         sensor.fx * factor, sensor.fy * factor, sensor.cx + 0.25, sensor.cy - 0.25, list(sensor.distortion)
     )
+
+
+@dataclass(frozen=True)
+class States:
+    """Depth images of one arm in several joint states, and the truth."""
+
+    joints: list[list[float]]
+    depths: list[npt.NDArray[np.uint16]]
+    parameters: CameraParameters
+    camera: Pose
+    assumed: Pose
+    true: Pose
+
+    def off(self, joint: int, angle: float) -> list[RobotSurface]:
+        """The surfaces with a joint off by an angle, rad."""
+        return [surface_of_arm([q + angle * (i == joint) for i, q in enumerate(each)]) for each in self.joints]
+
+
+def states(seed: int, count: int = 3) -> States:
+    """An arm in several joint states before one camera, 1.3 to 1.8 m away, 20 to 50° above."""
+    rng = np.random.default_rng(seed)
+    true = shift(*rng.uniform(-0.1, 0.1, 2), 0.0) @ turn(np.array([0.0, 0.0, 1.0]), rng.uniform(-3, 3))
+    joints = [joints_above_the_table(rng) for _ in range(count)]
+    middle = np.mean([(true @ [*link.begin, 1.0])[:3] for each in joints for link in arm(each)], axis=0)
+    up, around = math.radians(rng.uniform(20, 50)), rng.uniform(-math.pi, math.pi)
+    direction = np.array([math.cos(up) * math.cos(around), math.cos(up) * math.sin(around), math.sin(up)])
+    camera = looking(middle, middle + rng.uniform(1.3, 1.8) * direction)
+    depths = []
+    for each in joints:
+        sensor = Sensor(shapes=[moved(shape, true) for shape in [*arm(each), *tool(each)]], wall=-2.0)
+        depths.append(sensor.take(camera, rng))
+    assumed = off_by(true, 0.05, math.radians(5.0), rng)
+    poses = (Pose.from_matrix(camera), Pose.from_matrix(assumed), Pose.from_matrix(true))
+    return States(joints, depths, configured_parameters(sensor), *poses)

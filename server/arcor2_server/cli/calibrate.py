@@ -168,7 +168,13 @@ def check_lens(*pictures: ViewPictures, view: MarkerView, json: AsJson = False, 
 def robot(
     *depth: Annotated[Path, Parameter(help="Depth pictures (PNG, 16 bit, mm) taken while the robot did not move.")],
     model: Annotated[Path, Parameter(help="URDF of the robot: a file, a folder, or a zip archive with its meshes.")],
-    joints: Annotated[Path, Parameter(help="YAML file with a list of joint names and values during the pictures.")],
+    joints: Annotated[
+        list[Path],
+        Parameter(
+            help="YAML file with a list of joint names and values during the pictures. Repeat it for several joint "
+            "states, which check the joints and the model; each has an equal number of the pictures, in this order."
+        ),
+    ],
     lens: Lens,
     camera: Annotated[Path, Parameter(help="YAML file with the camera pose, as `calibrate camera -o` writes.")],
     assumed: Annotated[Path, Parameter(help="YAML file with the approximate pose of the robot.")],
@@ -184,15 +190,18 @@ def robot(
 
     async def work() -> None:
         described = RobotSource(StoredFile(str(model.absolute()), model.name), read_as(assumed, Pose))
+        pictures = [picture_of(path) for path in depth]
+        first, *others = t.states_of([read_as(path, list[Joint]) for path in joints], pictures)
         found = await compute(
             t.FindRobotPose(
                 described,
-                read_as(joints, list[Joint]),
-                [picture_of(path) for path in depth],
+                first.joints,
+                first.depth,
                 read_as(lens, CameraParameters),
                 read_as(camera, Pose),
                 within,
                 math.radians(turned),
+                others,
             )
         )
         if out := _report(found, found.pose, output, json):

@@ -25,9 +25,11 @@ from arcor2_hw.calibration.layout import CharucoBoard, Layout
 from arcor2_hw.calibration.records import CalibrationInput, CalibrationKind, CalibrationRecord
 from arcor2_hw.calibration.results import RobotPose, TouchedFrame, TouchedOrientation, TouchedTip
 from arcor2_hw.compute import calibration_tasks
+from arcor2_hw.compute.calibration_tasks import states_of
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.compute.workers import Compute
@@ -40,6 +42,8 @@ from arcor2_server.workspace.robots import SceneRobots
 
 MAX_PICTURES: Final = 256 * MIB
 """Maximum size of all pictures of a request, bytes."""
+MOST_STATES: Final = 19
+"""Maximum number of further joint states of a request."""
 MOST_POINTS: Final = 1000
 """Maximum number of points of a request."""
 
@@ -70,8 +74,13 @@ class CameraPictureArgs(Data, frozen=True):
 
 
 class RobotArgs(CalibrateRobotArgs, frozen=True):
-    """A robot seen by a camera. distance (m), angle (rad): maximum errors of its assumed pose."""
+    """A robot seen by a camera. distance (m), angle (rad): maximum errors of its assumed pose.
 
+    other_joints: joint values of further states, which check the joints and the model. The pictures are then an equal
+    number for each state, in this order.
+    """
+
+    other_joints: Annotated[list[list[Joint]], Meta(max_length=MOST_STATES)] = field(default_factory=list)
     distance: Annotated[float, Meta(gt=0, le=1)] = 0.08
     angle: Annotated[float, Meta(gt=0, le=1)] = 0.14
     record: RecordAs | Unset = UNSET
@@ -222,9 +231,17 @@ class CalibrationMethodOperations:
         args = read_args(uploads.fields["args"], RobotArgs)
         pictures = await _pictures(uploads)
         model = replace(self._robots.model_of_uri(args.urdf_uri), base=args.robot_pose)
+        first, *others = states_of([args.robot_joints, *args.other_joints], pictures)
         found = await self._compute.run(
             calibration_tasks.FindRobotPose(
-                model, args.robot_joints, pictures, args.camera_parameters, args.camera_pose, args.distance, args.angle
+                model,
+                first.joints,
+                first.depth,
+                args.camera_parameters,
+                args.camera_pose,
+                args.distance,
+                args.angle,
+                others,
             )
         )
         parameters = {"view": replace(args, record=UNSET)}
