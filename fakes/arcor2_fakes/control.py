@@ -17,9 +17,9 @@ import inspect
 import itertools
 import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import msgspec
 
@@ -36,6 +36,10 @@ _encoder = msgspec.json.Encoder()
 _decoder = msgspec.json.Decoder()
 
 
+T = TypeVar("T")
+N = TypeVar("N", int, float)
+
+
 class ControlError(Exception):
     """The fake refused a command, or the control channel broke or did not answer in time."""
 
@@ -46,6 +50,20 @@ def parse_address(address: str) -> tuple[str, int]:
     if not separator or not host or not port.isdigit() or int(port) > 0xFFFF:
         raise ValueError(f"{address!r} is not HOST:PORT")
     return host.strip("[]"), int(port)
+
+
+def one_of(name: str, value: T, allowed: Collection[T]) -> T:
+    """Return an argument of a command. Raise `ValueError` unless it is one of the allowed values."""
+    if value not in allowed:
+        raise ValueError(f"{name} is one of {', '.join(map(str, allowed))}")
+    return value
+
+
+def within(name: str, value: N, least: float, most: float) -> N:
+    """Return a number given to a command. Raise `ValueError` unless it is in a range."""
+    if not least <= value <= most:
+        raise ValueError(f"{name} is {least} to {most}")
+    return value
 
 
 class ControlServer:

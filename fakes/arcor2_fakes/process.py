@@ -62,7 +62,9 @@ async def wait_for_end() -> None:
 
 
 def run(main: Callable[[], Awaitable[None]], name: str, *, ahead: bool = True) -> int:
-    """Run a fake until its end and return the exit status: 0, or 1 with a line on standard error if a port is in use.
+    """Run a fake until its end and return the exit status.
+
+    It is 0, or 1 with a line on standard error if a port is in use or a module is missing.
 
     Args:
         main: The fake.
@@ -84,7 +86,7 @@ def run(main: Callable[[], Awaitable[None]], name: str, *, ahead: bool = True) -
 
     try:
         uvloop.run(body())
-    except OSError as e:
+    except (OSError, ModuleNotFoundError) as e:
         sys.stderr.write(f"{name}: {e}\n")
         return 1
     return 0

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
+from arcor2_fakes.control import parse_address
 from arcor2_fakes.wire import Connection, Faults, TcpWire
 
 _CHUNK = 4096
@@ -179,6 +180,11 @@ class TcpLine:
         """Apply one of the shared faults."""
         await self._wire.fault(kind, seconds)
         self._plugged = self._plugged if kind not in ("refuse", "heal") else kind == "heal"
+
+
+def line_at(feed: Callable[[bytes], None], link: Path | None, tcp: str | None) -> Line:
+    """Return a line on TCP at HOST:PORT, or on a pty with a symbolic link. Raise `ValueError` for another address."""
+    return PtyLine(feed, link) if tcp is None else TcpLine(feed, *parse_address(tcp))
 
 
 def _point(link: Path, target: str) -> None:

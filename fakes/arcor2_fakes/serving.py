@@ -20,6 +20,8 @@ class Fake:
 
     def __init__(self, name: str, channel: ControlServer) -> None:
         self.name, self.channel = name, channel
+        self.ready = False
+        """Whether the ready line was printed."""
         self._wires: dict[str, Wire] = {}
         self._ends: list[Callable[[], object]] = []
 
@@ -27,6 +29,24 @@ class Fake:
         """Register commands of the control channel by name."""
         for name, handler in handlers.items():
             self.channel.command(name, handler)
+
+    def switches(self, device: object, changed: Callable[[], object] = lambda: None, /, **attributes: str) -> None:
+        """Register commands that switch an attribute of the device, and then call `changed`.
+
+        Args:
+            device: The device.
+            changed: Called after each switching.
+            attributes: Attributes by the name of the command.
+        """
+
+        def switch(attribute: str) -> Handler:
+            def apply(on: bool = True) -> None:
+                setattr(device, attribute, bool(on))
+                changed()
+
+            return apply
+
+        self.commands(**{command: switch(attribute) for command, attribute in attributes.items()})
 
     def truth(self, read: Callable[[], Any]) -> None:
         """Register the true state as source `truth` of the control channel."""
@@ -88,6 +108,17 @@ class Fake:
         self.wires((name,) if checked else (), **{name: line})
         self.commands(plug=plug, unplug=unplug)
 
+    def renewable(self, reset: Callable[[], object]) -> None:
+        """Register the command `renew`, which calls `reset` and repairs the wires, for tests that share a process."""
+
+        async def renew() -> None:
+            reset()
+            for wire in self._wires.values():
+                await wire.fault("heal")
+            self.reset_wires()
+
+        self.commands(renew=renew)
+
     def reset_wires(self) -> None:
         """Break every TCP connection."""
         for wire in self._wires.values():
@@ -104,6 +135,7 @@ class Fake:
             await (wire.listen() if isinstance(wire, TcpWire) else wire.plug())
         shown = {name: each() if callable(each) else address_of(each) for name, each in addresses.items()}
         announce(name=self.name, **shown, control=await self.channel.start())
+        self.ready = True
         await wait_for_end()
 
     async def close(self) -> None:
@@ -126,32 +158,35 @@ def address_of(wire: Wire) -> str:
     return wire.address if isinstance(wire, TcpWire) else wire.port
 
 
-def serve(
-    name: str, control: str, body: Callable[[Fake], Awaitable[None]], *addresses: str | None, ahead: bool = True
-) -> int:
-    """Run a fake until its end and return the exit status: 2 for an address that is not HOST:PORT.
+def serve(name: str, control: str, body: Callable[[Fake], Awaitable[None]], *, ahead: bool = True) -> int:
+    """Run a fake until its end and return the exit status.
 
     Args:
         name: Name of the fake, for messages.
         control: HOST:PORT of the control channel.
-        body: Builds the device and awaits `Fake.run`.
-        addresses: Further addresses to check first; None for one that is not set.
+        body: Builds the device and awaits `Fake.run`. A ValueError before that names a wrong option; the status is 2.
         ahead: Whether to request a higher priority; see `process.run`.
     """
-    try:
-        host, port = parse_address(control)
-        for address in addresses:
-            if address is not None:
-                parse_address(address)
-    except ValueError as e:
-        sys.stderr.write(f"{name}: {e}\n")
-        return 2
+    wrong = ""
 
     async def main() -> None:
-        fake = Fake(name, ControlServer(host, port))
+        nonlocal wrong
+        try:
+            fake = Fake(name, ControlServer(*parse_address(control)))
+        except ValueError as e:
+            wrong = str(e)
+            return
         try:
             await body(fake)
+        except ValueError as e:
+            if fake.ready:
+                raise
+            wrong = str(e)
         finally:
             await fake.close()
 
-    return run(main, name, ahead=ahead)
+    status = run(main, name, ahead=ahead)
+    if wrong:
+        sys.stderr.write(f"{name}: {wrong}\n")
+        return 2
+    return status

@@ -140,7 +140,7 @@ class Connection(asyncio.Protocol):
     def send(self, frame: bytes) -> bool:
         """Send a frame, subject to the faults of the wire. Return whether it was sent."""
         faults = self.wire.faults
-        if not self.alive or self._torn or self._transport.get_write_buffer_size() > _MAX_UNSENT:
+        if not self.alive or self._torn or self.congested:
             return False
         data = faults.outgoing(frame)
         if len(data) < len(frame):
@@ -156,6 +156,11 @@ class Connection(asyncio.Protocol):
         else:
             self._transport.write(data)
         return True
+
+    @property
+    def congested(self) -> bool:
+        """Return whether the client does not read, so that frames are dropped."""
+        return self._transport.get_write_buffer_size() > _MAX_UNSENT
 
     def close(self) -> None:
         """Close after everything has been sent."""

@@ -6,28 +6,26 @@ import sys
 from typing import Annotated
 
 import numpy as np
-from cyclopts import App, Parameter, validators
+from cyclopts import Parameter, validators
 
-from arcor2_fakes.abb_yumi.arm import Hand
+from arcor2_fakes.abb_yumi.arm import HAND_STROKE, PART_WIDTH, Hand
 from arcor2_fakes.abb_yumi.controller import TASKS, Controller
 from arcor2_fakes.abb_yumi.http_port import HttpPort
 from arcor2_fakes.abb_yumi.motion_server import MotionServer
 from arcor2_fakes.abb_yumi.services import Services
-from arcor2_fakes.serving import Fake, serve
+from arcor2_fakes.control import one_of, within
+from arcor2_fakes.program import program
+from arcor2_fakes.serving import Fake
 from arcor2_fakes.wire import TcpWire
 
 _TICK = 0.004  # s
-
-app = App(name="arcor2_fakes.abb_yumi", help="Fake ABB YuMi: RWS 1.0 and a motion server per arm.", version_flags=[])
 
 
 def register_commands(fake: Fake, controller: Controller, http: HttpPort) -> None:
     """Register the commands of the control channel."""
 
     def arm_of(arm: str) -> str:
-        if arm not in TASKS:
-            raise ValueError(f"arm is one of {', '.join(TASKS)}")
-        return arm
+        return one_of("arm", arm, TASKS)
 
     def place(arm: str, joints: list[float] | None = None) -> None:
         body = controller.arms[arm_of(arm)]
@@ -35,13 +33,13 @@ def register_commands(fake: Fake, controller: Controller, http: HttpPort) -> Non
             raise ValueError("joints are seven numbers, degrees, axes 1 to 7")
         body.place(body.kinematics.home if joints is None else np.radians(joints))
 
-    def part(arm: str, on: bool = True) -> None:
-        controller.arms[arm_of(arm)].hand.part = on
+    def part(arm: str, on: bool = True, width: float = PART_WIDTH) -> None:
+        if not 0.0 < width <= HAND_STROKE:
+            raise ValueError(f"width is up to {HAND_STROKE:g} m")
+        controller.arms[arm_of(arm)].hand.part = width if on else 0.0
 
     def speed_ratio(percent: int) -> None:
-        if not 0 <= percent <= 100:
-            raise ValueError("percent is 0 to 100")
-        controller.speed_ratio = percent
+        controller.speed_ratio = within("percent", percent, 0, 100)
 
     def renew() -> None:
         """Reset to the state as delivered: motors on, automatic, no sessions, both arms at home."""
@@ -81,8 +79,9 @@ def register_commands(fake: Fake, controller: Controller, http: HttpPort) -> Non
     )
 
 
-@app.default
-def main(
+@program("abb_yumi", "Fake ABB YuMi: RWS 1.0 and a motion server per arm.")
+async def main(
+    fake: Fake,
     *,
     host: str = "127.0.0.1",
     rws_port: int = 8080,
@@ -90,9 +89,8 @@ def main(
     right_port: int = 6111,
     user: str = "Default User",
     password: str = "robotics",  # noqa: S107 - what ABB delivers
-    control: str = "127.0.0.1:0",
     time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=100))] = 1.0,
-) -> int:
+) -> None:
     """Start the fake; it prints one line `ready {json}` with its addresses, and exits on SIGTERM.
 
     Args:
@@ -102,39 +100,34 @@ def main(
         right_port: Port of the right arm's commands; its watch port is the next one.
         user: User of the digest authentication.
         password: Password of the user.
-        control: HOST:PORT of the control channel; port 0 takes a free one.
         time_scale: Speed of the simulation; 1 is real time.
     """
+    controller = Controller(time_scale)
+    http = HttpPort(user, password, Services(controller).handle, controller.session_ended)
+    servers = {name: MotionServer(controller, name) for name in TASKS}
+    servers["left"].partner, servers["right"].partner = servers["right"], servers["left"]
+    wires = {"rws": TcpWire("rws", host, rws_port, http.opened)}
+    for name, port in (("left", left_port), ("right", right_port)):
+        server = servers[name]
+        server.wires = {
+            name: TcpWire(name, host, port, server.opened_commands),
+            f"{name}_watch": TcpWire(f"{name}_watch", host, port + 1, server.opened_watch),
+        }
+        wires |= server.wires
 
-    async def body(fake: Fake) -> None:
-        controller = Controller(time_scale)
-        http = HttpPort(user, password, Services(controller).handle, controller.session_ended)
-        servers = {name: MotionServer(controller, name) for name in TASKS}
-        servers["left"].partner, servers["right"].partner = servers["right"], servers["left"]
-        wires = {"rws": TcpWire("rws", host, rws_port, http.opened)}
-        for name, port in (("left", left_port), ("right", right_port)):
-            server = servers[name]
-            server.wires = {
-                name: TcpWire(name, host, port, server.opened_commands),
-                f"{name}_watch": TcpWire(f"{name}_watch", host, port + 1, server.opened_watch),
-            }
-            wires |= server.wires
+    def advance(seconds: float) -> None:
+        controller.advance(seconds)
+        for server in servers.values():
+            server.tick()
+        http.expire()
 
-        def advance(seconds: float) -> None:
-            controller.advance(seconds)
-            for server in servers.values():
-                server.tick()
-            http.expire()
-
-        register_commands(fake, controller, http)
-        fake.commands(stops=lambda: {name: list(server.stops_taken) for name, server in servers.items()})
-        fake.wires(**wires)
-        fake.truth(lambda: controller.truth() | {"requests": http.requests})
-        fake.simulate(advance, _TICK)
-        await fake.run(**wires, host=lambda: host)
-
-    return serve("abb_yumi", control, body)
+    register_commands(fake, controller, http)
+    fake.commands(stops=lambda: {name: list(server.stops_taken) for name, server in servers.items()})
+    fake.wires(**wires)
+    fake.truth(lambda: controller.truth() | {"requests": http.requests})
+    fake.simulate(advance, _TICK)
+    await fake.run(**wires, host=lambda: host)
 
 
 if __name__ == "__main__":
-    sys.exit(app())
+    sys.exit(main())

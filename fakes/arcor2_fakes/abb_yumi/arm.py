@@ -16,6 +16,7 @@ HAND_STROKE: Final = 0.025
 HAND_SPEED: Final = 0.025
 """Speed of the fingers, m/s."""
 PART_WIDTH: Final = 0.01
+"""Width of a part, unless another is given, m."""
 
 
 class Motion:
@@ -61,7 +62,7 @@ class Hand:
     def __init__(self) -> None:
         self.width, self.goal = HAND_STROKE, HAND_STROKE
         self.calibrated = False
-        self.part = False
+        self.part = 0.0  # width of the part between the fingers, m
         self.vacuum = False
         self.blowing = False
         self.force = 0.0
@@ -73,7 +74,7 @@ class Hand:
 
     def grip(self, force: float) -> None:
         """Close the fingers with a force, N."""
-        self.force, self.goal = force, PART_WIDTH if self.part else 0.0
+        self.force, self.goal = force, self.part
 
     def advance(self, dt: float) -> None:
         """Move the fingers for `dt` s."""

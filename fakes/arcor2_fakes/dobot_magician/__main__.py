@@ -6,32 +6,28 @@ import sys
 from pathlib import Path
 from typing import Annotated, Any
 
-from cyclopts import App, Parameter, validators
+from cyclopts import Parameter, validators
 
+from arcor2_fakes.control import within
 from arcor2_fakes.dobot_magician.arm import Arm
 from arcor2_fakes.dobot_magician.commands import Commands
+from arcor2_fakes.program import program
 from arcor2_fakes.serial_line import PtyLine
-from arcor2_fakes.serving import Fake, serve
+from arcor2_fakes.serving import Fake
 
 _TICK = 0.005  # s
 JOINT_TO_ANGLES = 4
 """Mode of a point-to-point motion: joint angles, in degrees."""
-
-app = App(name="arcor2_fakes.dobot_magician", help="Fake Dobot Magician on a pty.", version_flags=[])
 
 
 def register_commands(fake: Fake, arm: Arm, commands: Commands) -> None:
     """Register the commands of the control channel."""
 
     def alarm(code: int) -> None:
-        if not 0 <= code < 128:
-            raise ValueError("code is 0 to 127")
-        arm.raise_alarm(code)
+        arm.raise_alarm(within("code", code, 0, 127))
 
     def wrong_checksum(count: int = 1) -> None:
-        if not 0 <= count <= 1000:
-            raise ValueError("count is 0 to 1000")
-        commands.spoiled = count
+        commands.spoiled = within("count", count, 0, 1000)
 
     def mute(number: int, on: bool = True) -> None:
         (commands.mute.add if on else commands.mute.discard)(number)
@@ -65,39 +61,34 @@ def register_commands(fake: Fake, arm: Arm, commands: Commands) -> None:
     )
 
 
-@app.default
-def main(
+@program("dobot_magician", "Fake Dobot Magician on a pty.")
+async def main(
+    fake: Fake,
     *,
     link: Path | None = None,
-    control: str = "127.0.0.1:0",
     pace: Annotated[
         float, Parameter(name=("--time-scale", "--pace"), validator=validators.Number(gt=0, lte=100))
     ] = 1.0,
-) -> int:
+) -> None:
     """Start the fake; it prints one line `ready {json}` with its port and exits on SIGTERM.
 
     Args:
         link: Symbolic link to the pty, whose path changes when it is unplugged and plugged.
-        control: HOST:PORT of the control channel; port 0 takes a free one.
         pace: Speed of the simulation; 1 is real time.
     """
+    arm = Arm(pace)
+    commands = Commands(arm, lambda frame: line.send(frame))
+    line = PtyLine(commands.feed, link)
 
-    async def body(fake: Fake) -> None:
-        arm = Arm(pace)
-        commands = Commands(arm, lambda frame: line.send(frame))
-        line = PtyLine(commands.feed, link)
+    def truth() -> dict[str, Any]:
+        return arm.truth() | {"plugged": line.plugged, "port": line.port, "received": list(commands.received)}
 
-        def truth() -> dict[str, Any]:
-            return arm.truth() | {"plugged": line.plugged, "port": line.port, "received": list(commands.received)}
-
-        register_commands(fake, arm, commands)
-        fake.line(line, commands.drop_input)
-        fake.truth(truth)
-        fake.simulate(arm.advance, _TICK)
-        await fake.run(port=line)
-
-    return serve("dobot_magician", control, body)
+    register_commands(fake, arm, commands)
+    fake.line(line, commands.drop_input)
+    fake.truth(truth)
+    fake.simulate(arm.advance, _TICK)
+    await fake.run(port=line)
 
 
 if __name__ == "__main__":
-    sys.exit(app())
+    sys.exit(main())

@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from cyclopts import App
 
-from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.control import parse_address
 from arcor2_fakes.erp.planning import Planning
 from arcor2_fakes.erp.port import Port
-from arcor2_fakes.serving import Fake, serve
-
-app = App(name="arcor2_fakes.erp", help="Fake production planning service (ERP) on HTTP.", version_flags=[])
+from arcor2_fakes.program import program
+from arcor2_fakes.serving import Fake
 
 
 def truth(planning: Planning, port: Port) -> dict[str, Any]:
@@ -30,79 +28,73 @@ def truth(planning: Planning, port: Port) -> dict[str, Any]:
     }
 
 
-def register_commands(control: ControlServer, planning: Planning, port: Port) -> None:
+def register_commands(fake: Fake, planning: Planning, port: Port) -> None:
     """Register the commands of the control channel."""
 
     def add_order(order: str, product: str, quantity: int = 1) -> None:
         planning.add_order(order, product, quantity)
-        control.publish("truth")
+        fake.channel.publish("truth")
 
     def forbid(order: str, on: bool = True) -> None:
         (planning.forbidden.add if on else planning.forbidden.discard)(order)
 
-    def fail(status: int, count: int = 1, retry_after: float = 0.0, path: str = "", done: bool = False) -> None:
-        port.fail(status, count, retry_after, path, done)
+    fake.commands(
+        add_order=add_order,
+        forbid=forbid,
+        forget=planning.reset,
+        lose_answers=port.lose_answers,
+        mistake=port.mistake,
+        fail=port.fail,
+        work=port.heal,
+        received=lambda: list(port.received),
+        power_cycle=port.power_cycle,
+    )
 
-    control.command("add_order", add_order)
-    control.command("forbid", forbid)
-    control.command("forget", planning.reset)
-    control.command("lose_answers", port.lose_answers)
-    control.command("mistake", port.mistake)
-    control.command("fail", fail)
-    control.command("work", port.heal)
-    control.command("received", lambda: list(port.received))
-    control.command("power_cycle", port.power_cycle)
 
-
-@app.default
-def main(
+@program("erp", "Fake production planning service (ERP) on HTTP.")
+async def main(
+    fake: Fake,
     *,
     listen: str = "127.0.0.1:0",
-    control: str = "127.0.0.1:0",
     order: list[str] | None = None,
     token: str = "",
     store: Path | None = None,
     certificate: Path | None = None,
     key: Path | None = None,
-) -> int:
+) -> None:
     """Start the fake; it prints one line `ready {json}` with its URL and ends on SIGTERM.
 
     Args:
         listen: HOST:PORT of the service; port 0 takes a free one.
-        control: HOST:PORT of the control channel; port 0 takes a free one.
         order: ID=PRODUCT:QUANTITY, an initial order; repeatable.
         token: bearer token that clients must send; empty for none.
         store: file for orders and results; by default they are stored in memory.
         certificate: PEM file; the service uses HTTPS then.
         key: PEM file of the certificate's private key.
     """
+    context = None
     try:
         planning = Planning(store)
-        for text in order or ():
-            number, _, what = text.partition("=")
-            product, _, quantity = what.rpartition(":")
-            if number not in planning.orders:
-                planning.add_order(number, product, int(quantity))
-        context = None
         if certificate is not None:
             context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
             context.load_cert_chain(certificate, key)
-    except (ValueError, OSError, msgspec.MsgspecError) as e:
-        sys.stderr.write(f"erp: {e}\n")
-        return 2
+    except (OSError, msgspec.MsgspecError) as e:
+        raise ValueError(e) from e
+    for text in order or ():
+        number, _, what = text.partition("=")
+        product, _, quantity = what.rpartition(":")
+        if number not in planning.orders:
+            planning.add_order(number, product, int(quantity))
 
-    async def body(fake: Fake) -> None:
-        port = Port(planning, *parse_address(listen), token, context)
-        port.changed = lambda: fake.channel.publish("truth")
-        register_commands(fake.channel, planning, port)
-        fake.wires(http=port.wire)
-        fake.truth(lambda: truth(planning, port))
-        fake.at_end(planning.close)
-        scheme = "http" if context is None else "https"
-        await fake.run(url=lambda: f"{scheme}://{port.wire.address}")
-
-    return serve("erp", control, body, listen)
+    port = Port(planning, *parse_address(listen), token, context)
+    port.changed = lambda: fake.channel.publish("truth")
+    register_commands(fake, planning, port)
+    fake.wires(http=port.wire)
+    fake.truth(lambda: truth(planning, port))
+    fake.at_end(planning.close)
+    scheme = "http" if context is None else "https"
+    await fake.run(url=lambda: f"{scheme}://{port.wire.address}")
 
 
 if __name__ == "__main__":
-    sys.exit(app())
+    sys.exit(main())

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
-from cyclopts import App, Parameter, validators
+from cyclopts import Parameter, validators
 
-from arcor2_fakes.control import parse_address
+from arcor2_fakes.control import within
 from arcor2_fakes.label_printer.printer import LabelPrinter
-from arcor2_fakes.serial_line import Line, PtyLine, TcpLine
-from arcor2_fakes.serving import Fake, serve
+from arcor2_fakes.program import program
+from arcor2_fakes.serial_line import Line, line_at
+from arcor2_fakes.serving import Fake
 
-app = App(name="arcor2_fakes.label_printer", help="Fake ZPL label printer on a pty or TCP.", version_flags=[])
 FULL_ROLL = 10_000
 
 
@@ -38,22 +38,15 @@ def truth(printer: LabelPrinter, line: Line) -> dict[str, Any]:
 def register_commands(fake: Fake, printer: LabelPrinter) -> None:
     """Register the commands of the control channel."""
 
-    def switch(name: str) -> Any:
-        def apply(on: bool) -> None:
-            setattr(printer, name, bool(on))
-            printer.hold()
-            printer.go_on()
-
-        return apply
-
-    def media(labels: int) -> None:
-        if not 0 <= labels <= FULL_ROLL:
-            raise ValueError(f"labels is 0 to {FULL_ROLL}")
-        printer.media = int(labels)
+    def changed() -> None:
         printer.hold()
         printer.go_on()
 
-    fake.commands(**{name: switch(name) for name in ("head_open", "ribbon_out", "hot", "mute", "forgetful")})
+    def media(labels: int) -> None:
+        printer.media = within("labels", int(labels), 0, FULL_ROLL)
+        changed()
+
+    fake.switches(printer, changed, **{name: name for name in ("head_open", "ribbon_out", "hot", "mute", "forgetful")})
     fake.commands(
         pause=lambda on=True: printer.pause(bool(on)),
         media=media,
@@ -62,44 +55,39 @@ def register_commands(fake: Fake, printer: LabelPrinter) -> None:
     )
 
 
-@app.default
-def main(
+@program("label_printer", "Fake ZPL label printer on a pty or TCP.")
+async def main(
+    fake: Fake,
     *,
     tcp: str | None = None,
     link: Path | None = None,
-    control: str = "127.0.0.1:0",
     duration: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 0.3,
     labels: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=FULL_ROLL))] = FULL_ROLL,
     mute: bool = True,
-) -> int:
+) -> None:
     """Start the fake; it prints one line `ready {json}` with its port and ends on SIGTERM.
 
     Args:
         tcp: HOST:PORT to serve instead of a pty (9100 on real printers); port 0 takes a free one.
         link: symbolic link to the pty, whose path changes when it is unplugged and plugged in.
-        control: HOST:PORT of the control channel; port 0 takes a free one.
         duration: printing time of a label, s.
         labels: number of labels on the roll.
         mute: do not answer while out of media or with the head open; otherwise report it in the flags of ~HS.
     """
-
-    async def body(fake: Fake) -> None:
-        printer = LabelPrinter(
-            lambda frame: line.send(frame),
-            lambda: fake.channel.publish("truth"),
-            duration=duration,
-            mute=mute,
-            labels=labels,
-        )
-        line: Line = PtyLine(printer.feed, link) if tcp is None else TcpLine(printer.feed, *parse_address(tcp))
-        register_commands(fake, printer)
-        fake.line(line, printer.drop_input, "data")
-        fake.truth(lambda: truth(printer, line))
-        fake.at_end(printer.close)
-        await fake.run(port=line)
-
-    return serve("label_printer", control, body, tcp)
+    printer = LabelPrinter(
+        lambda frame: line.send(frame),
+        lambda: fake.channel.publish("truth"),
+        duration=duration,
+        mute=mute,
+        labels=labels,
+    )
+    line = line_at(printer.feed, link, tcp)
+    register_commands(fake, printer)
+    fake.line(line, printer.drop_input, "data")
+    fake.truth(lambda: truth(printer, line))
+    fake.at_end(printer.close)
+    await fake.run(port=line)
 
 
 if __name__ == "__main__":
-    sys.exit(app())
+    sys.exit(main())

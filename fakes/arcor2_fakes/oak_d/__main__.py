@@ -9,17 +9,16 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import msgspec
-from cyclopts import App, Parameter, validators
+from cyclopts import Parameter, validators
 
-from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.control import parse_address
 from arcor2_fakes.oak_d.camera import Camera
 from arcor2_fakes.oak_d.optics import Lens
 from arcor2_fakes.oak_d.pictures import Pictures
 from arcor2_fakes.oak_d.scene import Pose, Scene
-from arcor2_fakes.serving import Fake, serve
+from arcor2_fakes.program import program
+from arcor2_fakes.serving import Fake
 from arcor2_fakes.wire import TcpWire
-
-app = App(name="arcor2_fakes.oak_d", help="Fake OAK-D: rendered colour and depth over TCP.", version_flags=[])
 
 LOOKING_DOWN: Final = Pose((0.0, 0.0, 0.8), (1.0, 0.0, 0.0, 0.0))
 """Default pose of the camera: above the centre of the table, the top of the image towards +y."""
@@ -53,15 +52,9 @@ def read_scene(path: Path | None) -> Scene:
     return scene
 
 
-def register_commands(control: ControlServer, camera: Camera, wire: TcpWire, boot_time: float) -> None:
+def register_commands(fake: Fake, camera: Camera, wire: TcpWire, boot_time: float) -> None:
     """Register the commands of the control channel."""
     scene = camera.scene
-
-    def switch(attribute: str) -> Any:
-        def apply(on: bool = True) -> None:
-            setattr(camera, attribute, bool(on))
-
-        return apply
 
     def move(name: str | None = None, pose: Any = None, poses: dict[str, Any] | None = None) -> None:
         scene.move({**(poses or {}), **({} if name is None else {name: pose})})
@@ -81,23 +74,24 @@ def register_commands(control: ControlServer, camera: Camera, wire: TcpWire, boo
             camera.switch_on()
         camera.heat(48.0)
 
-    for name, attribute in SWITCHES.items():
-        control.command(name, switch(attribute))
-    control.command("scene", lambda things=(), table_height=None: scene.replace(things, table_height))
-    control.command("place", lambda thing: scene.place(thing))
-    control.command("remove", lambda name: scene.remove(name))
-    control.command("camera", lambda pose: scene.look_from(pose))
-    control.command("move", move)
-    control.command("overheat", lambda temperature=96.0: camera.heat(temperature))
-    control.command("power_cycle", power_cycle)
-    control.command("heal", heal)  # also the faults of the device
+    fake.switches(camera, **SWITCHES)
+    fake.commands(
+        scene=lambda things=(), table_height=None: scene.replace(things, table_height),
+        place=lambda thing: scene.place(thing),
+        remove=lambda name: scene.remove(name),
+        camera=lambda pose: scene.look_from(pose),
+        move=move,
+        overheat=lambda temperature=96.0: camera.heat(temperature),
+        power_cycle=power_cycle,
+        heal=heal,  # also the faults of the device
+    )
 
 
-@app.default
-def main(
+@program("oak_d", "Fake OAK-D: rendered colour and depth over TCP.", ahead=False)
+async def main(
+    fake: Fake,
     *,
     listen: str = "127.0.0.1:0",
-    control: str = "127.0.0.1:0",
     scene: Path | None = None,
     fps: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=60))] = 30.0,
     width: Annotated[int, Parameter(validator=validators.Number(gte=160, lte=1920))] = 1280,
@@ -106,12 +100,11 @@ def main(
     boot_time: Annotated[float, Parameter(validator=validators.Number(gte=0, lte=60))] = 1.5,
     time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=100))] = 1.0,
     seed: int = 0,
-) -> int:
+) -> None:
     """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
 
     Args:
         listen: HOST:PORT of the stream; port 0 takes a free one.
-        control: HOST:PORT of the control channel; port 0 takes a free one.
         scene: JSON file {"things": [...], "camera": POSE, "table_height": m} of the initial scene.
         fps: frames per second while a client is connected.
         width: width of the images, pixels.
@@ -121,30 +114,22 @@ def main(
         time_scale: how many times faster than real time it boots.
         seed: seed of the noise.
     """
-    try:
-        start_scene = read_scene(scene)
-    except ValueError as e:
-        sys.stderr.write(f"oak_d: {e}\n")
-        return 2
+    start_scene = read_scene(scene)
     for module in ("open3d", "cv2"):
         if importlib.util.find_spec(module) is None:
-            sys.stderr.write(f"oak_d: {module} is not installed; it comes with the extra `vision`\n")
-            return 1
+            raise ModuleNotFoundError(f"{module} is not installed; it comes with the extra `vision`")
 
-    async def body(fake: Fake) -> None:
-        lens = Lens(width, height)
-        pictures = Pictures(lens, noise, seed)
-        camera = Camera(start_scene, lens, fps, pictures.warm, pictures.take)
-        wire = TcpWire("stream", *parse_address(listen), camera.opened)
-        fake.wires(stream=wire)
-        register_commands(fake.channel, camera, wire, boot_time / time_scale)
-        fake.truth(lambda: {**camera.truth(), "rendered": pictures.rendered})
-        fake.at_end(camera.stop)
-        camera.start()
-        await fake.run(stream=wire)
-
-    return serve("oak_d", control, body, listen, ahead=False)
+    lens = Lens(width, height)
+    pictures = Pictures(lens, noise, seed)
+    camera = Camera(start_scene, lens, fps, pictures.warm, pictures.take)
+    wire = TcpWire("stream", *parse_address(listen), camera.opened)
+    fake.wires(stream=wire)
+    register_commands(fake, camera, wire, boot_time / time_scale)
+    fake.truth(lambda: {**camera.truth(), "rendered": pictures.rendered})
+    fake.at_end(camera.stop)
+    camera.start()
+    await fake.run(stream=wire)
 
 
 if __name__ == "__main__":
-    sys.exit(app())
+    sys.exit(main())

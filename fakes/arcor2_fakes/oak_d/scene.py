@@ -127,7 +127,7 @@ class Scene:
         """Move objects. Raises LookupError if one does not exist; none is moved then."""
         new = {name: msgspec.convert(pose, Pose) for name, pose in poses.items()}
         if unknown := set(new) - set(self._things):
-            raise LookupError(f"no object {', '.join(sorted(unknown))}")
+            raise LookupError(f"unknown objects: {', '.join(sorted(unknown))}")
         moved = {name: pose for name, pose in new.items() if self._things[name].pose != pose}
         for name, pose in moved.items():
             self._things[name] = msgspec.structs.replace(self._things[name], pose=pose)
@@ -137,7 +137,7 @@ class Scene:
     def remove(self, name: str) -> None:
         """Remove an object. Raises LookupError."""
         if name not in self._things:
-            raise LookupError(f"no object {name}")
+            raise LookupError(f"object {name} does not exist")
         del self._things[name]
         self._changed()
 

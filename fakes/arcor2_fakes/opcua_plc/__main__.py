@@ -12,15 +12,15 @@ from typing import Annotated, Any, cast
 from asyncua import Server, ua
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.user_managers import UserManager
-from cyclopts import App, Parameter, validators
+from cyclopts import Parameter, validators
 
-from arcor2_fakes.control import ControlServer, parse_address
+from arcor2_fakes.control import parse_address, within
 from arcor2_fakes.opcua_plc.program import Host, Program, Step
 from arcor2_fakes.opcua_plc.proxy import Proxy
 from arcor2_fakes.opcua_plc.space import OFF_ON_LOSS, POINTS, Space
-from arcor2_fakes.serving import Fake, serve
+from arcor2_fakes.program import program
+from arcor2_fakes.serving import Fake
 
-app = App(name="arcor2_fakes.opcua_plc", help="Fake PLC with an OPC UA server.", version_flags=[])
 SCAN = 0.01
 """Time between scans, s."""
 JOBS = {1: 1.0, 2: 3.0, 3: 20.0}
@@ -103,7 +103,7 @@ class Plc:
             await self.space.set(f"Cell.{name}", value, 0)
 
 
-def register_commands(control: ControlServer, plc: Plc, proxy: Proxy) -> None:
+def register_commands(fake: Fake, plc: Plc, proxy: Proxy) -> None:
     """Register the commands of the control channel."""
     program, space = plc.program, plc.space
 
@@ -118,34 +118,27 @@ def register_commands(control: ControlServer, plc: Plc, proxy: Proxy) -> None:
         program.stranger = number > 0
         await space.set("Handshake.Owner", int(number))
 
-    def switch(name: str) -> Any:
-        def apply(on: bool = True) -> None:
-            setattr(program, name, bool(on))
-
-        return apply
-
     def job_error(code: int) -> None:
         program.next_error = int(code)
 
     async def power_cycle(seconds: float = 0.5) -> None:
-        if not 0.0 <= seconds <= 60.0:
-            raise ValueError("seconds must be 0 to 60")
+        within("seconds", seconds, 0, 60)
         proxy.wire.refuse()
         proxy.wire.reset()
         await plc.restart()
         await asyncio.sleep(seconds)
         await proxy.wire.fault("heal")
 
-    control.command("set", set_point)
-    control.command("quality", quality)
-    control.command("stranger", stranger)
-    control.command("stuck", switch("stuck"))
-    control.command("deaf", switch("deaf"))
-    control.command("live", switch("live"))
-    control.command("job_error", job_error)
-    control.command("remove", lambda name: space.remove(f"Cell.{name}"))
-    control.command("restart", plc.restart)
-    control.command("power_cycle", power_cycle)
+    fake.switches(program, stuck="stuck", deaf="deaf", live="live")
+    fake.commands(
+        set=set_point,
+        quality=quality,
+        stranger=stranger,
+        job_error=job_error,
+        remove=lambda name: space.remove(f"Cell.{name}"),
+        restart=plc.restart,
+        power_cycle=power_cycle,
+    )
 
 
 async def make_server(user: str, password: str, certificate: Path | None, key: Path | None) -> Server:
@@ -167,23 +160,22 @@ async def make_server(user: str, password: str, certificate: Path | None, key: P
     return server
 
 
-@app.default
-def main(
+@program("opcua_plc", "Fake PLC with an OPC UA server.")
+async def main(
+    fake: Fake,
     *,
     listen: str = "127.0.0.1:0",
-    control: str = "127.0.0.1:0",
     time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 1.0,
     patience: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 1.0,
     user: str = "",
     password: str = "",
     certificate: Path | None = None,
     key: Path | None = None,
-) -> int:
+) -> None:
     """Start the fake; it prints one line `ready {json}` with its URL and ends on SIGTERM.
 
     Args:
         listen: HOST:PORT of the OPC UA server; port 0 takes a free one.
-        control: HOST:PORT of the control channel; port 0 takes a free one.
         time_scale: how many times faster than real time the jobs are.
         patience: time without a life sign after which the host counts as disconnected, s; not scaled.
         user: name of the only accepted user; empty for everybody.
@@ -191,32 +183,22 @@ def main(
         certificate: PEM or DER file; the server then accepts only signed and encrypted connections.
         key: PEM file of the certificate's private key.
     """
-
-    async def body(fake: Fake) -> None:
-        logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # broken connections are expected
-        server = await make_server(user, password, certificate, key)
-        jobs = {number: seconds / time_scale for number, seconds in JOBS.items()}
-        plc = Plc(server, Program(jobs, 0.1 / time_scale, patience))
-        await plc.space.build()
-        await server.start()
-        inner = cast("Any", server.bserver)._server.sockets[0].getsockname()[1]
-        proxy = Proxy(*parse_address(listen), inner)
-        register_commands(fake.channel, plc, proxy)
-        fake.wires(opcua=proxy.wire)
-        fake.truth(plc.truth)
-        scanning = asyncio.ensure_future(plc.run())
-
-        async def end() -> None:
-            scanning.cancel()
-            await proxy.close()
-            await asyncio.gather(scanning, return_exceptions=True)
-            await server.stop()
-
-        fake.at_end(end)
-        await fake.run(url=lambda: f"opc.tcp://{proxy.wire.address}")
-
-    return serve("opcua_plc", control, body, listen)
+    logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # broken connections are expected
+    server = await make_server(user, password, certificate, key)
+    jobs = {number: seconds / time_scale for number, seconds in JOBS.items()}
+    plc = Plc(server, Program(jobs, 0.1 / time_scale, patience))
+    await plc.space.build()
+    await server.start()
+    inner = cast("Any", server.bserver)._server.sockets[0].getsockname()[1]
+    proxy = Proxy(*parse_address(listen), inner)
+    register_commands(fake, plc, proxy)
+    fake.wires(opcua=proxy.wire)
+    fake.truth(plc.truth)
+    fake.background(plc.run())
+    fake.at_end(proxy.close)
+    fake.at_end(server.stop)
+    await fake.run(url=lambda: f"opc.tcp://{proxy.wire.address}")
 
 
 if __name__ == "__main__":
-    sys.exit(app())
+    sys.exit(main())
