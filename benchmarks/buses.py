@@ -45,7 +45,7 @@ def modbus_reads(address: str, rounds: int = 150, n: int = 100) -> Metric:
         lambda: bare.read_input_registers(0, count=IMAGE_COUNT, device_id=1),
         lambda: block.read("part"),
     ]
-    bare.connect()
+    bare.connect()  # type: ignore[no-untyped-call]
     block.connect()
     try:
         samples: tuple[list[float], list[float]] = ([], [])
@@ -54,7 +54,7 @@ def modbus_reads(address: str, rounds: int = 150, n: int = 100) -> Metric:
                 samples[each].append(seconds_each(calls[each], n))
     finally:
         block.disconnect()
-        bare.close()
+        bare.close()  # type: ignore[no-untyped-call]
     library, driver = (1.0 / median(each) for each in samples)
     note = f"driver {driver:.0f}/s, library {library:.0f}/s"
     return Metric("modbus_read_ratio", driver / library, 2 * rounds * n, note)

@@ -3,29 +3,34 @@
 from __future__ import annotations
 
 import sys
+import time
+from collections import deque
 from typing import Annotated, Any
 
 import msgspec
-from cyclopts import App, Parameter, validators
+from cyclopts import Parameter, validators
 
+from arcor2_fakes.control import one_of
 from arcor2_fakes.functional_tester.board import Board
-from arcor2_fakes.functional_tester.modbus import ModbusPort
 from arcor2_fakes.functional_tester.registers import RegisterMap
 from arcor2_fakes.functional_tester.station import Command, Fault, Station
-from arcor2_fakes.serving import Fake, serve
+from arcor2_fakes.modbus import tcp_wire
+from arcor2_fakes.program import program
+from arcor2_fakes.serving import Fake
 
+_STORED_FRAMES = 20
 _MODES = {"produce": 1, "maintenance": 2, "manual": 3}
 
-app = App(name="arcor2_fakes.functional_tester", help="Fake functional tester on Modbus TCP.", version_flags=[])
 
 Positive = Annotated[float, Parameter(validator=validators.Number(gt=0))]
+Frames = deque[dict[str, object]]
+"""The latest frames on the wire."""
 
 
-def truth(station: Station, registers: RegisterMap, port: ModbusPort) -> dict[str, Any]:
+def truth(station: Station, registers: RegisterMap, frames: Frames) -> dict[str, Any]:
     """Return the real state of the station."""
     station.advance()
     results = [msgspec.to_builtins(result) for result in station.results]
-    passed = sum(result.result == "pass" for result in station.results)
     return {
         "state": station.state.name.capitalize(),
         "door": station.door,
@@ -37,14 +42,14 @@ def truth(station: Station, registers: RegisterMap, port: ModbusPort) -> dict[st
         "watchdog_ms": station.watchdog_ms,
         "last_command": registers.last_command,
         "tested": len(results),
-        "passed": passed,
-        "failed": len(results) - passed,
+        "passed": station.passed,
+        "failed": len(results) - station.passed,
         "results": results,
-        "frames": list(port.frames),
+        "frames": list(frames),
     }
 
 
-def register_commands(fake: Fake, station: Station, registers: RegisterMap, port: ModbusPort) -> None:
+def register_commands(fake: Fake, station: Station, registers: RegisterMap, frames: Frames) -> None:
     """Register the commands of the control channel."""
 
     def put_board(code: str, defect: str | None = None) -> None:
@@ -55,37 +60,30 @@ def register_commands(fake: Fake, station: Station, registers: RegisterMap, port
         return station.take_board().code
 
     def fault(code: int, armed: bool = False) -> None:
-        station.inject(_fault(code), armed=armed)
+        codes = [int(fault) for fault in Fault if fault is not Fault.NONE]
+        station.inject(Fault(one_of("fault code", code, codes)), armed=armed)
 
     def mode(mode: str) -> None:
-        if mode not in _MODES:
-            raise ValueError(f"mode is one of {', '.join(_MODES)}")
-        station.mode = _MODES[mode]
+        station.mode = _MODES[one_of("mode", mode, _MODES)]
 
     def command(name: str) -> str:
         """Press a button on the station."""
-        try:
-            number = Command[name.upper()]
-        except KeyError:
-            raise ValueError(f"command is one of {', '.join(c.name.lower() for c in Command)}") from None
-        return station.command(number).name.lower()
+        names = [each.name.lower() for each in Command]
+        return station.command(Command[one_of("command", name.lower(), names).upper()]).name.lower()
 
     def power_cycle() -> None:
         station.power_cycle()
         registers.power_on()
-        port.wire.reset()
+        fake.reset_wires()
 
-    async def renew() -> None:
-        """Return to the state after the start, for tests that share a process."""
+    def renew() -> None:
         station.as_delivered()
         registers.power_on()
-        await port.wire.fault("heal")
-        port.wire.reset()
-        port.frames.clear()
+        frames.clear()
 
+    fake.renewable(renew)
     fake.commands(
         power_cycle=power_cycle,
-        renew=renew,
         put_board=put_board,
         take_board=take_board,
         fault=fault,
@@ -96,45 +94,38 @@ def register_commands(fake: Fake, station: Station, registers: RegisterMap, port
     )
 
 
-def _fault(code: int) -> Fault:
-    real = [int(fault) for fault in Fault if fault is not Fault.NONE]
-    if code not in real:
-        raise ValueError(f"fault code is one of {', '.join(map(str, real))}")
-    return Fault(code)
-
-
-@app.default
-def main(
+@program("functional_tester", "Fake functional tester on Modbus TCP.")
+async def main(
+    fake: Fake,
     *,
     host: str = "127.0.0.1",
     port: int = 0,
-    control: str = "127.0.0.1:0",
     seed: int = 0,
     test_time: Positive = 1.5,
     time_scale: Positive = 1.0,
-) -> int:
+) -> None:
     """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
 
     Args:
         host: address to serve Modbus TCP on.
         port: port to serve Modbus TCP on; 0 takes a free one.
-        control: HOST:PORT of the control channel; port 0 takes a free one.
         seed: seed of the noise of measured values.
         test_time: duration of a test, s.
         time_scale: how many times faster than real time the station moves.
     """
+    station = Station(seed=seed, test_time=test_time, time_scale=time_scale)
+    registers = RegisterMap(station)
+    frames = Frames(maxlen=_STORED_FRAMES)
 
-    async def body(fake: Fake) -> None:
-        station = Station(seed=seed, test_time=test_time, time_scale=time_scale)
-        registers = RegisterMap(station)
-        modbus = ModbusPort(host, port, station, registers)
-        register_commands(fake, station, registers, modbus)
-        fake.wires(modbus=modbus.wire)
-        fake.truth(lambda: truth(station, registers, modbus))
-        await fake.run(modbus=modbus.wire)
+    def trace(to_host: bool, frame: bytes) -> None:
+        frames.append({"time": time.time(), "to_host": to_host, "hex": frame.hex()})
 
-    return serve("functional_tester", control, body)
+    modbus = tcp_wire(registers, host, port, trace=trace)
+    register_commands(fake, station, registers, frames)
+    fake.wires(modbus=modbus)
+    fake.truth(lambda: truth(station, registers, frames))
+    await fake.run(modbus=modbus)
 
 
 if __name__ == "__main__":
-    sys.exit(app())
+    sys.exit(main())

@@ -307,6 +307,11 @@ class Station:
         return self._board is not None and self._board_seen
 
     @property
+    def passed(self) -> int:
+        """Return the number of passed tests."""
+        return sum(result.result == "pass" for result in self.results)
+
+    @property
     def life(self) -> int:
         """Return the time since power-on, 0.1 s."""
         return int((self._now - self._started) * 10.0)

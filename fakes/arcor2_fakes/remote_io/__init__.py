@@ -4,7 +4,7 @@
 work as in the block.
 
 Not modelled: filters and delays of real inputs, noise and settling of analogue values, loads on the outputs, rejection
-of a second TCP client, RTU timing (silent intervals), broadcast writes, and Modbus over TLS.
+of a second TCP client, and Modbus over TLS. Silence between RTU frames is 50 ms, not 3.5 characters.
 """
 
 WIRE = "Modbus TCP, or RTU on a pty"

@@ -7,44 +7,34 @@ from pathlib import Path
 from typing import Any
 
 from cyclopts import App
-from pymodbus import FramerType
-from pymodbus.server import ModbusTcpServer
 
 from arcor2_fakes.modbus import serial_line, tcp_wire
 from arcor2_fakes.remote_io.block import ANALOG_IN, DIGITAL, Block
-from arcor2_fakes.remote_io.registers import IDENTITY, RegisterMap
-from arcor2_fakes.serial_line import PtyLine
+from arcor2_fakes.remote_io.registers import RegisterMap
 from arcor2_fakes.serving import Fake, serve
-from arcor2_fakes.wire import TcpWire
 
 app = App(name="arcor2_fakes.remote_io", help="Fake remote I/O block on Modbus TCP or RTU.", version_flags=[])
 
 
+def outputs(block: Block) -> dict[str, Any]:
+    """Return the outputs; the cell reads them 100 times per second."""
+    block.advance()
+    return {"outputs": list(block.outputs), "analog_outputs": list(block.analog_outputs)}
+
+
 def truth(block: Block) -> dict[str, Any]:
     """Return the real state of the block."""
-    block.advance()
-    return {
+    return outputs(block) | {
         "inputs": list(block.inputs),
-        "outputs": list(block.outputs),
         "analog_inputs": list(block.analog_inputs),
-        "analog_outputs": list(block.analog_outputs),
         "watchdogs": [{"state": dog.state.name.lower(), "time_ms": dog.time_ms} for dog in block.watchdogs],
         "writes": block.writes,
         "history": [{"time": at, "output": number, "on": on} for at, number, on in block.history],
     }
 
 
-def outputs(block: Block) -> dict[str, Any]:
-    """Return only the outputs; the cell reads them 100 times per second."""
-    block.advance()
-    return {"outputs": list(block.outputs), "analog_outputs": list(block.analog_outputs)}
-
-
-def register_commands(fake: Fake, block: Block, port: TcpWire | PtyLine) -> None:
+def register_commands(fake: Fake, block: Block) -> None:
     """Register the commands of the control channel."""
-
-    def set_input(number: int, on: bool) -> None:
-        set_inputs({str(number): on})
 
     def set_inputs(inputs: dict[str, bool]) -> None:
         """Switch several inputs at the same time, as {"3": true}."""
@@ -60,28 +50,19 @@ def register_commands(fake: Fake, block: Block, port: TcpWire | PtyLine) -> None
         block.analog_inputs[number] = raw
 
     def diagnosis(supply_missing: bool = False, overload: bool = False) -> None:
-        block.supply_missing, block.overload = bool(supply_missing), bool(overload)
-
-    def reset() -> None:
-        if isinstance(port, TcpWire):  # a serial port stays open when the block restarts
-            port.reset()
+        block.diagnosis = bool(supply_missing) | bool(overload) << 1
 
     def power_cycle() -> None:
         block.power_on()
-        reset()
+        fake.reset_wires()  # a serial port stays open when the block restarts
 
-    async def renew() -> None:
-        """Return to the state after the start, for tests that share a process."""
-        block.as_delivered()
-        await port.fault("heal")
-        reset()
-
+    fake.renewable(block.as_delivered)
     fake.commands(
-        renew=renew,
-        set_input=set_input,
+        set_input=lambda number, on: set_inputs({number: on}),
         set_inputs=set_inputs,
         set_analog=set_analog,
         diagnosis=diagnosis,
+        watchdogs_start=lambda on=True: setattr(block, "watchdogs_start", bool(on)),  # or do not, by a fault
         power_cycle=power_cycle,
     )
 
@@ -107,10 +88,9 @@ def main(
 
     async def body(fake: Fake) -> None:
         block = Block()
-        framer = FramerType.RTU if serial else FramerType.SOCKET
-        server = ModbusTcpServer(RegisterMap(block).device(), framer=framer, identity=IDENTITY)
-        modbus = serial_line(server, link) if serial else tcp_wire(server, host, port)
-        register_commands(fake, block, modbus)
+        registers = RegisterMap(block)
+        modbus = serial_line(registers, link) if serial else tcp_wire(registers, host, port)
+        register_commands(fake, block)
         fake.wires(("modbus",) if serial else (), modbus=modbus)
         fake.truth(lambda: truth(block))
         fake.channel.source("outputs", lambda: outputs(block))

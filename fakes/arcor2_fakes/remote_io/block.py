@@ -8,13 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-DIGITAL = 16
-ANALOG_IN = 4
-ANALOG_OUT = 2
-WATCHDOGS = 4
+DIGITAL, ANALOG_IN, ANALOG_OUT, WATCHDOGS = 16, 4, 2, 4
 ACKNOWLEDGE, RELEASE = 1, 2
 BROKEN_WIRE = -32768
-_HISTORY = 200
 
 
 class WatchdogState(IntEnum):
@@ -40,10 +36,6 @@ class Watchdog:
     state: WatchdogState = WatchdogState.OFF
     expires: float = 0.0
 
-    def set_safe(self, number: int, raw: int) -> None:
-        """Set the safe value of an analogue output."""
-        self.ao_safe[number] = raw
-
 
 class Locked(ValueError):
     """An expired watchdog holds this output in its safe state."""
@@ -60,10 +52,10 @@ class Block:
         """Reset everything: inputs off, nothing written, no fault."""
         self.inputs = [False] * DIGITAL
         self.analog_inputs = [0] * ANALOG_IN
-        self.supply_missing = False
-        self.overload = False
+        self.watchdogs_start = True
+        self.diagnosis = 0  # bits: 1 supply of the outputs missing, 2 an output overloaded
         self.writes = 0
-        self.history: deque[tuple[float, int, bool]] = deque(maxlen=_HISTORY)
+        self.history: deque[tuple[float, int, bool]] = deque(maxlen=200)
         self.power_on()
 
     def power_on(self) -> None:
@@ -76,16 +68,13 @@ class Block:
     def advance(self) -> None:
         """Apply in order the ends of pulses and the expired watchdogs that are due."""
         now = self._clock()
-        due: list[tuple[float, int, int]] = [(end, 0, number) for number, end in self._pulses.items() if end <= now]
-        due += [
-            (dog.expires, 1, number)
-            for number, dog in enumerate(self.watchdogs)
-            if dog.state is WatchdogState.RUNNING and dog.expires <= now
-        ]
-        for at, kind, number in sorted(due):
-            if kind == 1:
-                self.watchdogs[number].state = WatchdogState.EXPIRED
-                self._to_safe_state(self.watchdogs[number], at)
+        running = [dog for dog in self.watchdogs if dog.state is WatchdogState.RUNNING]
+        ends = [(end, 0, number) for number, end in self._pulses.items()]
+        ends += [(dog.expires, 1, number) for number, dog in enumerate(running)]
+        for at, is_watchdog, number in sorted(end for end in ends if end[0] <= now):
+            if is_watchdog:
+                running[number].state = WatchdogState.EXPIRED
+                self._to_safe_state(running[number], at)
             elif self._pulses.pop(number, None) is not None:
                 self._switch(number, on=False, at=at)
 
@@ -122,18 +111,15 @@ class Block:
     def trigger(self, dog: Watchdog, number: int) -> None:
         """Start or trigger a watchdog for the host with this number."""
         dog.number = number
-        if dog.state is WatchdogState.EXPIRED:
-            return
-        dog.state = WatchdogState.RUNNING if dog.time_ms else WatchdogState.OFF
-        dog.expires = self._clock() + dog.time_ms / 1000.0
+        if dog.state is not WatchdogState.EXPIRED:
+            dog.state = WatchdogState.RUNNING if dog.time_ms and self.watchdogs_start else WatchdogState.OFF
+            dog.expires = self._clock() + dog.time_ms / 1000.0
 
     def command(self, dog: Watchdog, command: int) -> None:
         """Acknowledge an expired watchdog, or release one: safe state at once, then off."""
         if command == RELEASE and dog.state is WatchdogState.RUNNING:
             self._to_safe_state(dog, self._clock())
-        if command in (ACKNOWLEDGE, RELEASE) and not (
-            command == ACKNOWLEDGE and dog.state is not WatchdogState.EXPIRED
-        ):
+        if command == RELEASE or (command == ACKNOWLEDGE and dog.state is WatchdogState.EXPIRED):
             dog.state, dog.number = WatchdogState.OFF, 0
 
     def _to_safe_state(self, dog: Watchdog, at: float) -> None:
@@ -144,7 +130,3 @@ class Block:
         for number in range(ANALOG_OUT):
             if dog.ao_guarded & dog.ao_switched & (1 << number):
                 self.analog_outputs[number] = dog.ao_safe[number]
-
-    def diagnosis(self) -> int:
-        """Return the diagnosis bits."""
-        return int(self.supply_missing) | int(self.overload) << 1

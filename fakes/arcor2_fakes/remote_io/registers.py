@@ -2,153 +2,103 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-from typing import NamedTuple
+from arcor2_fakes.modbus import ExceptionCode, ModbusRefusal, ModbusTables
+from arcor2_fakes.remote_io.block import ANALOG_OUT, DIGITAL, WATCHDOGS, Block, Locked, WatchdogState
 
-from pymodbus.constants import ExcCodes
-from pymodbus.pdu.device import ModbusDeviceIdentification
-from pymodbus.simulator import DataType, SimData, SimDevice
-
-from arcor2_fakes.remote_io.block import ANALOG_OUT, DIGITAL, WATCHDOGS, Block, Locked, Watchdog
-
-UNIT_ID = 1
-IDENTITY = ModbusDeviceIdentification(  # type: ignore[no-untyped-call]
-    info_name={
-        "VendorName": "Fake Field Devices",
-        "ProductCode": "RIO-16",
-        "MajorMinorRevision": "2.0",
-        "ProductName": "Remote I/O block",
-    }
-)
-_INPUT_WORDS = 17
-_HOLDING_WORDS = 128
-_PULSE = 16
-_WATCHDOG, _WATCHDOG_STEP = 64, 16
-_READ_COILS, _READ_INPUT, _READ_DISCRETE, _WRITE_COIL, _WRITE_COILS = 1, 4, 2, 5, 15
+_WORDS = ("time_ms", "number", "command", "do_guarded", "do_switched", "do_safe", "ao_guarded", "ao_switched")
+_SAFE = ("ao_safe_0", "ao_safe_1")
+_HOLDING: dict[int, tuple[str, int]] = {
+    **{number: ("analog", number) for number in range(ANALOG_OUT)},
+    **{16 + number: ("pulse", number) for number in range(DIGITAL)},
+    **{64 + 16 * dog + place: (name, dog) for dog in range(WATCHDOGS) for place, name in enumerate(_WORDS + _SAFE)},
+}
+"""Contents of each holding register, and the number of the output or watchdog."""
+_ALLOWED = {"pulse": range(1, 60001), "time_ms": range(100, 60001), "command": range(1, 3)}
+"""Allowed values besides 0; all for other registers."""
 
 
-class Register(NamedTuple):
-    """A holding register: allowed values (0, or `shortest` to `longest`), and the outputs it switches (bit masks)."""
+class RegisterMap(ModbusTables):
+    """Maps the block to the tables of a Modbus device."""
 
-    read: Callable[[], int]
-    write: Callable[[int], object]
-    shortest: int = 1
-    longest: int = 0xFFFF
-    digital: int = 0
-    analog: int = 0
-
-
-class RegisterMap:
-    """Maps the block to the registers of a simulated Modbus device."""
+    identity = ("Fake Field Devices", "RIO-16", "2.0", "Remote I/O block")
+    coils = discrete_inputs = DIGITAL
+    holding_registers, input_registers = 128, 17
 
     def __init__(self, block: Block) -> None:
         self._block = block
-        self._holding: dict[int, Register] = {}
-        for number in range(ANALOG_OUT):
-            read, write = partial(self._analog, number), partial(self._write_analog, number)
-            self._holding[number] = Register(read, write, analog=1 << number)
-        for number in range(DIGITAL):
-            pulse = Register(lambda: 0, partial(block.pulse, number), longest=60000, digital=1 << number)
-            self._holding[_PULSE + number] = pulse
-        for index in range(WATCHDOGS):
-            for place, register in enumerate(self._watchdog(index)):
-                self._holding[_WATCHDOG + _WATCHDOG_STEP * index + place] = register
 
-    def _analog(self, number: int) -> int:
-        return self._block.analog_outputs[number]
+    def request_arrived(self) -> None:
+        """Apply the changes that are due."""
+        self._block.advance()
 
-    def _write_analog(self, number: int, word: int) -> None:
-        self._block.write_analog(number, _signed(word))
+    def read_coils(self) -> list[bool]:
+        """Return the outputs."""
+        return self._block.outputs
 
-    def _watchdog(self, index: int) -> list[Register]:
-        def dog() -> Watchdog:
-            return self._block.watchdogs[index]
+    def read_discrete_inputs(self) -> list[bool]:
+        """Return the inputs."""
+        return self._block.inputs
 
-        def attribute(name: str) -> Register:
-            return Register(lambda: getattr(dog(), name), lambda value: setattr(dog(), name, value))
+    def write_coils(self, address: int, values: list[bool]) -> None:
+        """Switch outputs."""
+        self._block.writes += 1
+        self._check_unlocked(digital=((1 << len(values)) - 1) << address)
+        for number, on in enumerate(values, address):
+            self._block.write_digital(number, on=on)
 
-        def safe(number: int) -> Register:
-            return Register(lambda: dog().ao_safe[number], lambda word: dog().set_safe(number, _signed(word)))
-
-        return [
-            attribute("time_ms")._replace(shortest=100, longest=60000),
-            Register(lambda: dog().number, lambda number: self._block.trigger(dog(), number)),
-            Register(lambda: 0, lambda command: self._block.command(dog(), command), longest=2),
-            *(attribute(name) for name in ("do_guarded", "do_switched", "do_safe", "ao_guarded", "ao_switched")),
-            *(safe(number) for number in range(ANALOG_OUT)),
-        ]
-
-    def device(self) -> SimDevice:
-        """Return the device for the Modbus server."""
-        bits = [SimData(0, values=[False] * DIGITAL, datatype=DataType.BITS)]
-        holding = [SimData(0, values=[0] * _HOLDING_WORDS, datatype=DataType.REGISTERS)]
-        inputs = [SimData(0, values=[0] * _INPUT_WORDS, datatype=DataType.REGISTERS)]
-        return SimDevice(UNIT_ID, simdata=(bits, bits, holding, inputs), identity=IDENTITY, action=self._access)
-
-    async def _access(
-        self,
-        function_code: int,
-        start_address: int,  # noqa: ARG002 - every table starts at 0
-        address: int,
-        count: int,
-        registers: list[int],
-        set_values: list[int] | list[bool] | None,
-    ) -> ExcCodes | None:
-        """Update the registers before a read, execute a write."""
+    def read_input_registers(self) -> list[int]:
+        """Return the process image."""
         block = self._block
-        block.advance()
-        try:
-            if set_values is not None:
-                block.writes += 1
-                if function_code not in (_WRITE_COIL, _WRITE_COILS):
-                    return self._write(dict(enumerate(map(int, set_values), address)))
-                block.check_unlocked(digital=((1 << len(set_values)) - 1) << address)
-                for number, on in enumerate(set_values, address):
-                    block.write_digital(number, on=bool(on))
-            elif function_code == _READ_INPUT:
-                registers[:_INPUT_WORDS] = self._image()
-            elif function_code in (_READ_COILS, _READ_DISCRETE, _WRITE_COIL, _WRITE_COILS):
-                registers[0] = _bits(block.inputs if function_code == _READ_DISCRETE else block.outputs)
-            else:
-                for each in range(address, address + count):
-                    registers[each] = self._holding[each].read() & 0xFFFF
-        except KeyError:
-            return ExcCodes.ILLEGAL_ADDRESS
-        except Locked:
-            return ExcCodes.DEVICE_FAILURE
-        return None
+        digital = [sum(on << place for place, on in enumerate(points)) for points in (block.inputs, block.outputs)]
+        watchdogs = [*(dog.state for dog in block.watchdogs), *(dog.number for dog in block.watchdogs)]
+        return [*digital, *block.analog_inputs, *block.analog_outputs, block.diagnosis, *watchdogs]
 
-    def _write(self, words: dict[int, int]) -> ExcCodes | None:
+    def read_holding_register(self, address: int) -> int:
+        """Return a holding register; pulses and commands read as 0."""
+        name, number = self._contents(address)
+        if name == "analog":
+            return self._block.analog_outputs[number]
+        dog = self._block.watchdogs[number]
+        return dog.ao_safe[_SAFE.index(name)] if name in _SAFE else getattr(dog, name, 0)
+
+    def write_holding_registers(self, address: int, values: list[int]) -> None:
         """Execute all writes of a request, or none."""
-        writes = [(self._holding[address], word) for address, word in words.items()]
-        if not all(word == 0 or register.shortest <= word <= register.longest for register, word in writes):
-            return ExcCodes.ILLEGAL_VALUE
-        self._block.check_unlocked(
-            digital=sum(register.digital for register, _ in writes),
-            analog=sum(register.analog for register, _ in writes),
-        )
-        for register, word in writes:
-            register.write(word)
-        return None
+        writes = [(*self._contents(each), word) for each, word in enumerate(values, address)]
+        dogs = enumerate(self._block.watchdogs)
+        running = {("number", number, dog.number) for number, dog in dogs if dog.state is WatchdogState.RUNNING}
+        self._block.writes += not running.issuperset(writes)  # a trigger by the same host is only a keep-alive message
+        for name, _, word in writes:
+            if word and word not in _ALLOWED.get(name, range(0x10000)):
+                raise ModbusRefusal(ExceptionCode.ILLEGAL_VALUE)
+        masks = {kind: sum(1 << number for name, number, _ in writes if name == kind) for kind in ("pulse", "analog")}
+        self._check_unlocked(masks["pulse"], masks["analog"])
+        for name, number, word in writes:
+            self._write(name, number, word)
 
-    def _image(self) -> list[int]:
-        block = self._block
-        words = [
-            _bits(block.inputs),
-            _bits(block.outputs),
-            *block.analog_inputs,
-            *block.analog_outputs,
-            block.diagnosis(),
-            *(dog.state for dog in block.watchdogs),
-            *(dog.number for dog in block.watchdogs),
-        ]
-        return [int(word) & 0xFFFF for word in words]
+    def _write(self, name: str, number: int, word: int) -> None:
+        block, watchdogs = self._block, self._block.watchdogs
+        signed = word - 0x10000 if word & 0x8000 else word
+        if name == "analog":
+            block.write_analog(number, signed)
+        elif name == "pulse":
+            block.pulse(number, word)
+        elif name == "number":
+            block.trigger(watchdogs[number], word)
+        elif name == "command":
+            block.command(watchdogs[number], word)
+        elif name in _SAFE:
+            watchdogs[number].ao_safe[_SAFE.index(name)] = signed
+        else:
+            setattr(watchdogs[number], name, word)
 
+    @staticmethod
+    def _contents(address: int) -> tuple[str, int]:
+        if address not in _HOLDING:
+            raise ModbusRefusal(ExceptionCode.ILLEGAL_ADDRESS)
+        return _HOLDING[address]
 
-def _bits(values: list[bool]) -> int:
-    return sum(value << place for place, value in enumerate(values))
-
-
-def _signed(word: int) -> int:
-    return word - 0x10000 if word & 0x8000 else word
+    def _check_unlocked(self, digital: int = 0, analog: int = 0) -> None:
+        try:
+            self._block.check_unlocked(digital, analog)
+        except Locked:
+            raise ModbusRefusal(ExceptionCode.DEVICE_FAILURE) from None

@@ -1,70 +1,56 @@
-"""Modbus RTU port of the gripper."""
+"""Modbus RTU registers of the gripper."""
 
 from __future__ import annotations
 
 from collections import deque
-from pathlib import Path
-from typing import Final
 
-from pymodbus.constants import ExcCodes
-from pymodbus.framer import FramerType
-from pymodbus.server import ModbusSerialServer
-from pymodbus.simulator import DataType, SimData, SimDevice
-
-from arcor2_fakes.modbus import serial_line
+from arcor2_fakes.modbus import ExceptionCode, ModbusRefusal, ModbusTables
 from arcor2_fakes.robotiq_2f.gripper import Gripper
 
-UNIT: Final = 9
 _REQUESTS, _STATUS, _COUNT = 0x03E8, 0x07D0, 3
 
 
-class RtuPort:
-    """Serial port of the gripper. Create it in the event loop."""
+class RtuRegisters(ModbusTables):
+    """Three registers that are written and three of status; functions 3 and 4 read both."""
 
-    def __init__(self, gripper: Gripper, link: Path | None = None) -> None:
+    unit = 9
+    functions = (3, 4, 6, 16, 23)
+    holding_registers = input_registers = _STATUS + _COUNT
+
+    def __init__(self, gripper: Gripper) -> None:
         self._gripper = gripper
+        self._requests = [0] * _COUNT
         self.writes: deque[list[int]] = deque(maxlen=50)
-        device = SimDevice(
-            UNIT,
-            simdata=[SimData(_REQUESTS, values=[0] * (_STATUS - _REQUESTS + _COUNT), datatype=DataType.REGISTERS)],
-            action=self._access,
-        )
-        server = ModbusSerialServer(device, framer=FramerType.RTU, ignore_missing_devices=True)
-        self.line = serial_line(server, link, UNIT)  # the library answers for other units too
 
-    async def _access(
-        self,
-        _function_code: int,
-        start_address: int,
-        address: int,
-        count: int,
-        registers: list[int],
-        set_values: list[int] | list[bool] | None,
-    ) -> ExcCodes | None:
-        first = _STATUS if address >= _STATUS else _REQUESTS
-        if not first <= address <= address + count <= first + _COUNT:
-            return ExcCodes.ILLEGAL_ADDRESS
-        if set_values is None:
-            begin = _STATUS - start_address
-            registers[begin : begin + _COUNT] = self._status()
-            return None
-        if first == _STATUS:
-            return ExcCodes.ILLEGAL_ADDRESS
-        begin = _REQUESTS - start_address
-        requests = registers[begin : begin + _COUNT]
-        requests[address - first : address - first + len(set_values)] = [int(value) for value in set_values]
-        self.writes.append(requests)
-        action = requests[0] >> 8
+    def read_registers(self, function: int, address: int, count: int) -> list[int]:  # noqa: ARG002 - both are the same
+        """Return requests or status."""
+        if address >= _STATUS:
+            return self._status()[address - _STATUS :][:count]
+        first = self._place(address, count)
+        return self._requests[first : first + count]
+
+    def write_holding_registers(self, address: int, values: list[int]) -> None:
+        """Execute a request."""
+        first = self._place(address, len(values))
+        self._requests[first : first + len(values)] = values
+        self.writes.append(list(self._requests))
+        action, position, speed_and_force = self._requests
         self._gripper.request(
             {
-                "ACT": action & 1,
-                "GTO": action >> 3 & 1,
-                "POS": requests[1] & 0xFF,
-                "SPE": requests[2] >> 8,
-                "FOR": requests[2] & 0xFF,
+                "ACT": action >> 8 & 1,
+                "GTO": action >> 11 & 1,
+                "POS": position & 0xFF,
+                "SPE": speed_and_force >> 8,
+                "FOR": speed_and_force & 0xFF,
             }
         )
-        return None
+
+    @staticmethod
+    def _place(address: int, count: int) -> int:
+        """Return the place of the first of some requests."""
+        if not _REQUESTS <= address <= address + count <= _REQUESTS + _COUNT:
+            raise ModbusRefusal(ExceptionCode.ILLEGAL_ADDRESS)
+        return address - _REQUESTS
 
     def _status(self) -> list[int]:
         now = self._gripper.registers()

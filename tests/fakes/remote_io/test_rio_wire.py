@@ -22,7 +22,7 @@ def fake(start_fake: Callable[..., Any]) -> Any:
 def host(fake: Any) -> Iterator[ModbusTcpClient]:
     logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)
     name, port = fake.ready["modbus"].split(":")
-    client = ModbusTcpClient(name, port=int(port), timeout=2.0, retries=0)
+    client = ModbusTcpClient(name, port=int(port), timeout=30.0, retries=0)
     assert client.connect()
     yield client
     client.close()
@@ -76,6 +76,17 @@ def test_watchdog_over_the_wire(fake: Any, host: Any, wait_for: Callable[..., An
     assert host.read_holding_registers(80, count=10, device_id=1).registers == [150, 0, 0, 3, 3, 2, 0, 0, 0, 0]
 
 
+def test_a_trigger_of_the_own_running_watchdog_is_no_write(fake: Any, host: Any) -> None:
+    host.write_registers(80, [60_000, 4711], device_id=1)
+    started = fake.truth()["writes"]
+    host.write_registers(81, [4711], device_id=1)
+    assert fake.truth()["writes"] == started
+    host.write_registers(81, [4712], device_id=1)  # another host takes it over
+    host.write_registers(65, [4711], device_id=1)  # it is off
+    host.write_registers(81, [4712, 0], device_id=1)  # a command as well
+    assert fake.truth()["writes"] == started + 3
+
+
 def test_a_partly_invalid_write_changes_nothing(fake: Any, host: Any) -> None:
     assert host.write_registers(0, [1, 2, 3], device_id=1).exception_code == 2
     assert fake.truth()["analog_outputs"] == [0, 0]
@@ -109,7 +120,7 @@ def test_the_world_switches_inputs_and_reads_outputs(fake: Any, host: Any) -> No
 
 def test_rtu_line(start_fake: Callable[..., Any]) -> None:
     fake = start_fake("remote_io", "--serial")
-    host = ModbusSerialClient(fake.ready["modbus"], baudrate=115200, timeout=1.0, retries=0)
+    host = ModbusSerialClient(fake.ready["modbus"], baudrate=115200, timeout=30.0, retries=0)
     assert host.connect()
     try:
         host.write_coil(1, True, device_id=1)
@@ -134,7 +145,7 @@ def test_rtu_line_is_pulled_out_and_plugged(start_fake: Callable[..., Any], tmp_
     finally:
         first.close()
     fake.control.do("heal")
-    again = ModbusSerialClient(str(link), baudrate=115200, timeout=1.0, retries=0)
+    again = ModbusSerialClient(str(link), baudrate=115200, timeout=30.0, retries=0)
     assert again.connect()
     try:
         assert len(image(again)) == 17
