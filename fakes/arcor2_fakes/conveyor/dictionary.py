@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 from arcor2_fakes.conveyor.drive import Drive, Mode
 
-NO_OBJECT, NO_SUBINDEX = 0x06020000, 0x06090011
+NO_OBJECT, NO_SUBINDEX, NO_DATA = 0x06020000, 0x06090011, 0x08000024
 READ_ONLY, TOO_LONG, TOO_SHORT, BAD_VALUE = 0x06010002, 0x06070012, 0x06070013, 0x06090030
-WRONG_STATE = 0x08000022
 
 
 class Abort(Exception):
@@ -44,16 +43,22 @@ class Dictionary:
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
         """Write a value. Raises Abort."""
-        entry = self._entry(index, subindex)
-        if entry.write is None:
-            raise Abort(READ_ONLY)
-        size = struct.calcsize("<" + entry.form)
+        size = self.writable_size(index, subindex)
         if len(data) != size:
             raise Abort(TOO_LONG if len(data) > size else TOO_SHORT)
+        entry = self._entry(index, subindex)
+        assert entry.write is not None
         try:
             entry.write(struct.unpack("<" + entry.form, data)[0])
         except ValueError:
             raise Abort(BAD_VALUE) from None
+
+    def writable_size(self, index: int, subindex: int) -> int:
+        """Return the number of bytes of a value that can be written. Raises Abort."""
+        entry = self._entry(index, subindex)
+        if entry.write is None:
+            raise Abort(READ_ONLY)
+        return struct.calcsize("<" + entry.form)
 
     def _entry(self, index: int, subindex: int) -> Entry:
         entry = self.entries.get((index, subindex))

@@ -58,7 +58,12 @@ _MOVING = (_P.OPERATION_ENABLED, _P.QUICK_STOP_ACTIVE, _P.FAULT_REACTION_ACTIVE)
 class Drive:
     """The drive with its belt. It calls `emergency` with the code of a fault, and with 0 when the fault is reset."""
 
-    def __init__(self, emergency: Callable[[int], None], belt: float = 0.0) -> None:
+    def __init__(self, emergency: Callable[[int], None]) -> None:
+        self._emergency = emergency
+        self.power_on(0.0)
+
+    def power_on(self, belt: float) -> None:
+        """Switch on with the belt stopped at `belt` counts: volatile values are reset, and faults end."""
         self.parameters = Parameters()
         self.state = _P.SWITCH_ON_DISABLED
         self.mode = Mode.NONE
@@ -72,7 +77,6 @@ class Drive:
         self.belt = belt  # real position, counts
         self.velocity = 0.0
         self._offset = belt
-        self._emergency = emergency
         self._target: float | None = None  # in counts of the belt
         self._acknowledge = False
         self._reached = False

@@ -1,22 +1,27 @@
-"""The CANopen node (CiA 301) of the drive: NMT, SDO server, heartbeat producer and consumer, EMCY, boot-up."""
+"""The CANopen node (CiA 301) of the drive: NMT, PDOs, SDO server, heartbeat producer and consumer, EMCY, boot-up."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import struct
 from collections import deque
 from typing import Any
 
-from arcor2_fakes.conveyor.dictionary import BAD_VALUE, Abort, Dictionary, Entry, add_drive
+from arcor2_fakes.conveyor.dictionary import BAD_VALUE, NO_DATA, Abort, Dictionary, Entry, add_drive
 from arcor2_fakes.conveyor.drive import HEARTBEAT_ERROR, Drive
 from arcor2_fakes.conveyor.hub import Hub
-from arcor2_fakes.conveyor.pdo import Tpdo
+from arcor2_fakes.conveyor.pdo import Rpdo, Tpdo
+from arcor2_fakes.conveyor.sdo import SdoServer
 
 TICK = 0.0025
 BOOT_TIME = 0.03
 _OPERATIONAL, _STOPPED, _PRE_OPERATIONAL = 5, 4, 127
-_UNKNOWN_COMMAND, _TOGGLE = 0x05040001, 0x05030000
-_REGISTER = {0x2: 1 << 1, 0x3: 1 << 2, 0x4: 1 << 3, 0x81: 1 << 4}  # 1001h: current, voltage, temperature, communication
+_PDO_TOO_SHORT = 0x8210
+_GENERIC, _COMMUNICATION = 1, 1 << 4
+_REGISTER = {0x2: 1 << 1, 0x3: 1 << 2, 0x4: 1 << 3, 0x81: _COMMUNICATION}  # 1001h: current, voltage, temperature
+_INVALID = 1 << 31
+_ERRORS_STORED = 8
 
 
 class Node:
@@ -40,11 +45,16 @@ class Node:
         self._heard: float | None = None
         self._master_lost = False
         self._next_heartbeat = 0.0
-        self._upload: tuple[bytes, int] | None = None
+        self._emergency_id = 0x80 + self.number
+        self._errors: deque[int] = deque(maxlen=_ERRORS_STORED)
         self.dictionary = dictionary = Dictionary()
         number, entries = self.number, dictionary.entries
         entries[0x1000, 0] = Entry("I", lambda: 0x00020192)  # servo drive, profile 402
         entries[0x1001, 0] = Entry("B", self._error_register)
+        entries[0x1003, 0] = Entry("B", lambda: len(self._errors), self._clear_errors)
+        for place in range(_ERRORS_STORED):
+            entries[0x1003, place + 1] = Entry("I", lambda place=place: self._stored_error(place))  # type: ignore[misc]
+        entries[0x1014, 0] = Entry("I", lambda: self._emergency_id, self._set_emergency_id)
         entries[0x1008, 0] = Entry("s", lambda: "SD-48 belt servo")
         entries[0x100A, 0] = Entry("s", lambda: "3.07")
         entries[0x1016, 0] = Entry("B", lambda: 1)
@@ -54,11 +64,12 @@ class Node:
             entries[0x1018, subindex] = Entry("I" if subindex else "B", lambda value=value: value)  # type: ignore[misc]
         add_drive(dictionary, self.drive)
         self.pdos = (
-            Tpdo(0, number, (0x6041,), self._send_pdo),
-            Tpdo(1, number, (0x6041, 0x6064), self._send_pdo),
+            Tpdo(0, number, (0x6041,), dictionary, self._send_pdo),
+            Tpdo(1, number, (0x6041, 0x6064), dictionary, self._send_pdo),
         )
-        for pdo in self.pdos:
-            pdo.enter(dictionary)
+        received = ((0x6040,), (0x6040, 0x6060), (0x6040, 0x607A), (0x6040, 0x60FF))
+        self.rpdos = tuple(Rpdo(each, number, default, dictionary) for each, default in enumerate(received))
+        self._sdo = SdoServer(dictionary, self._written)
 
     def _set_consumer(self, value: int) -> None:
         if value >> 24 or (value & 0xFFFF and not 1 <= value >> 16 <= 127):
@@ -68,9 +79,29 @@ class Node:
     def _set_heartbeat(self, value: int) -> None:
         self._heartbeat_ms, self._next_heartbeat = value, 0.0
 
+    def _set_emergency_id(self, value: int) -> None:
+        valid = not value & _INVALID
+        if valid and (not 0 < value <= 0x7FF or (not self._emergency_id & _INVALID and value != self._emergency_id)):
+            raise Abort(BAD_VALUE)  # 11 bits; changed only while it is invalid
+        self._emergency_id = value
+
+    def _clear_errors(self, value: int) -> None:
+        if value:
+            raise Abort(BAD_VALUE)
+        self._errors.clear()
+
+    def _stored_error(self, place: int) -> int:
+        if place >= len(self._errors):
+            raise Abort(NO_DATA)
+        return self._errors[place]
+
+    def _written(self, index: int, subindex: int, data: bytes) -> None:
+        self.writes.append({"index": index, "subindex": subindex, "data": data.hex()})
+
     def _error_register(self) -> int:
         code = self.drive.error_code
-        return 0 if not code else 1 | _REGISTER.get(code >> 8, _REGISTER.get(code >> 12, 0))
+        fault = _GENERIC | _REGISTER.get(code >> 8, _REGISTER.get(code >> 12, 0)) if code else 0
+        return fault | (_GENERIC | _COMMUNICATION if self._master_lost else 0)
 
     # -------------------------------------------------------------------------------- life
     async def run(self) -> None:
@@ -107,8 +138,7 @@ class Node:
 
     def power_cycle(self, belt: float | None = None) -> None:
         """Switch off and on: volatile values are lost; the belt is stopped, or was moved to `belt` counts."""
-        belt = self.drive.belt if belt is None else float(belt)
-        self.drive = Drive(self._emergency, belt)
+        self.drive.power_on(self.drive.belt if belt is None else float(belt))
         self.writes.clear()
         self._hub.frames.clear()
         self._boot()
@@ -127,7 +157,11 @@ class Node:
             self._hub.transmit(identifier, data)
 
     def _emergency(self, code: int) -> None:
-        self._send(0x80, struct.pack("<HB5x", code, self._error_register() if code else 0))
+        if code:
+            self._errors.appendleft(code)
+        valid = not self._emergency_id & _INVALID and self._nmt != _STOPPED
+        if valid and not self.silent and not self._booted_at:
+            self._hub.transmit(self._emergency_id, struct.pack("<HB5x", code, self._error_register()))
 
     def _received(self, identifier: int, data: bytes) -> None:
         if self.silent or self._booted_at:
@@ -135,12 +169,27 @@ class Node:
         if identifier == 0 and len(data) == 2 and data[1] in (0, self.number):
             self._nmt_command(data[0])
         elif identifier == 0x600 + self.number and len(data) == 8 and self._nmt != _STOPPED:
-            self._sdo(data)
+            if answer := self._sdo.answer(data):
+                self._send(0x580, answer)
         elif identifier == 0x700 + (self._consumer >> 16 & 0x7F) and self._consumer & 0xFFFF:
             self._heard = asyncio.get_running_loop().time()
             if self._master_lost:
                 self._master_lost = False
                 self._emergency(self.drive.error_code)
+        elif self._nmt == _OPERATIONAL:
+            for pdo in self.rpdos:
+                if pdo.cob_id == identifier:
+                    self._receive_pdo(pdo, data)
+
+    def _receive_pdo(self, pdo: Rpdo, data: bytes) -> None:
+        """Write the values of a PDO; those that a drive refuses have no effect."""
+        values = pdo.received(data)
+        if values is None:
+            self._emergency(_PDO_TOO_SHORT)
+        for index, subindex, value in values or ():
+            self._written(index, subindex, value)
+            with contextlib.suppress(Abort):
+                self.dictionary.write(index, subindex, value)
 
     def _nmt_command(self, command: int) -> None:
         if command in (129, 130):  # reset node, reset communication
@@ -155,45 +204,6 @@ class Node:
             left, self._nmt = self._nmt == _OPERATIONAL, states[command]
             if left and self._nmt != _OPERATIONAL:
                 self.drive.connection_aborted()
-
-    # -------------------------------------------------------------------------------- SDO server
-    def _sdo(self, data: bytes) -> None:
-        specifier, index, subindex = struct.unpack_from("<BHB", data)
-        try:
-            answer = self._sdo_answer(specifier, index, subindex, data)
-        except Abort as abort:
-            self._upload = None
-            answer = struct.pack("<BHBI", 0x80, index, subindex, abort.code)
-        if answer:
-            self._send(0x580, answer)
-
-    def _sdo_answer(self, specifier: int, index: int, subindex: int, data: bytes) -> bytes:
-        if specifier == 0x80:
-            self._upload = None
-            return b""
-        if specifier == 0x40:
-            value = self.dictionary.read(index, subindex)
-            if len(value) <= 4:
-                return struct.pack("<BHB4s", 0x43 | (4 - len(value)) << 2, index, subindex, value)
-            self._upload = value, 0
-            return struct.pack("<BHBI", 0x41, index, subindex, len(value))
-        if specifier & 0xEF == 0x60 and self._upload is not None:
-            return self._segment(specifier & 0x10)
-        if specifier & 0xE2 == 0x22:  # expedited download
-            size = 4 - (specifier >> 2 & 3) if specifier & 1 else 4
-            self.writes.append({"index": index, "subindex": subindex, "data": data[4 : 4 + size].hex()})
-            self.dictionary.write(index, subindex, data[4 : 4 + size])
-            return struct.pack("<BHB4x", 0x60, index, subindex)
-        raise Abort(_UNKNOWN_COMMAND)
-
-    def _segment(self, toggle: int) -> bytes:
-        assert self._upload is not None
-        value, expected = self._upload
-        if toggle != expected:
-            raise Abort(_TOGGLE)
-        part, rest = value[:7], value[7:]
-        self._upload = (rest, expected ^ 0x10) if rest else None
-        return bytes([toggle | (7 - len(part)) << 1 | (not rest)]) + part.ljust(7, b"\0")
 
     # -------------------------------------------------------------------------------- truth
     def motion(self) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """Fake scale that speaks MT-SICS.
 
-Not modelled: filter dynamics (the displayed value approaches the load exponentially), SR and SIR repetition, tare
-preset (TA with a value), the display and keys, calibration, interface settings.
+It has all commands of the levels 0 and 1. Not modelled: filter dynamics (the displayed value approaches the load
+exponentially), keys other than zero and tare, calibration, interface settings.
 """
 
 WIRE = "MT-SICS on a pty, or TCP"

@@ -6,14 +6,14 @@ import sys
 from pathlib import Path
 from typing import Annotated, Any
 
-from cyclopts import App, Parameter, validators
+from cyclopts import Parameter, validators
 
-from arcor2_fakes.control import parse_address
+from arcor2_fakes.control import one_of
+from arcor2_fakes.program import program
 from arcor2_fakes.scale.balance import UNITS, Balance
-from arcor2_fakes.serial_line import Line, PtyLine, TcpLine
-from arcor2_fakes.serving import Fake, serve
+from arcor2_fakes.serial_line import Line, line_at
+from arcor2_fakes.serving import Fake
 
-app = App(name="arcor2_fakes.scale", help="Fake MT-SICS scale on a pty or TCP.", version_flags=[])
 Positive = Annotated[float, Parameter(validator=validators.Number(gt=0))]
 
 
@@ -24,6 +24,8 @@ def truth(balance: Balance, line: Line) -> dict[str, Any]:
         "zero": balance.zero,
         "tare": balance.tare,
         "stable": balance.stable,
+        "display": balance.display,
+        "keys": balance.keys,
         "plugged": line.plugged,
         "port": line.port,
         "received": list(balance.received),
@@ -33,67 +35,52 @@ def truth(balance: Balance, line: Line) -> dict[str, Any]:
 def register_commands(fake: Fake, balance: Balance) -> None:
     """Register the commands of the control channel."""
 
-    def vibrate(on: bool) -> None:
-        balance.vibrating = bool(on)
-
-    def busy(on: bool) -> None:
-        balance.busy = bool(on)
-
     def unit(value: str) -> None:
-        if value not in UNITS:
-            raise ValueError(f"unit is one of {', '.join(UNITS)}")
-        balance.unit = value
+        balance.unit = one_of("unit", value, UNITS)
 
     def error(code: str) -> None:
-        if code not in ("ES", "ET", "EL"):
-            raise ValueError("code is one of ES, ET, EL")
-        balance.next_error = code
+        balance.next_error = one_of("code", code, ("ES", "ET", "EL"))
 
+    fake.switches(balance, vibrate="vibrating", busy="busy")
     fake.commands(
         put=lambda kg: balance.put(float(kg)),
-        vibrate=vibrate,
-        busy=busy,
         unit=unit,
         error=error,
+        press=balance.press,
         renew=balance.renew,
         power_cycle=balance.power_cycle,
     )
 
 
-@app.default
-def main(
+@program("scale", "Fake MT-SICS scale on a pty or TCP.")
+async def main(
+    fake: Fake,
     *,
     tcp: str | None = None,
     link: Path | None = None,
-    control: str = "127.0.0.1:0",
     capacity: Positive = 3.2,
     settling: Positive = 0.4,
     stability_timeout: Positive = 5.0,
-) -> int:
+) -> None:
     """Start the fake; it prints one line `ready {json}` with its port and ends on SIGTERM.
 
     Args:
         tcp: HOST:PORT to serve instead of a pty; port 0 takes a free one.
         link: symbolic link to the pty, whose path changes when it is unplugged and plugged in.
-        control: HOST:PORT of the control channel; port 0 takes a free one.
         capacity: largest load, kg.
         settling: time until the value is stable after a change of the load, s.
         stability_timeout: time limit of S, T and Z for a stable value, s.
     """
-
-    async def body(fake: Fake) -> None:
-        balance = Balance(
-            lambda frame: line.send(frame), capacity=capacity, settling=settling, stability_timeout=stability_timeout
-        )
-        line: Line = PtyLine(balance.feed, link) if tcp is None else TcpLine(balance.feed, *parse_address(tcp))
-        register_commands(fake, balance)
-        fake.line(line, balance.drop_input)
-        fake.truth(lambda: truth(balance, line))
-        fake.at_end(balance.cancel)
-        await fake.run(port=line)
-
-    return serve("scale", control, body, tcp)
+    balance = Balance(
+        lambda frame: line.send(frame), capacity=capacity, settling=settling, stability_timeout=stability_timeout
+    )
+    line = line_at(balance.feed, link, tcp)
+    register_commands(fake, balance)
+    fake.line(line, balance.drop_input)
+    fake.truth(lambda: truth(balance, line))
+    fake.at_end(balance.cancel)
+    await fake.run(port=line)
 
 
 if __name__ == "__main__":
-    sys.exit(app())
+    sys.exit(main())
