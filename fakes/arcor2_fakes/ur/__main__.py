@@ -10,19 +10,21 @@ import sys
 from collections.abc import Callable
 from typing import Annotated
 
-from cyclopts import App, Parameter, validators
+from cyclopts import Parameter, validators
 
-from arcor2_fakes.serving import Fake, Wire, serve
+from arcor2_fakes.program import program
+from arcor2_fakes.serving import Fake, Wire
 from arcor2_fakes.ur.controller import Controller
 from arcor2_fakes.ur.dashboard import Dashboard
 from arcor2_fakes.ur.kinematics import MODELS
-from arcor2_fakes.ur.primary import PrimaryPort
+from arcor2_fakes.ur.primary import StatePorts
+from arcor2_fakes.ur.realtime import RealTimeStream
 from arcor2_fakes.ur.rtde_server import RtdeServer
 from arcor2_fakes.ur.script_port import ScriptPort
 from arcor2_fakes.ur.supervision import register
 from arcor2_fakes.ur.timer import PeriodicTimer
 from arcor2_fakes.ur.urscript import ForeignProgram
-from arcor2_fakes.wire import TcpWire
+from arcor2_fakes.wire import Connection, TcpWire
 
 log = logging.getLogger("main")
 
@@ -31,7 +33,6 @@ _MOST_AT_ONCE = 100  # control cycles to catch up after a delay; watchdog signal
 _CHUNK = 10  # cycles to catch up before the sockets are read again
 
 
-app = App(name="arcor2_fakes.ur", help="Fake Universal Robots e-series controller.", version_flags=[])
 Positive = Annotated[float, Parameter(validator=validators.Number(gt=0))]
 
 
@@ -48,8 +49,8 @@ def _check_model(_type: object, model: str) -> None:
 class _Cycles:
     """Runs the control cycles; after a delay, several at once, but not more than `_MOST_AT_ONCE`."""
 
-    def __init__(self, controller: Controller, rtde: RtdeServer) -> None:
-        self._controller, self._rtde = controller, rtde
+    def __init__(self, controller: Controller, *streams: RtdeServer | RealTimeStream | StatePorts) -> None:
+        self._controller, self._streams = controller, streams
         self._owed = 0
 
     def tick(self, periods: int) -> None:
@@ -65,36 +66,38 @@ class _Cycles:
         cycles = min(self._owed, _CHUNK)
         for _ in range(cycles):
             self._controller.tick()
-            self._rtde.tick()
+            for stream in self._streams:
+                stream.tick()
         self._owed -= cycles
         if self._owed:
             asyncio.get_running_loop().call_soon(self._catch_up)
 
 
-@app.default
-def main(
+@program("ur", "Fake Universal Robots e-series controller.")
+async def main(
+    fake: Fake,
     *,
     host: str = "127.0.0.1",
     rtde_port: int = 30004,
     script_port: int = 30003,
     dashboard_port: int = 29999,
     primary_port: int = 30001,
-    control: str = "127.0.0.1:0",
+    secondary_port: int = 30002,
     model: Annotated[str, Parameter(validator=_check_model)] = "ur5e",
     controller_version: Annotated[str, Parameter(validator=_check_version)] = "5.25",
     frequency: Positive = 500.0,
     time_scale: Positive = 1.0,
     powered_off: bool = False,
-) -> int:
+) -> None:
     """Start the fake; it prints one line `ready {json}` with its addresses, and exits on SIGTERM.
 
     Args:
         host: Address of all ports. Each fake needs its own, because clients fix the ports.
         rtde_port: Port of RTDE.
-        script_port: Port that takes programs.
+        script_port: Real-time port: takes programs, sends the state in each control cycle.
         dashboard_port: Port of the dashboard server.
-        primary_port: Port that reports the calibration.
-        control: HOST:PORT of the control channel; port 0 takes a free one.
+        primary_port: Port that takes programs and sends the state, with the calibration, and errors of programs.
+        secondary_port: Port that takes programs and sends the state.
         model: Model of the arm: ur3e, ur5e, ur10e or ur16e.
         controller_version: Version of the software; 10.x has no dashboard server.
         frequency: Control cycles and RTDE samples per second.
@@ -103,38 +106,43 @@ def main(
     """
     version = (*map(int, controller_version.split(".")), 0, 0)[:4]
 
-    async def body(fake: Fake) -> None:
-        controller = Controller(model, version, frequency, time_scale)
-        controller.load_program = lambda name: ForeignProgram(controller, name)
-        if powered_off:
-            controller.power_off()
-        rtde, script, dashboard = RtdeServer(controller), ScriptPort(controller), Dashboard(controller)
-        primary = PrimaryPort(MODELS[model], version)
-        wires = {
-            "primary": TcpWire("primary", host, primary_port, primary.opened),
-            "rtde": TcpWire("rtde", host, rtde_port, rtde.opened),
-            "script": TcpWire("script", host, script_port, script.opened),
-        }
-        if version[0] < _POLYSCOPE_X:
-            wires["dashboard"] = TcpWire("dashboard", host, dashboard_port, dashboard.opened)
-        fake.wires(**wires)
-        register(fake.channel, controller, rtde, script, dashboard)
+    controller = Controller(model, version, frequency, time_scale)
+    controller.load_program = lambda name: ForeignProgram(controller, name)
+    if powered_off:
+        controller.power_off()
+    rtde, script, dashboard = RtdeServer(controller), ScriptPort(controller), Dashboard(controller)
+    states = StatePorts(controller, MODELS[model])
 
-        def power_cycle() -> None:
-            """Switch the controller off and on: every connection breaks, and the arm has no power."""
-            fake.reset_wires()
-            controller.boot()
+    def opened(connection: Connection) -> None:
+        script.opened(connection)
+        states.greet(connection)
 
-        fake.commands(power_cycle=power_cycle, calibration=primary.calibrate)
-        timer = PeriodicTimer(controller.period, _Cycles(controller, rtde).tick)
-        fake.at_end(timer.close)
-        timer.start()
-        gc.freeze()
-        addresses: dict[str, Wire | Callable[[], object]] = {"host": lambda: host, "dashboard": lambda: None, **wires}
-        await fake.run(**addresses)
+    wires = {
+        "primary": TcpWire("primary", host, primary_port, opened),
+        "secondary": TcpWire("secondary", host, secondary_port, opened),
+        "rtde": TcpWire("rtde", host, rtde_port, rtde.opened),
+        "script": TcpWire("script", host, script_port, script.opened),
+    }
+    states.wires = [wires["primary"], wires["secondary"]]
+    stream = RealTimeStream(controller, wires["script"])
+    if version[0] < _POLYSCOPE_X:
+        wires["dashboard"] = TcpWire("dashboard", host, dashboard_port, dashboard.opened)
+    fake.wires(**wires)
+    register(fake.channel, controller, rtde, script, dashboard)
 
-    return serve("ur", control, body)
+    def power_cycle() -> None:
+        """Switch the controller off and on: every connection breaks, and the arm has no power."""
+        fake.reset_wires()
+        controller.boot()
+
+    fake.commands(power_cycle=power_cycle, calibration=states.calibrate)
+    timer = PeriodicTimer(controller.period, _Cycles(controller, rtde, stream, states).tick)
+    fake.at_end(timer.close)
+    timer.start()
+    gc.freeze()
+    addresses: dict[str, Wire | Callable[[], object]] = {"host": lambda: host, "dashboard": lambda: None, **wires}
+    await fake.run(**addresses)
 
 
 if __name__ == "__main__":
-    sys.exit(app())
+    sys.exit(main())

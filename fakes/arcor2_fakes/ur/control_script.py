@@ -17,6 +17,8 @@ from arcor2_fakes.ur.urscript import Call, Interpreter, calls
 _READY, _DONE = 1, 2
 _REALTIME = frozenset({24, 11, 9, 10, 6, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
 _STOP_SCRIPT = 255
+_NOT_MODELLED = frozenset({6, 8, 20, 21, 56, 57, 59, 62, 63, 66, 67, 68, 69, 71})
+"""Commands of the program that the fake does not execute: force mode, external sensors, contact detection, dynamics."""
 _OFFSET = re.compile(r"reg_offset_int =\s*(?:#[^\n]*\n)?\s*(\d+)")
 _PATH = re.compile(r"def exec_move_path\(\):(.*?)^\s*end\b", re.DOTALL | re.MULTILINE)
 _MARK = "def rtde_control()"
@@ -107,7 +109,7 @@ class ControlScript(Program):
             elif command == _STOP_SCRIPT:
                 return
             elif not executing:
-                steps = self._handlers.get(command, lambda: None)()
+                steps = self._handler(command)()
                 if steps is not None:
                     yield from steps
                 self._write_int(0, _DONE)
@@ -115,9 +117,13 @@ class ControlScript(Program):
             yield
 
     def _run_at_once(self, command: int) -> None:
-        handler = self._handlers.get(command)
-        if handler is not None:
-            handler()
+        self._handler(command)()
+
+    def _handler(self, command: int) -> Callable[[], Steps | None]:
+        """Return what executes a command: nothing, for one that is not in the program."""
+        if command in _NOT_MODELLED:
+            raise ValueError(f"command {command} is not modelled")
+        return self._handlers.get(command, lambda: None)
 
     def _start(self, name: str, steps: Steps) -> None:
         self._threads[name] = steps

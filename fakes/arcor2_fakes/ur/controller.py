@@ -64,8 +64,7 @@ class Controller:
         self.program: Program | None = None
         self.loaded: str | None = None
         self.load_program: Callable[[str], Program] | None = None
-        self.freedrive = False
-        self.contact = False
+        self.freedrive = self.contact = False
         self.obstacle: Obstacle | None = None
         self.tcp_force: tuple[float, ...] = (0.0,) * 6
         self.payload, self.payload_cog, self.payload_inertia = 0.0, (0.0, 0.0, 0.0), (0.0,) * 6
@@ -78,9 +77,9 @@ class Controller:
         self.commands: deque[dict[str, Any]] = deque(maxlen=_KEPT)
         self.stops: deque[dict[str, Any]] = deque(maxlen=_KEPT)
         self.stops_seen = 0
-        self.watchdog_trips = 0
-        self.programs_killed = 0
+        self.watchdog_trips = self.programs_killed = 0
         self.changed: Callable[[], None] = lambda: None
+        self.failed: Callable[[str], None] = lambda _: None  # called with the run-time error of a program
         self._steps: Steps | None = None
         self._conditions: dict[SafetyMode, bool] = dict.fromkeys(SafetyMode, False)
         self._unlockable = 0  # cycle from which a protective stop may be unlocked
@@ -108,6 +107,7 @@ class Controller:
                 self.protective_stop(str(e))
             except (ValueError, TypeError, LookupError, ArithmeticError) as e:  # the program is invalid
                 self.stop_program(f"runtime error: {e}")
+                self.failed(str(e))
         elif runtime is Runtime.STOPPING and not self.arm.busy:
             self.runtime = Runtime.STOPPED
         elif runtime is Runtime.PAUSING and not self.arm.moving:

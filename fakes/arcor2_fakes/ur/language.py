@@ -118,6 +118,21 @@ def _expression(text: str) -> ast.expr:
         raise ValueError(f"not understood: {text.strip()}") from None
 
 
+class _AtOnce(Interpreter):
+    """Runs only calls that take no time."""
+
+    def statement(self, call: Call) -> Steps:
+        """Run one call."""
+        self.at_once(call)
+        yield from ()
+
+
+def run_secondary(controller: Controller, name: str, text: str) -> None:
+    """Run a secondary program: at once, next to the playing one. Raise `ValueError` if it takes time."""
+    for _ in WrittenProgram(controller, name, text.replace("sec", "def", 1), _AtOnce).run():
+        raise ValueError("a secondary program takes no time")
+
+
 class _Leave(Exception):
     """Unwinding by `break`, `return` or `halt`."""
 
@@ -125,10 +140,12 @@ class _Leave(Exception):
 class WrittenProgram(Program):
     """A program of a client."""
 
-    def __init__(self, controller: Controller, name: str, text: str) -> None:
+    def __init__(
+        self, controller: Controller, name: str, text: str, interpreter: type[Interpreter] = Interpreter
+    ) -> None:
         self.name = name
         self._c = controller
-        self._interpreter = Interpreter(controller)
+        self._interpreter = interpreter(controller)
         self._statements = parse(text)
         self._variables: dict[str, Any] = {"True": True, "False": False}
         self._defined: dict[str, list[Statement]] = {}

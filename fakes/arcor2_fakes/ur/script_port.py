@@ -1,18 +1,18 @@
-"""The script port: receives a program as text, which replaces the playing one."""
+"""Programs of clients, received as text on the ports 30001, 30002 and 30003; one replaces the playing one."""
 
 import logging
 
 from arcor2_fakes.ur.control_script import ControlScript
 from arcor2_fakes.ur.controller import Controller, Program, Refused
-from arcor2_fakes.ur.language import WrittenProgram
-from arcor2_fakes.ur.urscript import Interpreter, Splitter, calls
+from arcor2_fakes.ur.language import WrittenProgram, run_secondary
+from arcor2_fakes.ur.urscript import Splitter
 from arcor2_fakes.wire import Connection
 
 log = logging.getLogger("script")
 
 
 class ScriptPort:
-    """All clients of the script port."""
+    """All clients of the ports that receive programs."""
 
     def __init__(self, controller: Controller) -> None:
         self.controller = controller
@@ -41,12 +41,11 @@ class ScriptPort:
             return
         self.scripts_taken += 1
         if kind == "sec":  # a secondary program runs concurrently and takes no time
-            interpreter = Interpreter(self.controller)
             try:
-                for call in calls(text):
-                    interpreter.at_once(call)
-            except (ValueError, TypeError, LookupError) as e:
+                run_secondary(self.controller, name, text)
+            except (ValueError, TypeError, LookupError, ArithmeticError) as e:
                 log.info("secondary program %s: runtime error: %s", name, e)
+                self.controller.failed(str(e))
             return
         if kind == "line" and name.startswith(("stopj", "stopl", "halt")):
             self.controller.note_stop("script", name)
@@ -58,6 +57,7 @@ class ScriptPort:
                 program = WrittenProgram(self.controller, name, text)
             except ValueError as e:
                 log.info("program %s cannot be read: %s", name, e)
+                self.controller.failed(str(e))
                 return
         try:
             self.controller.start_program(program)

@@ -21,6 +21,7 @@ from arcor2_fakes.ur.paths import JointBlend, JointMove, LinearBlend, LinearMove
 log = logging.getLogger("script")
 
 _DEFINITION = re.compile(r"^(def|sec)\s+(\w+)\s*\(\s*\)\s*:")
+_BLOCK = re.compile(r"\s*(def|sec|thread|while|if)\b.*:\s*(#.*)?")
 MAX_SCRIPT = 4 << 20
 
 
@@ -95,6 +96,7 @@ class Splitter:
     def __init__(self) -> None:
         self._rest = b""
         self._lines: list[str] = []
+        self._depth = 0
 
     def feed(self, data: bytes) -> Iterator[tuple[str, str, str]]:
         """Return the programs completed by `data`, as (kind, name, text); kind is def, sec or line.
@@ -108,14 +110,18 @@ class Splitter:
             line = raw.decode("utf-8", "replace").rstrip("\r")
             if self._lines:
                 self._lines.append(line)
-                if line == "end":
+                if _BLOCK.fullmatch(line):
+                    self._depth += 1
+                elif line.split("#", 1)[0].strip() == "end":
+                    self._depth -= 1
+                if self._depth == 0:
                     text = "\n".join(self._lines)
                     definition = _DEFINITION.match(text)
                     assert definition is not None
                     self._lines = []
                     yield definition[1], definition[2], text
             elif _DEFINITION.match(line):
-                self._lines = [line]
+                self._lines, self._depth = [line], 1
             elif line.strip():
                 yield "line", line.strip(), line
 
@@ -155,7 +161,7 @@ class Interpreter:
                 self.at_once(call)
 
     def at_once(self, call: Call) -> None:
-        """Run a call that takes no time: outputs, registers, payload, TCP."""
+        """Run a call that takes no time: outputs, registers, payload, TCP. Raise `ValueError` for others."""
         c = self.controller
         first, second = call.get("n", 0, 0), call.get("b", 1, 0)
         match call.name:
@@ -181,7 +187,7 @@ class Interpreter:
             case "textmsg" | "popup":
                 log.info("message: %s", call.arguments)
             case _:
-                log.info("not modelled: %s", call.name)
+                raise ValueError(f"{call.name} is not modelled, or takes time")
 
     def _output(self, bit: int, on: bool) -> None:
         c = self.controller

@@ -40,7 +40,8 @@ def play(ur: Any, tcp: float = 0.1, x: float = -0.5) -> None:
 
 @pytest.fixture
 def cell(start_fake: Callable[..., Any]) -> tuple[Any, Any, Any]:
-    ports = [part for name in ("rtde", "script", "dashboard", "primary") for part in (f"--{name}-port", "0")]
+    names = ("rtde", "script", "dashboard", "primary", "secondary")
+    ports = [part for name in names for part in (f"--{name}-port", "0")]
     ur = start_fake("ur", *ports)
     tester = start_fake("functional_tester", "--time-scale", "20")
     reader = start_fake("barcode_reader")

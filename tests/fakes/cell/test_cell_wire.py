@@ -191,7 +191,7 @@ async def test_the_world_waits_for_starting_fakes(start_fake: Callable[..., Any]
     assert world.ready["boards"] == 5
     # And it ends when one of them has gone.
     await asyncio.to_thread(reader.terminate)
-    assert await asyncio.to_thread(world.process.wait, 5.0) == 3
+    assert await asyncio.to_thread(world.process.wait, 30.0) == 3
     world.end()
     assert world.errors == f"cell: the reader at {reader.ready['control']} has gone\n"
     await late.control.close()

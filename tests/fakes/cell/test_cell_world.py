@@ -279,7 +279,7 @@ async def test_faults_can_be_injected() -> None:
         await cell.world.drop()
     await cell.world.remove("C")
     assert cell.places == "lost feeder removed"
-    with pytest.raises(ValueError, match="no board Z"):
+    with pytest.raises(ValueError, match="board Z does not exist"):
         await cell.world.remove("Z")
 
 

@@ -56,7 +56,7 @@ class FakeUr:
     def do(self, command: str, **arguments: Any) -> Any:
         return self.control.do(command, **arguments)
 
-    def library(self, body: str, within: float = 30.0) -> dict[str, Any]:
+    def library(self, body: str, within: float = 120.0) -> dict[str, Any]:
         """Runs `body` with ur_rtde in a process of its own; gives what it reports."""
         run = subprocess.run(
             [sys.executable, "-c", _PRELUDE + body, self.host, self.ready["control"]],
@@ -109,7 +109,7 @@ def start_ur() -> Iterator[Callable[..., FakeUr]]:
         if fake.process.poll() is None:
             fake.process.send_signal(signal.SIGTERM)
         try:
-            fake.process.wait(2.0)
+            fake.process.wait(30.0)
         except subprocess.TimeoutExpired:
             fake.process.kill()
             fake.process.wait()

@@ -59,7 +59,7 @@ async def test_an_endless_line_is_closed(server):
     reader, writer = await asyncio.open_connection(*parse_address(server.address))
     writer.write(b"x" * (MAX_LINE + 100_000))
     assert not json.loads(await reader.readline())["ok"]
-    async with asyncio.timeout(2.0):
+    async with asyncio.timeout(30.0):
         with contextlib.suppress(ConnectionError):  # the rest of the line was never read: the end may be an RST
             assert await reader.read() == b""
     await close(writer)
@@ -113,11 +113,11 @@ async def test_faults_of_a_wire(server):
     register_faults(server, {"echo": wire})
     client = await ControlClient.connect(server.address)
 
-    async def open_and_ask():
+    async def open_and_ask(within=30.0):
         reader, writer = await asyncio.open_connection(*parse_address(wire.address))
         writer.write(b"frame")
         try:
-            async with asyncio.timeout(0.15):
+            async with asyncio.timeout(within):
                 return await reader.readexactly(5)
         except TimeoutError:
             return bytes(reader._buffer)
@@ -126,14 +126,14 @@ async def test_faults_of_a_wire(server):
 
     assert await open_and_ask() == b"frame"
     await client.do("silence", wire="echo")
-    assert await open_and_ask() == b""
+    assert await open_and_ask(0.15) == b""
     await client.do("heal")
     await client.do("half_frame", wire="echo")
-    assert await open_and_ask() == b"fr"
+    assert await open_and_ask(0.5) == b"fr"
     await client.do("heal")
     assert await open_and_ask() == b"frame"
     await client.do("garbage")
-    assert await open_and_ask() != b"frame"
+    assert await open_and_ask(0.5) != b"frame"
     await client.do("heal")
     await client.do("slow", seconds=0.05)
     begin = asyncio.get_running_loop().time()
@@ -153,7 +153,7 @@ async def test_faults_of_a_wire(server):
         await asyncio.open_connection(*parse_address(wire.address))
     await client.do("heal", wire="echo")
     assert await open_and_ask() == b"frame"
-    with pytest.raises(ControlError, match="no wire"):
+    with pytest.raises(ControlError, match="wire 'other' does not exist"):
         await client.do("silence", wire="other")
     await client.close()
     wire.close()

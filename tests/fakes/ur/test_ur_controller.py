@@ -8,6 +8,7 @@ from arcor2_fakes.ur.control_script import ControlScript
 from arcor2_fakes.ur.controller import HOME, Controller, Refused
 from arcor2_fakes.ur.dashboard import NOT_IN_LOCAL, Dashboard
 from arcor2_fakes.ur.language import WrittenProgram
+from arcor2_fakes.ur.script_port import ScriptPort
 from arcor2_fakes.ur.states import RobotMode, Runtime, SafetyMode
 from arcor2_fakes.ur.urscript import Call, ForeignProgram, Splitter, calls, parse_call
 
@@ -359,6 +360,42 @@ def test_inverse_without_solution_ends_the_program_as_a_runtime_error(c):
     assert c.program is None
 
 
+@pytest.mark.parametrize("code", [6, 8, 20, 21, 56, 57, 59, 62, 63, 66, 67, 68, 69, 71])
+def test_commands_that_are_not_modelled_end_the_program(c, code):
+    failed = []
+    c.failed = failed.append
+    control_script(c)
+    command(c, 43, [0.0] * 12, [])
+    pose = c.output_doubles[:6]
+    assert pose == pytest.approx(c.arm.pose)
+    c.input_ints[0] = 0
+    wait(c, 0.01)
+    c.input_ints[0] = code
+    wait(c, 0.01)
+    assert c.program is None
+    assert failed == [f"command {code} is not modelled"]
+    assert c.output_ints[0] == 1, "it was not done: the result of the previous command is not its own"
+
+
+def test_programs_with_unknown_functions_end_in_an_error(c):
+    failed = []
+    c.failed = failed.append
+    port = ScriptPort(c)
+    port.take("def", "p", "def p():\n  force_mode(1)\n  set_standard_digital_out(0, True)\nend")
+    wait(c, 0.1)
+    assert (c.program, c.digital_outputs) == (None, 0)
+    port.take("def", "p", "def p():\n  if x\nend")
+    assert c.program is None
+    start_move(c)
+    program = c.program
+    for wrong in ("movej([0, 0, 0, 0, 0, 0])", "sleep(1)", "sync()", "no_function(1)", "x = y"):
+        port.take("sec", "s", f"sec s():\n  {wrong}\nend")
+    port.take("sec", "s", "sec s():\n  if 1 < 2:\n    set_standard_digital_out(3, True)\n  end\nend")
+    assert c.digital_outputs == 8
+    assert c.program is program
+    assert len(failed) == 7
+
+
 # ------------------------------------------------------------------------------------------------------------ URScript
 def test_calls_with_literals_only():
     assert parse_call("movel(p[0.1,-.2, 0,0,3,0],a=1,v=.5)") == Call(
@@ -375,3 +412,5 @@ def test_scripts_are_split_at_their_end():
     text = b"def a():\n  if x:\n    sync()\n  end\nend\nstopj(2)\nsec b():\n  textmsg(1)\nend\n"
     found = [entry for i in range(len(text)) for entry in splitter.feed(text[i : i + 1])]
     assert [(kind, name) for kind, name, _ in found] == [("def", "a"), ("line", "stopj(2)"), ("sec", "b")]
+    flat = b"def a():\nif x:  # not indented\nsync()\nelif y:\nsync()\nend\nend # of a\nstopj(2)\n"
+    assert [name for _, name, _ in Splitter().feed(flat)] == ["a", "stopj(2)"]

@@ -1,5 +1,6 @@
 """The fake controller with ur_rtde. Each case runs the library in a separate process."""
 
+import itertools
 import math
 import time
 
@@ -13,18 +14,24 @@ HOME = (0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0)
 def test_receiving_at_500_hz_misses_no_sample(ur):
     seen = ur.library("""
 receive = Receive(host, 500.0, ["timestamp", "actual_q", "actual_TCP_pose", "robot_mode", "safety_mode"])
-stamps, start = [], time.monotonic()
-while time.monotonic() < start + 2.0:
+samples = [(time.monotonic(), receive.getTimestamp())]
+while samples[-1][1] < samples[0][1] + 2.0:
     t = receive.getTimestamp()
-    if not stamps or t != stamps[-1]:
-        stamps.append(t)
+    if t != samples[-1][1]:
+        samples.append((time.monotonic(), t))
     time.sleep(0.0003)
-report(stamps=stamps, q=receive.getActualQ(), pose=receive.getActualTCPPose(), mode=receive.getRobotMode())
+report(samples=samples, q=receive.getActualQ(), pose=receive.getActualTCPPose(), mode=receive.getRobotMode())
 """)
-    ticks = [round(t * 500) for t in seen["stamps"]]
-    assert [t * 500 for t in seen["stamps"]] == pytest.approx(ticks, abs=1e-6)
-    assert ticks[-1] - ticks[0] == pytest.approx(1000, abs=50)  # a sample is 2 ms, on average over the 2 s
-    assert len(ticks) > 0.5 * (ticks[-1] - ticks[0])  # what is missing was overwritten before this loop looked
+    clocks, stamps = zip(*seen["samples"], strict=True)
+    ticks = [round(t * 500) for t in stamps]
+    assert [t * 500 for t in stamps] == pytest.approx(ticks, abs=1e-6)
+    # A busy machine delays fake and loop; the fake catches up 0.2 s at most.
+    assert stamps[-1] - stamps[0] < clocks[-1] - clocks[0] + 0.25
+    stretches = itertools.pairwise(range(0, len(ticks), 50))
+    assert max((ticks[j] - ticks[i]) / (clocks[j] - clocks[i]) for i, j in stretches) > 450
+    steps = [b - a for a, b in itertools.pairwise(ticks)]
+    assert min(steps) > 0
+    assert steps.count(1) > 100  # the others were overwritten before this loop looked
     assert seen["q"] == pytest.approx(HOME)
     assert seen["mode"] == 7
     assert ur.do("truth")["samples_lost"] == 0
@@ -62,7 +69,7 @@ report(took=took, fastest=fastest, q=receive.getActualQ(), goal=goal, qd=receive
     assert seen["q"] == pytest.approx(seen["goal"], abs=1e-9)
     assert seen["qd"] == [0.0] * 6
     assert seen["fastest"] == pytest.approx(0.8, rel=0.01)
-    assert 1.05 < seen["took"] < 3.0  # 0.6 / 0.8 + 0.8 / 2.0 s, and what a busy machine adds
+    assert seen["took"] > 1.05  # 0.6 / 0.8 + 0.8 / 2.0 s
     assert seen["back"]
     assert seen["home"] == pytest.approx(HOME, abs=1e-9)
 
@@ -72,12 +79,12 @@ def test_asynchronous_move_is_stopped(ur):
 control = Control(host, 500.0)
 control.moveJ([2.0] + HOME[1:], 1.0, 2.0, True)
 until(lambda: fake.do("truth")["q"][0] > 0.3)
-asked = time.monotonic()
+sent = time.monotonic()
 control.stopJ(3.0, True)
 until(lambda: not fake.do("truth")["moving"])
 q = fake.do("truth")["q"]
 time.sleep(0.3)
-report(asked=asked, q=q, later=fake.do("truth")["q"],
+report(sent=sent, q=q, later=fake.do("truth")["q"],
        running=control.getAsyncOperationProgressEx().isAsyncOperationRunning())
 """)
     assert 0.3 < seen["q"][0] < 1.5
@@ -85,7 +92,7 @@ report(asked=asked, q=q, later=fake.do("truth")["q"],
     assert not seen["running"]
     (stop,) = ur.do("stops")
     assert (stop["via"], stop["code"]) == ("rtde", 34)
-    assert 0.0 <= stop["t"] - seen["asked"] < 0.05
+    assert stop["t"] >= seen["sent"]
     assert ur.do("commands_taken")[-1]["kind"] == "stopl"  # what the library's program really runs
 
 
@@ -148,13 +155,13 @@ def test_speed_and_servo(ur):
 receive = Receive(host, 500.0, ["timestamp", "actual_q", "actual_qd", "actual_TCP_speed"])
 control = Control(host, 500.0)
 control.speedJ([0.4, 0, 0, 0, 0, 0], 2.0)
-time.sleep(0.5)
+until(lambda: receive.getActualQd()[0] > 0.399999)
 joint_speed = receive.getActualQd()
 control.speedStop(5.0)
 until(lambda: not any(receive.getActualQd()))
 stopped = receive.getActualQd()
 control.speedL([0.0, 0.0, -0.1, 0, 0, 0], 1.0)
-time.sleep(0.3)
+until(lambda: receive.getActualTCPSpeed()[2] < -0.09999)
 linear_speed = receive.getActualTCPSpeed()
 control.speedStop(5.0)
 target = receive.getActualQ()
@@ -163,7 +170,7 @@ for i in range(200):
     t = control.initPeriod()
     control.servoJ(target, 0.0, 0.0, 0.002, 0.1, 300)
     control.waitPeriod(t)
-time.sleep(0.5)
+until(lambda: abs(receive.getActualQ()[5] - target[5]) < 1e-4)
 followed = receive.getActualQ()
 control.servoStop()
 report(joint_speed=joint_speed, stopped=stopped, linear_speed=linear_speed, target=target, followed=followed)
@@ -221,8 +228,8 @@ report(inputs=receive.getActualDigitalInputBits())
 def test_watchdog_stops_the_arm_when_kicks_cease(ur):
     seen = ur.library("""
 control = Control(host, 500.0)
-control.setWatchdog(10.0)
-control.moveJ([3.0] + HOME[1:], 1.5, 5.0, True)
+control.setWatchdog(2.0)
+control.moveJ([3.0] + HOME[1:], 0.8, 5.0, True)
 for _ in range(20):
     control.kickWatchdog()
     time.sleep(0.03)
@@ -259,8 +266,8 @@ def test_a_cable_cut_during_a_move_ends_at_standstill(ur, fault):
     """The library kicks on, reconnects by itself and sometimes crashes over it: nothing of that may move the arm."""
     with ur.library_running("""
 control = Control(host, 500.0)
-control.setWatchdog(10.0)
-control.moveJ([3.0] + HOME[1:], 1.0, 5.0, True)
+control.setWatchdog(2.0)
+control.moveJ([3.0] + HOME[1:], 0.8, 5.0, True)
 while True:
     control.kickWatchdog()
     time.sleep(0.03)
@@ -291,9 +298,14 @@ try:
     early = None
 except RuntimeError as e:
     early = str(e)
-time.sleep(0.6)  # five seconds of the controller's
 dashboard.stop()
-dashboard.unlockProtectiveStop()
+def unlocked():
+    try:
+        dashboard.unlockProtectiveStop()
+        return True
+    except RuntimeError:
+        return False
+until(unlocked)  # after five seconds of the controller's clock
 until(lambda: not receive.isProtectiveStopped())
 resting = fake.do("truth")["q"]
 time.sleep(0.3)
@@ -350,10 +362,10 @@ fake.do("safeguard_stop", on=True)
 first.join(1.0)
 waits = first.is_alive()
 fake.do("safeguard_stop", on=False)
-first.join(5.0)
+first.join(20.0)
 second = start("second", 1.5)
 fake.do("emergency_stop", on=True)
-second.join(5.0)
+second.join(20.0)
 until(lambda: fake.do("truth")["robot_mode"] == "POWER_OFF")
 report(waits=waits, ends=ends, hangs=second.is_alive(), truth=fake.do("truth"))
 """)
@@ -402,9 +414,12 @@ def test_a_lost_stream_is_detected_and_recovers(ur, fault):
     seen = ur.library(f"""
 receive = Receive(host, 500.0, ["timestamp", "actual_q"])
 fake.do("{fault}", wire="rtde")
-time.sleep(0.1)
-before = receive.getTimestamp()
-time.sleep(0.3)
+def silent():
+    global before
+    before = receive.getTimestamp()
+    time.sleep(0.3)
+    return receive.getTimestamp() == before
+until(silent)
 stuck = receive.getTimestamp() - before
 fake.do("heal", wire="rtde")
 if stuck == 0.0:
