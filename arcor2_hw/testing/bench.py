@@ -12,6 +12,7 @@ from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.objects import Generic
 from arcor2_hw.testing import capabilities, quality
 from arcor2_hw.testing.frames import Frames
+from arcor2_hw.testing.time_limit import CallHangs
 from arcor2_hw.testing.wire import Wire
 
 
@@ -40,6 +41,7 @@ class Bench(abc.ABC):
         label: Name of the device where a cell has several of one type.
         guessed: Whether it was created from settings alone.
         real: Whether it uses a real device; it runs only with `--real` and the device named by `--real-device`.
+        case_within: Time in which each case ends, s; a call that has not returned by then fails the case.
         connect_timeout: Time limit passed to connect, s.
         call_within: Time in which a call on a silent device fails, s.
         stale_after: Time from the cut after which no old value is returned, s.
@@ -52,6 +54,7 @@ class Bench(abc.ABC):
     label: ClassVar[str] = ""
     guessed: ClassVar[bool] = False
     real: ClassVar[bool] = False
+    case_within: ClassVar[float] = 60.0
     connect_timeout: ClassVar[float] = 2.0
     call_within: ClassVar[float] = 2.0
     stale_after: ClassVar[float] = 1.0
@@ -63,6 +66,8 @@ class Bench(abc.ABC):
     """The wire between driver and device, if `start` created one; it provides the hooks of the cable."""
     frames: Frames | None = None
     """Reader of the driver's frames on the wire."""
+    hanging: CallHangs | None = None
+    """The call that did not return. While it runs, no other case does."""
 
     def __init__(self) -> None:
         self._made: list[Generic] = []

@@ -32,8 +32,8 @@ def held() -> set[str]:
 
 def left_behind(before: set[str]) -> set[str]:
     """Return the resources that this process did not have before, after waiting for them to end."""
-    until = time.monotonic() + GRACE
-    while (left := held() - before) and time.monotonic() < until:
+    began = own_time()
+    while (left := held() - before) and own_time() - began < GRACE:
         gc.collect()
         time.sleep(POLL)
     return left

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+import os
 import random
-from collections.abc import Iterator, Mapping, Sequence
+import sys
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
@@ -18,6 +21,11 @@ _REWRITTEN = ("acting_cases", "conformance", "connecting_cases", "life", "loss_c
 pytest.register_assert_rewrite(*(f"arcor2_hw.testing.{each}" for each in _REWRITTEN))
 
 OUTCOMES: pytest.StashKey[Outcomes] = pytest.StashKey()
+STATUS: pytest.StashKey[int] = pytest.StashKey()
+HANGING: list[Bench] = []
+"""Benches on which a call did not return."""
+RELEASE_WITHIN = 10.0
+"""Time in which the objects of a case are disconnected, s."""
 COLLECTED: pytest.StashKey[Mapping[str, frozenset[str]]] = pytest.StashKey()
 """Names of collected tests by path of their file."""
 
@@ -130,8 +138,9 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(_Recorder(config), "arcor2_hw_outcomes")
 
 
-def pytest_sessionfinish(session: pytest.Session) -> None:
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     """Write the requested report. With xdist, only the main process has all results."""
+    session.config.stash[STATUS] = int(exitstatus)
     file = session.config.getoption("--report")
     if file and not hasattr(session.config, "workerinput"):
         from arcor2_hw.testing import report
@@ -159,6 +168,49 @@ def _line(name: str, ran: Ran) -> str:
     return f"{name}: {ran.reached.name.lower()} (claimed {ran.claimed.name.lower()}), {counts}{missing}"
 
 
+# ---------------------------------------------------------------------------------------------------- time limits
+def _within(bench: Bench, limit: float, call: Callable[[], Any], what: str) -> Any:
+    """Call with a time limit. If it does not return, fail with the name of the device, the call and its stack."""
+    from arcor2_hw.testing.time_limit import CallHangs, within
+
+    try:
+        return within(limit, call, what)
+    except CallHangs as error:
+        hang = error
+    bench.hanging = hang
+    HANGING.append(bench)
+    pytest.fail(f"{bench.name()}: {hang}\n\nStack of the call:\n{hang.stack}", pytrace=False)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, object, object]:
+    """Run a case of the suite with a time limit."""
+    bench = cast("Bench | None", pyfuncitem.funcargs.get("arcor2_bench"))
+    if bench is None:
+        return (yield)
+    case, name = pyfuncitem.obj, pyfuncitem.name
+    limited = functools.partial(_limited, bench, case, f"the case {name.partition('[')[0].removeprefix('test_')}")
+    pyfuncitem.obj = limited
+    try:
+        return (yield)
+    finally:
+        pyfuncitem.obj = case
+
+
+def _limited(bench: Bench, case: Callable[..., None], what: str, **arguments: Any) -> None:
+    _within(bench, bench.case_within, lambda: case(**arguments), what)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """End the process while a call hangs: Python would wait for a thread pool that the call uses."""
+    hangs = any(bench.hanging is not None and not bench.hanging.returned(0.0) for bench in HANGING)
+    if hangs and STATUS in config.stash and not hasattr(config, "workerinput"):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(config.stash[STATUS])
+
+
 # ---------------------------------------------------------------------------------------------------- fixtures
 @pytest.fixture(scope="class")
 def arcor2_running_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
@@ -169,10 +221,10 @@ def arcor2_running_bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
         pytest.skip(f"{kind.name()} is a real device. Use --real --real-device {kind.name()}.")
     bench = kind()
     try:
-        bench.start()
+        _within(bench, bench.case_within, bench.start, "the start of the bench")
         yield bench
     finally:
-        bench.end()
+        _within(bench, bench.case_within, bench.end, "the end of the bench")
 
 
 @pytest.fixture(scope="class")
@@ -180,14 +232,15 @@ def arcor2_identity(request: pytest.FixtureRequest, arcor2_running_bench: Bench)
     """Return the identity of the device, read once when a report is written."""
     from arcor2_hw.exceptions import Arcor2Error
 
+    bench = arcor2_running_bench
     if not request.config.getoption("--report"):
         return {}
     try:
-        who = arcor2_running_bench.connected().identify()
+        who = _within(bench, bench.case_within, lambda: bench.connected().identify(), "reading the identity")
     except Arcor2Error:
         return {}
     finally:
-        arcor2_running_bench.release()
+        _within(bench, RELEASE_WITHIN, bench.release, "disconnecting after reading the identity")
     return {"vendor": who.vendor, "model": who.model, "serial": who.serial, "firmware": who.firmware}
 
 
@@ -199,13 +252,18 @@ def arcor2_bench(
     bench = arcor2_running_bench
     values = _values(request.node)
     values |= {"address": bench.address, "identity": arcor2_identity}
+    case = values["case"]
+    if bench.hanging is not None and not bench.hanging.returned(RELEASE_WITHIN):
+        pytest.fail(f"{bench.name()}: {case} was not run, because of a call that hangs: {bench.hanging}", pytrace=False)
     _check_hooks(request, bench, values)
     try:
-        bench.reset()
+        _within(bench, bench.case_within, bench.reset, f"the reset before the case {case}")
         yield bench
     finally:
-        bench.release()
-        bench.reset()
+        try:
+            _within(bench, RELEASE_WITHIN, bench.release, f"disconnecting after the case {case}")
+        finally:
+            _within(bench, bench.case_within, bench.reset, f"the reset after the case {case}")
 
 
 def _check_hooks(request: pytest.FixtureRequest, bench: Bench, values: dict[str, Any]) -> None:

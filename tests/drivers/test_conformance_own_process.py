@@ -14,7 +14,7 @@ class OwnProcessBench(BarcodeReaderBench):
         super().start()
         self.processes: list[DeviceProcess] = []
 
-    def _build(self, port: str) -> BarcodeReader:
+    def build(self, port: str) -> BarcodeReader:
         process = DeviceProcess(BarcodeReader, "reader")
         self.processes.append(process)
         settings = BarcodeReaderSettings(port, answer_timeout=0.5)

@@ -33,6 +33,7 @@ CANNOT_BE_GUESSED = {
     "loss_reaction",
     "nothing_resumes",
     "one_act_at_a_time",
+    "results_are_current",
     "stop_at_random_phases",
     "stop_passes",
     "units_and_frames",
@@ -126,7 +127,7 @@ def test_a_missing_cell_file_is_an_error(tmp_path: Path) -> None:
     ("changes", "told"),
     [
         ({"type": "Nonsense"}, "far: object type Nonsense is not installed and was not uploaded"),
-        ({"settings": {"hots": "127.0.0.1"}}, "far: FunctionalTester has no setting hots"),
+        ({"settings": {"hots": "127.0.0.1"}}, "far: Functional tester has no setting hots"),
         ({"settings": {"host": "127.0.0.1"}, "wire": ["gate"]}, "far: wire names 'gate'"),
         ({"bench": "no_such_module:Bench"}, "far: the bench no_such_module:Bench cannot be imported"),
         (

@@ -11,6 +11,6 @@ class BrokenPress(ToyPress):
     """A press."""
 
     def _stopped(self) -> Exception:
-        if self.connection is Connection.OFFLINE:
-            time.sleep(5.0)
+        while self.connection is Connection.OFFLINE and not self._press.scrapped:
+            time.sleep(0.02)
         return super()._stopped()

@@ -1,0 +1,78 @@
+"""Runs of the conformance suite on the press of `broken`, in a process of its own."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+HERE = Path(__file__).parent
+PACKAGE = HERE / "broken"
+QUALITY = (PACKAGE / "quality.yaml").read_text()
+BROKEN = sorted(path.stem for path in PACKAGE.glob("[a-z]*.py") if not path.stem.startswith("toy_"))
+SUITE = """
+import importlib
+
+from arcor2_hw.testing.conformance import Conformance
+from broken.toy_press import ToyBench
+from broken.toy_reactions import ContinuingBench, HoldingBench
+
+
+def broken(case):
+    module = importlib.import_module(f"broken.{case}")
+    base = getattr(module, "BrokenBench", ToyBench)
+    return type("Bench", (base,), {"object_type": module.BrokenPress, "label": case})
+
+
+class TestToy(Conformance):
+    benches = [ToyBench]
+
+
+class TestReactions(Conformance):
+    benches = [HoldingBench, ContinuingBench]
+
+
+class TestBroken(Conformance):
+    benches = [broken(case) for case in CASES]
+"""
+
+
+def run(
+    folder: Path,
+    *arguments: str,
+    selected: str = "",
+    quality: str = QUALITY,
+    conftest: str = "",
+    cases: Sequence[str] = (),
+) -> str:
+    """Run the suite on the press in its own process and return the output of pytest."""
+    shutil.copytree(PACKAGE, folder / "broken", dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+    for name, text in {
+        "test_of_toy.py": "def test_connecting_observes():\n    pass\n",
+        "test_toy.py": SUITE.replace("CASES", repr(list(cases))),
+        "broken/quality.yaml": quality,
+        "conftest.py": conftest,
+        "pytest.ini": "[pytest]\n",
+    }.items():
+        (folder / name).write_text(text)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "arcor2_hw.testing.plugin"]
+    command += ["-rA", *arguments, *(["-k", selected] if selected else [])]
+    # What the run around this one tells its own processes is not meant for this one. Of the plugins that happen to be
+    # installed none is loaded: the one of dash, which Open3D brings along, warns with every pytest, others take time.
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST_", "COV_"))}
+    environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
+    ended = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=290, check=False
+    )
+    return ended.stdout + ended.stderr
+
+
+def case_of(name: str) -> str:
+    """Return the case that a broken driver fails: several of one case are named `case__fault`."""
+    return name.partition("__")[0]
+
+
+def failed(output: str) -> list[str]:
+    lines = [line for line in output.splitlines() if line.startswith(("FAILED", "ERROR "))]
+    return sorted({line.partition("test_toy.py::TestToy::test_")[2].partition("[")[0] for line in lines})
