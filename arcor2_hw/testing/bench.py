@@ -3,15 +3,20 @@
 import abc
 import contextlib
 import inspect
+import subprocess
+import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, ClassVar, Final, NamedTuple
 
+from arcor2_hw.data.device import LossKind
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.objects import Generic
 from arcor2_hw.testing import capabilities, quality
 from arcor2_hw.testing.frames import Frames
+from arcor2_hw.testing.life import POLL
+from arcor2_hw.testing.own_time import own_time
 from arcor2_hw.testing.time_limit import CallHangs
 from arcor2_hw.testing.wire import Wire
 
@@ -22,12 +27,32 @@ def missing(name: str) -> NotImplementedError:
 
 
 class Check(NamedTuple):
-    """A reading of the driver, the value of the device itself, and their maximum difference, all in SI units."""
+    """A value that the driver returned, the value of the device itself, and their maximum difference, in SI units.
+
+    Values are numbers, sequences of them, or something that is compared for equality.
+    """
 
     what: str
-    by_driver: float
-    by_device: float
-    within: float
+    by_driver: Any
+    by_device: Any
+    within: float = 0.0
+
+    @property
+    def agrees(self) -> bool:
+        """Return whether the values agree."""
+        return _agree(self.by_driver, self.by_device, self.within)
+
+    def __str__(self) -> str:
+        apart = f" (allowed difference: {self.within:g})" if self.within else ""
+        return f"{self.what}: the driver returned {self.by_driver!r}, the device has {self.by_device!r}{apart}"
+
+
+def _agree(one: Any, other: Any, within: float) -> bool:
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return len(one) == len(other) and all(_agree(a, b, within) for a, b in zip(one, other, strict=True))
+    if isinstance(one, int | float) and isinstance(other, int | float):
+        return abs(one - other) <= within
+    return bool(one == other)
 
 
 class Bench(abc.ABC):
@@ -45,9 +70,13 @@ class Bench(abc.ABC):
         connect_timeout: Time limit passed to connect, s.
         call_within: Time in which a call on a silent device fails, s.
         stale_after: Time from the cut after which no old value is returned, s.
+        fresh_within: Time after a change of the device in which a reading that the driver polls follows, s.
         lost_within: Time until the connection is reported as lost, s.
         back_within: Time until the connection is reported as online again, s.
         stops_within: Time from `stop` to standstill, s.
+        loss_watched: Time for which a device that holds or continues is observed after its driver has died, s: longer
+            than any watchdog of the device.
+        progress_within: Longest time between two changes of `progress` while the action goes on, s.
     """
 
     object_type: ClassVar[type[Generic]]
@@ -58,9 +87,12 @@ class Bench(abc.ABC):
     connect_timeout: ClassVar[float] = 2.0
     call_within: ClassVar[float] = 2.0
     stale_after: ClassVar[float] = 1.0
+    fresh_within: ClassVar[float] = 1.0
     lost_within: ClassVar[float] = 3.0
     back_within: ClassVar[float] = 8.0
     stops_within: ClassVar[float] = 1.0
+    loss_watched: ClassVar[float] = 3.0
+    progress_within: ClassVar[float] = 1.0
 
     wire: Wire | None = None
     """The wire between driver and device, if `start` created one; it provides the hooks of the cable."""
@@ -71,6 +103,7 @@ class Bench(abc.ABC):
 
     def __init__(self) -> None:
         self._made: list[Generic] = []
+        self._orphans: list[subprocess.Popen[bytes]] = []
 
     # -------------------------------------------------------------------------------- every bench
     @property
@@ -155,13 +188,32 @@ class Bench(abc.ABC):
         raise missing("foreign")
 
     def orphan(self) -> list[str]:
-        """Return the command line of a process that connects, takes control and runs `run_long` until it is killed."""
+        """Return the command line of a process that connects, takes control and acts until it is killed.
+
+        It runs an action like that of `run_long`. A device declared to hold is brought to hold something.
+        """
         raise missing("orphan")
+
+    def holding(self) -> object:
+        """Return what the device holds, read without the driver: the grip, the outputs. Falsy if it holds nothing."""
+        raise missing("holding")
+
+    def progress(self) -> float:
+        """Return how much of the action of `orphan` is done, 0 to 1, read from the device without the driver."""
+        raise missing("progress")
 
     # -------------------------------------------------------------------------------- hooks for level silver
     def readings(self, device: Generic) -> Iterable[Check]:
         """Return readings of a connected driver with the values of the device, to check units, signs and frames."""
         raise missing("readings")
+
+    def results(self, device: Generic) -> Iterable[Check]:
+        """Call each action that returns a value at least twice, and change the device in between.
+
+        Yield what each call returned, by the name of the action, with the value of the device. The device is
+        controlled. For a type without such an action, use a reading.
+        """
+        raise missing("results")
 
     def beyond_limits(self, device: Generic) -> Mapping[str, Callable[[], object]]:
         """Return calls with values that device or driver must refuse, by description. The device is controlled."""
@@ -180,6 +232,8 @@ class Bench(abc.ABC):
             return True
         if hook == "works":
             return not capabilities.to_be_shown(self.object_type)
+        if hook in OF_A_REACTION:
+            return self.object_type.loss_reaction.kind is not OF_A_REACTION[hook]
         return self.wire is not None and (hook in OF_THE_WIRE or (hook == "actuating" and self.frames is not None))
 
     def why_not(self, hook: str) -> str | None:
@@ -223,8 +277,25 @@ class Bench(abc.ABC):
             device.take_control()
         return device
 
+    def polled(self, what: str, read: Callable[[], object], real: object, within: float = 0.0) -> Check:
+        """Return the check of a reading that the driver polls, when it agrees, or after `fresh_within` s."""
+        began = own_time()
+        while not (check := Check(what, read(), real, within)).agrees and own_time() - began < self.fresh_within:
+            time.sleep(POLL)
+        return check
+
+    def start_orphan(self) -> subprocess.Popen[bytes]:
+        """Start the process of `orphan`. `release` kills it, if it still runs."""
+        process = subprocess.Popen(self.orphan())  # noqa: S603 - the command line of the bench
+        self._orphans.append(process)
+        return process
+
     def release(self) -> None:
         """Disconnect all objects. Errors of a broken driver are ignored here, because another case checks them."""
+        while self._orphans:
+            process = self._orphans.pop()
+            process.kill()
+            process.wait()
         while self._made:
             with contextlib.suppress(Arcor2Error):
                 self._made.pop().disconnect()
@@ -238,6 +309,8 @@ HOOKS: Final = frozenset(
 """Names of the optional hooks."""
 OF_THE_WIRE: Final = frozenset({"cut", "heal", "reset_link", "half_frame"})
 """Hooks that a wire provides."""
+OF_A_REACTION: Final = {"holding": LossKind.HOLDS, "progress": LossKind.CONTINUES}
+"""Hooks that are needed only for one declared reaction to a connection loss."""
 
 
 def knows_control(kind: type[Generic]) -> bool:

@@ -65,6 +65,13 @@ def to_be_shown(kind: type[Generic]) -> frozenset[str]:
     return (said & set(hooks(kind))) - set(readable(kind, said))
 
 
+@lru_cache(maxsize=64)
+def returning(kind: type[Generic]) -> frozenset[str]:
+    """Return the actions of a type, except those of our bases, that return a value."""
+    found = Library([declarations.source_of(kind)]).analyse(kind.__name__)
+    return frozenset(each.name for each in declarations.own_actions(found) if each.returns)
+
+
 def contradictions(device: Generic, said: frozenset[str]) -> list[str]:
     """Return a sentence for each difference between the analysis and a disconnected object."""
     kind = type(device)

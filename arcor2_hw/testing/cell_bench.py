@@ -170,7 +170,10 @@ class CellBench(Bench):
 
 
 _UNKNOWN: Final = frozenset(
-    {"command", "run_long", "running", "foreign", "orphan", "readings", "beyond_limits", "works"}
+    {
+        *("command", "run_long", "running", "foreign", "orphan", "holding", "progress"),
+        *("readings", "results", "beyond_limits", "works"),
+    }
 )
 
 

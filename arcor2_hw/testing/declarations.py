@@ -23,6 +23,7 @@ from arcor2_hw.testing import quality
 
 STOCK: Final = "arcor2_hw.objects."
 """Package of the stock types, which are not drivers."""
+BASES: Final = ("Generic", "GenericWithPose", "CollisionObject", "Robot", "MultiArmRobot", "Camera")
 MOTION: Final = ("move_to_pose", "move_to_joints", "move_path", "move_until_contact", "jog")
 
 
@@ -55,7 +56,7 @@ def faults(file: SourceFile) -> list[str]:
     offered = {action.name for action in found.actions}
     if unknown := set(claims.actions_of(file.name)) - offered:
         wrong.append(f"quality.yaml: {file.name} has no action {', '.join(sorted(unknown))}")
-    own = {action.name for action in found.actions if isinstance(action.origins, Unset) or not _is_base(action.origins)}
+    own = {action.name for action in own_actions(found)}
     if unnamed := own - set(claims.actions_of(file.name)):
         wrong.append(f"quality.yaml: actions does not name {', '.join(sorted(unnamed))} of {file.name}")
     return wrong
@@ -76,8 +77,9 @@ def translation_faults(file: SourceFile) -> list[str]:
     return translations.faults(folder, texts(file)) if (folder / translations.FOLDER).is_dir() else []
 
 
-def _is_base(origin: str) -> bool:
-    return origin in ("Generic", "GenericWithPose", "CollisionObject", "Robot", "MultiArmRobot", "Camera")
+def own_actions(found: TypeAnalysis) -> list[ObjectAction]:
+    """Return the actions of a type, except those of our base types."""
+    return [action for action in found.actions if isinstance(action.origins, Unset) or action.origins not in BASES]
 
 
 def _of_the_type(file: SourceFile, found: TypeAnalysis) -> list[str]:

@@ -11,11 +11,12 @@ from arcor2_hw.objects import Axis, Generic
 from arcor2_hw.runtime.creation import Recipe
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.testing.bench import Bench
-from arcor2_hw.testing.life import POLL, BackgroundCall, wait_until
+from arcor2_hw.testing.life import POLL, SLACK, BackgroundCall, wait_until
+from arcor2_hw.testing.own_time import own_time
 
 WATCHED: Final = 0.5
 """Time in which nothing may start to move again, s."""
-START_TIMEOUT: Final = 15.0
+START_TIMEOUT: Final = 40.0
 """Time limit until a long action runs at the device, s. A process that imports a vendor library needs some time."""
 GONE: Final = (NotConnected, ConnectionLost, DeviceTimeout, Stale)
 """Errors that a call of a silent device may raise."""
@@ -62,6 +63,20 @@ def seen_again(bench: Bench, device: Generic) -> None:
             return False
 
     wait_until(is_observed, bench.back_within, "a reading after the loss")
+
+
+def goes_on(bench: Bench) -> None:
+    """Fail when the action of a process that was killed does not go on until it is done or was watched long enough."""
+    killed = changed = own_time()
+    done = bench.progress()
+    while (now := own_time()) - killed < max(bench.loss_watched, bench.progress_within + SLACK) and done < 1.0:
+        if (present := bench.progress()) != done:
+            done, changed = present, now
+        assert now - changed <= bench.progress_within, (
+            f"the device is declared to continue, but its action stopped at {done:.0%}, {changed - killed:.1f} s after "
+            "the process was killed"
+        )
+        time.sleep(POLL)
 
 
 def on_lanes(device: Generic) -> Device:

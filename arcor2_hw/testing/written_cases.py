@@ -73,14 +73,23 @@ class WrittenCases:
         checks = list(arcor2_bench.readings(arcor2_bench.connected()))
         assert checks, "the bench does not compare any reading"
         for each in checks:
-            apart = abs(each.by_driver - each.by_device)
-            assert apart <= each.within, (
-                f"{each.what}: the driver reads {each.by_driver:g}, the device {each.by_device:g}; they differ by more "
-                f"than {each.within:g}"
-            )
+            assert each.agrees, str(each)
         assert any(each.by_device for each in checks), (
             "all values of the device are zero, so units and signs are not tested"
         )
+
+    @needs("results", for_silver=True)
+    def test_results_are_current(self, arcor2_bench: Bench) -> None:
+        """Actions return the value that the device has at that time, also after it has changed (rule 6)."""
+        real: dict[str, list[object]] = {}
+        for each in arcor2_bench.results(arcor2_bench.controlled()):
+            assert each.agrees, str(each)
+            real.setdefault(each.what, []).append(each.by_device)
+        assert real, "the bench does not call any action"
+        missing = capabilities.returning(arcor2_bench.object_type) - set(real)
+        assert not missing, f"the bench does not call {', '.join(sorted(missing))}"
+        same = [what for what, values in real.items() if all(value == values[0] for value in values)]
+        assert not same, f"the value of the device does not change between the calls of {', '.join(same)}"
 
     @needs("beyond_limits", for_silver=True)
     def test_limits_are_refused(self, arcor2_bench: Bench) -> None:

@@ -1,8 +1,6 @@
 """Connecting to a silent press ignores the timeout."""
 
-import time
-
-from .toy_press import ToyPress
+from .toy_press import ToyPress, dawdle
 
 
 class BrokenPress(ToyPress):
@@ -10,5 +8,5 @@ class BrokenPress(ToyPress):
 
     def _nobody(self, timeout: float) -> Exception:
         if self._there:
-            time.sleep(timeout + 4.0)
+            dawdle(timeout + 2.0)
         return super()._nobody(timeout)

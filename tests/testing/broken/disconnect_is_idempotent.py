@@ -1,10 +1,8 @@
 """A second disconnect waits for a thread that has ended."""
 
-import time
-
 from arcor2_hw.data.device import Connection
 
-from .toy_press import ToyPress
+from .toy_press import ToyPress, dawdle
 
 
 class BrokenPress(ToyPress):
@@ -12,5 +10,5 @@ class BrokenPress(ToyPress):
 
     def disconnect(self) -> None:
         if self._read_at and self.connection is Connection.OFFLINE:
-            time.sleep(5.0)
+            dawdle(3.0)
         super().disconnect()

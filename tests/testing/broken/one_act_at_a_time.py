@@ -1,8 +1,8 @@
 """A second stroke waits for the first."""
 
-import time
-
 from arcor2_hw.actions import action
+from arcor2_hw.exceptions import DeviceTimeout
+from arcor2_hw.keep_alive import once_within
 
 from .toy_press import ToyPress
 
@@ -13,7 +13,6 @@ class BrokenPress(ToyPress):
     @action
     def stroke(self, *, an: str | None = None) -> None:
         """Press."""
-        until = time.monotonic() + 5.0
-        while self._acting.locked() and time.monotonic() < until:
-            time.sleep(0.01)
+        if not once_within(lambda: not self._acting.locked(), 2.0, 0.01):
+            raise DeviceTimeout(f"{self.where}: the first stroke did not end")
         super().stroke()

@@ -1,4 +1,4 @@
-"""A simulated press, a driver that keeps all rules, and its bench. The other modules each break one rule."""
+"""A driver of a simulated press that keeps all rules, and its bench. The other modules each break one rule."""
 
 import math
 import sys
@@ -22,17 +22,19 @@ from arcor2_hw.exceptions import (
     Refused,
     Stale,
 )
+from arcor2_hw.keep_alive import once_within
 from arcor2_hw.objects import Generic, Machine, MachineCommand, MachineState
 from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.own_time import own_time
+
+from .toy_device import PRESSES, WATCHDOG, Press
 
 NOWHERE = "nowhere.cell:502"
-WATCHDOG = 0.6  # s
-STROKE = 20.0  # s
 MAX_FORCE = 1000.0  # N
-FRESH = 0.1
+FRESH = 0.5
 """Age in s from which on a reading is stale."""
 PATIENCE = 0.5
-"""Time in s for which a call waits for a fresh reading: on a busy machine the observing thread runs late."""
+"""Running time in s for which a call waits for a fresh reading: the observing thread may be late."""
 ORPHAN = """
 import sys, time
 while True:
@@ -41,67 +43,11 @@ while True:
 """
 
 
-class Press:
-    """The device. A stroke ends after its duration, by a stop, or by the watchdog when the press is unreachable.
-
-    The watchdog counts from the moment at which the press falls silent, not from the last request, so a thread that
-    runs late on a busy computer does not trip it.
-    """
-
-    def __init__(self) -> None:
-        self.writes: list[str] = []
-        self.wire: list[str] = []
-        self.torn = False
-        self.silent_since = math.inf
-        self.owner: str | None = None
-        self.until = 0.0
-        self.link = 0
-        self.force = 250.0  # N
-        self.scrapped = False
-
-    @property
-    def silent(self) -> bool:
-        return self.silent_since != math.inf
-
-    def fall_silent(self) -> None:
-        self.silent_since = time.monotonic()
-
-    def heal(self) -> None:
-        self.running()
-        self.silent_since, self.torn = math.inf, False
-
-    def scrap(self) -> None:
-        """End the threads that a broken driver has left behind."""
-        self.scrapped, self.until = True, 0.0
-
-    def ask(self, write: str = "", link: int | None = None) -> None:
-        if link is not None and link != self.link:
-            raise ConnectionResetError
-        if self.silent or self.scrapped:
-            raise TimeoutError
-        if write:
-            self.writes.append(write)
-            self.wire.append(write)
-        if write == "stroke":
-            self.until = time.monotonic() + STROKE
-        if write == "halt":
-            self.until = 0.0
-
-    def running(self) -> bool:
-        if time.monotonic() - self.silent_since > WATCHDOG:
-            self.until = 0.0
-        return time.monotonic() < self.until
-
-    def answer(self) -> bytes:
-        if self.torn:
-            self.torn = False
-            self.fall_silent()
-            return b"\x00"
-        return b"\x00\x2a"
-
-
-PRESSES: dict[str, Press] = {}
-"""The presses by address; each bench has its own, and each case a new one at the same address."""
+def dawdle(seconds: float) -> None:
+    """Do nothing for some seconds of the suite's clock, which runs slower on a busy machine."""
+    began = own_time()
+    while own_time() - began < seconds:
+        time.sleep(0.05)
 
 
 class ToyPress(Machine, Generic):
@@ -213,14 +159,13 @@ class ToyPress(Machine, Generic):
 
     # -------------------------------------------------------------------------------- readings
     def reading(self) -> float:
-        until = time.monotonic() + PATIENCE
-        self._check()
-        while time.monotonic() - self._read_at > FRESH:
-            if time.monotonic() > until:
-                raise Stale(f"{self.where}: the newest reading is old")
-            time.sleep(0.005)
-            self._check()
+        if not once_within(self._is_fresh, PATIENCE, 0.005):
+            raise Stale(f"{self.where}: the newest reading is old")
         return self._read_at
+
+    def _is_fresh(self) -> bool:
+        self._check()
+        return time.monotonic() - self._read_at <= FRESH
 
     def force(self) -> float:
         """Return the force, N."""
@@ -269,6 +214,13 @@ class ToyPress(Machine, Generic):
         self._limit(force)
         self._press.ask(f"press {force}")
 
+    @action(quick=True)
+    def weigh(self, *, an: str | None = None) -> float:
+        """Return the weight of the part, kg."""
+        self._check()
+        self._press.ask()
+        return self._press.weight
+
     def _limit(self, force: float) -> None:
         if not 0.0 <= force <= MAX_FORCE:
             raise OutOfRange(f"{self.where}: {force} N is not 0 to {MAX_FORCE} N")
@@ -309,7 +261,7 @@ class ToyPress(Machine, Generic):
 class ToyBench(Bench):
     object_type = ToyPress
     call_within = 1.0
-    stale_after = 0.3
+    stale_after = FRESH + 0.2
     back_within = 3.0
     watchdog: ClassVar[float] = WATCHDOG
 
@@ -368,13 +320,14 @@ class ToyBench(Bench):
         return device.stroke()
 
     def running(self) -> bool:
-        return self.press.running() or self._run_by_another()
+        return self.press.running() or time.time() - self.heard_last() < self.watchdog
 
-    def _run_by_another(self) -> bool:
+    def heard_last(self) -> float:
+        """Return when the process of `orphan` gave its last sign of life, s; if it gave none, the distant past."""
         try:
-            return time.time() - float(self.sign_of_life.read_text()) < self.watchdog
+            return float(self.sign_of_life.read_text())
         except (FileNotFoundError, ValueError):
-            return False
+            return -math.inf
 
     @contextmanager
     def foreign(self) -> Iterator[None]:
@@ -387,6 +340,11 @@ class ToyBench(Bench):
 
     def readings(self, device: Any) -> list[Check]:
         return [Check("force, N", device.force(), self.press.force, 0.1)]
+
+    def results(self, device: Any) -> Iterator[Check]:
+        for weight in (0.5, 0.7, 0.6):
+            self.press.weight = weight
+            yield Check("weigh", device.weigh(), weight, 0.001)
 
     def beyond_limits(self, device: Any) -> dict[str, Any]:
         return {"too much force": lambda: device.press(MAX_FORCE * 1.01), "a pull": lambda: device.press(-1.0)}
