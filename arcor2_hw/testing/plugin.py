@@ -129,8 +129,13 @@ class _Recorder:
             from arcor2_hw.testing.outcomes import Outcomes
 
             outcomes = self._config.stash.setdefault(OUTCOMES, Outcomes())
-            text = str(report.longrepr).strip().rpartition("\n")[2][:200] if report.failed else ""
-            outcomes.add(report.user_properties, report.passed, report.failed, report.when, text)
+            text = _problem(report) if report.failed else ""
+            outcomes.add(report.user_properties, report.passed, report.failed, report.when, text, report.duration)
+
+
+def _problem(report: pytest.TestReport) -> str:
+    crash = getattr(report.longrepr, "reprcrash", None)
+    return str(report.longrepr if crash is None else crash.message).partition("\n")[0][:300]
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -339,8 +344,9 @@ def arcor2_verdict(request: pytest.FixtureRequest, arcor2_running_bench: Bench) 
     except Arcor2Error as error:
         return outcomes.Verdict(Level.BRONZE, Level.NONE, [str(error)])
     folder = bench.quality_file().parent
+    passed = {case: kind is outcomes.Kind.PASSED for case, (kind, _) in there.items()}
     tests = rules.missing_tests(
-        claims.rules, _test_folders(config, claims), folder.name, config.stash.get(COLLECTED, {})
+        claims.named_tests(), _test_folders(config, claims), folder.name, config.stash.get(COLLECTED, {}), passed
     )
     lacks = report.unmatched(folder, claims, bench.type_name(), there)
     reached, missing = outcomes.judge(there, tests, lacks)

@@ -1,6 +1,7 @@
 """quality.yaml: the claims of a driver, next to its source."""
 
 import enum
+import re
 from pathlib import Path
 from typing import Final, Literal
 
@@ -12,6 +13,7 @@ from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_hw.testing.frames import KINDS
 
 FILE: Final = "quality.yaml"
+_SAYS_TESTED: Final = re.compile(r"\b(tested|test_\w+)\b")
 
 
 class Conformance(enum.StrEnum):
@@ -54,6 +56,8 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
     Attributes:
         rules: By rule, numbered as in docs/reference/object-types.md, the tests that show it.
         not_run: By case of the suite, or by `Type.case`, why it cannot be run; a whole type by its name.
+        instead: By entry of `not_run`, the tests that show the behaviour instead of the suite. Required for a whole
+            type and for a reason that says that something is tested.
         actions: Actions of all types, or by type.
         outputs_on_loss: YAML reads off and on as false and true, which are accepted.
         level: The claimed level; the suite checks it.
@@ -73,6 +77,7 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
     limits: list[str]
     conformance: Conformance = Conformance.PENDING
     not_run: dict[str, str] = field(default_factory=dict)
+    instead: dict[str, list[str]] = field(default_factory=dict)
     level: Literal["none", "bronze", "silver", "gold"] = "none"
     tests: str | Unset = UNSET
     report: str | Unset = UNSET
@@ -82,6 +87,11 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
     def claimed(self) -> Level:
         """Return the claimed level."""
         return Level[self.level.upper()]
+
+    def named_tests(self) -> dict[str, list[str]]:
+        """Return the tests that show the claims, by claim."""
+        rules = {f"rule {rule}": tests for rule, tests in self.rules.items()}
+        return rules | {f"instead of {entry}": tests for entry, tests in self.instead.items()}
 
     def __post_init__(self) -> None:
         if not self.types:

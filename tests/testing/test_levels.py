@@ -62,8 +62,16 @@ def test_a_failure_in_teardown_counts() -> None:
         ("test_press.py::test_gone", "does not exist"),
         ("test_press.py::test_later", "is skipped"),
         ("test_press.py::test_hidden", "is not collected"),
-        ("test_oven.py::test_stops", "there is no file"),
+        ("test_press.py::test_gives_up", "is skipped"),
+        ("test_press.py::TestOven::test_heats", "is skipped"),
+        ("test_press_later.py::test_stops", "is skipped"),
+        ("test_oven.py::test_stops", "file test_oven.py does not exist"),
         ("press_tests.py::test_stops", "that pytest does not collect"),
+        ("test_press.py::TestSuite::test_stop_passes", ""),
+        ("test_press.py::TestSuite::test_loss_reaction", "did not pass"),
+        ("test_press.py::TestSuite::test_jumps", "does not exist"),
+        ("test_press.py::TestPress::test_stop_passes", "does not exist"),
+        ("test_press.py::test_stop_passes", "does not exist"),
     ],
 )
 def test_the_test_of_a_rule_must_exist_and_run(tmp_path: Path, named: str, told: str) -> None:
@@ -73,16 +81,42 @@ def test_the_test_of_a_rule_must_exist_and_run(tmp_path: Path, named: str, told:
     file.write_text(
         "import pytest\n\n\ndef test_stops(): ...\n\n\n@pytest.mark.skip\ndef test_later(): ...\n\n\n"
         "def test_hidden(): ...\n\n\nclass TestPress:\n    def test_holds(self): ...\n"
+        "\n\ndef test_gives_up():\n    pytest.skip('no press')\n"
+        "\n\nclass TestSuite(Conformance):\n    benches = ()\n"
+        "\n\n@pytest.mark.skip\nclass TestOven:\n    def test_heats(self): ...\n"
     )
+    (folder / "test_press_later.py").write_text("pytestmark = [pytest.mark.skip]\n\n\ndef test_stops(): ...\n")
     (folder / "press_tests.py").write_text("def test_stops(): ...\n")
-    collected = {str(file): frozenset({"test_stops", "test_holds", "test_later"})}
-    found = rules.missing_tests({"5 stop": [named]}, [tmp_path], "press", collected)
+    collected = {str(file): frozenset({"test_stops", "test_holds", "test_later", "test_gives_up", "test_heats"})}
+    cases = {"stop_passes": True, "loss_reaction": False}
+    found = rules.missing_tests({"5 stop": [named]}, [tmp_path], "press", collected, cases)
     assert bool(found) == bool(told)
     assert told in "".join(found)
 
 
 def test_missing_rules_are_reported(tmp_path: Path) -> None:
     assert rules.missing_tests({"1 connecting observes": []}, [tmp_path], "press", {}) == ["rules names no test"]
+
+
+@pytest.mark.parametrize(
+    ("not_run", "instead", "told"),
+    [
+        ({"stop_passes": "stop() is tested elsewhere"}, {}, "not_run: stop_passes needs the tests that show it"),
+        ({"stop_passes": "see test_press.py for this"}, {}, "not_run: stop_passes needs the tests that show it"),
+        ({TYPE: "the code of another type"}, {}, f"not_run: {TYPE} needs the tests that show it"),
+        ({}, {"stop_passes": ["test_press.py::test_stops"]}, "instead: not_run has no stop_passes"),
+    ],
+)
+def test_a_claim_without_a_test_is_refused(not_run: dict[str, str], instead: dict[str, list[str]], told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        claims(not_run=not_run, instead=instead)
+
+
+def test_the_tests_that_replace_a_case_are_checked(tmp_path: Path) -> None:
+    given = claims(not_run={TYPE: "the code of another type"}, instead={TYPE: ["test_press.py::test_gone"]})
+    (tmp_path / "test_press.py").write_text("def test_stops(): ...\n")
+    found = rules.missing_tests(given.named_tests(), [tmp_path], "press", {})
+    assert found == [f"instead of {TYPE}: test_press.py::test_gone does not exist"]
 
 
 # ------------------------------------------------------------------------------------------------ the report of gold
@@ -114,6 +148,7 @@ def written(tmp_path: Path, **changes: Any) -> None:
         "version": version,
         "libraries": {},
         "cases": {case: CaseResult(Kind.PASSED) for case in ALL_PASSED},
+        "sources": report.digest(tmp_path),
     }
     run = DeviceRun(**(given | changes))
     whole = Report("2026-01-02T03:04:05+00:00", "0.1.0", "3.11.7", "Linux x86_64", [run])
