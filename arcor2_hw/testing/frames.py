@@ -86,10 +86,11 @@ def _modbus(function: int, data: bytes) -> str:
 
 
 class Lines:
-    """Lines of text ended by CR, LF or both; those that start with certain words act."""
+    """Lines of text ended by CR, LF or both; those that start with a declared word act, or are a word with $."""
 
     def __init__(self, words: Sequence[str]) -> None:
-        self._words = tuple(word.encode() for word in words)
+        self._words = tuple(word.encode() for word in words if not word.endswith("$"))
+        self._whole = frozenset(word.removesuffix("$").encode() for word in words if word.endswith("$"))
 
     def split(self, stream: bytes) -> list[bytes]:
         """Split by the ends of the lines."""
@@ -97,7 +98,8 @@ class Lines:
 
     def acting(self, frame: bytes) -> str:
         """Return the line when it acts."""
-        return frame.decode(errors="replace") if frame.lstrip().startswith(self._words) else ""
+        acts = frame.strip() in self._whole or frame.lstrip().startswith(self._words)
+        return frame.decode(errors="replace") if acts else ""
 
 
 class CanopenSlcan:
@@ -126,7 +128,36 @@ class CanopenSlcan:
         return ""
 
 
-KINDS: Final = ("modbus-tcp", "modbus-rtu", "lines", "canopen-slcan")
+class Rtde:
+    """The ports of a UR controller: RTDE frames, and lines of the dashboard server, scripts and programs.
+
+    In RTDE, setting up inputs (I) reserves registers, and data (U) writes them; the other messages set up and start
+    outputs. Source: Universal Robots, "Real-Time Data Exchange (RTDE) Guide".
+    """
+
+    _READING: Final = b"VvOSPM"
+
+    def __init__(self, declared: Sequence[str] = ()) -> None:
+        self._declared = {each.encode() for each in declared}
+
+    def split(self, stream: bytes) -> list[bytes]:
+        """Split a connection into RTDE frames, if it starts with one, otherwise into lines."""
+        if stream[:1] != b"\0":
+            return [line for line in re.split(rb"[\r\n]+", stream) if line]
+        frames = []
+        while len(stream) >= 3 and len(stream) >= (end := struct.unpack_from(">H", stream)[0]) >= 3:
+            frames.append(stream[:end])
+            stream = stream[end:]
+        return [*frames, stream] if stream else frames
+
+    def acting(self, frame: bytes) -> str:
+        """Return the kind of an RTDE frame that acts, or a line that is not declared to read."""
+        if len(frame) >= 3 and struct.unpack_from(">H", frame)[0] == len(frame):
+            return "" if frame[2] in self._READING else f"RTDE message {chr(frame[2])}"
+        return "" if frame.strip() in self._declared else frame.decode(errors="replace")[:80]
+
+
+KINDS: Final = ("modbus-tcp", "modbus-rtu", "lines", "canopen-slcan", "rtde")
 """Values of `frames` in quality.yaml."""
 
 
@@ -135,7 +166,7 @@ def reader(kind: str, words: Sequence[str]) -> Frames:
 
     Args:
         kind: Name of the protocol.
-        words: First words of lines that act, or objects that may be written.
+        words: First words of lines that act, objects that may be written, or commands that only read.
 
     Raises:
         InvalidData: The protocol is unknown.
@@ -148,6 +179,8 @@ def reader(kind: str, words: Sequence[str]) -> Frames:
         return Lines(words)
     if kind == "canopen-slcan":
         return CanopenSlcan(words)
+    if kind == "rtde":
+        return Rtde(words)
     raise InvalidData(
         "frames of the kind {type} are not supported. Available: {kinds}", type=kind, kinds=", ".join(KINDS)
     )

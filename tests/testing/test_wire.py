@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from arcor2_hw.exceptions import InvalidData
-from arcor2_hw.testing.frames import CanopenSlcan, Lines, ModbusRtu, ModbusTcp, reader
+from arcor2_hw.testing.frames import CanopenSlcan, Lines, ModbusRtu, ModbusTcp, Rtde, reader
 from arcor2_hw.testing.life import wait_until
 from arcor2_hw.testing.serial_wire import SerialWire
 from arcor2_hw.testing.tcp_wire import TcpWire
@@ -23,7 +23,7 @@ QUIET = 0.2  # s in which nothing may come
 @pytest.fixture
 def device() -> Iterator[socket.socket]:
     with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(5.0)
+        server.settimeout(30.0)
         yield server
 
 
@@ -40,7 +40,7 @@ def ends(device: socket.socket, wire: TcpWire) -> Iterator[tuple[socket.socket, 
     """The ends of driver and device of one connection."""
     with dial(wire) as driver:
         at_device, _ = device.accept()
-        at_device.settimeout(5.0)
+        at_device.settimeout(30.0)
         with at_device:
             yield driver, at_device
 
@@ -268,3 +268,17 @@ def test_canopen_acts_by_nmt_process_data_and_downloads(line: str, words: str) -
 def test_an_unknown_kind_of_frames_is_named() -> None:
     with pytest.raises(InvalidData, match="morse"):
         reader("morse", [])
+
+
+def test_the_ports_of_a_ur_controller_are_read() -> None:
+    reader = Rtde(["programState"])
+    asked, started, inputs, data = b"\0\5V\0\2", b"\0\3S", b"\0\6Ia,b", b"\0\5U\1\7"
+    assert reader.split(asked + started + inputs + data + b"\0") == [asked, started, inputs, data, b"\0"]
+    assert [reader.acting(each) for each in (asked, started, inputs, data)] == [
+        "",
+        "",
+        "RTDE message I",
+        "RTDE message U",
+    ]
+    lines = reader.split(b"programState\nplay\n  movej([0, 0, 0, 0, 0, 0])\n")
+    assert [reader.acting(each) for each in lines] == ["", "play", "  movej([0, 0, 0, 0, 0, 0])"]
