@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from arcor2_drivers.abb_yumi.settings import YumiSettings
-from arcor2_drivers.abb_yumi.yumi import YuMi
+from arcor2_drivers.abb_yumi.yumi import ArmId, YuMi
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint, Safety
 from arcor2_hw.exceptions import Stale
@@ -115,6 +115,18 @@ class YuMiBench(Bench):
             flange = (pose * Pose(Position(0.0, 0.0, -0.136))).position
             for axis, by_driver, by_device in zip("xyz", flange, truth["position"], strict=True):
                 yield Check(f"{axis} of the {arm} flange", by_driver, by_device, 1e-5)
+
+    def results(self, device: Generic) -> Iterable[Check]:
+        assert isinstance(device, YuMi)
+        device.calibrate_gripper(ArmId.LEFT)
+        for width in (0.01, 0.015):
+            yield Check("open_gripper", device.open_gripper(ArmId.LEFT, width + 0.005), self._width(), 1e-4)
+            self.fake.do("part", arm="left", width=width)
+            yield Check("grip", device.grip(ArmId.LEFT), width, 1e-4)
+            yield Check("gripper_width", device.gripper_width(ArmId.LEFT), self._width(), 1e-4)
+
+    def _width(self) -> float:
+        return float(self.fake.arm("left")["width"])
 
     def beyond_limits(self, device: Generic) -> Mapping[str, Callable[[], object]]:
         assert isinstance(device, YuMi)

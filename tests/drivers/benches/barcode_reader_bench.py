@@ -1,18 +1,15 @@
 """The barcode reader on its fake, on a pty behind a wire; a reading of a code that is not there is its long act."""
 
 import sys
-import tempfile
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from arcor2_drivers.barcode_reader.barcode_reader import BarcodeReader
 from arcor2_drivers.barcode_reader.settings import BarcodeReaderSettings
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.bench import Check
 from arcor2_hw.testing.frames import Lines
-from arcor2_hw.testing.serial_wire import SerialWire
-from tests.fakes.conftest import FakeProcess
+from tests.drivers.fake_bench import WiredBench
 
 ORPHAN = """
 import sys
@@ -25,44 +22,21 @@ reader.scan(60.0)
 ACTING = ("LON", "RST")
 
 
-class BarcodeReaderBench(Bench):
+class BarcodeReaderBench(WiredBench):
     object_type = BarcodeReader
-    fake: FakeProcess
-
-    def start(self) -> None:
-        self.folder = tempfile.TemporaryDirectory()
-        self.fake = FakeProcess(
-            "barcode_reader", "--link", str(Path(self.folder.name) / "ttyREADER"), "--timeout", "0.5"
-        )
-        self.do = self.fake.control.do
-        self.wire = SerialWire(self.fake.ready["port"])
-        self.wire.start()
-        self.frames = Lines(ACTING)
-
-    def end(self) -> None:
-        if self.wire is not None:
-            self.wire.close()
-        self.fake.end()
-        self.folder.cleanup()
+    module = "barcode_reader"
+    options = ("--timeout", "0.5")
+    link = "ttyREADER"
+    nowhere = "/dev/does-not-exist"
+    frames = Lines(ACTING)
 
     def reset(self) -> None:
         self.heal()
         self.do("present", code=None)
         self.fake.control.wait_until(lambda t: not t["reading"])
 
-    @property
-    def address(self) -> str:
-        assert self.wire is not None
-        return self.wire.address
-
-    def _build(self, port: str) -> BarcodeReader:
-        return BarcodeReader("reader_id", "reader", settings=BarcodeReaderSettings(port, answer_timeout=0.5))
-
-    def make(self) -> BarcodeReader:
-        return self._build(self.address)
-
-    def absent(self) -> tuple[Generic, str]:
-        return self._build("/dev/does-not-exist"), "/dev/does-not-exist"
+    def build(self, address: str) -> BarcodeReader:
+        return BarcodeReader("reader_id", "reader", settings=BarcodeReaderSettings(address, answer_timeout=0.5))
 
     def writes(self) -> Any:
         return [line for line in self.fake.truth()["received"] if line in ACTING]
@@ -83,6 +57,16 @@ class BarcodeReaderBench(Bench):
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address]
+
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, BarcodeReader)
+        for code in ("A-1", "B-2"):
+            self.do("present", code=code)
+            yield Check("scan", device.scan(2.0), code)
+            yield Check("code_present", device.code_present(2.0), True)
+            yield Check("last_code", device.last_code(), code)
+            self.do("present", code=None)
+            yield Check("code_present", device.code_present(0.5), False)
 
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, BarcodeReader)

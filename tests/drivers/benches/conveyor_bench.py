@@ -8,11 +8,10 @@ from typing import Any
 from arcor2_drivers.conveyor.conveyor import Conveyor
 from arcor2_drivers.conveyor.settings import ConveyorSettings
 from arcor2_hw.objects import Generic, MachineState
-from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.bench import Check
 from arcor2_hw.testing.frames import CanopenSlcan
 from arcor2_hw.testing.life import wait_until
-from arcor2_hw.testing.tcp_wire import TcpWire
-from tests.fakes.conftest import FakeProcess
+from tests.drivers.fake_bench import WiredBench
 
 ORPHAN = """
 import sys
@@ -40,22 +39,11 @@ def build(address: str, **settings: Any) -> Conveyor:
     )
 
 
-class ConveyorBench(Bench):
+class ConveyorBench(WiredBench):
     object_type = Conveyor
-    fake: FakeProcess
-
-    def start(self) -> None:
-        self.fake = FakeProcess("conveyor")
-        self.do = self.fake.control.do
-        host, _, port = str(self.fake.ready["can"]).rpartition(":")
-        self.wire = TcpWire(host, [int(port)])
-        self.wire.start()
-        self.frames = CanopenSlcan()
-
-    def end(self) -> None:
-        if self.wire is not None:
-            self.wire.close()
-        self.fake.end()
+    module = "conveyor"
+    port = "can"
+    frames = CanopenSlcan()
 
     def reset(self) -> None:
         self.heal()
@@ -63,16 +51,8 @@ class ConveyorBench(Bench):
         self.do("power_cycle", belt=0)
         self.fake.control.wait_until(lambda truth: truth["booted"])
 
-    @property
-    def address(self) -> str:
-        assert self.wire is not None
-        return self.wire.address
-
-    def make(self) -> Conveyor:
-        return build(self.address)
-
-    def absent(self) -> tuple[Generic, str]:
-        return build("127.0.0.1:1"), "127.0.0.1:1"
+    def build(self, address: str) -> Conveyor:
+        return build(address)
 
     def writes(self) -> Any:
         truth = self.fake.truth()
@@ -83,12 +63,12 @@ class ConveyorBench(Bench):
         wire = self.wire
         assert wire is not None
 
-        def heard() -> int:
+        def received() -> int:
             return sum(piece.by == "device" for piece in wire.record())
 
-        before = heard()
+        before = received()
         super().half_frame()
-        wait_until(lambda: heard() > before + 1, 2.0, "what the drive sends by itself")
+        wait_until(lambda: received() > before + 1, 2.0, "what the drive sends by itself")
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, Conveyor)
@@ -131,6 +111,12 @@ class ConveyorBench(Bench):
         yield Check("velocity, m/s", device.velocity().value, self.do("motion")["velocity"] / COUNTS, 0.01)
         device.halt()
 
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, Conveyor)
+        for distance in (0.05, -0.03):
+            device.move_by(distance, 0.3)
+            yield Check("belt_position", device.belt_position(), self.fake.truth()["belt"] / COUNTS, 1e-4)
+
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, Conveyor)
         # NMT commands are confirmed by nobody: the start of the node may still be under way.
@@ -150,7 +136,7 @@ class ConveyorBench(Bench):
         def waited() -> None:
             device.reset()
             device.start()
-            device.wait_for(MachineState.EXECUTE, 1.0)
+            device.wait_for(MachineState.EXECUTE, 30.0)
             assert self.do("motion")["velocity"] > 0.0
             device.halt()
 

@@ -2,11 +2,8 @@
 
 import math
 import sys
-import tempfile
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 from arcor2_drivers.dobot_magician.dobot_magician import DobotMagician
@@ -14,9 +11,9 @@ from arcor2_drivers.dobot_magician.settings import DobotMagicianSettings
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.bench import Check
 from arcor2_hw.testing.life import wait_until
-from tests.fakes.conftest import FakeProcess
+from tests.drivers.fake_bench import FakeBench
 
 ORPHAN = """
 import sys
@@ -27,56 +24,37 @@ arm = DobotMagician("id", "orphan", Pose(), DobotMagicianSettings(sys.argv[1]))
 arm.connect()
 arm.take_control()
 joints = arm.robot_joints()
-joints[0].value = 1.5
+joints[0].value = float(sys.argv[2])
 arm.move_to_joints(joints, 0.05)
 """
+TURN = 1.5  # rad, of the base
 SENT = 1
 """Bit of a frame's control byte that says that something is written."""
 
 
-class DobotMagicianBench(Bench):
+class DobotMagicianBench(FakeBench):
     object_type = DobotMagician
-    fake: FakeProcess
-
-    def start(self) -> None:
-        self.folder = tempfile.TemporaryDirectory()
-        self.fake = FakeProcess("dobot_magician", "--link", str(Path(self.folder.name) / "ttyDOBOT"))
-        self.do = self.fake.control.do
-
-    def end(self) -> None:
-        self.fake.end()
-        self.folder.cleanup()
+    module = "dobot_magician"
+    link = "ttyDOBOT"
+    nowhere = "/dev/does-not-exist"
 
     def reset(self) -> None:
         self.do("heal")
         self.do("renew")
         self.do("pace", factor=1.0)
 
-    @property
-    def address(self) -> str:
-        return str(self.fake.ready["port"])
-
-    def _build(self, port: str) -> DobotMagician:
-        return DobotMagician("arm_id", "arm", Pose(), DobotMagicianSettings(port))
-
-    def make(self) -> DobotMagician:
-        return self._build(self.address)
-
-    def absent(self) -> tuple[Generic, str]:
-        return self._build("/dev/does-not-exist"), "/dev/does-not-exist"
+    def build(self, address: str) -> DobotMagician:
+        return DobotMagician("arm_id", "arm", Pose(), DobotMagicianSettings(address, answer_timeout=0.6))
 
     def writes(self) -> Any:
         truth = self.fake.truth()
         written = [each for each in truth["received"] if each[1] & SENT]
         return written, truth["suction"], truth["gripper"], truth["steppers"]
 
-    def cut(self) -> None:
-        self.do("silence")
-
     def heal(self) -> None:
         # A motion that was begun is done, as declared; only then may nothing begin any more.
         wait_until(lambda: not self.running(), 15.0, "the end of a motion that was begun")
-        self.do("heal")
+        super().heal()
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, DobotMagician)
@@ -108,27 +86,34 @@ class DobotMagicianBench(Bench):
             self.do("renew")
 
     def orphan(self) -> list[str]:
-        return [sys.executable, "-c", ORPHAN, self.address]
+        return [sys.executable, "-c", ORPHAN, self.address, str(TURN)]
 
-    def reset_link(self) -> None:
-        self.do("reset")
-
-    def half_frame(self) -> None:
-        self.do("half_frame")
+    def progress(self) -> float:
+        return math.radians(self.fake.truth()["joints"][0]) / TURN
 
     def readings(self, device: Generic) -> list[Check]:
         assert isinstance(device, DobotMagician)
         self.do("drive", turn=30.0, percent=100.0)
         wait_until(lambda: self.fake.truth()["motions"] == 1 and not self.running(), 10.0, "a turn of 30 degrees")
-        time.sleep(0.3)  # until the driver has looked again
         truth = self.fake.truth()
-        joints = zip(device.robot_joints(), truth["joints"], strict=True)
-        position = device.get_end_effector_pose(self._tool(device)).position
+        joints = [math.radians(own) for own in truth["joints"]]
+        tool = [each / 1000.0 for each in truth["tool"][:2]]
+
+        def position() -> list[float]:
+            found = device.get_end_effector_pose(self._tool(device)).position
+            return [found.x, found.y]
+
         return [
-            *(Check(f"{joint.name}, rad", joint.value, math.radians(own), 1e-3) for joint, own in joints),
-            Check("the tool's x, m", position.x, truth["tool"][0] / 1000.0, 1e-3),
-            Check("the tool's y, m", position.y, truth["tool"][1] / 1000.0, 1e-3),
+            self.polled("joints, rad", lambda: [joint.value for joint in device.robot_joints()], joints, 1e-3),
+            self.polled("x and y of the tool, m", position, tool, 1e-3),
         ]
+
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, DobotMagician)
+        for by in (0.2, -0.3):
+            device.move_to_joints(self._turned(device, by), 0.5)
+            real = [math.radians(own) for own in self.fake.truth()["joints"]]
+            yield self.polled("robot_joints", lambda: [joint.value for joint in device.robot_joints()], real, 1e-3)
 
     @staticmethod
     def _tool(device: DobotMagician) -> str:

@@ -1,59 +1,35 @@
 """The planning service on its fake; asking for an order is what speaks with it."""
 
 import shutil
-import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from arcor2_drivers.erp.erp_service import ErpService
 from arcor2_drivers.erp.settings import ErpSettings
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
-from tests.fakes.conftest import FakeProcess
+from arcor2_hw.testing.bench import Check
+from tests.drivers.fake_bench import FakeBench
 
 
-class ErpServiceBench(Bench):
+class ErpServiceBench(FakeBench):
     object_type = ErpService
     stale_after = 0.2
-    fake: FakeProcess
-
-    def start(self) -> None:
-        self.folder = tempfile.TemporaryDirectory()
-        self.fake = FakeProcess("erp")
-        self.do = self.fake.control.do
-
-    def end(self) -> None:
-        self.fake.end()
-        self.folder.cleanup()
+    module = "erp"
+    port = "url"
+    nowhere = "http://127.0.0.1:1/api"
 
     def reset(self) -> None:
         for command in ("heal", "work", "forget"):
             self.do(command)
         shutil.rmtree(Path(self.folder.name), ignore_errors=True)
 
-    @property
-    def address(self) -> str:
-        return str(self.fake.ready["url"])
-
-    def _build(self, url: str) -> ErpService:
-        settings = ErpSettings(url, outbox=self.folder.name, request_timeout=1.0, longest_pause=1.0, poll=0.1)
+    def build(self, address: str) -> ErpService:
+        settings = ErpSettings(address, outbox=self.folder.name, request_timeout=1.0, longest_pause=1.0, poll=0.1)
         return ErpService("erp_id", "planning", settings)
-
-    def make(self) -> ErpService:
-        return self._build(self.address)
-
-    def absent(self) -> tuple[Generic, str]:
-        return self._build("http://127.0.0.1:1/api"), "http://127.0.0.1:1/api"
 
     def writes(self) -> Any:
         return [each for each in self.do("received") if each["method"] != "GET"]
-
-    def cut(self) -> None:
-        self.do("silence")
-
-    def heal(self) -> None:
-        self.do("heal")
 
     def observe(self, device: Generic) -> object:
         return device.identify()
@@ -62,14 +38,25 @@ class ErpServiceBench(Bench):
         assert isinstance(device, ErpService)
         return device.next_order(0.0)
 
-    def reset_link(self) -> None:
-        self.do("reset")
-
-    def half_frame(self) -> None:
-        self.do("half_frame")
-
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
         return {}  # no optional method but those that read
+
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, ErpService)
+        for order, product, quantity in (("A-1", "PCB", 2), ("B-1", "cover", 1)):
+            self.do("add_order", order=order, product=product, quantity=quantity)
+            for left in range(quantity, 0, -1):
+                yield Check("next_order", list(device.next_order(1.0)), [True, order, product, quantity, left])
+                yield Check("results_waiting", device.results_waiting(), 0)
+                self.do("fail", status=503, count=-1, path="/results")
+                device.report_result(order, f"{order} {left}", True)
+                yield Check("results_waiting", device.results_waiting(), 1)
+                self.do("work")
+                device.wait_until_sent(5.0)
+        yield Check("resend_refused", device.resend_refused(), 0)
+        device.report_result("C-9", "S-1", True)  # no such order
+        device.wait_until_sent(5.0)
+        yield Check("resend_refused", device.resend_refused(), 1)
 
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, ErpService)

@@ -9,10 +9,9 @@ from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
 from arcor2_drivers.functional_tester.settings import FunctionalTesterSettings
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.objects import Generic, MachineState
-from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.bench import Check
 from arcor2_hw.testing.frames import ModbusTcp
-from arcor2_hw.testing.tcp_wire import TcpWire
-from tests.fakes.conftest import FakeProcess
+from tests.drivers.fake_bench import WiredBench
 
 ORPHAN = """
 import sys
@@ -20,7 +19,7 @@ from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
 from arcor2_drivers.functional_tester.settings import FunctionalTesterSettings
 from arcor2_hw.data.geometry import Pose
 host, port = sys.argv[1].rsplit(":", 1)
-settings = FunctionalTesterSettings(host, int(port), watchdog_ms=1000, request_timeout=0.25)
+settings = FunctionalTesterSettings(host, int(port), watchdog_ms=2000, request_timeout=0.5)
 tester = FunctionalTester("id", "orphan", Pose(), None, settings=settings)
 tester.connect()
 tester.take_control()
@@ -28,28 +27,12 @@ tester.test()
 """
 
 
-def build(address: str) -> FunctionalTester:
-    host, _, port = address.rpartition(":")
-    settings = FunctionalTesterSettings(host, int(port), watchdog_ms=1000, request_timeout=0.25)
-    return FunctionalTester("tester_id", "tester", Pose(), None, settings=settings)
-
-
-class FunctionalTesterBench(Bench):
+class FunctionalTesterBench(WiredBench):
     object_type = FunctionalTester
-    fake: FakeProcess
-
-    def start(self) -> None:
-        self.fake = FakeProcess("functional_tester", "--seed", "1", "--test-time", "20", "--time-scale", "5")
-        self.do = self.fake.control.do
-        host, _, port = str(self.fake.ready["modbus"]).rpartition(":")
-        self.wire = TcpWire(host, [int(port)])
-        self.wire.start()
-        self.frames = ModbusTcp()
-
-    def end(self) -> None:
-        if self.wire is not None:
-            self.wire.close()
-        self.fake.end()
+    module = "functional_tester"
+    options = ("--seed", "1", "--test-time", "20", "--time-scale", "5")
+    port = "modbus"
+    frames = ModbusTcp()
 
     def reset(self) -> None:
         do = self.do
@@ -69,16 +52,10 @@ class FunctionalTesterBench(Bench):
         do("push_door", opening=False)
         self.fake.control.wait_until(lambda t: t["door"] == "closed")
 
-    @property
-    def address(self) -> str:
-        assert self.wire is not None
-        return self.wire.address
-
-    def make(self) -> FunctionalTester:
-        return build(self.address)
-
-    def absent(self) -> tuple[Generic, str]:
-        return build("127.0.0.1:1"), "127.0.0.1:1"
+    def build(self, address: str) -> FunctionalTester:
+        host, _, port = address.rpartition(":")
+        settings = FunctionalTesterSettings(host, int(port), watchdog_ms=2000, request_timeout=0.5)
+        return FunctionalTester("tester_id", "tester", Pose(), None, settings=settings)
 
     def writes(self) -> Any:
         truth = self.fake.truth()
@@ -122,6 +99,21 @@ class FunctionalTesterBench(Bench):
             Check("boards tested", device.counters()["tested"], truth["tested"], 0.0),
             Check("board present", device.board_present(), truth["board"] is not None, 0.0),
         ]
+
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, FunctionalTester)
+        for defect in (None, "leakage"):
+            device.open_door()
+            self.do("take_board")
+            yield Check("board_present", device.board_present(), False)
+            self.do("put_board", code="B-2", defect=defect)
+            yield Check("board_present", device.board_present(), True)
+            device.close_door()
+            passed = device.test()
+            real = self.fake.truth()["results"][-1]
+            yield Check("test", passed, defect is None)
+            for name in ("supply_voltage", "supply_current", "contact_resistance"):
+                yield Check(name, getattr(device, name)(), real["measured"][name], 1e-4)
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, FunctionalTester)

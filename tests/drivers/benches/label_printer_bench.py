@@ -1,14 +1,17 @@
 """The label printer on its fake, on TCP; a label takes 1.5 s, and is finished without us."""
 
+import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from arcor2_drivers.label_printer.settings import ZplPrinterSettings
 from arcor2_drivers.label_printer.zpl_printer import ZplPrinter
+from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench
-from tests.fakes.conftest import FakeProcess
+from arcor2_hw.testing.bench import Check
+from arcor2_hw.testing.life import wait_until
+from tests.drivers.fake_bench import FakeBench
 
 ORPHAN = """
 import sys
@@ -21,43 +24,25 @@ printer.print_label("title", "text", "code")
 ASKING = ("~HS", "~HI", "getvar ")
 
 
-class ZplPrinterBench(Bench):
+class ZplPrinterBench(FakeBench):
     object_type = ZplPrinter
-    fake: FakeProcess
-
-    def start(self) -> None:
-        self.fake = FakeProcess("label_printer", "--tcp", "127.0.0.1:0", "--duration", "1.5")
-        self.do = self.fake.control.do
-
-    def end(self) -> None:
-        self.fake.end()
+    progress_within = 4.0  # a label, which the counter counts when it is printed
+    module = "label_printer"
+    options = ("--tcp", "127.0.0.1:0", "--duration", "1.5")
 
     def reset(self) -> None:
         self.do("heal")
         self.do("power_cycle")
 
-    @property
-    def address(self) -> str:
-        return str(self.fake.ready["port"])
-
-    def _build(self, port: str) -> ZplPrinter:
-        return ZplPrinter("printer_id", "printer", settings=ZplPrinterSettings(port, answer_timeout=0.4))
-
-    def make(self) -> ZplPrinter:
-        return self._build(self.address)
+    def build(self, address: str) -> ZplPrinter:
+        return ZplPrinter("printer_id", "printer", settings=ZplPrinterSettings(address, answer_timeout=0.8))
 
     def absent(self) -> tuple[Generic, str]:
-        return self._build("socket://127.0.0.1:1"), "127.0.0.1:1"
+        return self.build("socket://127.0.0.1:1"), "127.0.0.1:1"
 
     def writes(self) -> Any:
         truth = self.fake.truth()
         return [each for each in truth["received"] if not each.startswith(ASKING)], truth["counter"], truth["paused"]
-
-    def cut(self) -> None:
-        self.do("silence")
-
-    def heal(self) -> None:
-        self.do("heal")
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, ZplPrinter)
@@ -73,11 +58,31 @@ class ZplPrinterBench(Bench):
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address]
 
-    def reset_link(self) -> None:
-        self.do("reset")
+    def progress(self) -> float:
+        return float(self.fake.truth()["counter"])
 
-    def half_frame(self) -> None:
-        self.do("half_frame")
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, ZplPrinter)
+        for _ in range(2):
+            yield Check("print_label", device.print_label("title", "text", "1"), f"printer-{self._count()}")
+            yield Check("labels_printed", device.labels_printed(), self._count())
+        yield Check("ready", device.ready(), True)
+        self.do("pause")
+        yield Check("ready", device.ready(), False)
+        self.do("pause", on=False)
+        device.disconnect()
+        impatient = ZplPrinter("id", "printer", settings=ZplPrinterSettings(self.address, print_timeout=1.0))
+        self.keep(impatient).connect()
+        for lost in (True, False):
+            self.do("forgetful", on=lost)
+            before = self._count()
+            with contextlib.suppress(DeviceTimeout):
+                impatient.print_label("title", "text", "2")
+            wait_until(lambda: not self.running(), 5.0, "the end of the label")
+            yield Check("last_came_out", impatient.last_came_out(), self._count() > before)
+
+    def _count(self) -> int:
+        return int(self.fake.truth()["counter"])
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
         return {}  # no optional method but those that read

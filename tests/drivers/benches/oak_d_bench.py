@@ -9,54 +9,36 @@ from arcor2_drivers.oak_d.oak_d import OakD
 from arcor2_drivers.oak_d.settings import OakDSettings
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench, Check
-from tests.fakes.conftest import FakeProcess
+from arcor2_hw.testing.bench import Check
+from tests.drivers.fake_bench import FakeBench
 
 BOARD = {"name": "board", "pose": {"position": [0.12, 0.06, 0.05]}, "size": [0.1, 0.06, 0.1]}
 
 
-class OakDBench(Bench):
+class OakDBench(FakeBench):
     object_type = OakD
     connect_timeout = 5.0  # a network source renders its first picture only then
     stale_after = 1.5
-    fake: FakeProcess
+    module = "oak_d"
+    options = ("--width", "320", "--height", "180")
+    port = "stream"
 
     def start(self) -> None:
-        self.fake = FakeProcess("oak_d", "--width", "320", "--height", "180")
-        self.do = self.fake.control.do
+        super().start()
         self.do("scene", things=[BOARD])
         first = self.make()
         first.connect(60.0)  # Open3D is loaded for the first that looks
         first.disconnect()
 
-    def end(self) -> None:
-        self.fake.end()
-
     def reset(self) -> None:
         self.do("heal")
 
-    @property
-    def address(self) -> str:
-        return str(self.fake.ready["stream"])
-
-    def _build(self, address: str) -> OakD:
+    def build(self, address: str) -> OakD:
         pose = Pose(Position(0.0, 0.0, 0.8), Orientation(1.0, 0.0, 0.0, 0.0))
         return OakD("camera_id", "camera", pose, None, OakDSettings(address, max_age=1.0, frame_timeout=1.5))
 
-    def make(self) -> OakD:
-        return self._build(self.address)
-
-    def absent(self) -> tuple[Generic, str]:
-        return self._build("127.0.0.1:1"), "127.0.0.1:1"
-
     def writes(self) -> Any:
         return self.fake.truth()["received"]
-
-    def cut(self) -> None:
-        self.do("silence")
-
-    def heal(self) -> None:
-        self.do("heal")
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, OakD)
@@ -65,12 +47,6 @@ class OakDBench(Bench):
     def ask(self, device: Generic) -> object:
         assert isinstance(device, OakD)
         return device.trigger()
-
-    def reset_link(self) -> None:
-        self.do("reset")
-
-    def half_frame(self) -> None:
-        self.do("half_frame")
 
     def readings(self, device: Generic) -> Iterable[Check]:
         assert isinstance(device, OakD)
@@ -91,6 +67,22 @@ class OakDBench(Bench):
         device.set_exposure(0.006)
         self.fake.control.wait_until(lambda now: now["exposure"] is not None)
         yield Check("exposure, s", device.trigger().exposure or 0.0, self.fake.truth()["exposure"], 1e-5)
+
+    def results(self, device: Generic) -> Iterable[Check]:
+        assert isinstance(device, OakD)
+        parameters = device.color_camera_params
+        assert parameters is not None
+        for x in (0.12, -0.12):
+            self.do("scene", things=[BOARD | {"pose": {"position": [x, 0.06, 0.05]}}])
+            truth = self.fake.truth()
+            real_x, height = truth["things"][0]["pose"]["position"][0], truth["camera"]["position"][2]
+            depth = np.asarray(device.depth_image())
+            across = (parameters.cx + parameters.fx * real_x / (height - 0.1)) / depth.shape[1]
+            yield Check("depth_image", _column(depth), across, 0.01)
+            with_board = np.asarray(device.color_image())
+            self.do("scene", things=[])
+            changed = np.abs(np.asarray(device.color_image()).astype(int) - with_board).max(axis=2) > 30
+            yield Check("color_image", float(np.nonzero(changed)[1].mean()) / changed.shape[1], across, 0.06)
 
     def beyond_limits(self, device: Generic) -> Mapping[str, Callable[[], object]]:
         assert isinstance(device, OakD)

@@ -8,8 +8,8 @@ from typing import Any
 from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
 from arcor2_drivers.opcua_plc.settings import OpcUaPlcSettings
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench, Check
-from tests.fakes.conftest import FakeProcess
+from arcor2_hw.testing.bench import Check
+from tests.drivers.fake_bench import FakeBench
 
 POINTS = (
     "part=DI ns=2;s=Cell.PartPresent | lamp=DO ns=2;s=Cell.Lamp on_loss=off | "
@@ -31,40 +31,21 @@ plc.run_job(3)
 """
 
 
-class OpcUaPlcBench(Bench):
+class OpcUaPlcBench(FakeBench):
     object_type = OpcUaPlc
-    fake: FakeProcess
-
-    def start(self) -> None:
-        self.fake = FakeProcess("opcua_plc")
-        self.do = self.fake.control.do
-
-    def end(self) -> None:
-        self.fake.end()
+    module = "opcua_plc"
+    port = "url"
+    nowhere = "opc.tcp://127.0.0.1:1"
 
     def reset(self) -> None:
         self.do("heal")
         self.do("restart")
 
-    @property
-    def address(self) -> str:
-        return str(self.fake.ready["url"])
-
-    def make(self) -> OpcUaPlc:
-        return OpcUaPlc("plc_id", "plc", OpcUaPlcSettings(self.address, POINTS, HANDSHAKE))
-
-    def absent(self) -> tuple[Generic, str]:
-        url = "opc.tcp://127.0.0.1:1"
-        return OpcUaPlc("plc_id", "plc", OpcUaPlcSettings(url, POINTS, HANDSHAKE)), url
+    def build(self, address: str) -> OpcUaPlc:
+        return OpcUaPlc("plc_id", "plc", OpcUaPlcSettings(address, POINTS, HANDSHAKE))
 
     def writes(self) -> Any:
         return self.fake.truth()["writes"]
-
-    def cut(self) -> None:
-        self.do("silence")
-
-    def heal(self) -> None:
-        self.do("heal")
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, OpcUaPlc)
@@ -95,17 +76,20 @@ class OpcUaPlcBench(Bench):
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address, POINTS, HANDSHAKE]
 
-    def reset_link(self) -> None:
-        self.do("reset")
-
-    def half_frame(self) -> None:
-        self.do("half_frame")
-
     def readings(self, device: Generic) -> list[Check]:
         assert isinstance(device, OpcUaPlc)
         self.do("set", name="Level", value=-250)
         by_device = self.fake.truth()["points"]["Level"] / 1000.0  # the fake's level counts millimetres
         return [Check("the level, m", float(device.read("level").value), by_device, 1e-9)]
+
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, OpcUaPlc)
+        for part, level in ((True, -250), (False, 1234)):
+            self.do("set", name="PartPresent", value=part)
+            self.do("set", name="Level", value=level)
+            points = self.fake.truth()["points"]
+            yield Check("read_digital", device.read_digital("part"), points["PartPresent"])
+            yield Check("read_analog", device.read_analog("level"), points["Level"] / 1000.0, 1e-9)
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, OpcUaPlc)

@@ -10,12 +10,11 @@ from arcor2_drivers.remote_io.settings import RemoteIOSettings, TowerLightSettin
 from arcor2_drivers.remote_io.tower_light import LampColor, TowerLight
 from arcor2_hw.objects import Generic
 from arcor2_hw.objects.machine import MachineStateName
-from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.bench import Check
 from arcor2_hw.testing.frames import ModbusTcp
-from arcor2_hw.testing.tcp_wire import TcpWire
-from tests.fakes.conftest import FakeProcess
+from tests.drivers.fake_bench import WiredBench
 
-QUICK: dict[str, Any] = {"watchdog_ms": 1000, "request_timeout": 0.25}
+QUICK: dict[str, Any] = {"watchdog_ms": 2000, "request_timeout": 0.5}
 LONG = 20.0  # s, of a pulse
 
 ORPHAN_IO = """
@@ -23,7 +22,7 @@ import sys
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings
 host, port = sys.argv[1].rsplit(":", 1)
-settings = RemoteIOSettings(host, int(port), watchdog_ms=1000, request_timeout=0.25, points="valve=DO4")
+settings = RemoteIOSettings(host, int(port), watchdog_ms=2000, request_timeout=0.5, points="valve=DO4")
 block = RemoteIO("id", "orphan", settings)
 block.connect()
 block.take_control()
@@ -34,7 +33,7 @@ import sys
 from arcor2_drivers.remote_io.settings import TowerLightSettings
 from arcor2_drivers.remote_io.tower_light import TowerLight
 host, port = sys.argv[1].rsplit(":", 1)
-settings = TowerLightSettings(host, int(port), watchdog_ms=1000, request_timeout=0.25, green="DO0", buzzer="DO4")
+settings = TowerLightSettings(host, int(port), watchdog_ms=2000, request_timeout=0.5, green="DO0", buzzer="DO4")
 light = TowerLight("id", "orphan", settings)
 light.connect()
 light.take_control()
@@ -48,36 +47,15 @@ def block(address: str, **settings: Any) -> RemoteIO:
     return RemoteIO("block_id", "block", RemoteIOSettings(host, int(port), points=points, **{**QUICK, **settings}))
 
 
-def light(address: str) -> TowerLight:
-    host, _, port = address.rpartition(":")
-    return TowerLight("light_id", "light", TowerLightSettings(host, int(port), green="DO0", buzzer="DO4", **QUICK))
-
-
-class RemoteIOBench(Bench):
+class RemoteIOBench(WiredBench):
     object_type: ClassVar[type[Generic]] = RemoteIO
-    fake: FakeProcess
-
-    def start(self) -> None:
-        self.fake = FakeProcess("remote_io")
-        self.do = self.fake.control.do
-        host, _, port = str(self.fake.ready["modbus"]).rpartition(":")
-        self.wire = TcpWire(host, [int(port)])
-        self.wire.start()
-        self.frames = ModbusTcp()
-
-    def end(self) -> None:
-        if self.wire is not None:
-            self.wire.close()
-        self.fake.end()
+    module = "remote_io"
+    port = "modbus"
+    frames = ModbusTcp()
 
     def reset(self) -> None:
         self.heal()
         self.do("renew")
-
-    @property
-    def address(self) -> str:
-        assert self.wire is not None
-        return self.wire.address
 
     def writes(self) -> Any:
         truth = self.fake.truth()
@@ -96,11 +74,8 @@ class RemoteIOBench(Bench):
         finally:
             other.disconnect()
 
-    def make(self) -> Generic:
-        return block(self.address)
-
-    def absent(self) -> tuple[Generic, str]:
-        return block("127.0.0.1:1"), "127.0.0.1:1"
+    def build(self, address: str) -> Generic:
+        return block(address)
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, RemoteIO)
@@ -131,6 +106,14 @@ class RemoteIOBench(Bench):
         device.write_analog("pressure", -2500.0)
         yield Check("pressure, Pa", device.read_analog("pressure"), self.fake.truth()["analog_outputs"][1] * 10.0, 1e-9)
 
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, RemoteIO)
+        for part, level in ((True, -1234), (False, 567)):
+            self.do("set_input", number=0, on=part)
+            self.do("set_analog", number=0, raw=level)
+            yield Check("read_digital", device.read_digital("part"), part)
+            yield Check("read_analog", device.read_analog("level"), level / 1000.0, 1e-9)
+
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, RemoteIO)
         return {
@@ -153,7 +136,7 @@ class RemoteIOBench(Bench):
 
         def waited() -> None:
             self.do("set_input", number=0, on=True)
-            device.wait_for("part", True, 1.0)
+            device.wait_for("part", True, 30.0)
 
         return {"pulse": pulsed, "wait_for": waited}
 
@@ -161,11 +144,9 @@ class RemoteIOBench(Bench):
 class TowerLightBench(RemoteIOBench):
     object_type = TowerLight
 
-    def make(self) -> Generic:
-        return light(self.address)
-
-    def absent(self) -> tuple[Generic, str]:
-        return light("127.0.0.1:1"), "127.0.0.1:1"
+    def build(self, address: str) -> Generic:
+        host, _, port = address.rpartition(":")
+        return TowerLight("light_id", "light", TowerLightSettings(host, int(port), green="DO0", buzzer="DO4", **QUICK))
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, TowerLight)
@@ -193,6 +174,12 @@ class TowerLightBench(RemoteIOBench):
         yield Check("green, lit", device.lit()["green"], self.fake.truth()["outputs"][0], 0.0)
         device.off()
         yield Check("green, out", device.lit()["green"], self.fake.truth()["outputs"][0], 0.0)
+
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, TowerLight)
+        for switch in (lambda: device.show(LampColor.GREEN), device.off):
+            switch()
+            yield Check("lit", device.lit()["green"], self.fake.truth()["outputs"][0])
 
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, TowerLight)

@@ -1,46 +1,49 @@
 """The 2F gripper on its fake. After a connection loss it finishes its motion and holds."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
 from arcor2_drivers.robotiq_2f.settings import Robotiq2FSettings
 from arcor2_fakes.control import BlockingControlClient
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.bench import Check
 from arcor2_hw.testing.life import wait_until
-from tests.fakes.conftest import FakeProcess
+from tests.drivers.fake_bench import FakeBench
 
 PACE = 6.0
 """How much faster than real the gripper is, so that its activation is quick; gripping is done at its slowest."""
 READY = 100.0
-MOVING = 0
-"""gOBJ of fingers under way."""
+MOVING, GRIPPED = 0, 2
+"""gOBJ of fingers under way, and of fingers stopped by a part while closing."""
 ORPHAN = """
 import sys
+import time
 from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
 from arcor2_drivers.robotiq_2f.settings import Robotiq2FSettings
 gripper = Robotiq2F("id", "orphan", Robotiq2FSettings(host=sys.argv[1], port=int(sys.argv[2])))
 gripper.connect()
 gripper.take_control()
-gripper.activate()
-gripper.grip(0.0, speed=0.02)
+gripper.grip(0.0, 30.0)
+time.sleep(60.0)
 """
+PART = 0.04  # m
 
 
-class Robotiq2FBench(Bench):
+class Robotiq2FBench(FakeBench):
     object_type = Robotiq2F
-    fake: FakeProcess
+    module = "robotiq_2f"
+    options = ("--time-scale", str(PACE))
+    port = "ascii"
 
     def start(self) -> None:
-        self.fake = FakeProcess("robotiq_2f", "--time-scale", str(PACE))
-        self.do = self.fake.control.do
+        super().start()
         self.beside = BlockingControlClient(self.fake.ready["control"])  # for calls on another thread
 
     def end(self) -> None:
         self.beside.close()
-        self.fake.end()
+        super().end()
 
     def reset(self) -> None:
         self.do("heal")
@@ -49,30 +52,17 @@ class Robotiq2FBench(Bench):
         self.do("power_cycle")
         self.do("pace", factor=PACE)
 
-    @property
-    def address(self) -> str:
-        return str(self.fake.ready["ascii"])
-
-    def _build(self, address: str) -> Robotiq2F:
+    def build(self, address: str) -> Robotiq2F:
         host, _, port = address.rpartition(":")
-        return Robotiq2F("gripper_id", "gripper", Robotiq2FSettings(host=host, port=int(port), request_timeout=0.3))
-
-    def make(self) -> Robotiq2F:
-        return self._build(self.address)
-
-    def absent(self) -> tuple[Generic, str]:
-        return self._build("127.0.0.1:1"), "127.0.0.1:1"
+        return Robotiq2F("gripper_id", "gripper", Robotiq2FSettings(host=host, port=int(port), request_timeout=0.5))
 
     def writes(self) -> Any:
         return self.fake.truth()["count"], self.fake.truth()["sets"]
 
-    def cut(self) -> None:
-        self.do("silence")
-
     def heal(self) -> None:
         # A motion that was begun is finished, as declared; only then may nothing begin any more.
         wait_until(lambda: not self.running(), 10.0, "the end of a motion that was begun")
-        self.do("heal")
+        super().heal()
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, Robotiq2F)
@@ -101,13 +91,17 @@ class Robotiq2FBench(Bench):
         return bool(registers["GTO"] and registers["OBJ"] == MOVING)
 
     def orphan(self) -> list[str]:
+        first = self.controlled()
+        assert isinstance(first, Robotiq2F)
+        first.activate()
+        first.disconnect()
+        self.do("put_part", width=PART)
         return [sys.executable, "-c", ORPHAN, *self.address.rsplit(":", 1)]
 
-    def reset_link(self) -> None:
-        self.do("reset")
-
-    def half_frame(self) -> None:
-        self.do("half_frame")
+    def holding(self) -> object:
+        registers = self.fake.truth()["registers"]
+        kept = {name: registers[name] for name in ("GTO", "POS", "FOR", "OBJ")}
+        return kept if registers["OBJ"] == GRIPPED else None
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
         return {}  # no optional method but those that read
@@ -115,6 +109,16 @@ class Robotiq2FBench(Bench):
     def readings(self, device: Generic) -> list[Check]:
         assert isinstance(device, Robotiq2F)
         return [Check("the width, m", device.width(), self.fake.truth()["width"], 0.001)]
+
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, Robotiq2F)
+        device.activate()
+        for part in (PART, None):
+            device.grip(0.085)
+            self.do("remove_part") if part is None else self.do("put_part", width=part)
+            held, width = device.grip()
+            yield Check("grip", [held, width], [part is not None, self.fake.truth()["width"]], 0.001)
+            yield self.polled("part_held", device.part_held, part is not None)
 
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, Robotiq2F)

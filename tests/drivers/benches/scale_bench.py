@@ -1,32 +1,24 @@
 """The scale on its fake, on a pty."""
 
-import tempfile
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from arcor2_drivers.scale.mt_sics_scale import MtSicsScale
 from arcor2_drivers.scale.settings import MtSicsScaleSettings
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench, Check
-from tests.fakes.conftest import FakeProcess
+from arcor2_hw.testing.bench import Check
+from tests.drivers.fake_bench import FakeBench
 
 ACTING = ("T", "Z", "@", "TI", "ZI", "TA ", "M21")
 """How the commands begin that change something in the scale; TA alone asks."""
 
 
-class MtSicsScaleBench(Bench):
+class MtSicsScaleBench(FakeBench):
     object_type = MtSicsScale
-    fake: FakeProcess
-
-    def start(self) -> None:
-        self.folder = tempfile.TemporaryDirectory()
-        self.fake = FakeProcess("scale", "--link", str(Path(self.folder.name) / "ttySCALE"), "--settling", "0.1")
-        self.do = self.fake.control.do
-
-    def end(self) -> None:
-        self.fake.end()
-        self.folder.cleanup()
+    module = "scale"
+    options = ("--settling", "0.1")
+    link = "ttySCALE"
+    nowhere = "/dev/does-not-exist"
 
     def reset(self) -> None:
         self.do("heal")
@@ -34,29 +26,13 @@ class MtSicsScaleBench(Bench):
         self.do("put", kg=0.5)
         self.fake.control.wait_until(lambda truth: truth["stable"])
 
-    @property
-    def address(self) -> str:
-        return str(self.fake.ready["port"])
-
-    def _build(self, port: str) -> MtSicsScale:
-        return MtSicsScale("scale_id", "scale", settings=MtSicsScaleSettings(port, answer_timeout=0.4))
-
-    def make(self) -> MtSicsScale:
-        return self._build(self.address)
-
-    def absent(self) -> tuple[Generic, str]:
-        return self._build("/dev/does-not-exist"), "/dev/does-not-exist"
+    def build(self, address: str) -> MtSicsScale:
+        return MtSicsScale("scale_id", "scale", settings=MtSicsScaleSettings(address, answer_timeout=0.8))
 
     def writes(self) -> Any:
         truth = self.fake.truth()
         acting = [line for line in truth["received"] if line != "TA" and line.startswith(ACTING)]
         return acting, truth["zero"], truth["tare"]
-
-    def cut(self) -> None:
-        self.do("silence")
-
-    def heal(self) -> None:
-        self.do("heal")
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, MtSicsScale)
@@ -67,12 +43,6 @@ class MtSicsScaleBench(Bench):
     def ask(self, device: Generic) -> object:
         return self.observe(device)
 
-    def reset_link(self) -> None:
-        self.do("reset")
-
-    def half_frame(self) -> None:
-        self.do("half_frame")
-
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
         return {}  # no optional method but those that read
 
@@ -80,6 +50,13 @@ class MtSicsScaleBench(Bench):
         assert isinstance(device, MtSicsScale)
         truth = self.fake.truth()
         return [Check("the weight, kg", device.weigh().value, truth["load"] - truth["zero"] - truth["tare"], 1e-4)]
+
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, MtSicsScale)
+        for load in (0.5, 0.8):
+            self.do("put", kg=load)
+            yield Check("weight", device.weight(), load, 1e-4)
+            yield Check("weight_within", device.weight_within(0.4, 0.6), 0.4 <= load <= 0.6)
 
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, MtSicsScale)

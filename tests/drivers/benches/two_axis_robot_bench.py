@@ -2,10 +2,7 @@
 
 import math
 import sys
-import tempfile
-import time
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from arcor2_drivers.two_axis_robot.settings import TwoAxisRobotSettings
@@ -13,9 +10,9 @@ from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.bench import Check
 from arcor2_hw.testing.life import wait_until
-from tests.fakes.conftest import FakeProcess
+from tests.drivers.fake_bench import FakeBench
 
 ORPHAN = """
 import sys
@@ -32,46 +29,25 @@ robot.move_to_joints(joints, 0.1)
 AT_REST = 0.03  # rad/s: what a servo tells as 0
 
 
-class TwoAxisRobotBench(Bench):
+class TwoAxisRobotBench(FakeBench):
     object_type = TwoAxisRobot
-    fake: FakeProcess
-
-    def start(self) -> None:
-        self.folder = tempfile.TemporaryDirectory()
-        self.fake = FakeProcess("two_axis_robot", "--link", str(Path(self.folder.name) / "ttyDXL"))
-        self.do = self.fake.control.do
-
-    def end(self) -> None:
-        self.fake.end()
-        self.folder.cleanup()
+    module = "two_axis_robot"
+    link = "ttyDXL"
+    nowhere = "/dev/does-not-exist"
 
     def reset(self) -> None:
         self.do("heal")
         self.do("power_cycle")
         self.fake.control.wait_until(lambda truth: all(servo["answers"] for servo in truth["servos"].values()))
 
-    @property
-    def address(self) -> str:
-        return str(self.fake.ready["port"])
-
-    def _build(self, port: str) -> TwoAxisRobot:
+    def build(self, address: str) -> TwoAxisRobot:
         # The longest watchdog: the machine that runs the suite may be busy.
-        return TwoAxisRobot("arm_id", "arm", Pose(), TwoAxisRobotSettings(port, watchdog=0.4))
-
-    def make(self) -> TwoAxisRobot:
-        return self._build(self.address)
-
-    def absent(self) -> tuple[Generic, str]:
-        return self._build("/dev/does-not-exist"), "/dev/does-not-exist"
+        return TwoAxisRobot("arm_id", "arm", Pose(), TwoAxisRobotSettings(address, watchdog=0.4))
 
     def writes(self) -> Any:
-        return {number: servo["writes"] for number, servo in self.fake.truth()["servos"].items()}
-
-    def cut(self) -> None:
-        self.do("silence")
-
-    def heal(self) -> None:
-        self.do("heal")
+        """All but the LEDs, which are written to keep the bus watchdog from tripping while this process is delayed."""
+        servos = self.fake.truth()["servos"]
+        return {number: [each for each in servo["writes"] if each[0] != "led"] for number, servo in servos.items()}
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, TwoAxisRobot)
@@ -98,23 +74,21 @@ class TwoAxisRobotBench(Bench):
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address]
 
-    def reset_link(self) -> None:
-        self.do("reset")
-
-    def half_frame(self) -> None:
-        self.do("half_frame")
-
     def readings(self, device: Generic) -> list[Check]:
         assert isinstance(device, TwoAxisRobot)
         self.do("place", servo=1, ticks=2500)
         self.do("place", servo=2, ticks=1800)
-        time.sleep(0.3)  # until the driver has looked again
         servos = self.fake.truth()["servos"]
-        joints = device.robot_joints()
-        return [
-            Check(f"{joint.name}, rad", joint.value, servos[number]["angle"], 0.01)
-            for joint, number in zip(joints, ("1", "2"), strict=True)
-        ]
+        real = [servos[number]["angle"] for number in ("1", "2")]
+        return [self.polled("joints, rad", lambda: [joint.value for joint in device.robot_joints()], real, 0.01)]
+
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, TwoAxisRobot)
+        for by in (0.3, -0.2):
+            device.move_to_joints(self._turned(device, by), 0.5)
+            servos = self.fake.truth()["servos"]
+            real = [servos[number]["angle"] for number in ("1", "2")]
+            yield self.polled("robot_joints", lambda: [joint.value for joint in device.robot_joints()], real, 0.01)
 
     @staticmethod
     def _tool(device: TwoAxisRobot) -> str:

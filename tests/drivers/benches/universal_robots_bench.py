@@ -127,6 +127,15 @@ class UR5eBench(Bench):
         yield Check("the TCP's y, m", place.y, -y, 1e-4)
         yield Check("the TCP's z, m", place.z, z, 1e-4)
 
+    def results(self, device: Generic) -> Iterable[Check]:
+        assert isinstance(device, UR5e)
+        for on, by in ((True, 0.1), (False, -0.2)):
+            self.fake.do("set_input", bit=3, on=on)
+            yield self.polled("get_digital_input", lambda: device.get_digital_input(3), on)
+            self._turn(device, by)
+            real = self.fake.truth()["q"]
+            yield self.polled("robot_joints", lambda: [joint.value for joint in device.robot_joints()], real, 1e-3)
+
     def beyond_limits(self, device: Generic) -> Mapping[str, Callable[[], object]]:
         assert isinstance(device, UR5e)
         joints = device.robot_joints()

@@ -17,6 +17,7 @@ from tests.fakes.conftest import FakeProcess
 POINTS = "part=DI0; vacuum=DO0 on_loss=hold; blow=DO1; pressure=AI0 scale=2.5 unit=Pa"
 ORPHAN = """
 import sys
+import time
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings
 from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
@@ -24,11 +25,12 @@ from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
 host, _, port = sys.argv[1].rpartition(":")
 block = RemoteIO("block_id", "block", RemoteIOSettings(host=host, port=int(port), points=sys.argv[2]))
 block.connect()
-gripper = SuctionGripper("id", "orphan", VacuumGripperSettings("block", "vacuum", "blow", "part", blow_time=8.0))
+gripper = SuctionGripper("id", "orphan", VacuumGripperSettings("block", "vacuum", "blow", "part"))
 gripper.attach(lambda _: block)
 gripper.connect()
 gripper.take_control()
-gripper.blow_off()
+gripper.on()
+time.sleep(60.0)
 """
 CARRIER = "valve_block"
 NOBODY = "nobody"
@@ -53,7 +55,7 @@ class SuctionGripperBench(Bench):
     @staticmethod
     def _block(name: str, address: str) -> RemoteIO:
         host, _, port = address.rpartition(":")
-        settings = RemoteIOSettings(host=host, port=int(port), points=POINTS, request_timeout=0.2)
+        settings = RemoteIOSettings(host=host, port=int(port), points=POINTS, request_timeout=0.25)
         return RemoteIO(f"{name}_id", name, settings)
 
     def end(self) -> None:
@@ -133,6 +135,9 @@ class SuctionGripperBench(Bench):
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.fake.ready["modbus"], POINTS]
 
+    def holding(self) -> object:
+        return self.fake.truth()["outputs"][0]
+
     def reset_link(self) -> None:
         self.fake.control.do("reset")
 
@@ -145,6 +150,14 @@ class SuctionGripperBench(Bench):
         self.fake.control.do("set_input", number=0, on=True)
         yield Check("the vacuum, Pa", device.vacuum().value, 60_000.0, 1e-6)
         yield Check("a part is held", device.part_held(), True, 0.0)
+
+    def results(self, device: Generic) -> Iterator[Check]:
+        assert isinstance(device, SuctionGripper)
+        for part, raw in ((True, 24000), (False, 400)):
+            self.fake.control.do("set_input", number=0, on=part)
+            self.fake.control.do("set_analog", number=0, raw=raw)
+            yield Check("is_part_held", device.is_part_held(), part)
+            yield Check("measure_vacuum", device.measure_vacuum(), raw * 2.5, 1e-6)
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
         quick = self._gripper(CARRIER, blow_time=0.3)

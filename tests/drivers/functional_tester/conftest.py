@@ -8,9 +8,10 @@ import pytest
 from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
 from arcor2_drivers.functional_tester.settings import FunctionalTesterSettings
 from arcor2_hw.data.geometry import Pose
+from tests.drivers.faults import relay
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
-__all__ = ["start_fake", "wait_for"]
+__all__ = ["relay", "start_fake", "wait_for"]
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,10 @@ import pytest
 
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings
+from tests.drivers.faults import relay
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
-__all__ = ["start_fake", "wait_for"]
+__all__ = ["relay", "start_fake", "wait_for"]
 
 POINTS = (
     "part=DI0; door=DI1 debounce=0.1; lamp=DO4; valve=DO5 on_loss=hold; lock=DO6 on_loss=on; "

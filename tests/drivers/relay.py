@@ -62,7 +62,7 @@ class Relay:
             with contextlib.suppress(OSError):
                 each.shutdown(socket.SHUT_RDWR)
         for thread in self._threads:
-            thread.join(2.0)
+            thread.join(30.0)
         for each in (self._server, *self._sockets):
             each.close()
 

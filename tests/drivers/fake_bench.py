@@ -1,0 +1,87 @@
+"""Benches of drivers on their fakes. The fake injects the faults of the cable, or a wire that is recorded."""
+
+import abc
+import tempfile
+from typing import Any, ClassVar
+
+from arcor2_fakes.control import BlockingControlClient
+from arcor2_hw.objects import Generic
+from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.fake_bench import FakeFaults
+from arcor2_hw.testing.serial_wire import SerialWire
+from arcor2_hw.testing.tcp_wire import TcpWire
+from tests.fakes.conftest import FakeProcess
+
+
+class _OnFake(Bench):
+    """A driver on its fake.
+
+    Attributes:
+        module: Module of the fake.
+        options: Arguments of the fake.
+        link: Name of the link to its serial port; empty for a device in the network.
+        port: Key of its address in the ready line.
+        nowhere: Address where nothing answers.
+        folder: Directory that exists while the fake runs.
+    """
+
+    module: ClassVar[str]
+    options: ClassVar[tuple[str, ...]] = ()
+    link: ClassVar[str] = ""
+    port: ClassVar[str] = "port"
+    nowhere: ClassVar[str] = "127.0.0.1:1"
+    folder: tempfile.TemporaryDirectory[str]
+    fake: FakeProcess
+    control: BlockingControlClient
+
+    @abc.abstractmethod
+    def build(self, address: str) -> Generic:
+        """Return a new object for the device at an address, not connected."""
+
+    def start(self) -> None:
+        self.folder = tempfile.TemporaryDirectory()
+        link = ("--link", f"{self.folder.name}/{self.link}") if self.link else ()
+        self.fake = FakeProcess(self.module, *link, *self.options)
+        self.control = self.fake.control
+
+    def do(self, command: str, **arguments: Any) -> Any:
+        return self.control.do(command, **arguments)
+
+    def end(self) -> None:
+        self.fake.end()
+        self.folder.cleanup()
+
+    @property
+    def address(self) -> str:
+        return str(self.fake.ready[self.port])
+
+    def make(self) -> Generic:
+        return self.build(self.address)
+
+    def absent(self) -> tuple[Generic, str]:
+        return self.build(self.nowhere), self.nowhere
+
+
+class FakeBench(_OnFake, FakeFaults):
+    """A driver on its fake, which injects the faults of the cable."""
+
+
+class WiredBench(_OnFake):
+    """A driver on its fake, with a wire between that is cut and recorded."""
+
+    def start(self) -> None:
+        super().start()
+        address = super().address
+        host, _, port = address.rpartition(":")
+        self.wire = SerialWire(address) if self.link else TcpWire(host, [int(port)])
+        self.wire.start()
+
+    def end(self) -> None:
+        if self.wire is not None:
+            self.wire.close()
+        super().end()
+
+    @property
+    def address(self) -> str:
+        assert self.wire is not None
+        return self.wire.address
