@@ -65,6 +65,7 @@ class Bench(abc.ABC):
         object_type: The driver's class.
         label: Name of the device where a cell has several of one type.
         guessed: Whether it was created from settings alone.
+        independent: Whether driver and fake were written independently; if not, the level is bronze at most.
         real: Whether it uses a real device; it runs only with `--real` and the device named by `--real-device`.
         case_within: Time in which each case ends, s; a call that has not returned by then fails the case.
         connect_timeout: Time limit passed to connect, s.
@@ -82,6 +83,7 @@ class Bench(abc.ABC):
     object_type: ClassVar[type[Generic]]
     label: ClassVar[str] = ""
     guessed: ClassVar[bool] = False
+    independent: ClassVar[bool] = True
     real: ClassVar[bool] = False
     case_within: ClassVar[float] = 60.0
     connect_timeout: ClassVar[float] = 2.0

@@ -350,6 +350,9 @@ def arcor2_verdict(request: pytest.FixtureRequest, arcor2_running_bench: Bench) 
     )
     lacks = report.unmatched(folder, claims, bench.type_name(), there)
     reached, missing = outcomes.judge(there, tests, lacks)
+    if not bench.independent:
+        reached = min(reached, Level.BRONZE)
+        missing = ["the fake is written from the same source as the driver", *missing]
     _values(request.node).update(claimed=int(claims.claimed), reached=int(reached), missing=missing)
     return outcomes.Verdict(claims.claimed, reached, missing)
 

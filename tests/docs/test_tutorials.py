@@ -14,7 +14,7 @@ import pytest
 DOCS = Path(__file__).parents[2] / "docs"
 TUTORIALS = sorted([*(DOCS / "tutorials").glob("*.md"), *(DOCS / "how-to").glob("*.md")])
 BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-TIMEOUT = 60
+TIMEOUT = 150  # s, of a command; one runs the conformance suite, on a busy machine for more than a minute
 
 
 def expected(lines: list[str]) -> re.Pattern[str]:
@@ -65,7 +65,7 @@ class Background:
     def stop(self) -> None:
         self.process.send_signal(signal.SIGTERM)
         try:
-            self.process.wait(10)
+            self.process.wait(60)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
@@ -108,12 +108,16 @@ def test_tutorial(tutorial: Path, tmp_path: Path) -> None:
     assert ran > 0, "the tutorial runs nothing"
 
 
-def test_a_device_of_ones_own_takes_sixty_lines_of_driver_and_of_fake() -> None:
+def test_the_how_to_states_the_length_of_its_example() -> None:
     text = (DOCS / "how-to" / "add-a-device.md").read_text()
     written = {
         title.group(1): sum(bool(line.strip()) for line in block.splitlines())
         for _, info, block in BLOCK.findall(text)
         if (title := re.search(r'title="([\w./-]+)"', info))
     }
-    assert set(written) == {"sealer/sealer/sealer.py", "sealer/sealer/sealer_fake.py"}
-    assert max(written.values()) <= 60, written
+    stated = re.search(r"The example has (\d+) lines of driver\s+and (\d+) lines of a fake", text)
+    assert stated is not None
+    assert written == {
+        "sealer/sealer/sealer.py": int(stated.group(1)),
+        "sealer/sealer/sealer_fake.py": int(stated.group(2)),
+    }

@@ -32,9 +32,10 @@ class Kind(NamedTuple):
         words: the registers that are read.
         writes: the commands in register 0.
         does: description of the actions.
-        own_test: tests of this kind of device.
         fake: name of the template of the fake.
         rest_value: value of the fake at the start.
+        acts: calls that act until the process is killed, where `run_long` is empty.
+        not_run: cases of the conformance suite that the device does not have, with the reason.
     """
 
     actions: str
@@ -46,12 +47,16 @@ class Kind(NamedTuple):
     words: str
     writes: str
     does: str
-    own_test: str
     fake: str
     rest_value: int = 0
+    acts: str = ""
+    not_run: tuple[tuple[str, str], ...] = ()
 
 
 NO_ACT: Final = "the device has no action that takes time"
+_OF_ACTIONS: Final = tuple(
+    (case, NO_ACT) for case in ("nothing_resumes", "stop_passes", "one_act_at_a_time", "disconnecting_ends_an_act")
+)
 STATUS: Final = "state (0 idle, 1 busy)"
 MOTION_WRITES: Final = (
     "1 go (with target in 0.1 mm and speed in 0.1 mm/s), 2 stop, 3 reset, 4 home. Register 2: ms without a request "
@@ -71,18 +76,6 @@ KINDS: Final = {
         "command (PackML), and the amount in tenths after START. Register 2: ms without a request after which it "
         "stops; 0 releases control",
         "`process` does one piece of work: it resets the machine if necessary, starts it and waits until it ends.",
-        """def test_pieces_are_counted(bench):
-    device = bench.controlled()
-    assert device.process(0.4) == 1
-    assert device.process(0.4) == 2
-    assert device.machine_state() is MachineState.COMPLETE
-
-
-def test_a_command_in_a_wrong_state_is_refused(bench):
-    device = bench.controlled()
-    with pytest.raises(Refused, match="CLEAR is not allowed in the state STOPPED"):
-        device.command(MachineCommand.CLEAR)
-""",
         "machine",
     ),
     Base.GENERIC: Kind(
@@ -96,10 +89,6 @@ def test_a_command_in_a_wrong_state_is_refused(bench):
         "1 go and the amount in tenths, 2 stop, 3 reset. Register 2: ms without a request after which it stops; 0 "
         "releases control",
         "`work` does one piece of work and waits until it ends.",
-        """def test_work_returns_the_amount(bench):
-    device = bench.controlled()
-    assert device.work(0.4) == 0.4
-""",
         "generic",
     ),
     Base.AXIS: Kind(
@@ -112,18 +101,10 @@ def test_a_command_in_a_wrong_state_is_refused(bench):
         MOTION_WORDS,
         MOTION_WRITES,
         "`home` references it; `move_absolute` and `move_relative` move it, and are refused before homing.",
-        """def test_it_moves_to_the_position(bench):
-    device = bench.controlled()
-    device.home()
-    device.move_absolute(0.05, 0.5)
-    assert device.position().value == pytest.approx(0.05)
-    device.move_relative(-0.02, 0.5)
-    assert device.position().value == pytest.approx(0.03)
-""",
         "motion",
     ),
     Base.GRIPPER: Kind(
-        "activate, grip, release",
+        "activate, grip, release, set_part, set_part_object",
         "state()",
         "fresh()",
         "release()",
@@ -132,15 +113,6 @@ def test_a_command_in_a_wrong_state_is_refused(bench):
         MOTION_WORDS,
         MOTION_WRITES,
         "`grip` closes until a part is gripped or the width is reached, and returns which; `release` opens.",
-        """def test_a_part_is_held(bench):
-    device = bench.controlled()
-    device.activate()
-    bench.do("put_part", width=4900)
-    assert device.grip(0.48, 10.0, 0.2) == (True, pytest.approx(0.49))
-    device.release()
-    bench.do("put_part")
-    assert device.grip(0.48, 10.0, 0.2) == (False, pytest.approx(0.48))
-""",
         "motion",
         5000,
     ),
@@ -154,15 +126,12 @@ def test_a_command_in_a_wrong_state_is_refused(bench):
         f"state (0 stable, 1 changing), grams, tares done, {COMMON_WORDS}",
         "4 tare, 5 zero. Register 2: ms without a request after which control is released; 0 releases control",
         "`weight` returns the weight, on request when it is stable; `tare` and `zero` set the present weight to zero.",
-        """def test_weight_before_and_after_taring(bench):
-    device = bench.controlled()
-    bench.do("put", grams=1250)
-    assert device.weight() == 1.25
-    device.tare()
-    bench.do("put", grams=1000)
-    assert device.weight() == -0.25
-""",
         "scale",
+        not_run=(
+            *_OF_ACTIONS,
+            ("loss_reaction", NO_ACT),
+            ("limits_are_refused", "its calls have no values with limits"),
+        ),
     ),
     Base.READER: Kind(
         "scan",
@@ -174,20 +143,8 @@ def test_a_command_in_a_wrong_state_is_refused(bench):
         f"{STATUS}, the code, codes read, {COMMON_WORDS}",
         "1 read a code, 2 stop. Register 2: ms without a request after which it stops; 0 releases control",
         "`scan` waits for a code; codes from before the call do not count.",
-        """def test_a_code_from_before_the_scan_does_not_count(bench):
-    device = bench.controlled()
-    bench.do("show", code=4711)
-    assert device.scan(0.1) == ""
-
-
-def test_a_code_during_the_scan_is_read(bench):
-    device = bench.controlled()
-    timer = threading.Timer(0.2, lambda: bench.do("show", code=4711))
-    timer.start()
-    assert device.scan(5.0) == "4711"
-    timer.join()
-""",
         "reader",
+        not_run=(("units_and_frames", "the reader returns codes, and no value with a unit"),),
     ),
     Base.PRINTER: Kind(
         "print",
@@ -200,12 +157,6 @@ def test_a_code_during_the_scan_is_read(bench):
         "1 print, with one character per register, 2 stop. Register 2: ms without a request after which it stops; 0 "
         "releases control",
         "`print` prints a label of up to 40 ASCII characters and waits until it is printed.",
-        """def test_a_label_is_printed_once(bench):
-    device = bench.controlled()
-    assert device.print("B-7") == "1"
-    assert bench.do("truth")["labels"] == ["B-7"]
-    assert (device.status(), device.counter()) == ("ready", 1)
-""",
         "printer",
     ),
     Base.IOBLOCK: Kind(
@@ -219,16 +170,8 @@ def test_a_code_during_the_scan_is_read(bench):
         "3 switch an output, with its number and 0 or 1. Register 2: ms without a request after which all outputs are "
         "off; 0 releases control",
         "`read_point` returns a point, `write_point` switches an output. Without a connection, all outputs are off.",
-        """def test_points_are_read_and_switched(bench):
-    device = bench.controlled()
-    bench.do("set_input", number=3, on=True)
-    device.fresh()
-    assert [device.read_point(f"DI{n}") for n in (2, 3)] == [False, True]
-    device.write_point("DO5", True)
-    assert device.fresh()[2] == 1 << 5
-    device.disconnect()
-    assert bench.do("truth")["outputs"] == 0
-""",
         "ioblock",
+        acts='write("DO1", True)\nwhile True:\n    device.fresh()',
+        not_run=_OF_ACTIONS,
     ),
 }

@@ -1,7 +1,6 @@
 """`arcor2-hw device new`: generated code passes the suite, the linter and the analysis unchanged."""
 
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,18 +9,12 @@ import pytest
 
 from arcor2_hw.data.cell import read_cell
 from arcor2_server.cli.device_new import WIRES, Bus, refusal, texts
-from arcor2_server.cli.starter_kinds import KINDS, NO_ACT, Base
+from arcor2_server.cli.starter_kinds import KINDS, Base
 
-pytestmark = pytest.mark.timeout(180)
 COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
 ROOT = Path(__file__).parents[3]
-RUN = [
-    (Base.MACHINE, Bus.MODBUS),
-    (Base.AXIS, Bus.SERIAL),
-]
-"""What is run here in full; every other combination is linted and analysed."""
-OF_THE_AUTHOR = ("hook works", "hook readings", "hook beyond_limits", NO_ACT)
-"""Hooks of the bench that only somebody who knows the device can fill, and a device that does nothing for long."""
+RUN = list(zip(KINDS, [*WIRES, *WIRES], strict=True))
+"""What is run here in full: each base, each bus twice. Every other combination is linted and analysed."""
 ALL = [(base, bus) for base in KINDS for bus in WIRES]
 
 
@@ -36,13 +29,8 @@ def written(directory: Path, base: Base, bus: Bus, name: str = "dough-mixer") ->
     return directory / name
 
 
-def lines(path: Path) -> int:
-    """The lines that somebody has to write: all but the empty ones."""
-    return sum(bool(line.strip()) for line in path.read_text().splitlines())
-
-
 @pytest.mark.parametrize(("base", "bus"), RUN, ids=lambda each: each.value)
-def test_the_generated_driver_passes_the_suite(tmp_path: Path, base: Base, bus: Bus) -> None:
+def test_the_generated_driver_reaches_silver(tmp_path: Path, base: Base, bus: Bus) -> None:
     root = written(tmp_path, base, bus)
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rs"],
@@ -54,12 +42,10 @@ def test_the_generated_driver_passes_the_suite(tmp_path: Path, base: Base, bus: 
         check=False,
     )
     assert done.returncode == 0, done.stdout[-6000:]
-    found = re.search(r"(\d+) passed", done.stdout)
-    assert found is not None
-    assert int(found.group(1)) >= 19, "the cases of the suite, and the driver's own"
+    assert "DoughMixer: silver (claimed silver)" in done.stdout
     for line in done.stdout.splitlines():
         if line.startswith("SKIPPED"):
-            assert line.endswith(OF_THE_AUTHOR), line
+            assert line.endswith(tuple(why for _, why in KINDS[base].not_run)), line
 
 
 def test_generated_code_is_clean_with_any_name(tmp_path: Path) -> None:
@@ -83,19 +69,41 @@ def test_generated_code_is_clean_with_any_name(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_a_modbus_machine_takes_sixty_lines_in_each_of_three_files(tmp_path: Path) -> None:
-    root = written(tmp_path, Base.MACHINE, Bus.MODBUS, "press")
-    by_hand = [root / "press" / "press.py", root / "press" / "press_fake.py", root / "tests" / "test_press.py"]
-    assert sorted(path for path in root.rglob("*.py") if path.name != "__init__.py") == sorted(by_hand)
-    assert lines(by_hand[0]) <= 60
-    assert lines(by_hand[1]) <= 60
+def pass_tests(root: Path, selected: str, count: int) -> None:
+    """Run selected tests of a generated driver; as many have to pass."""
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-k", selected],
+        cwd=root,
+        env=os.environ,
+        capture_output=True,
+        text=True,
+        timeout=150,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-6000:]
+    assert f"{count} passed" in done.stdout
+
+
+def test_a_generated_modbus_driver_also_works_over_rtu(tmp_path: Path) -> None:
+    root = written(tmp_path, Base.GENERIC, Bus.MODBUS, "press")
+    test = root / "tests" / "test_press.py"
+    test.write_text(test.read_text().replace("    fake = ", '    arguments = ("--rtu",)\n    fake = '))
+    pass_tests(root, "amount or half_a_frame or loss_reaction or reset_and_back", 4)
+
+
+def test_lines_of_text_may_end_in_another_way(tmp_path: Path) -> None:
+    root = written(tmp_path, Base.GENERIC, Bus.TCP, "press")
+    link, fake = root / "press" / "link.py", root / "press" / "press_fake.py"
+    link.write_text(link.read_text().replace('END = b"\\r"', 'END = b"\\r\\n"'))
+    fake.write_text(fake.read_text().replace('"tcp")', '"tcp", end=b"\\r\\n")'))
+    assert all('\\r\\n"' in path.read_text() for path in (link, fake))
+    pass_tests(root, "amount or half_a_frame", 2)
 
 
 def test_the_drivers_are_typed(tmp_path: Path, pytestconfig: pytest.Config) -> None:
     kept = getattr(pytestconfig, "cache", None)  # of the library, which need not be read each time
     known = kept.mkdir("typed-starters") if kept is not None else tmp_path / "mypy"
-    buses = [*WIRES, *WIRES]
-    for base, bus in zip(KINDS, buses, strict=False):  # each base, each bus twice
+    for base, bus in RUN:
         for path, text in texts(f"{base}-of-mine", base, bus).items():
             (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / path).write_text(text)
@@ -114,11 +122,12 @@ def test_the_drivers_are_typed(tmp_path: Path, pytestconfig: pytest.Config) -> N
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["arm", "--base", "robot", "--bus", "modbus"], "no template for robots"),
-        (["eye", "--base", "camera", "--bus", "serial"], "no template for cameras"),
+        (["arm", "--base", "robot", "--bus", "modbus"], "robots have no template"),
+        (["eye", "--base", "camera", "--bus", "serial"], "cameras have no template"),
         (["belt", "--base", "machine", "--bus", "can"], "object dictionary"),
         (["Press!", "--base", "machine", "--bus", "modbus"], "invalid name"),
         (["class", "--base", "machine", "--bus", "modbus"], "invalid name"),
+        (["generic", "--base", "machine", "--bus", "modbus"], "a class of the library has the name of 'generic'"),
         (["press", "--base", "lamp", "--bus", "modbus"], "lamp"),
     ],
 )
