@@ -25,6 +25,7 @@ VALID: dict[str, dict[str, Any]] = {
     "OakD": {"address": "10.0.0.7"},
     "OpcUaPlc": {"url": "opc.tcp://plc.example", "points": "a=DI i=1", "user": "u", "password_file": "plc.example/p"}
     | {"security": "basic256sha256_sign", "client_certificate": "c", "client_key": "k", "server_certificate": "s"},
+    "OpenProtocolScrewdriver": {"host": "10.0.0.7"},
     "RemoteIO": {"serial_port": "/dev/ttyUSB0", "points": "a=DI0"},
     "Robotiq2F": {"wire": "modbus_rtu", "serial_port": "/dev/ttyUSB0"},
     "TowerLight": {"serial_port": "/dev/ttyUSB0", "red": "DO0"},

@@ -1,0 +1,1 @@
+"""Screwdrivers and other tightening tools by Open Protocol (docs/devices/screwdriver.md)."""

@@ -1,0 +1,203 @@
+"""The controller: its clients, what it refuses, and the data of its telegrams."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from arcor2_fakes.screwdriver.session import Session
+from arcor2_fakes.screwdriver.telegram import Message, numbered
+from arcor2_fakes.wire import Connection
+
+if TYPE_CHECKING:
+    from arcor2_fakes.screwdriver.tool import Alarm, Tightening, Tool
+
+_PLAIN = {3: 1, 18: 1, 42: 1, 43: 1, 63: 1, 73: 1, 78: 1}  # highest revision of each message
+_NAME = "Fake controller"
+_INVALID, _NO_PROGRAM, _PROGRAM_BLOCKED, _NO_JOB, _JOB_BLOCKED = 1, 2, 3, 17, 20
+_RESULTS_EXIST, _NO_RESULTS, _ALARMS_EXIST, _NO_ALARMS, _NO_ALARM = 9, 10, 11, 12, 58
+_DISABLED, _CLIENT_CONNECTED, _REVISION, _UNKNOWN = 92, 96, 97, 99
+
+
+class Options(msgspec.Struct, frozen=True):
+    """Properties of the controller."""
+
+    clients: int = 5
+    start_revision: int = 6
+    result_revision: int = 2
+    alarm_revision: int = 2
+    job_revision: int = 2
+    binary: bool = False
+    """Whether the bit fields of a result are bytes, as in older controllers, instead of digits."""
+    lock_on_loss: bool = False
+    """Whether the tool is disabled when a client disconnects without MID 0003."""
+
+
+class Controller:
+    """A tightening controller with one tool.
+
+    Args:
+        tool: The tool.
+        options: Properties.
+        response_timeout: Time in which a client has to acknowledge an event, s.
+        keep_alive_timeout: Time without a message after which a client is disconnected, s.
+    """
+
+    def __init__(self, tool: Tool, options: Options, *, response_timeout: float, keep_alive_timeout: float) -> None:
+        self.tool, self.options = tool, options
+        self.response_timeout, self.keep_alive_timeout = response_timeout, keep_alive_timeout
+        self.sessions: set[Session] = set()
+        self.received: deque[str] = deque(maxlen=200)
+        self.deaf = 0
+        """Number of acknowledgements that get lost."""
+        self.commands_disabled = False
+        tool.finished = self._finished
+        tool.alarm_raised = self._alarm_raised
+        tool.alarm_cleared = self._alarm_cleared
+
+    def opened(self, connection: Connection) -> None:
+        """Serve a new connection."""
+        self.sessions.add(Session(self, connection))
+
+    def left(self, session: Session, was_started: bool) -> None:
+        """Forget a session whose connection is closed."""
+        self.sessions.discard(session)
+        if was_started and self.options.lock_on_loss:
+            self.tool.enable(False)
+
+    # ------------------------------------------------------------------------------------------------ events
+
+    def _finished(self, result: Tightening) -> None:
+        for session in tuple(self.sessions):
+            session.report_result(result)
+
+    def _alarm_raised(self, alarm: Alarm) -> None:
+        for session in tuple(self.sessions):
+            session.report_alarm(alarm)
+
+    def _alarm_cleared(self, alarm: Alarm) -> None:
+        for session in tuple(self.sessions):
+            session.report_cleared(alarm)
+
+    # ------------------------------------------------------------------------------------------------ messages
+
+    def refusal(self, session: Session, message: Message) -> int:
+        """Return the error code that refuses a message; 0 if it is accepted."""
+        limits = _PLAIN | {
+            1: self.options.start_revision,
+            38: self.options.job_revision,
+            60: self.options.result_revision,
+            70: self.options.alarm_revision,
+        }
+        if message.mid not in limits or limits[message.mid] == 0:
+            return _UNKNOWN
+        if message.revision > limits[message.mid]:
+            return _REVISION
+        match message.mid:
+            case 1:
+                others = sum(each.started for each in self.sessions)
+                return _CLIENT_CONNECTED if session.started or others >= self.options.clients else 0
+            case 60:
+                return _RESULTS_EXIST if session.results is not None else 0
+            case 63:
+                return _NO_RESULTS if session.results is None else 0
+            case 70:
+                return _ALARMS_EXIST if session.alarms is not None else 0
+            case 73:
+                return _NO_ALARMS if session.alarms is None else 0
+            case 18 | 38 | 42 | 43 | 78 if self.commands_disabled:
+                return _DISABLED
+            case 18:
+                return self._refused_number(message.data, 3, self.tool.programs, 1, _NO_PROGRAM, _PROGRAM_BLOCKED)
+            case 38:
+                digits = 2 if message.revision == 1 else 4
+                return self._refused_number(message.data, digits, self.tool.jobs, 0, _NO_JOB, _JOB_BLOCKED)
+            case 78:
+                return _NO_ALARM if self.tool.alarm is None else 0
+        return 0
+
+    def _refused_number(self, data: bytes, digits: int, highest: int, lowest: int, missing: int, blocked: int) -> int:
+        if len(data) != digits or not data.isdigit():
+            return _INVALID
+        if not lowest <= int(data) <= highest:
+            return missing
+        return blocked if self.tool.running else 0
+
+    def execute(self, session: Session, message: Message) -> None:
+        """Do what an accepted message says, after it was answered."""
+        match message.mid:
+            case 3:
+                session.close()
+            case 18:
+                self.tool.program = int(message.data)
+            case 38:
+                self.tool.job = int(message.data)
+            case 42 | 43:
+                self.tool.enable(message.mid == 43)
+            case 60:
+                session.results = message.revision, message.no_ack
+            case 63:
+                session.results = None
+            case 70:
+                session.alarms = message.revision
+                if self.tool.alarm is not None:
+                    session.report_alarm_status(self.tool.alarm)
+            case 73:
+                session.alarms = None
+            case 78:
+                self.tool.clear_alarm()
+
+    # ------------------------------------------------------------------------------------------------ data fields
+
+    def introduction(self, revision: int) -> bytes:
+        """Return the data field of MID 0002."""
+        versions = ("2.8".ljust(19), "1.4.0".ljust(19), "3.2".ljust(19))
+        later: list[tuple[str, ...]] = [("FKE",), versions, ("RBU".ljust(24), "SN00012345"), ("001", "001")]
+        later.append(("0", "0", "0000000001", "Station 1".ljust(25), "1"))
+        values = ["0001", "01", _NAME.ljust(25)]
+        for more in later[: revision - 1]:
+            values += more
+        return numbered(*values)
+
+    def result_data(self, result: Tightening, revision: int) -> bytes:
+        """Return the data field of MID 0061. Torque is in 1/100 N m."""
+        ok, torque_status, angle_status = str(int(result.ok)), str(result.torque_status), str(result.angle_status)
+        low, high, target = (f"{round(each * 100):06d}" for each in result.torque_limits)
+        torques = (low, high, target, f"{round(result.torque * 100):06d}")
+        least, most, aim = (f"{each:05d}" for each in result.angle_limits)
+        angles = (least, most, aim, f"{result.angle:05d}")
+        at = result.at.strftime("%Y-%m-%d:%H:%M:%S")
+        changed = "2026-01-01:00:00:00"
+        first = ("0001", "01", _NAME.ljust(25), " " * 25)
+        batch = ("0000", "0000")
+        if revision == 1:
+            job, program = f"{result.job % 100:02d}", f"{result.program:03d}"
+            statuses = (ok, torque_status, angle_status)
+            last = (at, changed, "2", f"{result.id:010d}")
+            return numbered(*first, job, program, *batch, *statuses, *torques, *angles, *last)
+        options = b"\x02\x00\x00\x00\x00" if self.options.binary else b"00002"
+        errors = b"\x00\x08" + bytes(8) if self.options.binary else b"0000000000"
+        return numbered(
+            *first,
+            f"{result.job:04d}",
+            f"{result.program:03d}",
+            "02",
+            options,
+            *batch,
+            ok,
+            "2",
+            torque_status,
+            angle_status,
+            *("1" * 5),
+            errors,
+            *torques,
+            *angles,
+            *("00000", "09999", "00720"),
+            *("000", "150", "080"),
+            *(["000000"] * 6),
+            f"{result.id:010d}",
+            *("00000", "00000", "TOOL0000012345"),
+            *(at, changed),
+        )
