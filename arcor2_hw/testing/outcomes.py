@@ -26,13 +26,15 @@ class Kind(enum.StrEnum):
 
 @dataclass
 class Ran:
-    """Results of one bench: results and reasons by case."""
+    """Results of one bench: results and reasons by case, durations by case, s. `folder`: that of the driver."""
 
     type_name: str
     real: bool = False
     address: str = ""
     identity: Mapping[str, str] = field(default_factory=dict)
+    folder: str = ""
     outcomes: dict[str, tuple[Kind, str]] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
     claimed: Level = Level.NONE
     reached: Level | None = None
     missing: Sequence[str] = ()
@@ -45,7 +47,15 @@ class Ran:
 class Outcomes(dict[str, Ran]):
     """All results, by the name of the bench."""
 
-    def add(self, properties: Sequence[tuple[str, Any]], passed: bool, failed: bool, when: str, text: str) -> None:
+    def add(
+        self,
+        properties: Sequence[tuple[str, Any]],
+        passed: bool,
+        failed: bool,
+        when: str,
+        text: str,
+        seconds: float = 0.0,
+    ) -> None:
         """Add a report of pytest; reports of other tests are ignored."""
         values: dict[str, Any] = next((value for key, value in reversed(properties) if key == PROPERTY), {})
         if not values:
@@ -53,7 +63,10 @@ class Outcomes(dict[str, Ran]):
         ran = self.setdefault(values["bench"], Ran(values["type"], values["real"]))
         ran.address = values.get("address", ran.address)
         ran.identity = values.get("identity", ran.identity)
+        ran.folder = values.get("folder", ran.folder)
         case = values["case"]
+        if when == "call":
+            ran.seconds[case] = seconds
         if case == LEVEL_CASE:
             if "reached" in values:
                 ran.claimed, ran.reached = Level(values["claimed"]), Level(values["reached"])

@@ -256,7 +256,7 @@ def arcor2_bench(
     """Return the bench after a reset. Skip or fail a case for which it lacks hooks."""
     bench = arcor2_running_bench
     values = _values(request.node)
-    values |= {"address": bench.address, "identity": arcor2_identity}
+    values |= {"address": bench.address, "identity": arcor2_identity, "folder": str(bench.quality_file().parent)}
     case = values["case"]
     if bench.hanging is not None and not bench.hanging.returned(RELEASE_WITHIN):
         pytest.fail(f"{bench.name()}: {case} was not run, because of a call that hangs: {bench.hanging}", pytrace=False)

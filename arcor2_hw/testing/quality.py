@@ -62,7 +62,8 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
         outputs_on_loss: YAML reads off and on as false and true, which are accepted.
         level: The claimed level; the suite checks it.
         tests: Folder of the tests in `rules`, from the project's root; default: all test folders.
-        report: File next to this one, written by `--report` in a run on the real device.
+        report: File in this folder, written by a run on the real device.
+        not_on_hardware: By case, why it did not pass on the real device of the report, although it does on the fake.
         frames: How the driver's frames are read, by kind (`arcor2_hw.testing.frames`), with the first words of lines
             that act, or the objects that may be written for observation.
     """
@@ -81,6 +82,7 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
     level: Literal["none", "bronze", "silver", "gold"] = "none"
     tests: str | Unset = UNSET
     report: str | Unset = UNSET
+    not_on_hardware: dict[str, str] = field(default_factory=dict)
     frames: dict[str, list[str]] = field(default_factory=dict)
 
     @property
@@ -99,6 +101,13 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
         for what, reason in self.not_run.items():
             if len(reason.split()) < 3:
                 raise ValueError(f"not_run: {what} needs a reason in words, not {reason!r}")
+            if (what in self.types or _SAYS_TESTED.search(reason)) and not self.instead.get(what):
+                raise ValueError(f"not_run: {what} needs the tests that show it, under `instead`")
+        for what, reason in self.not_on_hardware.items():
+            if len(reason.split()) < 3:
+                raise ValueError(f"not_on_hardware: {what} needs a reason in words, not {reason!r}")
+        if unknown := set(self.instead) - set(self.not_run):
+            raise ValueError(f"instead: not_run has no {', '.join(sorted(unknown))}")
         if unknown := set(self.frames) - set(KINDS):
             raise ValueError(f"frames: unknown kind {', '.join(sorted(unknown))}. Available: {', '.join(KINDS)}")
 

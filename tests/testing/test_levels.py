@@ -1,5 +1,6 @@
 """Levels require cases, tests and a report. Addresses and wires are found in settings."""
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -131,7 +132,7 @@ def claims(**changes: Any) -> Quality:
         "rules": {},
         "outputs_on_loss": "hold",
         "limits": [],
-        "report": "real.json",
+        "report": "evidence/real.json",
     }
     return Quality(**(given | changes))
 
@@ -152,7 +153,8 @@ def written(tmp_path: Path, **changes: Any) -> None:
     }
     run = DeviceRun(**(given | changes))
     whole = Report("2026-01-02T03:04:05+00:00", "0.1.0", "3.11.7", "Linux x86_64", [run])
-    (tmp_path / "real.json").write_bytes(msgspec.json.encode(whole))
+    (tmp_path / "evidence").mkdir(exist_ok=True)
+    (tmp_path / "evidence" / "real.json").write_bytes(msgspec.json.encode(whole))
 
 
 def test_a_matching_report_reaches_gold(tmp_path: Path) -> None:
@@ -180,9 +182,56 @@ def test_differences_of_a_report_are_named(tmp_path: Path, changes: dict[str, An
     assert told in "; ".join(report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED))
 
 
+def test_a_report_is_of_the_very_files_of_the_driver(tmp_path: Path) -> None:
+    (tmp_path / "press.py").write_text("FORCE = 100\n")
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "press.stl").write_bytes(b"solid")
+    written(tmp_path)
+    (tmp_path / "__pycache__").mkdir()
+    for name in ("quality.yaml", "first_day.yaml", "__pycache__/press.pyc", "evidence/notes.txt"):
+        (tmp_path / name).write_text("anything")
+    assert report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED) == []
+    for name, content in (("press.py", "FORCE = 101\n"), ("meshes/press.stl", "Solid"), ("other.py", "")):
+        path = tmp_path / name
+        before = path.read_bytes() if path.exists() else None
+        path.write_text(content)
+        changed = ["the files of the driver have changed since the report was written"]
+        assert report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED) == changed
+        path.unlink() if before is None else path.write_bytes(before)
+    assert report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED) == []
+
+
+def test_a_recording_belongs_to_its_report(tmp_path: Path) -> None:
+    recording = report.Recording("wire.jsonl.gz", hashlib.sha256(b"bytes").hexdigest())
+    written(tmp_path, recording=recording)
+    missing = report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED)
+    assert missing == ["the recording wire.jsonl.gz cannot be read: No such file or directory"]
+    for content, told in ((b"bytes", []), (b"Bytes", ["the recording wire.jsonl.gz is not the one of the report"])):
+        (tmp_path / "evidence" / "wire.jsonl.gz").write_bytes(content)
+        assert report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED) == told
+
+
+def test_a_case_that_the_real_device_could_not_show_needs_a_reason(tmp_path: Path) -> None:
+    cases = {case: CaseResult(Kind.PASSED) for case in ALL_PASSED}
+    written(tmp_path, cases=cases | {"stop_passes": CaseResult(Kind.NOT_RUN, "declined")})
+    reason = {"stop_passes": "the guard was not mounted yet"}
+    assert report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED) == ["stop_passes is not run there"]
+    assert report.unmatched(tmp_path, claims(not_on_hardware=reason), TYPE, ALL_PASSED) == []
+    written(tmp_path, cases=cases | {"stop_passes": CaseResult(Kind.FAILED, "went on")})
+    assert report.unmatched(tmp_path, claims(not_on_hardware=reason), TYPE, ALL_PASSED) == [
+        "stop_passes is failed there"
+    ]
+    written(tmp_path)
+    recovery = claims(not_on_hardware={"half_a_frame": "the line cannot be interrupted"})
+    assert report.unmatched(tmp_path, recovery, TYPE, ALL_PASSED) == ["half_a_frame has to pass on the real device"]
+    with pytest.raises(ValueError, match="not_on_hardware: stop_passes needs a reason in words"):
+        claims(not_on_hardware={"stop_passes": "no"})
+
+
 def test_a_missing_or_invalid_report_is_named(tmp_path: Path) -> None:
-    assert report.unmatched(tmp_path, claims(), TYPE, {}) == ["the report real.json does not exist"]
-    (tmp_path / "real.json").write_text("{}")
+    assert report.unmatched(tmp_path, claims(), TYPE, {}) == ["the report evidence/real.json does not exist"]
+    (tmp_path / "evidence").mkdir()
+    (tmp_path / "evidence" / "real.json").write_text("{}")
     assert "cannot be read" in report.unmatched(tmp_path, claims(), TYPE, {})[0]
     assert "names no report" in report.unmatched(tmp_path, claims(report=msgspec.UNSET), TYPE, {})[0]
 
