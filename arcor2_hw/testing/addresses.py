@@ -48,6 +48,11 @@ class Place(Data, frozen=True):
             return False
 
     @property
+    def fixed(self) -> bool:
+        """Return whether the device has fixed ports, so that its settings contain only the host."""
+        return bool(self.ports) and len(self.settings) == 1 and not self.url
+
+    @property
     def error_text(self) -> str:
         """Return the text that an error has to contain."""
         if self.path:
@@ -60,8 +65,8 @@ class Place(Data, frozen=True):
             return SerialWire(self.path)
         if not self.ports:
             return None
-        if len(self.settings) == 1 and not self.url:  # fixed ports of the device
-            return TcpWire(self.host, self.ports, _own_loopback(), fixed=True)
+        if self.fixed:
+            return TcpWire(self.host, self.ports, own_loopback(), fixed=True)
         return TcpWire(self.host, self.ports)
 
     def moved(self, host: str, port: int, path: str) -> dict[str, Any]:
@@ -80,7 +85,8 @@ class Place(Data, frozen=True):
         return self.moved("", 0, wire.address)
 
 
-def _own_loopback() -> str:
+def own_loopback() -> str:
+    """Return an address of this machine that no other process uses."""
     number = next(_numbers)
     return f"127.{64 + os.getpid() % 32}.{os.getpid() // 32 % 250}.{number % 250 + 1}"
 

@@ -16,6 +16,7 @@ from arcor2_hw.objects import Generic
 from arcor2_hw.testing import capabilities, quality
 from arcor2_hw.testing.frames import Frames
 from arcor2_hw.testing.life import POLL
+from arcor2_hw.testing.outcomes import Kind
 from arcor2_hw.testing.own_time import own_time
 from arcor2_hw.testing.time_limit import CallHangs
 from arcor2_hw.testing.wire import Wire
@@ -340,3 +341,34 @@ def needs(
         return case
 
     return mark
+
+
+def obstacle(bench: Bench, case: Callable[..., None], name: str) -> tuple[Kind, str] | None:
+    """Return why a case is not run on a bench: its hooks are missing, or quality.yaml excludes it. Else return None.
+
+    FAILED: a hook is missing without a reason, or a reason is given although the bench can run the case.
+    """
+    lacking = [hook for hook in getattr(case, "needs", ()) if not bench.has(hook)]
+    reason = None
+    try:
+        claims = quality.read(bench.quality_file())
+        reason = claims.reason(bench.type_name(), name)
+        if reason is None and lacking and (like := getattr(case, "like", "")):
+            reason = claims.reason(bench.type_name(), like)
+    except Arcor2Error as error:
+        if not bench.guessed:  # otherwise the case `described` reports it
+            return Kind.FAILED, str(error)
+    if reason is not None and (lacking or bench.guessed):
+        return Kind.NOT_RUN, reason
+    if reason is not None:
+        return Kind.FAILED, f"quality.yaml excludes {name}, but the bench can run it"
+    if not lacking:
+        return None
+    if all(bench.why_not(hook) for hook in lacking):
+        return Kind.LACKING, "; ".join(dict.fromkeys(str(bench.why_not(hook)) for hook in lacking))
+    if getattr(case, "for_silver", False):
+        return Kind.LACKING, f"the bench has no hook {', '.join(lacking)}"
+    return Kind.FAILED, (
+        f"the bench of {bench.type_name()} lacks {', '.join(lacking)}: implement it, or give the reason "
+        f"in quality.yaml under not_run, as {name}"
+    )

@@ -20,7 +20,7 @@ from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.objects import Generic, GenericWithPose, IOBlock
 from arcor2_hw.runtime.creation import fill_settings, find_type, recipe
 from arcor2_hw.testing import capabilities, frames, quality
-from arcor2_hw.testing.addresses import Place, places
+from arcor2_hw.testing.addresses import Place, own_loopback, places
 from arcor2_hw.testing.bench import OF_THE_WIRE, Bench
 from arcor2_hw.testing.serial_wire import SerialWire
 
@@ -86,13 +86,18 @@ class CellBench(Bench):
         )
         return recipe(scene_object, self.object_type, None).make()
 
+    def lay_wire(self) -> None:
+        """Create the wire without opening anything, so that the hooks that it provides are known."""
+        self.wire = None if self.place is None else self.place.wire()
+        if self.wire is not None:
+            self.frames = self._frames()
+
     def start(self) -> None:
         """Put the wire in front of the device."""
-        self.wire = None if self.place is None else self.place.wire()
+        self.lay_wire()
         if self.wire is not None and self.place is not None:
             self.wire.start()
             self._moved = self.place.behind(self.wire)
-            self.frames = self._frames()
 
     def _frames(self) -> frames.Frames | None:
         with contextlib.suppress(Arcor2Error):
@@ -118,6 +123,9 @@ class CellBench(Bench):
     def absent(self) -> tuple[Generic, str]:
         """Return an object at a port without a listener, or at a port that does not exist."""
         assert self.place is not None
+        if self.place.fixed:
+            host = own_loopback()
+            return self._made_with({self.place.settings[0]: host}), host
         if self._closed is None:
             self._closed = socket.socket()
             self._closed.bind(("127.0.0.1", 0))  # without listening, so that no other process takes the port
@@ -158,7 +166,7 @@ class CellBench(Bench):
     def _lack(self, hook: str) -> str | None:
         if hook in OF_THE_WIRE and self.wire is None:
             return "no wire is possible. `wire` must name host and port, the port, or fixed ports."
-        if hook == "absent" and (self.place is None or len(self.place.ports) > 1 or not self.place.error_text):
+        if hook == "absent" and (self.place is None or not self.place.error_text):
             return "its settings do not contain an address for a missing device"
         if hook in ("writes", "actuating") and (self.wire is None or self.frames is None):
             return "its frames are unknown, because quality.yaml has no `frames` for this wire"

@@ -273,41 +273,17 @@ def arcor2_bench(
 
 def _check_hooks(request: pytest.FixtureRequest, bench: Bench, values: dict[str, Any]) -> None:
     """Skip or fail a case for which the bench lacks hooks, or that quality.yaml excludes."""
-    from arcor2_hw.exceptions import Arcor2Error
+    from arcor2_hw.testing.bench import obstacle
     from arcor2_hw.testing.outcomes import Kind
 
-    case = values["case"]
-    lacking = [hook for hook in getattr(request.function, "needs", ()) if not bench.has(hook)]
-    try:
-        claims = _claims(bench)
-        reason = claims.reason(bench.type_name(), case)
-        if reason is None and lacking and (like := getattr(request.function, "like", "")):
-            reason = claims.reason(bench.type_name(), like)
-    except Arcor2Error as error:
-        if not bench.guessed:
-            pytest.fail(str(error), pytrace=False)
-        reason = None  # the case `described` reports an invalid quality.yaml
-
-    def skip(kind: Kind, why: str) -> None:
-        values.update(kind=kind.value, reason=why)
-        pytest.skip(f"{bench.name()}: {why}")
-
-    if lacking and reason is not None:
-        skip(Kind.NOT_RUN, reason)
-    if lacking and all(bench.why_not(hook) for hook in lacking):
-        skip(Kind.LACKING, "; ".join(dict.fromkeys(str(bench.why_not(hook)) for hook in lacking)))
-    if lacking and getattr(request.function, "for_silver", False):
-        skip(Kind.LACKING, f"the bench has no hook {', '.join(lacking)}")
-    if lacking:
-        pytest.fail(
-            f"the bench of {bench.type_name()} lacks {', '.join(lacking)}: implement it, or give the reason "
-            f"in quality.yaml under not_run, as {case}",
-            pytrace=False,
-        )
-    if reason is not None and bench.guessed:
-        skip(Kind.NOT_RUN, reason)
-    if reason is not None:
-        pytest.fail(f"quality.yaml excludes {case}, but the bench can run it", pytrace=False)
+    found = obstacle(bench, request.function, values["case"])
+    if found is None:
+        return
+    kind, why = found
+    if kind is Kind.FAILED:
+        pytest.fail(why, pytrace=False)
+    values.update(kind=kind.value, reason=why)
+    pytest.skip(f"{bench.name()}: {why}")
 
 
 def _claims(bench: Bench) -> Quality:

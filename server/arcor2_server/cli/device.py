@@ -33,7 +33,10 @@ app.command(
 app.command(
     "arcor2_server.cli.device_cell:check",
     name="check",
-    help="Connect to each device of a cell.yaml and read its state. Nothing is moved, switched or written.",
+    help="Connect to each device of a cell.yaml and read its state. Nothing is moved, switched or written.\n\n"
+    "With --real NAME, lead a person at the terminal through the first day with one real device: reading with the "
+    "brakes on, limits, and the conformance cases in a safe order. Everything that moves is confirmed first. The "
+    "result is a report that can be evidence for the driver.",
 )
 
 

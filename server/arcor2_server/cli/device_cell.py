@@ -12,6 +12,7 @@ from rich.table import Table
 from arcor2_hw.data.cell import Cell, exported, read_cell, write_cell
 from arcor2_hw.data.discovery import Checked
 from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_server.cli.device_first_day import first_day
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.cli.server_connection import HERE, Server, run
 from arcor2_server.cli.tables import console
@@ -57,13 +58,26 @@ def check(
     file: Annotated[Path, Parameter(help="The cell.yaml.")],
     *,
     json: Annotated[bool, Parameter(negative=(), help="Print the result as JSON.")] = False,
+    real: Annotated[
+        str | None,
+        Parameter(help="Lead through the first day with this real device. Everything that moves is confirmed first."),
+    ] = None,
+    plan: Annotated[bool, Parameter(negative=(), help="With --real, only show what would be done.")] = False,
+    report: Annotated[Path | None, Parameter(help="With --real, the new folder for report and recording.")] = None,
 ) -> int:
-    """Connect to each device of a cell.yaml and read its state. Nothing is moved, switched or written."""
+    """Connect to each device of a cell.yaml and read its state. Nothing is moved, switched or written.
+
+    With --real NAME, lead a person at the terminal through the first day with one real device.
+    """
     try:
         cell = read_cell(file)
     except (NotFound, InvalidData) as error:
         status = ExitStatus.NOT_FOUND if isinstance(error, NotFound) else ExitStatus.CELL_UNUSABLE
         return fail("device check", " ".join(str(error).split()), status)
+    if real is not None:
+        return first_day(file, real, plan, report)
+    if plan or report is not None:
+        return fail("device check", "--plan and --report need --real NAME", ExitStatus.USAGE)
     found = check_devices(file, cell)
     if json:
         sys.stdout.write(msgspec.json.encode(found).decode() + "\n")

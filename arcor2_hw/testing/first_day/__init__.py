@@ -1,0 +1,1 @@
+"""The first day with a real device: a session that a person confirms step by step, and its report."""
