@@ -4,6 +4,7 @@ import asyncio
 from typing import Final
 
 from arcor2_hw.data.events import ChangeType, Event
+from arcor2_server.background import BackgroundTasks
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.object_types.changes import Changes
 from arcor2_server.object_types.registry import ObjectTypes
@@ -29,7 +30,7 @@ class TypeNotifications:
         self._types = types
         self._hub = hub
         self._timer: asyncio.TimerHandle | None = None
-        self._publishing: set[asyncio.Task[None]] = set()
+        self._publishing = BackgroundTasks()
 
     async def uploaded(self) -> None:
         """Read object types that were written to the storage, and notify the clients when uploads pause."""
@@ -45,14 +46,10 @@ class TypeNotifications:
 
     def _start(self) -> None:
         self._timer = None
-        task = asyncio.create_task(self.publish(), name="notification of object types")
-        self._publishing.add(task)
-        task.add_done_callback(self._publishing.discard)
+        self._publishing.spawn(self.publish(), "notification of object types")
 
     async def close(self) -> None:
         """Cancel pending notifications."""
         if self._timer is not None:
             self._timer.cancel()
-        for task in self._publishing:
-            task.cancel()
-        await asyncio.gather(*self._publishing, return_exceptions=True)
+        await self._publishing.cancel()
