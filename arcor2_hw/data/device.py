@@ -4,7 +4,8 @@ import enum
 import time
 from typing import Final, Generic, TypeVar
 
-from arcor2_hw.data.base import Data, Timestamp, now
+from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset, now
+from arcor2_hw.messages import Message
 
 T = TypeVar("T")
 DEVICE_FILES: Final = "ARCOR2_HW_DEVICE_FILES"
@@ -81,13 +82,24 @@ class Severity(enum.StrEnum):
 
 
 class Alarm(Data, frozen=True):
-    """A condition that needs attention; `remedy` says what to do."""
+    """A condition that needs attention; `remedy` says what to do.
+
+    text_message, remedy_message: the text and the remedy with what is needed to translate them, if they have values.
+    """
 
     code: str
     severity: Severity
     text: str
     remedy: str
     since: Timestamp
+    text_message: Message | Unset = UNSET
+    remedy_message: Message | Unset = UNSET
+
+    @classmethod
+    def of(cls, code: str, severity: Severity, text: str | Message, remedy: str | Message, since: Timestamp) -> "Alarm":
+        """Return an alarm whose text and remedy may be messages with values."""
+        messages = [each if isinstance(each, Message) and each.values else UNSET for each in (text, remedy)]
+        return cls(code, severity, str(text), str(remedy), since, *messages)
 
 
 class LossKind(enum.StrEnum):

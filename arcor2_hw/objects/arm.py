@@ -10,6 +10,7 @@ from arcor2_hw.data.device import Alarm, Severity
 from arcor2_hw.data.geometry import Orientation
 from arcor2_hw.data.robot import Joint, Safety
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, InvalidData, NotFound, OutOfRange, Refused
+from arcor2_hw.messages import Message, translatable
 from arcor2_hw.objects.settings import within
 
 TCP: Final = "tcp"
@@ -167,6 +168,22 @@ def jog_axes(arm: str, frame: str, axes: Mapping[str, Orientation]) -> Orientati
     return axes[frame]
 
 
+_LABELS: Final = translatable(
+    {
+        Safety.NORMAL: "normal",
+        Safety.REDUCED: "reduced",
+        Safety.PROTECTIVE_STOP: "protective stop",
+        Safety.SAFEGUARD_STOP: "safeguard stop",
+        Safety.EMERGENCY_STOP: "emergency stop",
+        Safety.ENABLING_STOP: "enabling stop",
+        Safety.RECOVERY: "recovery",
+        Safety.VIOLATION: "violation",
+        Safety.FAULT: "fault",
+    }
+)
+"""Names of the safety states."""
+
+
 class SafetyAlarm:
     """Report an active safety stop as an alarm, with the time at which it was first observed."""
 
@@ -181,9 +198,9 @@ class SafetyAlarm:
         if safety in (Safety.NORMAL, Safety.REDUCED):
             return []
         severity = Severity.CRITICAL if safety in _CRITICAL else Severity.ERROR
-        return [Alarm(safety.value, severity, label(safety), self._remedies.get(safety, ""), self._since[1])]
+        return [Alarm(safety.value, severity, label(safety).text, self._remedies.get(safety, ""), self._since[1])]
 
 
-def label(safety: Safety) -> str:
-    """Return the name of a safety state with spaces."""
-    return safety.value.replace("_", " ")
+def label(safety: Safety) -> Message:
+    """Return the name of a safety state."""
+    return Message.of(_LABELS[safety])

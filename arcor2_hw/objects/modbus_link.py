@@ -11,23 +11,26 @@ from typing import TYPE_CHECKING, Final
 
 from arcor2_hw.data.device import Identity
 from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.messages import Message, translatable
 from arcor2_hw.objects.modbus_settings import ModbusSettings
 from arcor2_hw.objects.settings import check_serial_port
 
 if TYPE_CHECKING:
     from arcor2_hw.objects.modbus_client import Client, ModbusPDU
 
-EXCEPTIONS: Final[Mapping[int, str]] = {
-    1: "illegal function",
-    2: "illegal address",
-    3: "illegal value",
-    4: "device failure",
-    5: "accepted, takes longer",
-    6: "device busy",
-    8: "memory parity error",
-    10: "gateway path unavailable",
-    11: "device behind the gateway does not answer",
-}
+EXCEPTIONS: Final[Mapping[int, str]] = translatable(
+    {
+        1: "illegal function",
+        2: "illegal address",
+        3: "illegal value",
+        4: "device failure",
+        5: "accepted, takes longer",
+        6: "device busy",
+        8: "memory parity error",
+        10: "gateway path unavailable",
+        11: "device behind the gateway does not answer",
+    }
+)
 """Meanings of exception codes (Modbus application protocol 1.1b3, section 7)."""
 
 _ITEMS: Final = {
@@ -323,7 +326,7 @@ class ModbusLink:
                 fault_code=code,
                 device=self.who,
                 what=what,
-                meaning=self._exceptions.get(code, "exception"),
+                meaning=Message.of(self._exceptions.get(code, translatable("exception"))),
                 code=code,
             )
         return answer

@@ -19,6 +19,7 @@ from arcor2_hw.exceptions import (
     Refused,
 )
 from arcor2_hw.keep_alive import PULSE_PERIOD, KeepAlive
+from arcor2_hw.messages import Message
 
 from .motion_lines import LAST_SEQUENCE, LONGEST_LINE, MEANING, VERSION, Answer, Code, Status, answer, line
 
@@ -237,8 +238,9 @@ class ArmLine:
                 device=self.who,
                 status=found.status,
             ) from None
-        template, values = "{device}, {command}: {reason}", {"device": self.who, "command": command.what}
-        values["reason"] = MEANING.get(status, status.name)
+        template = "{device}, {command}: {reason}"
+        meaning = Message.of(MEANING.get(status, status.name))
+        values = {"device": self.who, "command": command.what, "reason": meaning}
         if status in (Status.BAD_CHECK, Status.RAPID_ERROR):
             number = int(found.values[0]) if found.values else int(status)
             raise DeviceFault(template, f"status {int(status)} {found.values}", number, **values)

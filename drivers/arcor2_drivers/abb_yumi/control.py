@@ -250,7 +250,7 @@ class Control:
         found = []
         safety = self.safety(sample)
         if safety is not Safety.NORMAL:
-            found.append(label(safety))
+            found.append(label(safety).text)
         elif sample.control_state != MOTORS_ON:
             found.append("motors off")
         if panel.operation_mode != AUTOMATIC:

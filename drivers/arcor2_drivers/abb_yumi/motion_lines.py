@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 from arcor2_hw.exceptions import DeviceFault
 from arcor2_hw.keep_alive import TOO_SLOW
+from arcor2_hw.messages import translatable
 
 VERSION: Final = 1
 LONGEST_LINE: Final = 79
@@ -69,19 +70,21 @@ class Status(enum.IntEnum):
     RAPID_ERROR = 30
 
 
-MEANING: Final = {
-    Status.STOPPED: "stopped",
-    Status.WATCHDOG: f"stopped by its watchdog: {TOO_SLOW.format('robot')}",
-    Status.BAD_CHECK: "the checksum of the line was wrong",
-    Status.BAD_CODE: "the RAPID modules do not know the code",
-    Status.BAD_COUNT: "the number of arguments was wrong",
-    Status.BAD_VALUE: "a value was refused",
-    Status.UNREACHABLE: "the target cannot be reached",
-    Status.NO_SESSION: "no session was started, or its watchdog ended it",
-    Status.BY_HAND: "the arm is being moved by hand",
-    Status.NO_PARTNER: "the other arm did not join the synchronized motion",
-    Status.RAPID_ERROR: "a RAPID error",
-}
+MEANING: Final = translatable(
+    {
+        Status.STOPPED: "stopped",
+        Status.WATCHDOG: f"stopped by its watchdog: {TOO_SLOW.format('robot')}",
+        Status.BAD_CHECK: "the checksum of the line was wrong",
+        Status.BAD_CODE: "the RAPID modules do not know the code",
+        Status.BAD_COUNT: "the number of arguments was wrong",
+        Status.BAD_VALUE: "a value was refused",
+        Status.UNREACHABLE: "the target cannot be reached",
+        Status.NO_SESSION: "no session was started, or its watchdog ended it",
+        Status.BY_HAND: "the arm is being moved by hand",
+        Status.NO_PARTNER: "the other arm did not join the synchronized motion",
+        Status.RAPID_ERROR: "a RAPID error",
+    }
+)
 
 
 class Answer(NamedTuple):

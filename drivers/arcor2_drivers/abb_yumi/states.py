@@ -3,6 +3,7 @@
 from typing import Final
 
 from arcor2_hw.data.robot import Mode, Power, Safety
+from arcor2_hw.messages import translatable
 
 MOTORS_ON: Final = "motoron"
 MOTORS_OFF: Final = "motoroff"
@@ -26,12 +27,14 @@ MODES: Final = {
     "MANF": Mode.MANUAL_HIGH_SPEED,
     "MANF_CH": Mode.MANUAL_HIGH_SPEED,
 }
-REMEDIES: Final = {
-    Safety.EMERGENCY_STOP: "Release the emergency stop, press motors on at the controller, then take control.",
-    Safety.SAFEGUARD_STOP: "Close the safeguard, or hold the enabling device, then take control.",
-    Safety.PROTECTIVE_STOP: "Check what the robot hit, acknowledge the collision, then take control.",
-    Safety.FAULT: "Restart the controller. Its event log has the cause.",
-}
+REMEDIES: Final = translatable(
+    {
+        Safety.EMERGENCY_STOP: "Release the emergency stop, press motors on at the controller, then take control.",
+        Safety.SAFEGUARD_STOP: "Close the safeguard, or hold the enabling device, then take control.",
+        Safety.PROTECTIVE_STOP: "Check what the robot hit, acknowledge the collision, then take control.",
+        Safety.FAULT: "Restart the controller. Its event log has the cause.",
+    }
+)
 
 
 def safety_of(control_state: str, collided: bool) -> Safety:

@@ -3,6 +3,7 @@
 from typing import Final, NamedTuple
 
 from arcor2_hw.data.device import Severity
+from arcor2_hw.messages import translatable
 
 
 class Fault(NamedTuple):
@@ -71,18 +72,20 @@ _FAULTS: Final = {
     0x8611: Fault("following error", _FREE),
     0x8612: Fault("reference limit", f"move off the limit, {_RESET}"),
 }
-_CLASSES: Final = {
-    0x1: "generic error",
-    0x2: "current",
-    0x3: "voltage",
-    0x4: "temperature",
-    0x5: "device hardware",
-    0x6: "device software",
-    0x7: "additional modules",
-    0x8: "monitoring",
-    0x9: "external error",
-    0xF: "specific to the device",
-}
+_CLASSES: Final = translatable(
+    {
+        0x1: "generic error",
+        0x2: "current",
+        0x3: "voltage",
+        0x4: "temperature",
+        0x5: "device hardware",
+        0x6: "device software",
+        0x7: "additional modules",
+        0x8: "monitoring",
+        0x9: "external error",
+        0xF: "specific to the device",
+    }
+)
 
 
 def fault_of(code: int) -> Fault:

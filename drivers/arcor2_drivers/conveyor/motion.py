@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, Refused
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.observing import GoOn
 
 from . import cia402
@@ -51,8 +52,8 @@ class Motion:
             device=self._who,
             what=what,
             code=code,
-            text=fault.text,
-            remedy=fault.remedy,
+            text=Message.of(fault.text),
+            remedy=Message.of(fault.remedy),
         )
 
     def _enabled(self, now: State, what: str) -> None:

@@ -21,6 +21,7 @@ from arcor2_hw.exceptions import (
     OutOfRange,
     Refused,
 )
+from arcor2_hw.messages import Message, translatable
 from arcor2_hw.objects import Generic
 from arcor2_hw.objects.connected import Connected
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
@@ -138,20 +139,30 @@ class ErpService(Connected, Generic):
         if state.since is not None:
             due = datetime.fromisoformat(state.since) + timedelta(seconds=self._config.waiting_alarm)
             if datetime.now(UTC) >= due:
-                why = state.last_error or "delivery is running"
-                text = f"{state.waiting} results have been waiting since {state.since}: {why}"
-                remedy = "check that the service is running and reachable; the results are delivered then"
-                found.append(Alarm(WAITING, Severity.WARNING, text, remedy, due.isoformat(timespec="microseconds")))
+                why = state.last_error or Message.of("delivery is running")
+                text = Message.of(
+                    "{count} results have been waiting since {since}: {reason}",
+                    count=state.waiting,
+                    since=state.since,
+                    reason=why,
+                )
+                remedy = translatable("check that the service is running and reachable; the results are delivered then")
+                found.append(Alarm.of(WAITING, Severity.WARNING, text, remedy, due.isoformat(timespec="microseconds")))
             if sender.unauthorized:
-                remedy = "renew token_file or client_certificate, then go online again"
-                found.append(Alarm(NOT_AUTHORIZED, Severity.ERROR, sender.unauthorized, remedy, state.since))
+                remedy = translatable("renew token_file or client_certificate, then go online again")
+                found.append(Alarm.of(NOT_AUTHORIZED, Severity.ERROR, sender.unauthorized, remedy, state.since))
         if refused := self._outbox.refused():
             first = refused[0]
-            text = f"the service refused {len(refused)} results, the first of order {first.order_id}: {first.why}"
-            remedy = (
+            text = Message.of(
+                "the service refused {count} results, the first of order {order}: {reason}",
+                count=len(refused),
+                order=first.order_id,
+                reason=first.why,
+            )
+            remedy = translatable(
                 "fix it at the service and run resend_refused, or acknowledge: the results are then stored but not sent"
             )
-            found.append(Alarm(REFUSED, Severity.ERROR, text, remedy, first.since))
+            found.append(Alarm.of(REFUSED, Severity.ERROR, text, remedy, first.since))
         return found
 
     def acknowledge(self, code: str) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from arcor2_hw.data.device import Health, Severity
+from arcor2_hw.messages import translatable
 from arcor2_hw.objects import MachineCommand, MachineState, UnitMode
 
 
@@ -47,13 +48,15 @@ COMMANDS: Final = frozenset(
     }
 )
 
-REFUSALS: Final = {
-    REFUSED_IN_STATE: "this state does not allow it",
-    2: "the tester does not know this command",
-    3: "the door is not closed",
-    4: "there is no board in the fixture",
-    5: "the tester does not know this test program",
-}
+REFUSALS: Final = translatable(
+    {
+        REFUSED_IN_STATE: "this state does not allow it",
+        2: "the tester does not know this command",
+        3: "the door is not closed",
+        4: "the fixture is empty",
+        5: "the tester does not know this test program",
+    }
+)
 """Values of command_result other than 0 (accepted)."""
 
 

@@ -16,6 +16,7 @@ from arcor2_hw.exceptions import (
     SafetyStop,
     Stale,
 )
+from arcor2_hw.messages import Message
 from arcor2_hw.objects import MachineCommand, MachineState, UnitMode
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.modbus_device import ModbusDevice
@@ -207,10 +208,17 @@ class Tester(ModbusDevice[Inputs]):
                 "{device}: {what} ended: aborted by command; clear it", fault_code=0, device=self.who, what=what
             )
         fault = fault_of(code)
-        text = f"{self.who}: {what} ended: fault {code}, {fault.text}; {fault.remedy}"
+        message = Message.of(
+            "{device}: {what} ended: fault {code}, {text}; {remedy}",
+            device=self.who,
+            what=what,
+            code=code,
+            text=Message.of(fault.text),
+            remedy=Message.of(fault.remedy),
+        )
         if code == registers.EMERGENCY_STOP:
-            return SafetyStop(text, kind="emergency_stop")
-        return DeviceFault(text, fault_code=code)
+            return SafetyStop(message, kind="emergency_stop")
+        return DeviceFault(message, fault_code=code)
 
     def move_door(self, command: int, what: str, arrived: Callable[[Inputs], bool]) -> None:
         """Move the door and wait for its end position. The tester reports no refusal, so the state is checked."""

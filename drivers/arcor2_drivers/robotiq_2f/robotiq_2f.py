@@ -8,6 +8,7 @@ from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.data.device import Alarm, Health, LossReaction
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
+from arcor2_hw.messages import Message
 from arcor2_hw.objects import Gripper, GripResult, PartSize
 from arcor2_hw.objects.observing import GoOn
 from arcor2_hw.objects.polled_control import NOBODY, US, PolledControl
@@ -121,8 +122,8 @@ class Robotiq2F(PolledControl[Status], Gripper):
                 "{device}: fault {code} ({text}) is cleared by removing its cause: {remedy}.",
                 device=self.who,
                 code=code,
-                text=fault.text,
-                remedy=fault.remedy,
+                text=Message.of(fault.text),
+                remedy=Message.of(fault.remedy),
             )
         with self.act("acknowledge") as go_on:
             self._reset(go_on)
@@ -192,7 +193,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
             device=self.who,
             what=what,
             code=status.fault,
-            text=fault.text,
+            text=Message.of(fault.text),
         )
 
     # -------------------------------------------------------------------------------- observing

@@ -10,6 +10,7 @@ from arcor2_hw.actions import action
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Health, Identity, LossReaction, Reading, Severity
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused, Stale
+from arcor2_hw.messages import Message
 from arcor2_hw.objects import Scale
 from arcor2_hw.objects.connected import AlarmText
 from arcor2_hw.objects.line_device import LineDevice
@@ -276,7 +277,13 @@ class MtSicsScale(LineDevice, Scale):
     def _needs_tare(self) -> None:
         if self._tare_is_lost:
             text, remedy, _ = self.ALARMS[TARE_LOST]
-            raise Refused("{device}: {text}; {remedy}", TARE_LOST, device=self.who, text=text, remedy=remedy)
+            raise Refused(
+                "{device}: {text}; {remedy}",
+                TARE_LOST,
+                device=self.who,
+                text=Message.of(text),
+                remedy=Message.of(remedy),
+            )
 
     # -------------------------------------------------------------------------------- observing
     def greet(self, deadline: float) -> None:
@@ -313,4 +320,6 @@ class MtSicsScale(LineDevice, Scale):
     def _complaint(self, answer: Answer) -> DeviceFault:
         code = OVERLOAD if answer.mark == "+" else UNDERLOAD
         text, remedy, _ = self.ALARMS[code]
-        return DeviceFault("{device}: {text}; {remedy}", code, code, device=self.who, text=text, remedy=remedy)
+        return DeviceFault(
+            "{device}: {text}; {remedy}", code, code, device=self.who, text=Message.of(text), remedy=Message.of(remedy)
+        )

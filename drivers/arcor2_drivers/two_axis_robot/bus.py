@@ -16,6 +16,7 @@ from dynamixel_sdk import (  # type: ignore[import-untyped]
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected, Refused
 from arcor2_hw.keep_alive import KeepAlive, RunningTime
+from arcor2_hw.messages import Message
 
 from .registers import LED, STATUS_ERRORS, Register
 
@@ -164,7 +165,7 @@ class Bus:
                 "{what} could not be sent to {servo}", f"result {result}", what=what, servo=self.servo(number)
             )
         if error & ~ALERT:
-            reason = STATUS_ERRORS.get(error & ~ALERT, f"error {error:#04x}")
+            reason = Message.of(STATUS_ERRORS.get(error & ~ALERT, f"error {error:#04x}"))
             raise Refused(
                 "{servo} refuses {what}: {reason}",
                 f"status error {error:#04x}",

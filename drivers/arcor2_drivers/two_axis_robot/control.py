@@ -11,6 +11,7 @@ from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Severity
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotInControl, Refused
 from arcor2_hw.keep_alive import TOO_SLOW, once_within
+from arcor2_hw.messages import Message, translatable
 from arcor2_hw.objects.arm import StopCounter, check_confirmed
 
 from . import registers as reg
@@ -201,12 +202,13 @@ class Control:
         for number, servo in zip(self._ids, newest.servos if newest else (), strict=False):
             for bit in range(8):
                 if servo.hardware_error >> bit & 1:
-                    unknown = f"hardware error bit {bit}", "See the manual of the servo"
-                    text, remedy = reg.HARDWARE_ERRORS.get(bit, unknown)
+                    unknown = f"hardware error bit {bit}", translatable("See the manual of the servo")
+                    text, remedy = map(Message.of, reg.HARDWARE_ERRORS.get(bit, unknown))
                     code = f"{number}:{bit}"
                     since = self._since.get(code, now())
-                    remedy = f"{remedy}, then call restart_safety."
-                    found[code] = Alarm(code, Severity.ERROR, f"servo {number}: {text}", remedy, since)
+                    remedy = Message.of("{remedy}, then call restart_safety.", remedy=remedy)
+                    text = Message.of("servo {number}: {text}", number=number, text=text)
+                    found[code] = Alarm.of(code, Severity.ERROR, text, remedy, since)
         self._since = {code: alarm.since for code, alarm in found.items()}
         return list(found.values())
 

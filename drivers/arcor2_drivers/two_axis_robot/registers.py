@@ -3,6 +3,8 @@
 import math
 from typing import Final, NamedTuple
 
+from arcor2_hw.messages import translatable
+
 from .settings import TwoAxisRobotSettings
 
 TICK: Final = math.tau / 4096
@@ -51,22 +53,26 @@ STATE: Final = Register(64, 83)
 EEPROM: Final = Register(0, 56)
 """All registers of the setup."""
 
-HARDWARE_ERRORS: Final = {
-    0: ("input voltage out of range", "Check the supply"),
-    2: ("overheating", "Let it cool down, and reduce the load"),
-    3: ("encoder fault", "Replace the servo"),
-    4: ("electrical shock, or not enough power", "Check supply and wiring"),
-    5: ("overload", "Remove what blocks the joint"),
-}
-STATUS_ERRORS: Final = {
-    1: "the instruction failed",
-    2: "the instruction is unknown",
-    3: "the packet was damaged",
-    4: "the value is out of range, or its bus watchdog has tripped",
-    5: "the length of the data is wrong",
-    6: "the value is beyond the register's limit",
-    7: "the register cannot be accessed now",
-}
+HARDWARE_ERRORS: Final = translatable(
+    {
+        0: ("input voltage out of range", "Check the supply"),
+        2: ("overheating", "Let it cool down, and reduce the load"),
+        3: ("encoder fault", "Replace the servo"),
+        4: ("electrical shock, or not enough power", "Check supply and wiring"),
+        5: ("overload", "Remove what blocks the joint"),
+    }
+)
+STATUS_ERRORS: Final = translatable(
+    {
+        1: "the instruction failed",
+        2: "the instruction is unknown",
+        3: "the packet was damaged",
+        4: "the value is out of range, or its bus watchdog has tripped",
+        5: "the length of the data is wrong",
+        6: "the value is beyond the register's limit",
+        7: "the register cannot be accessed now",
+    }
+)
 
 
 def signed(value: int, size: int) -> int:

@@ -162,7 +162,7 @@ class Control:
             found.append(f"not switched on ({MODE_NAMES.get(sample.robot_mode, sample.robot_mode)})")
         safety = safety_of(sample.safety_mode)
         if safety not in MAY_MOVE:
-            found.append(label(safety))
+            found.append(label(safety).text)
         if control is ControlMode.LOCAL:
             found.append("local control")
         return found

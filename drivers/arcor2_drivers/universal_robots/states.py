@@ -7,6 +7,7 @@ import enum
 from typing import Final
 
 from arcor2_hw.data.robot import Power, Safety
+from arcor2_hw.messages import translatable
 
 
 class Runtime(enum.IntEnum):
@@ -56,15 +57,17 @@ MAY_MOVE: Final = frozenset({Safety.NORMAL, Safety.REDUCED})
 MAY_MOVE_MODES: Final = frozenset(mode for mode, safety in _SAFETY.items() if safety in MAY_MOVE)
 """Values of safety_mode in which the arm may move."""
 
-REMEDIES: Final = {
-    Safety.PROTECTIVE_STOP: "Find out why the arm was stopped, then acknowledge the protective stop.",
-    Safety.SAFEGUARD_STOP: "Close the guard, then start the motion again.",
-    Safety.EMERGENCY_STOP: "Release the emergency stop, then switch the arm on again.",
-    Safety.ENABLING_STOP: "Hold the enabling device in its middle position.",
-    Safety.RECOVERY: "Move the arm back within its limits at the pendant.",
-    Safety.VIOLATION: "Find out why a safety limit was exceeded, then restart the safety system.",
-    Safety.FAULT: "Read the log at the pendant, then restart the safety system.",
-}
+REMEDIES: Final = translatable(
+    {
+        Safety.PROTECTIVE_STOP: "Find out why the arm was stopped, then acknowledge the protective stop.",
+        Safety.SAFEGUARD_STOP: "Close the guard, then start the motion again.",
+        Safety.EMERGENCY_STOP: "Release the emergency stop, then switch the arm on again.",
+        Safety.ENABLING_STOP: "Hold the enabling device in its middle position.",
+        Safety.RECOVERY: "Move the arm back within its limits at the pendant.",
+        Safety.VIOLATION: "Find out why a safety limit was exceeded, then restart the safety system.",
+        Safety.FAULT: "Read the log at the pendant, then restart the safety system.",
+    }
+)
 
 
 def safety_of(safety_mode: int) -> Safety:
