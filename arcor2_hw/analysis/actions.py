@@ -40,7 +40,7 @@ class ActionReader:
         expression = owner.marks.get((name, "__action__"))
         if expression is not None:
             if not isinstance(expression, ast.Call):
-                raise owner.problem(f"{name}.__action__ must be ActionMetadata(...)", expression)
+                raise owner.problem("{name}.__action__ must be ActionMetadata(...)", expression, name=name)
             return self._metadata(owner, expression)
         for decorator in node.decorator_list:
             plain = decorator.func if isinstance(decorator, ast.Call) else decorator
@@ -68,7 +68,7 @@ class ActionReader:
                     raise metadata
                 category, icon = of_action(node, info, shown, self._hierarchy)
             except Broken as error:
-                result[node.name] = ObjectAction(node.name, disabled=True, problem=str(error.problem))
+                result[node.name] = ObjectAction(node.name).disabled_because(error.problem.message)
                 continue
             found = self._action(info, node, metadata, seen_from)
             result[node.name] = replace(
@@ -90,8 +90,8 @@ class ActionReader:
                     arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
                     names = {argument.arg for argument in arguments}
                     if not isinstance(renamed, dict) or not names.issuperset(renamed.values()) or names & set(renamed):
-                        text = f"{node.name}: `renamed` is {{former name: name of a parameter}}"
-                        raise owner.problem(text, keyword.value)
+                        text = "{action}: `renamed` is {{former name: name of a parameter}}"
+                        raise owner.problem(text, keyword.value, action=node.name)
                     for former, present in renamed.items():
                         found.setdefault(present, []).append(str(former))
         return found
@@ -136,31 +136,32 @@ class ActionReader:
             returns = self._returns(info, node)
             parameters = self._parameters(info, node, seen_from, text)
         except Broken as error:
-            problem = str(error.problem)
-            return ObjectAction(node.name, description, parameters, metadata, UNSET, returns, True, problem)
+            action = ObjectAction(node.name, description, parameters, metadata, UNSET, returns)
+            return action.disabled_because(error.problem.message)
         return ObjectAction(node.name, description, parameters, metadata, UNSET, returns)
 
     def _check_form(self, info: ClassInfo, node: FunctionNode) -> None:
         if isinstance(node, ast.AsyncFunctionDef):
-            raise info.problem(f"{node.name}: an action must be synchronous", node)
+            raise info.problem("{action}: an action must be synchronous", node, action=node.name)
         if self._hierarchy.decorated(node, info, *_NOT_ORDINARY):
-            raise info.problem(f"{node.name}: an action must be an ordinary method", node)
+            raise info.problem("{action}: an action must be an ordinary method", node, action=node.name)
         arguments = node.args
         if arguments.vararg or arguments.kwarg:
-            raise info.problem(f"{node.name}: the parameters of an action need names (no * and **)", node)
+            raise info.problem("{action}: the parameters of an action need names (no * and **)", node, action=node.name)
         if not (arguments.posonlyargs or arguments.args):
-            raise info.problem(f"{node.name}: the first parameter of an action must be self", node)
+            raise info.problem("{action}: the first parameter of an action must be self", node, action=node.name)
         every = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs][1:]
         if not every or every[-1].arg != "an":
-            raise info.problem(f"{node.name}: the last parameter of an action must be `an: str | None = None`", node)
+            text = "{action}: the last parameter of an action must be `an: str | None = None`"
+            raise info.problem(text, node, action=node.name)
         hint = every[-1].annotation
         if hint is None:
-            raise info.problem(f"{node.name}: `an` must be annotated `str | None`", node)
+            raise info.problem("{action}: `an` must be annotated `str | None`", node, action=node.name)
         inner, optional = without_none(hint, info.module, self._resolver)
         if not optional or self._resolver.expression(inner, info.module, info) != External("builtins.str"):
-            raise info.problem(f"{node.name}: `an` must be annotated `str | None`", hint)
+            raise info.problem("{action}: `an` must be annotated `str | None`", hint, action=node.name)
         if node.returns is None:
-            raise info.problem(f"{node.name}: the return annotation is missing", node)
+            raise info.problem("{action}: the return annotation is missing", node, action=node.name)
 
     def _returns(self, info: ClassInfo, node: FunctionNode) -> list[str]:
         if node.returns is None:
@@ -171,7 +172,7 @@ class ActionReader:
                 for hint in results(node.returns, info.module, self._resolver)
             ]
         except Broken as error:
-            raise info.problem(f"{node.name}: result: {error}", node.returns) from None
+            raise info.problem("{action}: result: {reason}", node.returns, action=node.name, reason=error) from None
 
     def _parameters(
         self, info: ClassInfo, node: FunctionNode, seen_from: ClassInfo, text: str | None
@@ -195,15 +196,13 @@ class ActionReader:
         for argument in [*positional, *arguments.kwonlyargs][1:-1]:
             name = argument.arg
             if argument.annotation is None:
-                raise info.problem(f"{node.name}: parameter {name} is not annotated", argument)
+                raise info.problem("{action}: parameter {name} is not annotated", argument, action=node.name, name=name)
             try:
                 kind, enumeration = parameter_type_of(argument.annotation, info.module, info, self._resolver)
                 extra = self._extra(info, kind, enumeration, ranges.get(name), descriptions.get(name, ""))
                 default = self.default(info, kind, enumeration, defaults.get(name))
             except Broken as error:
-                raise Broken(
-                    f"{node.name}: parameter {name}: {error}", error.problem.path, error.problem.line
-                ) from None
+                raise error.within("{action}: parameter {name}: {reason}", action=node.name, name=name) from None
             parents = dynamic.get(name)
             result.append(
                 ParameterMeta(
@@ -240,17 +239,17 @@ class ActionReader:
             if enumeration is not None:
                 members = enum_members(enumeration, self._resolver)
                 if not members:
-                    raise enumeration.problem(f"the enumeration {enumeration.name} has no members")
+                    raise enumeration.problem("the enumeration {name} has no members", name=enumeration.name)
                 return encode(Extra(allowed_values=list(dict.fromkeys(members.values()))))
             if kind.name not in NUMBERS:
                 return UNSET
             if limits is None:
                 return unit_extra(description)
             if {type(limits.low), type(limits.high)} != {_LITERALS[kind.name]}:
-                raise info.problem(f"the range in `assert` must be of type {kind.name} too", limits.node)
+                raise info.problem("the range in `assert` must be of type {type} too", limits.node, type=kind.name)
             return encode(Extra(minimum=limits.low, maximum=limits.high, unit=unit_in(description) or UNSET))
         except InvalidData as error:
-            raise info.problem(str(error), enumeration.node if enumeration else None) from None
+            raise info.problem(error.message, enumeration.node if enumeration else None) from None
 
     def default(
         self, info: ClassInfo, kind: ParameterType, enumeration: ClassInfo | None, expression: ast.expr | None
@@ -267,11 +266,11 @@ class ActionReader:
             if isinstance(value, EnumMember) and value.owner is enumeration:
                 value = value.value
             elif value not in (enum_members(enumeration, self._resolver) or {}).values():
-                raise info.problem(f"the default is not a member of {enumeration.name}", expression)
+                raise info.problem("the default is not a member of {name}", expression, name=enumeration.name)
         try:
             return kind.encode(value)
         except InvalidData as error:
-            raise info.problem(f"default: {error}", expression) from None
+            raise info.problem("default: {reason}", expression, reason=error) from None
 
 
 def _former_names(owner: ClassInfo, action: str) -> list[str]:

@@ -64,7 +64,12 @@ def enum_members(info: ClassInfo, resolver: Resolver) -> dict[str, str | int] | 
             value = constant(member.expression, info.module, info, resolver)
         if type(value) is not (str if kind == "StrEnum" else int):
             raise info.problem(
-                f"{info.name}.{name} must be a member of type {kind}, not {value!r:.40}", member.expression
+                "{cls}.{name} must be a member of type {type}, not {value!r:.40}",
+                member.expression,
+                cls=info.name,
+                name=name,
+                type=kind,
+                value=value,
             )
         result[name] = value
     return result
@@ -134,7 +139,8 @@ def constant(
 
 
 def _unreadable(expression: ast.expr, module: Module) -> Broken:
-    return module.problem(f"the value {_shown(expression)} cannot be determined from the source", expression.lineno)
+    text = "the value {value} cannot be determined from the source"
+    return module.problem(text, expression.lineno, value=_shown(expression))
 
 
 def _named(expression: ast.expr, module: Module, owner: ClassInfo | None, resolver: Resolver, depth: int) -> Any:

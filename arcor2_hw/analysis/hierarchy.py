@@ -40,7 +40,7 @@ class Hierarchy:
                 result.append(symbol)
             else:
                 shown = getattr(plain, "id", None) or getattr(plain, "attr", None) or "base"
-                raise info.problem(f"{info.name}: the base {shown} cannot be read", expression)
+                raise info.problem("{cls}: the base {base} cannot be read", expression, cls=info.name, base=shown)
         return result
 
     def base(self, info: ClassInfo) -> ClassInfo | None:
@@ -58,7 +58,7 @@ class Hierarchy:
             return self._lineages[info]
         if info in self._underway:
             names = " -> ".join(c.name for c in [*self._underway[self._underway.index(info) :], info])
-            raise info.problem(f"{info.name} is its own ancestor: {names}")
+            raise info.problem("{cls} is its own ancestor: {names}", cls=info.name, names=names)
         self._underway.append(info)
         try:
             bases = self.bases(info)
@@ -79,7 +79,7 @@ class Hierarchy:
                 if not any(candidate in other[1:] for other in sequences):
                     break
             else:
-                raise info.problem(f"{info.name}: the orders of its bases contradict each other")
+                raise info.problem("{cls}: the orders of its bases contradict each other", cls=info.name)
             result.append(candidate)
             for sequence in sequences:
                 if sequence[0] == candidate:
@@ -124,7 +124,7 @@ class Hierarchy:
             return default
         owner, binding = found
         if not isinstance(binding, Value) or binding.expression is None:
-            raise owner.problem(f"{owner.name}.{name} is not a plain value")
+            raise owner.problem("{cls}.{name} is not a plain value", cls=owner.name, name=name)
         return constant(binding.expression, owner.module, owner, self.resolver)
 
     def decorated(self, node: FunctionNode, owner: ClassInfo, *names: str) -> bool:

@@ -24,7 +24,7 @@ def plain(hint: ast.expr, module: Module) -> ast.expr:
         try:
             return ast.copy_location(parse_expression(hint.value.strip()), hint)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
-            raise module.problem(f"{hint.value[:40]!r} is not a type hint", hint.lineno) from None
+            raise module.problem("{hint!r} is not a type hint", hint.lineno, hint=hint.value[:40]) from None
     return hint
 
 
@@ -97,8 +97,8 @@ def unsupported(hint: ast.expr, module: Module, symbol: Symbol | None) -> Broken
     """Return the error for a hint that is not a parameter type."""
     shown = shown_hint(plain(hint, module))
     if symbol is None and isinstance(plain(hint, module), ast.Name):
-        return module.problem(f"the name {shown} is not defined", hint.lineno)
-    return module.problem(f"the type {shown} is not supported", hint.lineno)
+        return module.problem("the name {name} is not defined", hint.lineno, name=shown)
+    return module.problem("the type {type} is not supported", hint.lineno, type=shown)
 
 
 def shown_hint(hint: ast.expr) -> str:

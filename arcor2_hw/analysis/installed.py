@@ -9,6 +9,7 @@ from typing import Final
 
 from arcor2_hw.analysis.source import Problem, SourceFile
 from arcor2_hw.data.base import Data
+from arcor2_hw.messages import Message
 
 GROUP: Final = "arcor2_hw.object_types"
 """Entry point group of object types: `UR5e = "package.module:UR5e"`."""
@@ -48,13 +49,14 @@ def _installed(point: EntryPoint) -> InstalledType:
     origin = (distribution.name, distribution.version) if distribution is not None else ("", "")
     located = _locate(point.module)
     if located is None:
-        problem = Problem(f"the module {point.module} of the entry point {point.name} is not installed", point.value, 1)
+        text = "the module {module} of the entry point {name} is not installed"
+        problem = Problem(Message.of(text, module=point.module, name=point.name), point.value, 1)
         return InstalledType(name, point.value, *origin, "", None, problem)
     path, is_package = located
     try:
         source = _read(str(path), path.stat().st_mtime_ns)
     except OSError as error:
-        problem = Problem(f"the file cannot be read: {error.strerror}", str(path), 1)
+        problem = Problem(Message.of("the file cannot be read: {reason}", reason=error.strerror), str(path), 1)
         return InstalledType(name, point.value, *origin, str(path.parent), None, problem)
     file = SourceFile(name, point.module, source, str(path), is_package)
     return InstalledType(name, point.value, *origin, str(path.parent), file)

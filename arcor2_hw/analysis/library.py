@@ -148,7 +148,7 @@ class Library:
                 self._modules[dotted] = error
         found = self._modules[dotted]
         if isinstance(found, Broken):
-            raise Broken(str(found), found.problem.path, found.problem.line)
+            raise Broken(found.message, found.problem.path, found.problem.line)
         return found
 
     def _parse(self, file: SourceFile, dotted: str) -> Module:
@@ -173,7 +173,7 @@ class Library:
             except (FileNotFoundError, NotADirectoryError):
                 continue
             except OSError as error:
-                raise Broken(f"the file cannot be read: {error.strerror}", str(path), 1) from None
+                raise Broken("the file cannot be read: {reason}", str(path), 1, reason=error.strerror) from None
         return None
 
     def _needed(self, module: Module) -> list[SourceFile]:
@@ -209,7 +209,7 @@ class Library:
             raise
         if found.relative and first is None and second is None and not found.guarded:
             shown = found.module.rpartition(".")[2]
-            raise module.problem(f"the imported module {shown} does not exist", found.line)
+            raise module.problem("the imported module {name} does not exist", found.line, name=shown)
         if second is not None and first is not None and found.name in first.bindings:
             second = None  # a name in the package, not the module of that name
         return [each for each in (first, second) if each is not None]
@@ -241,7 +241,7 @@ class Library:
             assert module is not None
             info = module.bindings.get(name)
             if isinstance(info, Import | Value) or (info is None and self._declares_object_type(module)):
-                raise module.problem(f"the file has no class {name}", 1)
+                raise module.problem("the file has no class {name}", 1, name=name)
             needed = tuple(self._needed(module))
             if not isinstance(info, ClassInfo) or not info.node.bases or not self._is_object_type(info):
                 return TypeAnalysis(ObjectTypeMeta(name, abstract=True), modules=needed, is_object_type=False)
@@ -250,8 +250,8 @@ class Library:
             problem = error.problem
         except (RecursionError, MemoryError):
             path = file.path or f"{_dotted(file).replace('.', '/')}.py"
-            problem = Problem("the source is nested too deeply", sendable(path), 1)
-        meta = ObjectTypeMeta(name, NO_DESCRIPTION, base=base, abstract=True, disabled=True, problem=str(problem))
+            problem = Broken("the source is nested too deeply", path, 1).problem
+        meta = ObjectTypeMeta(name, NO_DESCRIPTION, base=base, abstract=True).disabled_because(problem.message)
         return TypeAnalysis(meta, modules=needed, problem=problem)
 
     def _declares_object_type(self, module: Module) -> bool:
@@ -269,12 +269,12 @@ class Library:
         if not hierarchy.derives_from(info, "Generic"):
             for each in hierarchy.lineage(info):
                 if isinstance(each, External) and not is_known_library(each):
-                    raise info.problem(f"{info.name}: the base {each.dotted} cannot be read", last)
+                    raise info.problem("{cls}: the base {base} cannot be read", last, cls=info.name, base=each.dotted)
             return False
         base = hierarchy.base(info)
         if base is None or not hierarchy.derives_from(base, "Generic"):
             raise info.problem(
-                f"{info.name}: the last base is not an object type; mixins must come before the base", last
+                "{cls}: the last base is not an object type; mixins must come before the base", last, cls=info.name
             )
         return True
 
@@ -299,10 +299,10 @@ class Library:
             base=bases[0] if bases else "",
             has_pose=hierarchy.derives_from(info, "GenericWithPose"),
             abstract=abstract,
-            disabled=problem is not None,
-            problem=UNSET if problem is None else str(problem),
             settings=settings,
         )
+        if problem is not None:
+            meta = meta.disabled_because(problem.message)
         category, icon = of_type(info, hierarchy)
         meta = msgspec.structs.replace(meta, display_name=display_name(info, hierarchy), category=category, icon=icon)
         direct = hierarchy.bases(info)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from arcor2_hw.analysis.source import Broken, SourceFile
+from arcor2_hw.messages import Message
 from arcor2_hw.parsing import parse
 
 FunctionNode: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
@@ -47,9 +48,9 @@ class ClassInfo:
     marks: dict[tuple[str, str], ast.expr] = field(default_factory=dict)
     """Values assigned to attributes of members: {("move", "__action__"): expression}."""
 
-    def problem(self, text: str, node: ast.AST | None = None) -> Broken:
+    def problem(self, message: str | Message, node: ast.AST | None = None, /, **values: object) -> Broken:
         """Return an error at `node`, or at the class statement."""
-        return self.module.problem(text, getattr(node, "lineno", self.node.lineno))
+        return self.module.problem(message, getattr(node, "lineno", self.node.lineno), **values)
 
     def function(self, name: str) -> FunctionNode | None:
         """Return the method that the class itself defines under this name."""
@@ -75,19 +76,19 @@ class Module:
         try:
             tree = parse(file.source)
         except SyntaxError as error:
-            raise self.problem(f"this is not valid Python: {error.msg}", error.lineno or 1) from None
+            raise self.problem("this is not valid Python: {reason}", error.lineno or 1, reason=error.msg) from None
         except (RecursionError, MemoryError):
             raise self.problem("the source is nested too deeply", 1) from None
         except ValueError as error:
-            raise self.problem(f"the file is not text: {error}", 1) from None
+            raise self.problem("the file is not text: {reason}", 1, reason=error) from None
         try:
             self._bind(tree.body, self.bindings, None)
         except RecursionError:
             raise self.problem("the source is nested too deeply", 1) from None
 
-    def problem(self, text: str, line: int) -> Broken:
+    def problem(self, message: str | Message, line: int, /, **values: object) -> Broken:
         """Return an error at `line` of this file."""
-        return Broken(text, self.path, line)
+        return Broken(message, self.path, line, **values)
 
     # -------------------------------------------------------------------------------- binding
     def _bind(self, body: Sequence[ast.stmt], scope: dict[str, Binding], owner: ClassInfo | None) -> None:

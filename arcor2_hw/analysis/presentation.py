@@ -62,7 +62,13 @@ def of_action(node: FunctionNode, owner: ClassInfo, inherited: Presentation, hie
         category, icon = _title(given.get("category")), _icon(given.get("icon"))
         for name, value in (("category", category), ("icon", icon)):
             if name in given and isinstance(value, Unset):
-                raise owner.problem(f"{node.name}: {given[name]!r:.60} is not a valid {name}", decorator)
+                raise owner.problem(
+                    "{action}: {value!r:.60} is not a valid {name}",
+                    decorator,
+                    action=node.name,
+                    value=given[name],
+                    name=name,
+                )
         return Presentation(
             inherited.category if isinstance(category, Unset) else category,
             inherited.icon if isinstance(icon, Unset) else icon,

@@ -57,11 +57,13 @@ class SettingsReader:
             if argument.arg != "settings":
                 continue
             if argument.annotation is None:
-                raise owner.problem(f"{owner.name}: settings is not annotated", argument)
+                raise owner.problem("{cls}: settings is not annotated", argument, cls=owner.name)
             hint, _ = without_none(argument.annotation, owner.module, self._resolver)
             symbol = meaning(hint, owner.module, owner, self._resolver)
             if not isinstance(symbol, ClassInfo) or not self._hierarchy.derives_from(symbol, "Settings"):
-                raise owner.problem(f"{owner.name}: settings must be a dataclass derived from Settings", argument)
+                raise owner.problem(
+                    "{cls}: settings must be a dataclass derived from Settings", argument, cls=owner.name
+                )
             return symbol
         return None
 
@@ -126,20 +128,21 @@ class SettingsReader:
         try:
             kind, enumeration = parameter_type_of(hint, info.module, info, self._resolver)
             if kind.name not in _KINDS:
-                raise info.problem(f"a setting cannot be of type {kind.name}", hint)
+                raise info.problem("a setting cannot be of type {type}", hint, type=kind.name)
             text = "" if isinstance(description, Unset) else description
             extra = unit_extra(text) if kind.name in NUMBERS else UNSET
             if enumeration is not None:
                 members = enum_members(enumeration, self._resolver) or {}
                 extra = encode(Extra(allowed_values=list(dict.fromkeys(members.values()))))
             default = self._actions.default(info, kind, enumeration, field.default)
-            for what, declared in (("a secret setting", field.secret), ("an address", field.address)):
-                if declared and kind.name != "string":
-                    raise info.problem(f"{what} must be of type str, not {kind.name}", hint)
+            if kind.name != "string" and field.secret:
+                raise info.problem("a secret setting must be of type str, not {type}", hint, type=kind.name)
+            if kind.name != "string" and field.address:
+                raise info.problem("an address must be of type str, not {type}", hint, type=kind.name)
         except Broken as error:
-            raise Broken(f"setting {name}: {error}", error.problem.path, error.problem.line) from None
+            raise error.within("setting {name}: {reason}", name=name) from None
         except InvalidData as error:
-            raise info.problem(f"setting {name}: {error}", hint) from None
+            raise info.problem("setting {name}: {reason}", hint, name=name, reason=error) from None
         secret = kind.name == "string" and (is_secret_name(name) if field.secret is None else field.secret)
         if secret and default not in (UNSET, '""'):
             default = encode(HIDDEN)

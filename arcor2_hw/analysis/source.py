@@ -5,6 +5,7 @@ from pathlib import Path
 import humps
 
 from arcor2_hw.data.base import Data
+from arcor2_hw.messages import Message
 
 
 def module_name(type_name: str) -> str:
@@ -45,23 +46,46 @@ class SourceFile(Data, frozen=True):
 
 
 class Problem(Data, frozen=True):
-    """An error in a source, and its place."""
+    """An error in a source, and its place. `str(problem)` contains both."""
 
-    text: str
+    what: Message
     path: str
     line: int
 
+    @property
+    def message(self) -> Message:
+        """The error with its place."""
+        return Message.of("{path}:{line}: {problem}", path=self.path, line=self.line, problem=self.what)
+
     def __str__(self) -> str:
-        return f"{self.path}:{self.line}: {self.text}"
+        return self.message.text
 
 
 class Broken(Exception):
-    """Reading cannot continue. It is caught inside the analysis."""
+    """Reading cannot continue. It is caught inside the analysis.
 
-    def __init__(self, text: str, path: str, line: int) -> None:
-        super().__init__(text)
-        # The text may come from the source; lone surrogates could not be sent to a client.
-        self.problem = Problem(sendable(text), sendable(path), line)
+    Args:
+        message: The message; with values its template.
+        values: Values of the fields of the template, by name.
+    """
+
+    def __init__(self, message: str | Message, path: str, line: int, /, **values: object) -> None:
+        self.message = _sendable(message if isinstance(message, Message) else Message.of(message, **values))
+        super().__init__(self.message.text)
+        self.problem = Problem(self.message, sendable(path), line)
+
+    def within(self, template: str, /, **values: object) -> "Broken":
+        """Return this error as `reason` of another message about the same place."""
+        return Broken(template, self.problem.path, self.problem.line, **values, reason=self)
+
+
+def _sendable(message: Message) -> Message:
+    """Return a message without the lone surrogates of a source, which could not be sent to a client."""
+    values = {
+        name: _sendable(value) if isinstance(value, Message) else sendable(value)
+        for name, value in message.values.items()
+    }
+    return Message(sendable(message.text), sendable(message.key), values)
 
 
 def sendable(text: str) -> str:

@@ -15,6 +15,7 @@ from arcor2_hw.analysis.source import Problem
 from arcor2_hw.analysis.type_analysis import TypeAnalysis
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
 
 HUGE: Final = 64 * 1024
 """Number of characters above which a source is analysed in a separate process; a shorter one is parsed in about 20 ms.
@@ -33,17 +34,10 @@ def is_needed(library: Library) -> bool:
     return bool(_huge(library))
 
 
-def disable_huge_types(library: Library, reason: str) -> None:
+def disable_huge_types(library: Library, reason: Message) -> None:
     """Disable the types of huge sources after their analysis failed."""
-    library.put_analyses(
-        {
-            name: TypeAnalysis(
-                ObjectTypeMeta(name, abstract=True, disabled=True, problem=reason), problem=Problem(reason, name, 1)
-            )
-            for name in _huge(library)
-        },
-        {},
-    )
+    metas = [ObjectTypeMeta(name, abstract=True).disabled_because(reason) for name in _huge(library)]
+    library.put_analyses({meta.type: TypeAnalysis(meta, problem=Problem(reason, meta.type, 1)) for meta in metas}, {})
 
 
 async def analyse(library: Library) -> bytes:

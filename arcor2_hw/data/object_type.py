@@ -2,11 +2,14 @@
 
 import enum
 from collections.abc import Iterable
+from typing import Self
 
 from msgspec import field
+from msgspec.structs import replace
 
-from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from arcor2_hw.data.base import UNSET, Data, Timestamp, TranslatableData, Unset
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.messages import Message
 
 
 class Model3dType(enum.StrEnum):
@@ -132,8 +135,26 @@ class ActionMetadata(Data, frozen=True):
     cancellable: bool = False
 
 
-class ObjectAction(Data, frozen=True):
-    """One action of an object type; category, icon and former_names are not in ARCOR2.
+class Disableable(TranslatableData, frozen=True, kw_only=True):
+    """Base of what a problem in a source disables; `key` and `values` translate the problem."""
+
+    disabled: bool = False
+    problem: str | Unset = UNSET
+
+    def disabled_because(self, problem: Message) -> Self:
+        """Return this, disabled by a problem."""
+        return replace(self.untranslated(), disabled=True, problem=problem.text, **problem.translation())
+
+    @property
+    def why_disabled(self) -> Message:
+        """The problem as a message, to be translated as part of another one."""
+        text = "the reason is unknown" if isinstance(self.problem, Unset) else self.problem
+        key = text if isinstance(self.key, Unset) else self.key
+        return Message(text, key, {} if isinstance(self.values, Unset) else self.values)
+
+
+class ObjectAction(Disableable, frozen=True):
+    """One action of an object type; category, icon, former_names, key and values are not in ARCOR2.
 
     former_names: names in older projects.
     """
@@ -144,8 +165,6 @@ class ObjectAction(Data, frozen=True):
     meta: ActionMetadata = ActionMetadata()
     origins: str | Unset = UNSET
     returns: list[str] = field(default_factory=list)
-    disabled: bool = False
-    problem: str | Unset = UNSET
     category: str | Unset = UNSET
     icon: str | Unset = UNSET
     former_names: list[str] | Unset = UNSET
@@ -166,8 +185,8 @@ def find_action(actions: Iterable[ObjectAction], name: str) -> ObjectAction | No
     return present or next(formerly, None)
 
 
-class ObjectTypeMeta(Data, frozen=True):
-    """Metadata of an object type; display_name, category, icon and shadows are not in ARCOR2.
+class ObjectTypeMeta(Disableable, frozen=True):
+    """Metadata of an object type; display_name, category, icon, shadows, key and values are not in ARCOR2.
 
     display_name: name for users; omitted when the type declares none.
     built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
@@ -182,14 +201,17 @@ class ObjectTypeMeta(Data, frozen=True):
     needs_parent_type: str | Unset = UNSET
     has_pose: bool = False
     abstract: bool = False
-    disabled: bool = False
-    problem: str | Unset = UNSET
     settings: list[ParameterMeta] = field(default_factory=list)
     modified: Timestamp | Unset = UNSET
     display_name: str | Unset = UNSET
     category: str | Unset = UNSET
     icon: str | Unset = UNSET
     shadows: str | Unset = UNSET
+
+    @property
+    def shown_name(self) -> str:
+        """The name for users: the display name, else the name of the class."""
+        return self.type if isinstance(self.display_name, Unset) else self.display_name
 
 
 class ObjectTypeSource(Data, frozen=True):

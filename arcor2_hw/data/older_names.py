@@ -5,6 +5,8 @@ The table is used to read such sources (`analysis`) and to run them (`runtime.ol
 
 from typing import Final
 
+from arcor2_hw.messages import Message
+
 _GEOMETRY: Final = "arcor2_hw.data.geometry"
 _MODELS: Final = "arcor2_hw.data.object_type"
 _PROJECT: Final = "arcor2_hw.data.project"
@@ -67,7 +69,7 @@ def is_older(module: str) -> bool:
     return module.partition(".")[0] in OLDER_PACKAGES
 
 
-def not_offered(module: str, name: str | None = None) -> str | None:
+def not_offered(module: str, name: str | None = None) -> Message | None:
     """Return a message that a module or name of ARCOR2 is not available, or None if it is, or is not part of ARCOR2."""
     if not is_older(module):
         return None
@@ -79,7 +81,9 @@ def not_offered(module: str, name: str | None = None) -> str | None:
         if wanted not in OLDER_NAMES:
             if part in OLDER_NAMES[known] and part is rest[-1]:
                 return None
-            return f"{wanted} is not available. Available in {known}: {', '.join(_within(known))}"
+            available = ", ".join(_within(known))
+            text = "{wanted} is not available. Available in {module}: {available}"
+            return Message.of(text, wanted=wanted, module=known, available=available)
         known = wanted
     return None
 

@@ -43,7 +43,7 @@ def faults(file: SourceFile) -> list[str]:
     library = Library([file])
     found = library.analyse(file.name)
     if found.problem is not None:
-        return [f"{file.name}: {found.problem.text}"]
+        return [f"{file.name}: {found.problem.what}"]
     if not found.is_object_type:
         return [f"{file.name} does not derive from Generic"]
     wrong = _of_the_type(file, found)

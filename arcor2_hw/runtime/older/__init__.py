@@ -30,7 +30,7 @@ class _Finder(MetaPathFinder, Loader):
             return None
         if fullname in OLDER_NAMES:
             return ModuleSpec(fullname, self, origin="arcor2_hw", is_package=True)
-        raise ImportError(not_offered(fullname), name=fullname)
+        raise ImportError(str(not_offered(fullname)), name=fullname)
 
     def create_module(self, spec: ModuleSpec) -> ModuleType | None:  # noqa: ARG002
         """Return None, so that Python creates the module."""

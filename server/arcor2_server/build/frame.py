@@ -151,7 +151,8 @@ class Frame:
             obj = self.index.scene_object(object_id)
         except (ValueError, NotFound) as error:
             raise InvalidProject("action {name!r}: {reason}", name=action.name, reason=error) from error
-        found = self._facts(obj.type).actions.get(method)
+        facts = self._facts(obj.type)
+        found = facts.actions.get(method)
         if found is None:
             raise InvalidProject(
                 "action {name!r}: {type} has no action {method}", name=action.name, type=obj.type, method=method
@@ -161,7 +162,6 @@ class Frame:
             raise InvalidProject(
                 "action {name!r}: {type}.{method} cannot be used{reason}",
                 name=action.name,
-                type=obj.type,
                 method=method,
                 reason=why,
             )

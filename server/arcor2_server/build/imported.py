@@ -56,6 +56,8 @@ def _wanted(path: PurePosixPath) -> bool:
             return True
         case (snapshot.FOLDER, name):
             return name.endswith(".py") and name != "__init__.py"
+        case (snapshot.FOLDER, _, name):
+            return name.endswith(".py")
         case ("data", "models", name):
             return name.endswith(".json")
     return False

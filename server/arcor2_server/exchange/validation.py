@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal
 
 from arcor2_hw.analysis import SourceFile
-from arcor2_hw.data.base import Data, Unset
+from arcor2_hw.data.base import Data
 from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, find_action
 from arcor2_hw.data.project import END, START, Project
 from arcor2_hw.data.robot import RobotMeta
@@ -91,8 +91,8 @@ def find_problems(archive: Archive, types: Known, assets: Iterable[str] | None =
             yield Finding(f"object_types/{name}", str(analysis.problem))
         for action in analysis.actions:
             if action.disabled:
-                why = "" if isinstance(action.problem, Unset) else f": {action.problem}"
-                yield Finding(f"object_types/{name}.{action.name}", f"The action cannot be used{why}", "note")
+                text = f"The action cannot be used: {action.why_disabled}"
+                yield Finding(f"object_types/{name}.{action.name}", text, "note")
         mesh = mesh_of(one)
         if mesh is not None and mesh not in available:
             text = f"The mesh needs the asset {mesh!r}, which is missing."
@@ -114,13 +114,13 @@ def _document_findings(archive: Archive, types: Known) -> Iterator[tuple[str, st
         return
     scene_names = {f"objects[{index}]": obj.name for index, obj in enumerate(scene.objects)}
     if project is None:
-        for entry, text in scene_findings(scene, types):
-            yield _titled(SCENE, entry, scene_names), text
+        for entry, problem in scene_findings(scene, types):
+            yield _titled(SCENE, entry, scene_names), problem.text
     else:
         names = scene_names | _project_names(project)
-        for entry, text in project_findings(scene, project, types):
+        for entry, problem in project_findings(scene, project, types):
             document, _, inner = entry.partition(".")
-            yield _titled(SCENE if document == "scene" else PROJECT, inner, names), text
+            yield _titled(SCENE if document == "scene" else PROJECT, inner, names), problem.text
         yield from _logic(project)
     yield from _duplicate_ids(SCENE, [scene.id, *(obj.id for obj in scene.objects)])
     if project is not None:

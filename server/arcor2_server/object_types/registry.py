@@ -14,6 +14,7 @@ from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.object_type import ObjectTypeMeta, ObjectTypeSource
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
 from arcor2_server.files import write_private
 from arcor2_server.object_types.catalog import Known, TypeCatalog
 from arcor2_server.object_types.changes import Changes, PendingChanges
@@ -173,9 +174,9 @@ class ObjectTypes(TypeCatalog):
             meta = analysis.meta
             if (one := self._uploaded.get(name)) is not None:
                 meta = replace(meta, object_model=one.model, modified=one.modified)
-                problem = f"its collision model {name} is missing" if name in without_model else self._missing_mesh(one)
-                if problem and not meta.disabled:
-                    meta = replace(meta, disabled=True, problem=problem)
+                problem = self._missing_model(one, without_model)
+                if problem is not None and not meta.disabled:
+                    meta = meta.disabled_because(problem)
                 if name in self._installed:
                     meta = replace(meta, shadows=self._origin(name))
             else:
@@ -206,7 +207,8 @@ class ObjectTypes(TypeCatalog):
             encoded = await worker.analyse(self._library)
         except InvalidData as error:
             log.error("huge object types not analysed", reason=str(error), detail=error.detail)
-            worker.disable_huge_types(self._library, f"{error} Split the source into modules.")
+            reason = Message.of("{error} Split the source into modules.", error=error)
+            worker.disable_huge_types(self._library, reason)
             return False
         await asyncio.to_thread(snapshot.restore, self._library, encoded)
         return True
@@ -228,12 +230,14 @@ class ObjectTypes(TypeCatalog):
                 "analysis cannot be stored, so the next start takes longer", file=str(file), reason=error.strerror
             )
 
-    def _missing_mesh(self, one: ObjectTypeSource) -> str:
-        """Return the problem of a missing mesh, empty if none is missing."""
+    def _missing_model(self, one: ObjectTypeSource, without_model: set[str]) -> Message | None:
+        """Return the problem of a missing collision model or mesh, None if none is missing."""
+        if one.id in without_model:
+            return Message.of("its collision model {name} is missing", name=one.id)
         mesh = UNSET if isinstance(one.model, Unset) else one.model.mesh
         if isinstance(mesh, Unset) or self._assets.exists(mesh.asset_id):
-            return ""
-        return f"the mesh {mesh.asset_id} of its collision model is missing"
+            return None
+        return Message.of("the mesh {name} of its collision model is missing", name=mesh.asset_id)
 
     def _with_asset(self, robot: RobotMeta) -> RobotMeta:
         name = robot.urdf_package_filename
@@ -272,8 +276,7 @@ class ObjectTypes(TypeCatalog):
             self._pending.skip(name)
         return meta
 
-    @staticmethod
-    def require_replaceable(name: str) -> None:
+    def require_replaceable(self, name: str) -> None:
         """Raise InvalidData for a base class, which cannot be replaced."""
         if name in BUILT_IN:
             raise InvalidData("The object type {name} is built in and cannot be replaced.", name=name)

@@ -143,14 +143,14 @@ class LoopReader:
                     call.lineno, "{func} is not an action of an object in the scene", func=excerpt(call.func)
                 )
         obj = self._frame.index.scene_object(object_id)
-        declared = find_action(self._frame.types[obj.type].actions.values(), method)
+        facts = self._frame.types[obj.type]
+        declared = find_action(facts.actions.values(), method)
         if declared is None:
             raise NotUnderstood(call.lineno, "{type} has no action {method}", type=obj.type, method=method)
         if declared.disabled:
             raise NotUnderstood(
                 call.lineno,
-                "{type}.{method} cannot be used: {problem}",
-                type=obj.type,
+                "{method} of {type} cannot be used: {problem}",
                 method=method,
                 problem=declared.problem,
             )
