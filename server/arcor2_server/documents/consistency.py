@@ -9,7 +9,8 @@ from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.messages import Message
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks import Types, action_meta, check_action, object_problems
-from arcor2_server.documents.document import OWNED, Document, action_of, reference
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.item_indexes import OWNED, action_of, reference
 from arcor2_server.documents.logic import check_logic_item, check_no_loops
 from arcor2_server.documents.reparenting import check_no_loop, check_parent
 

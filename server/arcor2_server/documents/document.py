@@ -11,7 +11,6 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.project import (
     Action,
-    ActionParameterType,
     ActionPoint,
     BareActionPoint,
     LogicItem,
@@ -19,20 +18,22 @@ from arcor2_hw.data.project import (
     Project,
     ProjectParameter,
     ProjectRobotJoints,
-    parse_link,
 )
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.documents.changes import OF_SCENE, Change, Item, Kind
-
-OWNED: Final = (Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
-"""Kinds that belong to an action point."""
+from arcor2_server.documents.item_indexes import OWNED, ItemIndexes, action_of
 
 ROOTS: Final = (Kind.OBJECT, Kind.PARAMETER, Kind.SCENE, Kind.PROJECT)
 """Kinds of items that are roots of lock trees, in addition to action points without a parent."""
 
-REFERRING: Final = frozenset({"pose", "position", "joints", *ActionParameterType})
-"""Types of action parameter whose value is the id of an item of the project."""
+_TITLES: Final = {
+    Kind.JOINTS: "joint configuration",
+    Kind.PARAMETER: "project parameter",
+    Kind.LOGIC: "logic item",
+    Kind.OVERRIDE: "override of the object",
+}
+"""Kinds as users know them, where their name differs."""
 
 UNTIMED: Final = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
 """Resets the times of a scene or project, since an undo must not change them."""
@@ -40,22 +41,6 @@ UNTIMED: Final = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
 T = TypeVar("T", bound=msgspec.Struct)
 
 _by_rank = operator.attrgetter("rank")
-
-
-def action_of(end: str) -> str:
-    """Return the action id, START or END of one side of a logic item, without the name of the flow."""
-    return end.partition("/")[0]
-
-
-def reference(kind: str, value: str) -> str | None:
-    """Return the id that an action parameter refers to, None if it is a literal or malformed."""
-    if kind not in REFERRING:
-        return None
-    try:
-        target = msgspec.json.decode(value, type=str)
-        return parse_link(target)[0] if kind == ActionParameterType.LINK else target
-    except (msgspec.DecodeError, ValueError):
-        return None
 
 
 class Document:
@@ -69,12 +54,7 @@ class Document:
         self._unordered: set[Kind] = set()
         self._next_rank = 0
         self._retired = False
-        self._owned: dict[str, dict[Kind, dict[str, None]]] = {}
-        self._points: dict[str, dict[str, None]] = {}
-        self._names: dict[tuple[str, str], dict[str, None]] = {}
-        self._users: dict[str, dict[str, None]] = {}
-        self._leaving: dict[str, dict[str, None]] = {}
-        self._arriving: dict[str, dict[str, None]] = {}
+        self._indexes = ItemIndexes()
         self._scene: Scene | None = None
         self._project: Project | None = None
         for item in items:
@@ -116,13 +96,13 @@ class Document:
     def update(self, kind: Kind, item_id: str, value: Any) -> Change:
         """Return the change that replaces an item's value. Raise NotFound if there is none."""
         self._check_open()
-        item = self._get(kind, item_id, kind.replace("_", " "))
+        item = self._get(kind, item_id)
         return Change(kind, item_id, item.parent, item.rank, item.value, value)
 
     def remove(self, kind: Kind, item_id: str) -> Change:
         """Return the change that removes an item. Raise NotFound if there is none."""
         self._check_open()
-        item = self._get(kind, item_id, kind.replace("_", " "))
+        item = self._get(kind, item_id)
         return Change(kind, item_id, item.parent, item.rank, item.value, None)
 
     @contextmanager
@@ -143,7 +123,7 @@ class Document:
         """Apply changes in order."""
         for change in changes:
             if change.before is not None:
-                self._forget(self._items[change.kind][change.id])
+                self._indexes.remove(self._items[change.kind][change.id])
                 if change.after is None:
                     del self._items[change.kind][change.id]
             if change.after is not None:
@@ -159,47 +139,7 @@ class Document:
             self._unordered.add(item.kind)
         self._next_rank = max(self._next_rank, item.rank)
         of_kind[item.id] = item
-        for index, key in self._keys(item):
-            index.setdefault(key, {})[item.id] = None
-        if item.kind in OWNED:
-            self._owned.setdefault(item.parent, {kind: {} for kind in OWNED})[item.kind][item.id] = None
-
-    def _forget(self, item: Item) -> None:
-        for index, key in self._keys(item):
-            ids = index[key]
-            ids.pop(item.id, None)
-            if not ids:
-                del index[key]
-        if item.kind in OWNED:
-            owned = self._owned[item.parent]
-            del owned[item.kind][item.id]
-            if not any(owned.values()):
-                del self._owned[item.parent]
-
-    def _keys(self, item: Item) -> Iterator[tuple[dict[Any, dict[str, None]], Any]]:
-        """Return each index with the key under which it lists the item, each key at most once."""
-        value = item.value
-        match item.kind:
-            case Kind.OBJECT | Kind.PARAMETER:
-                yield self._names, (item.kind, value.name)
-            case Kind.POINT:
-                yield self._names, (item.kind, value.name)
-                if value.parent:
-                    yield self._points, value.parent
-            case Kind.ORIENTATION | Kind.JOINTS:
-                yield self._names, (item.parent + item.kind, value.name)
-            case Kind.ACTION:
-                yield self._names, (item.kind, value.name)
-                for output in set(value.outputs()):
-                    yield self._names, ("output", output)
-                targets = {reference(parameter.type, parameter.value) for parameter in value.parameters}
-                for target in targets - {None}:
-                    yield self._users, target
-            case Kind.LOGIC:
-                yield self._leaving, action_of(value.start)
-                yield self._arriving, action_of(value.end)
-                if value.condition:
-                    yield self._users, action_of(value.condition.what)
+        self._indexes.add(item)
 
     # ------------------------------------------------------------------------------------------ whole documents
     def of_kind(self, kind: Kind) -> list[Item]:
@@ -257,61 +197,61 @@ class Document:
         """Return an item, None if there is none."""
         return self._items[kind].get(item_id)
 
-    def _get(self, kind: Kind, item_id: str, what: str) -> Item:
+    def _get(self, kind: Kind, item_id: str) -> Item:
         try:
             return self._items[kind][item_id]
         except KeyError:
-            raise NotFound("There is no {what} with the id {item_id!r}.", what=what, item_id=item_id) from None
+            what = _TITLES.get(kind, kind.replace("_", " "))
+            raise NotFound("The {what} with the id {item_id!r} does not exist.", what=what, item_id=item_id) from None
 
     def scene_object(self, object_id: str) -> SceneObject:
         """Return an object of the scene."""
-        value: SceneObject = self._get(Kind.OBJECT, object_id, "object").value
+        value: SceneObject = self._get(Kind.OBJECT, object_id).value
         return value
 
     def action_point(self, action_point_id: str) -> BareActionPoint:
         """Return an action point without its lists."""
-        value: BareActionPoint = self._get(Kind.POINT, action_point_id, "action point").value
+        value: BareActionPoint = self._get(Kind.POINT, action_point_id).value
         return value
 
     def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
         """Return an orientation with its action point."""
-        item = self._get(Kind.ORIENTATION, orientation_id, "orientation")
+        item = self._get(Kind.ORIENTATION, orientation_id)
         return self.action_point(item.parent), item.value
 
     def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
         """Return joints with their action point."""
-        item = self._get(Kind.JOINTS, joints_id, "joints")
+        item = self._get(Kind.JOINTS, joints_id)
         return self.action_point(item.parent), item.value
 
     def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
         """Return an action with its action point."""
-        item = self._get(Kind.ACTION, action_id, "action")
+        item = self._get(Kind.ACTION, action_id)
         return self.action_point(item.parent), item.value
 
     def parameter(self, parameter_id: str) -> ProjectParameter:
         """Return a project parameter."""
-        value: ProjectParameter = self._get(Kind.PARAMETER, parameter_id, "project parameter").value
+        value: ProjectParameter = self._get(Kind.PARAMETER, parameter_id).value
         return value
 
     def logic_item(self, logic_item_id: str) -> LogicItem:
         """Return a logic item."""
-        value: LogicItem = self._get(Kind.LOGIC, logic_item_id, "logic item").value
+        value: LogicItem = self._get(Kind.LOGIC, logic_item_id).value
         return value
 
     def override(self, object_id: str) -> SceneObjectOverride:
         """Return the overrides of an object."""
-        value: SceneObjectOverride = self._get(Kind.OVERRIDE, object_id, "override of an object").value
+        value: SceneObjectOverride = self._get(Kind.OVERRIDE, object_id).value
         return value
 
     # ------------------------------------------------------------------------------------------ relations
     def owned(self, point_id: str, kind: Kind) -> list[Item]:
         """Return the items of a kind that belong to an action point, in their order."""
-        ids = self._owned.get(point_id, {}).get(kind, {})
-        return sorted((self._items[kind][i] for i in ids), key=_by_rank)
+        return sorted((self._items[kind][i] for i in self._indexes.owned_by(point_id, kind)), key=_by_rank)
 
     def points_of(self, parent_id: str) -> list[BareActionPoint]:
         """Return the action points whose parent is this object or action point."""
-        ids = self._points.get(parent_id, ())
+        ids = self._indexes.points.get(parent_id, ())
         return [item.value for item in sorted((self._items[Kind.POINT][i] for i in ids), key=_by_rank)]
 
     def descendants(self, parent_id: str) -> list[BareActionPoint]:
@@ -331,15 +271,15 @@ class Document:
         the item is the action whose result has the name.
         """
         scope = parent + kind if parent else kind
-        return next(iter(self._names.get((scope, name), ())), None)
+        return next(iter(self._indexes.names.get((scope, name), ())), None)
 
     def outgoing(self, start: str) -> list[LogicItem]:
         """Return the logic items that leave START or an action."""
-        return [self._items[Kind.LOGIC][i].value for i in self._leaving.get(start, ())]
+        return [self._items[Kind.LOGIC][i].value for i in self._indexes.leaving.get(start, ())]
 
     def incoming(self, end: str) -> list[LogicItem]:
         """Return the logic items that arrive at END or an action."""
-        return [self._items[Kind.LOGIC][i].value for i in self._arriving.get(end, ())]
+        return [self._items[Kind.LOGIC][i].value for i in self._indexes.arriving.get(end, ())]
 
     def leads_to(self, origin: str, target: str, without: str = "") -> bool:
         """Return whether the logic, without the item `without`, leads from one action to another.
@@ -353,7 +293,7 @@ class Document:
         forward = True
         while waiting and other_waiting:
             place = waiting.pop()
-            for key in (self._leaving if forward else self._arriving).get(place, ()):
+            for key in (self._indexes.leaving if forward else self._indexes.arriving).get(place, ()):
                 if key == without:
                     continue
                 value = items[key].value
@@ -371,7 +311,7 @@ class Document:
     def users_of(self, target_id: str) -> list[Action | LogicItem]:
         """Return the actions with a parameter that refers to this id, and the logic items with a condition on it."""
         actions, logic = self._items[Kind.ACTION], self._items[Kind.LOGIC]
-        return [(actions.get(i) or logic[i]).value for i in self._users.get(target_id, ())]
+        return [(actions.get(i) or logic[i]).value for i in self._indexes.users.get(target_id, ())]
 
     def root_of(self, item: str) -> str:
         """Return the root of the lock tree that an id belongs to (protocol, section 6). Raise NotFound if unknown."""
@@ -391,7 +331,9 @@ class Document:
     def tree_of(self, root: str) -> list[str]:
         """Return the ids below a root: its action points with their items; empty if it is not a root."""
         points = [point.id for point in self.descendants(root)]
-        below = [i for holder in (root, *points) for kind in OWNED for i in self._owned.get(holder, {}).get(kind, ())]
+        below = [
+            i for holder in (root, *points) for kind in OWNED for i in self._indexes.owned.get(holder, {}).get(kind, ())
+        ]
         return points + below
 
 

@@ -8,7 +8,8 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import END, START, Action, LogicItem, ProjectLogicIf
 from arcor2_hw.exceptions import InvalidData
-from arcor2_server.documents.document import Document, action_of
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.item_indexes import action_of
 from arcor2_server.documents.logic_graph import BRANCHABLE
 
 

@@ -9,8 +9,9 @@ from arcor2_hw.data.role import Role
 from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Kind, net
 from arcor2_server.documents.checks import Types
 from arcor2_server.documents.consistency import Inconsistent, check_consistent, title
-from arcor2_server.documents.document import OWNED, ROOTS, Document, action_of
+from arcor2_server.documents.document import ROOTS, Document
 from arcor2_server.documents.history import History
+from arcor2_server.documents.item_indexes import OWNED, action_of
 from arcor2_server.errors import RequestRefused
 
 

@@ -22,7 +22,8 @@ from arcor2_server.collaboration.locks import PROJECT, Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks import check_name
-from arcor2_server.documents.document import OWNED, Document
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.item_indexes import OWNED
 from arcor2_server.documents.removal import require_point_unused
 from arcor2_server.documents.reparenting import changes_for_parent, check_parent
 from arcor2_server.errors import RequestRefused

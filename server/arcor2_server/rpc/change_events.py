@@ -11,7 +11,8 @@ from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import BareAction
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
-from arcor2_server.documents.document import OWNED, Document
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.item_indexes import OWNED
 from arcor2_server.rpc.registry import Context
 
 EVENTS: Final = {

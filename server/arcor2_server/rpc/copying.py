@@ -15,7 +15,8 @@ from arcor2_hw.data.rpc import CopyActionPointArgs
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
-from arcor2_server.documents.document import OWNED, Document, reference
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.item_indexes import OWNED, reference
 from arcor2_server.rpc.change_events import EVENTS
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc

@@ -13,7 +13,8 @@ from arcor2_server.collaboration.locks import Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks import action_meta
-from arcor2_server.documents.document import Document, action_of
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.item_indexes import action_of
 from arcor2_server.documents.logic import check_logic_item
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes

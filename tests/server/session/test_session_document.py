@@ -77,9 +77,10 @@ def state(document: Document) -> tuple[bytes, Scene | None, Project | None]:
 
 def lookups(document: Document) -> dict[str, object]:
     """Give all lookups, without those that are empty."""
-    names = ("_names", "_users", "_leaving", "_arriving", "_points")
-    return {name: {key: set(ids) for key, ids in getattr(document, name).items()} for name in names} | {
-        "_owned": {p: {k: set(i) for k, i in kinds.items() if i} for p, kinds in document._owned.items()}
+    indexes = document._indexes
+    names = ("names", "users", "leaving", "arriving", "points")
+    return {name: {key: set(ids) for key, ids in getattr(indexes, name).items()} for name in names} | {
+        "owned": {p: {k: set(i) for k, i in kinds.items() if i} for p, kinds in indexes.owned.items()}
     }
 
 
