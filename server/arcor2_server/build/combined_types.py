@@ -14,7 +14,7 @@ from arcor2_server.build.frame import TypeFacts
 
 
 class CombinedTypes:
-    """Look-ups over object types (`Types` of documents.checks). Each raises NotFound if the type is unknown.
+    """Look-ups over object types; a `Types` of documents.checks. Each raises NotFound if the type is unknown.
 
     Args:
         known: sources on this server. If two have the same name, the later one is used.

@@ -14,11 +14,13 @@ from arcor2_hw.data.object_type import Mesh, Models, ObjectTypeSource
 from arcor2_hw.data.project import END, START, Action, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFound
+from arcor2_hw.messages import Message
 from arcor2_server.build import script
 from arcor2_server.build.combined_types import CombinedTypes
 from arcor2_server.build.imported import Imported, read, with_helper_names
 from arcor2_server.documents import Session
-from arcor2_server.documents.checks import complete_parameters, project_problems
+from arcor2_server.documents.checks.actions import complete_parameters
+from arcor2_server.documents.checks.project import project_problems
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
@@ -58,7 +60,7 @@ def _check(package: Imported, types: CombinedTypes) -> None:
         raise InvalidPackage(
             "The project {name} of the package has errors. {problems}",
             name=package.project.name,
-            problems=" ".join(problems),
+            problems=Message.joined(problems),
         )
     if package.needs_source:
         script.check_syntax(package.script)

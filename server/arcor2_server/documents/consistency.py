@@ -8,7 +8,9 @@ from arcor2_hw.data.project import END, START, Action, LogicItem
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.messages import Message
 from arcor2_server.documents.changes import Change, Kind
-from arcor2_server.documents.checks import Types, action_meta, check_action, object_problems
+from arcor2_server.documents.checks.actions import action_meta, check_action
+from arcor2_server.documents.checks.object_types import Types
+from arcor2_server.documents.checks.scene import object_problems
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.item_indexes import OWNED, action_of, reference
 from arcor2_server.documents.logic import check_logic_item, check_no_loops
@@ -83,7 +85,7 @@ def _check_name(document: Document, change: Change) -> None:
 
 def _object(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
     if problems := object_problems(change.after, types):
-        raise Inconsistent(" ".join(problems), [])
+        raise Inconsistent(Message.joined(problems), [])
 
 
 def _point(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001

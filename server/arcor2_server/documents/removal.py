@@ -6,7 +6,8 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.project import Action, BareActionPoint, LogicItem
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.documents.changes import Change, Kind
-from arcor2_server.documents.checks import Types, action_meta
+from arcor2_server.documents.checks.actions import action_meta
+from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.item_indexes import OWNED, action_of
 from arcor2_server.documents.logic import check_logic_item

@@ -12,7 +12,9 @@ from arcor2_hw.analysis.snapshot import code_digest
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.project import BareProject, Project
 from arcor2_hw.data.scene import BareScene, Scene
-from arcor2_server.documents.checks import project_problems, scene_problems
+from arcor2_hw.messages import Message
+from arcor2_server.documents.checks.project import project_problems
+from arcor2_server.documents.checks.scene import scene_problems
 from arcor2_server.files import write_private
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.storage import Storage
@@ -21,6 +23,9 @@ log = structlog.get_logger(__name__)
 
 _CHECKS: Final = Path(__file__).parent
 """The directory of the checks. Stored problems are outdated when its code changes."""
+
+Problems = dict[str, list[Message]]
+"""Problems by id of the document."""
 
 
 class Checked(Data, frozen=True, array_like=True):
@@ -32,7 +37,7 @@ class Checked(Data, frozen=True, array_like=True):
     """
 
     sources: tuple[str, ...]
-    problems: list[str]
+    problems: list[Message]
 
 
 class Stored(Data, frozen=True):
@@ -62,7 +67,7 @@ class SavedProblems:
         if self._writing is not None:
             await self._writing
 
-    async def of_scenes(self, scenes: Sequence[BareScene]) -> dict[str, list[str]]:
+    async def of_scenes(self, scenes: Sequence[BareScene]) -> Problems:
         """Return the problems of each of these saved scenes by id."""
         async with self._changing:
             known = await self._known()
@@ -73,7 +78,7 @@ class SavedProblems:
             self._store(msgspec.structs.replace(known, scenes=checked))
         return {key: each.problems for key, each in checked.items()}
 
-    async def of_projects(self, projects: Sequence[BareProject], scenes: Sequence[BareScene]) -> dict[str, list[str]]:
+    async def of_projects(self, projects: Sequence[BareProject], scenes: Sequence[BareScene]) -> Problems:
         """Return the problems of each of these saved projects by id, given all saved scenes."""
         async with self._changing:
             known = await self._known()
@@ -87,10 +92,10 @@ class SavedProblems:
             self._store(msgspec.structs.replace(known, projects=checked))
         return {key: each.problems for key, each in checked.items()}
 
-    def _checker(self, scenes: Mapping[str, Scene]) -> Callable[[Sequence[Project]], dict[str, list[str]]]:
-        def check(project: Project) -> list[str]:
+    def _checker(self, scenes: Mapping[str, Scene]) -> Callable[[Sequence[Project]], Problems]:
+        def check(project: Project) -> list[Message]:
             if (scene := scenes.get(project.scene_id)) is None:
-                return [f"The scene of the project {project.name} does not exist."]
+                return [Message.of("The scene of the project {name} does not exist.", name=project.name)]
             return project_problems(scene, project, self._types)
 
         return lambda projects: {project.id: check(project) for project in projects}
@@ -126,7 +131,7 @@ def _outdated(sources: Mapping[str, tuple[str, ...]], checked: Mapping[str, Chec
 
 
 def _merged(
-    sources: Mapping[str, tuple[str, ...]], checked: Mapping[str, Checked], fresh: Mapping[str, list[str]]
+    sources: Mapping[str, tuple[str, ...]], checked: Mapping[str, Checked], fresh: Problems
 ) -> dict[str, Checked]:
     """Merge stored and new problems; a document that was deleted before it could be read has none."""
     return {

@@ -13,8 +13,9 @@ from arcor2_hw.data.base import now
 from arcor2_hw.data.project import BareProject, Project
 from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_hw.exceptions import NotFound, StorageError
+from arcor2_hw.messages import Message
 from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Kind
-from arcor2_server.documents.checks import scene_problems
+from arcor2_server.documents.checks.scene import scene_problems
 from arcor2_server.documents.closed_history import ClosedHistories
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.history import History
@@ -317,6 +318,6 @@ class Session(OpenDocument):
             raise
 
     # ------------------------------------------------------------------------------------------ problems
-    def scene_problems(self, scene: Scene) -> list[str]:
+    def scene_problems(self, scene: Scene) -> list[Message]:
         """Return the problems of a scene, empty if it can be opened."""
         return scene_problems(scene, self._types)

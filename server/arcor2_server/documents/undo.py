@@ -7,7 +7,7 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.project import END, START
 from arcor2_hw.data.role import Role
 from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Kind, net
-from arcor2_server.documents.checks import Types
+from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.consistency import Inconsistent, check_consistent, title
 from arcor2_server.documents.document import ROOTS, Document
 from arcor2_server.documents.history import History

@@ -13,7 +13,8 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, InvalidProject, NotFound
 from arcor2_server.build import script
 from arcor2_server.build.combined_types import CombinedTypes
-from arcor2_server.documents.checks import project_findings, scene_findings
+from arcor2_server.documents.checks.project import project_findings
+from arcor2_server.documents.checks.scene import scene_findings
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.exchange.archive import PROJECT, SCENE, SCRIPT, Archive, mesh_of
 

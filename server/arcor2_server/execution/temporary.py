@@ -11,11 +11,12 @@ from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ChangeType, MainScreen, OpenProjectData, SceneStateEnum, ShowMainScreenData
 from arcor2_hw.data.project import Project
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 from arcor2_server.build.service import BuildService
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.documents import Session
-from arcor2_server.documents.checks import project_problems
+from arcor2_server.documents.checks.project import project_problems
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
@@ -205,7 +206,7 @@ class TemporaryRuns:
         project = await self._storage.project(project_id)
         scene = await self._storage.scene(project.scene_id)
         if problems := project_problems(scene, project, self._types):
-            raise RequestRefused(" ".join(problems))
+            raise RequestRefused(Message.joined(problems))
         project = with_present_names(scene, project, self._types)
         await self.session.show(scene, project)
         return OpenProjectData(scene, project)

@@ -21,7 +21,7 @@ from arcor2_hw.data.rpc import (
 from arcor2_server.collaboration.locks import PROJECT, Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
-from arcor2_server.documents.checks import check_name
+from arcor2_server.documents.checks.names import check_name
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.item_indexes import OWNED
 from arcor2_server.documents.removal import require_point_unused

@@ -12,7 +12,7 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
-from arcor2_server.documents.checks import (
+from arcor2_server.documents.checks.actions import (
     action_meta,
     check_flows,
     check_outputs_unique,

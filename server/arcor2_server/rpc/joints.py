@@ -18,7 +18,7 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
-from arcor2_server.documents.checks import check_name
+from arcor2_server.documents.checks.names import check_name
 from arcor2_server.errors import RequestRefused
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rpc.editing import Editing

@@ -12,7 +12,7 @@ from arcor2_hw.data.rpc import AddLogicItemArgs, RemoveLogicItemArgs, UpdateLogi
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
-from arcor2_server.documents.checks import action_meta
+from arcor2_server.documents.checks.actions import action_meta
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.item_indexes import action_of
 from arcor2_server.documents.logic import check_logic_item

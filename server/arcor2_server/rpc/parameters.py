@@ -21,7 +21,8 @@ from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.collaboration.locks import PROJECT, Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
-from arcor2_server.documents.checks import check_project_parameter, check_setting
+from arcor2_server.documents.checks.project import check_project_parameter
+from arcor2_server.documents.checks.scene import check_setting
 from arcor2_server.documents.document import Document
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes
@@ -92,7 +93,8 @@ class ParameterRequests:
         """Return the document and the overrides of an object; check that `given` is a valid value of a setting."""
         document = self._session.require_project_open()
         obj = document.scene_object(object_id)
-        settings = {setting.name: setting for setting in self._types.meta(obj.type).settings}
+        meta = self._types.meta(obj.type)
+        settings = {setting.name: setting for setting in meta.settings}
         if given.name not in settings:
             raise NotFound("{type} has no setting {name}.", type=obj.type, name=given.name)
         check_setting(given, settings[given.name])

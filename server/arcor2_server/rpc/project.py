@@ -21,10 +21,11 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import NotFound
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.locks import PROJECT, Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
-from arcor2_server.documents.checks import project_problems
+from arcor2_server.documents.checks.project import project_problems
 from arcor2_server.documents.document import reduce_to
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.errors import RequestRefused
@@ -96,7 +97,7 @@ class ProjectRequests:
             scene = await self._scene_for(context, args.scene_id)
             if problems := session.scene_problems(scene):
                 raise RequestRefused(
-                    "{name} cannot be opened. {problems}", name=scene.name, problems=" ".join(problems)
+                    "{name} cannot be opened. {problems}", name=scene.name, problems=Message.joined(problems)
                 )
             # Another request may have opened a project meanwhile.
             self._require_no_project(context)
@@ -127,7 +128,7 @@ class ProjectRequests:
             await self._type_notifications.publish()
             if problems := project_problems(scene, project, self._types):
                 raise RequestRefused(
-                    "{name} cannot be opened. {problems}", name=project.name, problems=" ".join(problems)
+                    "{name} cannot be opened. {problems}", name=project.name, problems=Message.joined(problems)
                 )
             await self._save_scene_changes(context)
             await session.show(session.scene or scene, with_present_names(scene, project, self._types))

@@ -16,6 +16,7 @@ from arcor2_hw.data.rpc import (
     UpdateSceneDescriptionArgs,
 )
 from arcor2_hw.data.scene import BareScene, Scene
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.locks import SCENE, Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
@@ -68,7 +69,7 @@ class SceneRequests:
             await self._type_notifications.publish()
             if problems := session.scene_problems(scene):
                 raise RequestRefused(
-                    "{name} cannot be opened. {problems}", name=scene.name, problems=" ".join(problems)
+                    "{name} cannot be opened. {problems}", name=scene.name, problems=Message.joined(problems)
                 )
             await session.show(scene)
             self._emit_opened(context, session.require_scene())

@@ -20,10 +20,12 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.locks import ADDING_OBJECT, SCENE, Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
-from arcor2_server.documents.checks import check_name, object_problems, settings_problems
+from arcor2_server.documents.checks.names import check_name
+from arcor2_server.documents.checks.scene import object_problems, settings_problems
 from arcor2_server.documents.dependents import VIRTUAL, Dependents
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.derived_types import virtual_source
@@ -72,7 +74,7 @@ class SceneObjectRequests:
     async def _add(self, context: Context, obj: SceneObject) -> None:
         self._editing.require_name_free(Kind.OBJECT, obj.name, "an object")
         if problems := object_problems(obj, self._types):
-            raise InvalidData(" ".join(problems))
+            raise InvalidData(Message.joined(problems))
         await self._editing.commit_one(context, self._session.document.add(Kind.OBJECT, obj.id, obj))
 
     @rpc("AddVirtualCollisionObjectToScene")
@@ -128,7 +130,7 @@ class SceneObjectRequests:
         self._online.require_offline()
         obj = document.scene_object(args.id)
         if problems := settings_problems(obj.name, args.parameters, self._types.meta(obj.type)):
-            raise InvalidData(" ".join(problems))
+            raise InvalidData(Message.joined(problems))
         self._editing.require_locked(context, args.id)
         parameters = await self._editing.hide_secrets(context, obj, args.parameters, obj.parameters)
         self._editing.require_locked(context, args.id)

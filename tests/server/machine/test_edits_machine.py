@@ -17,7 +17,8 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 from arcor2_hw.data.project import Action
 from arcor2_hw.data.rpc import RPCS
 from arcor2_server.documents.changes import Kind
-from arcor2_server.documents.checks import action_meta, project_problems
+from arcor2_server.documents.checks.actions import action_meta
+from arcor2_server.documents.checks.project import project_problems
 from arcor2_server.documents.logic import check_logic_item
 from tests.server.crash_copy import copy_at_one_moment
 from tests.server.document_picture import Picture

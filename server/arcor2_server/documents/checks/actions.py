@@ -1,0 +1,206 @@
+"""Checks of actions, their parameters, flows and results."""
+
+import msgspec
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.actions.parameter_types import PARAMETER_TYPES
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.project import (
+    Action,
+    ActionParameter,
+    ActionParameterType,
+    BareActionPoint,
+    Flow,
+    FlowTypes,
+    NamedOrientation,
+    ProjectRobotJoints,
+    parse_link,
+)
+from arcor2_hw.data.project_index import ProjectLookup
+from arcor2_hw.exceptions import Arcor2Error, InvalidData
+from arcor2_server.documents.checks.names import check_name
+from arcor2_server.documents.checks.object_types import Types
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.renamed_actions import with_present_name
+
+
+def check_action(action: Action, lookup: ProjectLookup, types: Types) -> None:
+    """Raise InvalidData or NotFound for an invalid action. Whether its names are free is not checked."""
+    meta = action_meta(action, lookup, types)
+    check_flows(action, meta)
+    complete = complete_parameters(action, meta)
+    check_parameters(complete, meta, lookup, types)
+
+
+class _Unparented:
+    """A lookup without the parents of action points, which are not needed to check references."""
+
+    def __init__(self, lookup: ProjectLookup) -> None:
+        self._lookup = lookup
+        self.scene_object = lookup.scene_object
+        self.action = lookup.action
+        self.parameter = lookup.parameter
+
+    def action_point(self, action_point_id: str) -> BareActionPoint:
+        return replace(self._lookup.action_point(action_point_id), parent=UNSET)
+
+    def orientation(self, orientation_id: str) -> tuple[BareActionPoint, NamedOrientation]:
+        point, orientation = self._lookup.orientation(orientation_id)
+        return replace(point, parent=UNSET), orientation
+
+    def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
+        point, joints = self._lookup.joints(joints_id)
+        return replace(point, parent=UNSET), joints
+
+
+def action_meta(action: Action, lookup: ProjectLookup, types: Types) -> ObjectAction:
+    """Return the metadata of an action.
+
+    Raises:
+        InvalidData: The action is malformed or disabled.
+        NotFound: Its object or method does not exist.
+    """
+    try:
+        object_id, method = action.parse_type()
+    except ValueError as error:
+        raise InvalidData("{reason}.", reason=error) from None
+    obj = lookup.scene_object(object_id)
+    meta = types.action(obj.type, method)
+    if meta.disabled:
+        shown, why = types.meta(obj.type).shown_name, meta.why_disabled
+        raise InvalidData("{method} of {type} cannot be used ({reason}).", method=method, type=shown, reason=why)
+    return meta
+
+
+def check_flows(action: Action, meta: ObjectAction) -> None:
+    """Raise InvalidData for flows that do not fit the results of the action."""
+    flows: list[Flow] = action.flows
+    if [flow.type for flow in flows] != [FlowTypes.DEFAULT]:
+        raise InvalidData("{name}: exactly one flow is needed, of type default.", name=action.name)
+    outputs = flows[0].outputs
+    for output in outputs:
+        check_name(output, "result")
+    if outputs and len(outputs) != len(meta.returns):
+        raise InvalidData(
+            "{name}: {meta_name} returns {count} values, {other_count} names are given.",
+            name=action.name,
+            meta_name=meta.name,
+            count=len(meta.returns),
+            other_count=len(outputs),
+        )
+
+
+def check_outputs_unique(document: Document, action: Action) -> None:
+    """Raise InvalidData for a result name that another action uses, since results become variables of one program."""
+    for output in action.outputs():
+        other = document.named("output", output)
+        if other is not None and other != action.id:
+            raise InvalidData(
+                "{name} names a result {output} already: choose another name.",
+                name=document.action(other)[1].name,
+                output=output,
+            )
+
+
+def complete_parameters(action: Action, meta: ObjectAction) -> Action:
+    """Return the action with present names, and with default values for missing parameters.
+
+    Raises:
+        InvalidData: A parameter is unknown, duplicate, or missing without a default.
+    """
+    action = with_present_name(action, meta)
+    given = {parameter.name: parameter for parameter in action.parameters}
+    if len(given) != len(action.parameters):
+        raise InvalidData("{name}: a parameter is given twice.", name=action.name)
+    if unknown := given.keys() - {parameter.name for parameter in meta.parameters}:
+        raise InvalidData(
+            "{name}: {meta_name} has no parameter {unknown}.",
+            name=action.name,
+            meta_name=meta.name,
+            unknown=", ".join(sorted(unknown)),
+        )
+    filled = list(action.parameters)
+    for parameter in meta.parameters:
+        if parameter.name in given:
+            continue
+        if isinstance(parameter.default_value, Unset):
+            raise InvalidData(
+                "{name}: the parameter {parameter_name} is missing.", name=action.name, parameter_name=parameter.name
+            )
+        filled.append(ActionParameter(parameter.name, parameter.type, parameter.default_value))
+    return action if len(filled) == len(action.parameters) else replace(action, parameters=filled)
+
+
+def check_parameters(action: Action, meta: ObjectAction, lookup: ProjectLookup, types: Types) -> None:
+    """Raise InvalidData for parameters that do not fit the method. None may be missing (see complete_parameters)."""
+    declared = {parameter.name: parameter for parameter in meta.parameters}
+    robot_id = action.parse_type()[0]
+    unparented = _Unparented(lookup)
+    for parameter in action.parameters:
+        wanted = declared[parameter.name]
+        try:
+            match parameter.type:
+                case ActionParameterType.PROJECT_PARAMETER:
+                    _check_project_parameter(parameter, wanted, lookup)
+                case ActionParameterType.LINK:
+                    _check_link(action, parameter, wanted, lookup, types)
+                case _ if wanted.type in PARAMETER_TYPES:
+                    PARAMETER_TYPES[wanted.type].check(parameter, wanted, unparented, robot_id)
+                case _:
+                    raise InvalidData(
+                        "parameter {name} is of the unknown type {type}", name=wanted.name, type=wanted.type
+                    )
+        except Arcor2Error as error:
+            raise InvalidData("{name}: {reason}", name=action.name, reason=error) from error
+
+
+def _text(parameter: Parameter) -> str:
+    try:
+        return msgspec.json.decode(parameter.value, type=str)
+    except msgspec.DecodeError:
+        raise InvalidData(
+            "parameter {name}: {value} is not a JSON string.", name=parameter.name, value=parameter.value[:80]
+        ) from None
+
+
+def _check_project_parameter(parameter: Parameter, wanted: ParameterMeta, lookup: ProjectLookup) -> None:
+    source = lookup.parameter(_text(parameter))
+    if source.type != wanted.type:
+        raise InvalidData(
+            "parameter {name} is {type}, the project parameter {source_name} is {source_type}.",
+            name=wanted.name,
+            type=wanted.type,
+            source_name=source.name,
+            source_type=source.type,
+        )
+
+
+def _check_link(
+    action: Action, parameter: Parameter, wanted: ParameterMeta, lookup: ProjectLookup, types: Types
+) -> None:
+    try:
+        source_id, flow, index = parse_link(_text(parameter))
+    except ValueError as error:
+        raise InvalidData("parameter {name}: {reason}.", name=wanted.name, reason=error) from None
+    if source_id == action.id:
+        raise InvalidData("parameter {name} cannot be linked to a result of the same action.", name=wanted.name)
+    _, source = lookup.action(source_id)
+    returns, outputs = action_meta(source, lookup, types).returns, source.outputs()
+    if flow != FlowTypes.DEFAULT or len(outputs) != len(returns) or index >= len(returns):
+        raise InvalidData(
+            "parameter {name}: {source_name} has no named result number {index}. Name its results.",
+            name=wanted.name,
+            source_name=source.name,
+            index=index,
+        )
+    if returns[index] != wanted.type:
+        raise InvalidData(
+            "parameter {name} is {type}, the result {output} is {return_value}.",
+            name=wanted.name,
+            type=wanted.type,
+            output=outputs[index],
+            return_value=returns[index],
+        )
