@@ -9,6 +9,7 @@ from arcor2_hw.data.project import ActionParameter, BareProject, Flow, Project, 
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc.envelope import Rpc
 from arcor2_hw.data.rpc.general import IdArgs
+from arcor2_hw.messages import Message
 
 
 class AddActionArgs(Data, frozen=True):
@@ -51,9 +52,10 @@ class CopyProjectArgs(Data, frozen=True):
 
 
 class ListProjectsData(BareProject, frozen=True):
-    """Answer to ListProjects."""
+    """Answer to ListProjects; `problem_messages` as in ListScenes."""
 
     problems: list[str] | Unset = UNSET
+    problem_messages: list[Message] | Unset = UNSET
 
 
 class NewProjectArgs(Data, frozen=True):

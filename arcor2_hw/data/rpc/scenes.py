@@ -16,6 +16,7 @@ from arcor2_hw.data.rpc.envelope import Rpc
 from arcor2_hw.data.rpc.general import IdArgs, RenameArgs
 from arcor2_hw.data.rpc.operation import RetryObjectArgs
 from arcor2_hw.data.scene import Scene
+from arcor2_hw.messages import Message
 
 
 class AddObjectToSceneArgs(Data, frozen=True):
@@ -67,7 +68,7 @@ class CopySceneArgs(Data, frozen=True):
 
 
 class ListScenesData(Data, frozen=True):
-    """Answer to ListScenes."""
+    """Answer to ListScenes. `problem_messages`: the problems with what is needed to translate them, if requested."""
 
     id: str
     name: str
@@ -75,6 +76,7 @@ class ListScenesData(Data, frozen=True):
     modified: Timestamp
     description: str | Unset = UNSET
     problems: list[str] | Unset = UNSET
+    problem_messages: list[Message] | Unset = UNSET
 
 
 class NewSceneArgs(Data, frozen=True):

@@ -8,6 +8,11 @@ from msgspec import Raw
 from arcor2_server.events import encode
 
 
+def cache_name(request: str, codes: bool) -> str:
+    """Return the name of a cached answer, which depends on whether the caller asked for codes."""
+    return f"{request} with codes" if codes else request
+
+
 class AnswerCache:
     """Encoded answers by name. An answer is valid for the revisions of its sources from which it was made."""
 

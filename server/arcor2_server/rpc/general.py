@@ -76,7 +76,7 @@ class GeneralRequests:
         return _system_info(len(DECLARED))
 
     @cached("SystemInfo")
-    def cached_system_info(self) -> Raw:
+    def cached_system_info(self, codes: bool) -> Raw:
         """Return the encoded answer to SystemInfo."""
         return _system_info(len(DECLARED))
 

@@ -1,5 +1,6 @@
 """Requests about object types."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -7,7 +8,7 @@ from msgspec import UNSET, Raw
 
 from arcor2_hw.data.base import Unset, is_valid_name
 from arcor2_hw.data.events import ChangeType
-from arcor2_hw.data.object_type import Mesh, Models, ObjectTypeMeta, ObjectTypeSource
+from arcor2_hw.data.object_type import Disableable, Mesh, Models, ObjectTypeMeta, ObjectTypeSource
 from arcor2_hw.data.parameter import IdValue
 from arcor2_hw.data.rpc import ActionParamValuesArgs, DeleteObjectTypesData, IdArgs, TypeArgs
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
@@ -17,7 +18,7 @@ from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.derived_types import derived_source
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
-from arcor2_server.rpc.answer_cache import AnswerCache
+from arcor2_server.rpc.answer_cache import AnswerCache, cache_name
 from arcor2_server.rpc.registry import Context, cached, rpc
 from arcor2_server.storage import AssetStore, Storage
 
@@ -63,18 +64,23 @@ class ObjectTypeRequests:
     @rpc("GetObjectTypes")
     async def get_object_types(self, context: Context, args: None) -> Raw:
         """Return all object types, including built-in and disabled ones."""
-        return self._answer_cache.get_or_encode("GetObjectTypes", (self._types.revision,), self._types.metas)
+        return self._listed("GetObjectTypes", context, self._types.metas)
+
+    def _listed(self, name: str, context: Context, items: Callable[[], Sequence[Disableable]]) -> Raw:
+        """Return the cached answer with these items, else encode it."""
+        name, revisions = cache_name(name, context.codes), (self._types.revision,)
+        return self._answer_cache.get_or_encode(name, revisions, lambda: context.translatable(items()))
 
     @cached("GetObjectTypes")
-    def cached_object_types(self) -> Raw | None:
+    def cached_object_types(self, codes: bool) -> Raw | None:
         """Return the cached object types, None if they are outdated."""
-        return self._answer_cache.get("GetObjectTypes", (self._types.revision,))
+        return self._answer_cache.get(cache_name("GetObjectTypes", codes), (self._types.revision,))
 
     @rpc("GetActions")
     async def get_actions(self, context: Context, args: TypeArgs) -> Raw:
         """Return the actions of an object type."""
         actions = self._types.actions(args.type)
-        return self._answer_cache.get_or_encode(f"GetActions {args.type}", (self._types.revision,), lambda: actions)
+        return self._listed(f"GetActions {args.type}", context, lambda: actions)
 
     @rpc("GetRobotMeta")
     async def get_robot_meta(self, context: Context, args: None) -> Raw:

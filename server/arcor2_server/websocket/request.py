@@ -1,16 +1,18 @@
 """The context of a request: its client and the events that it sends."""
 
 import time
-from collections.abc import Awaitable, Callable
-from typing import Any
+from collections.abc import Awaitable, Callable, Iterable
+from typing import Any, TypeVar
 
 from msgspec import Raw
 
-from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.base import UNSET, TranslatableData
 from arcor2_hw.data.events import ChangeType, Event
 from arcor2_server.errors import NotRegistered
 from arcor2_server.events import make_event
 from arcor2_server.websocket.client import Client
+
+T = TypeVar("T", bound=TranslatableData)
 
 
 class Context:
@@ -22,6 +24,7 @@ class Context:
 
     __slots__ = (
         "client",
+        "codes",
         "dry_run",
         "events_after",
         "events_before",
@@ -30,10 +33,12 @@ class Context:
         "request",
     )
 
-    def __init__(self, client: Client, dry_run: bool = False, request: str = "") -> None:
+    def __init__(self, client: Client, dry_run: bool = False, request: str = "", codes: bool = False) -> None:
         self.client = client
         self.dry_run = dry_run
         self.request = request
+        self.codes = codes
+        """Whether the caller asked for what is needed to translate messages."""
         self.received_at = time.monotonic()
         """Time of receipt, s of the monotonic clock."""
         self.events_before: list[Event] = []
@@ -48,6 +53,10 @@ class Context:
             raise NotRegistered("You are not logged in: send RegisterUser first.")
         return self.client.user
 
+    def translatable(self, items: Iterable[T]) -> list[T]:
+        """Return items of the answer, with `key` and `values` only if the caller asked for them."""
+        return [*items] if self.codes else [item.untranslated() for item in items]
+
     def emit(self, name: str, data: Any = UNSET, change: ChangeType | None = None, parent: str | None = None) -> None:
         """Send an event to all clients after the response."""
         self.events_after.append(make_event(name, data, change, parent))
@@ -61,5 +70,5 @@ class Context:
 
 Handler = Callable[[Context, Any], Awaitable[Any]]
 """Takes the context and the decoded arguments (None if the request has none); returns the data of the answer."""
-CachedAnswer = Callable[[], Raw | None]
-"""Returns the encoded data of an answer if it is cached, else None."""
+CachedAnswer = Callable[[bool], Raw | None]
+"""Takes whether the caller asked for codes; returns the encoded data of an answer if it is cached, else None."""

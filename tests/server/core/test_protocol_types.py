@@ -19,6 +19,8 @@ ADDED = {
     "RobotEef.Data": {"time_ms"},
     "RobotFeatures": {"jog", "acknowledge_stop", "kinematic_calibration"},
     "RobotJoints.Data": {"time_ms"},
+    "ListProjects.Response.Data": {"problem_messages"},
+    "ListScenes.Response.Data": {"problem_messages"},
     "ActionResult.Data": TRANSLATION,
     "Notification.Data": TRANSLATION,
     "ProcessState.Data": TRANSLATION,

@@ -5,6 +5,10 @@ from typing import Any
 
 import pytest
 
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import Scene, SceneObject
 from tests.server.session.session_server import Person, SessionServer
 from tests.server.session.work import Work
 
@@ -66,3 +70,43 @@ async def test_only_changed_documents_are_checked_again(
     await alice.ask("DeleteProject", id=project)
     assert len(await alice.ask("ListProjects")) == 3
     assert len(server.services.saved_problems._stored.projects) == 3  # nothing is stored for the deleted one
+
+
+async def test_problems_can_be_translated_by_clients_that_ask_for_codes(server: SessionServer, alice: Person) -> None:
+    lamp = SceneObject("lamp", "NoSuchType", id="obj_lamp")
+    scale = SceneObject("scale", "WeighingMachine", Pose(), [Parameter("bogus", "string", '""')], "obj_scale")
+    await server.services.storage.put_scene(Scene("bad", id="scn_bad", objects=[lamp, scale]))
+    await server.services.storage.put_project(Project("job", "scn_bad", id="pro_bad"))
+    for request in ("ListScenes", "ListProjects"):
+        (plain,) = await alice.ask(request)
+        (translatable,) = await alice.ask(request, codes=True)
+        assert "problem_messages" not in plain
+        messages = translatable.pop("problem_messages")
+        assert translatable == plain
+        assert [each["text"] for each in messages] == plain["problems"]
+        assert messages[:2] == [
+            {
+                "text": "lamp: the object type NoSuchType does not exist.",
+                "key": "{name}: the object type {type} does not exist.",
+                "values": {"name": "lamp", "type": "NoSuchType"},
+            },
+            {
+                "text": "scale: WeighingMachine has no setting bogus.",
+                "key": "{name}: {type} has no setting {setting}.",
+                "values": {"name": "scale", "type": "WeighingMachine", "setting": "bogus"},
+            },
+        ]
+        # Both answers are cached, each for its clients.
+        assert await alice.ask(request) == [plain]
+        assert (await alice.ask(request, codes=True))[0]["problem_messages"] == messages
+
+
+async def test_a_refusal_with_several_problems_can_be_translated(server: SessionServer, alice: Person) -> None:
+    objects = [SceneObject(name, "NoSuchType", id=f"obj_{name}") for name in ("lamp", "scale")]
+    await server.services.storage.put_scene(Scene("bad", id="scn_bad", objects=objects))
+    request = {"id": 1, "request": "OpenScene", "args": {"id": "scn_bad"}, "codes": True}
+    answer = await alice.send(request)
+    assert answer["key"] == "{name} cannot be opened. {problems}"
+    problems = answer["values"]["problems"]
+    assert [each["values"]["name"] for each in problems["values"].values()] == ["lamp", "scale"]
+    assert answer["messages"] == [f"bad cannot be opened. {problems['text']}"]
