@@ -18,8 +18,9 @@ from arcor2_server.rest.responses import http_refusal
 from arcor2_server.web.editor import editor_routes
 from arcor2_server.web.response_headers import add_headers
 from arcor2_server.websocket.classic_ports import SOCKET
-from arcor2_server.websocket.endpoint import Endpoint, Service, routes
+from arcor2_server.websocket.endpoint import Endpoint
 from arcor2_server.websocket.execution_endpoint import execution_service
+from arcor2_server.websocket.routes import Service, routes
 
 
 @websocket(["/", "/{path:path}"], opt={ROLE: Role.OPERATOR})

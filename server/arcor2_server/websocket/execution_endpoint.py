@@ -9,8 +9,8 @@ from arcor2_hw.data.base import Data
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import Rpc
-from arcor2_server.websocket.endpoint import AUTHENTICATE, Route, Service
 from arcor2_server.websocket.request import Context
+from arcor2_server.websocket.routes import AUTHENTICATE, Route, Service
 
 API_VERSION: Final = "1.2.0"
 """Version of the Execution service of ARCOR2 whose behaviour this is. ARServer of ARCOR2 checks the major version."""

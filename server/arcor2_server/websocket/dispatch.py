@@ -1,0 +1,131 @@
+"""From a decoded request to its handler, and from the result to the answer."""
+
+import logging
+import secrets
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import msgspec
+import structlog
+from msgspec import UNSET
+
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc import Request, Rpc
+from arcor2_hw.data.texts import SHORTEST, check_texts
+from arcor2_hw.exceptions import Arcor2Error, TextTooLong
+from arcor2_hw.messages import Message
+from arcor2_server.errors import RequestRefused
+from arcor2_server.log import audit
+from arcor2_server.websocket.answers import Head, answer, refusal, shortened
+from arcor2_server.websocket.client import Client
+from arcor2_server.websocket.hub import Hub
+from arcor2_server.websocket.request import Context
+from arcor2_server.websocket.routes import Route
+
+log = structlog.get_logger(__name__)
+
+
+def refuse(client: Client, request: "Request | Head", message: str | Message, code: str = "") -> None:
+    """Send the answer to a refused request."""
+    encoded = refusal(request, message, code)
+    if log.is_enabled_for(logging.DEBUG):
+        log.debug("refused", client=client.number, request=request.request[:200], message=shortened(str(message)))
+    client.put(encoded)
+
+
+class Dispatcher:
+    """Calls the handlers of requests and answers them."""
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._holds: WeakKeyDictionary[Client, tuple[str, str, int, str]] = WeakKeyDictionary()
+        """The last logged hold-to-run request of each client."""
+
+    def answer_from_cache(self, client: Client, request: Request, route: Route) -> bool:
+        """Send the cached answer if there is one; return whether it was sent."""
+        if client.role < route.rpc.role or route.cached is None:
+            return False
+        try:
+            data = route.cached(request.codes)
+        except Exception:
+            # The handler will meet the same error and report it.
+            log.exception("cached answer failed", request=request.request)
+            return False
+        if data is not None:
+            client.put(answer(request, data))
+        return data is not None
+
+    async def handle(self, client: Client, request: Request, route: Route) -> None:
+        """Handle a request and send its answer."""
+        try:
+            await self._run(client, request, route)
+        except Exception:
+            reference = secrets.token_hex(4)
+            log.exception("request failed", request=request.request, reference=reference, user=client.user)
+            message = f"An error inside the server: see its log, reference {reference}."
+            refuse(client, request, message, "internal")
+
+    async def _run(self, client: Client, request: Request, route: Route) -> None:
+        rpc = route.rpc
+        if client.role < rpc.role:
+            needed = f"{rpc.name} needs the role {Role(rpc.role).name.lower()} or a higher one."
+            refuse(client, request, needed, "forbidden")
+            self._note("forbidden", client, rpc, UNSET)
+            return
+        args = route.default
+        if route.decode is not None:
+            if not isinstance(request.args, msgspec.UnsetType):
+                try:
+                    args = route.decode(request.args)
+                    if len(request.args) > SHORTEST:
+                        check_texts(args)
+                except TextTooLong as error:
+                    refuse(client, request, f"The arguments of {rpc.name} are wrong: {error}", error.code)
+                    return
+                except (msgspec.DecodeError, RecursionError) as error:
+                    wrong = f"The arguments of {rpc.name} are wrong: {error}."
+                    refuse(client, request, wrong, "invalid_arguments")
+                    return
+            elif args is UNSET:
+                refuse(client, request, f"The arguments of {rpc.name} are missing.", "invalid_arguments")
+                return
+        if route.handler is None:
+            refuse(client, request, f"{rpc.name} is not available in this version.", "not_available")
+            return
+        context = Context(client, request.dry_run and rpc.dry_run, rpc.name, request.codes)
+        try:
+            data = await route.handler(context, args)
+        except Arcor2Error as error:
+            if error.detail:
+                log.info("request refused", request=rpc.name, reason=shortened(str(error)), detail=error.detail)
+            if isinstance(error, RequestRefused) and error.data is not UNSET:  # a part of the request was done
+                self._send(client, refusal(request, error.message, error.code, error.data), context)
+            else:
+                refuse(client, request, error.message, error.code)
+            self._note("refused", client, rpc, args, dry_run=context.dry_run)
+            return
+        self._send(client, answer(request, UNSET if data is None else data), context)
+        self._note("done", client, rpc, args, dry_run=context.dry_run)
+
+    def _note(self, outcome: str, client: Client, rpc: Rpc, args: Any, *, dry_run: bool = False) -> None:
+        """Log a command, or any request refused by role. A hold-to-run request is logged once, not on each renewal."""
+        if outcome != "forbidden" and (dry_run or not audit.is_command(rpc)):
+            return
+        if (hold := getattr(args, "hold", None)) is not None:
+            logged = (rpc.name, args.robot_id, hold, outcome)
+            if self._holds.get(client) == logged:
+                return
+            self._holds[client] = logged
+        target = audit.target_of(args)
+        audit.note(outcome, rpc.name, user=client.name, role=client.role, address=client.address, target=target)
+
+    def _send(self, client: Client, message: bytes, context: Context) -> None:
+        """Send an answer with the events of its request."""
+        broadcast = self._hub.broadcast
+        for event in context.events_before:
+            broadcast(event)
+        client.put(message)
+        for event in context.events_to_caller:
+            self._hub.send(client, event)
+        for event in context.events_after:
+            broadcast(event)
