@@ -20,6 +20,7 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.kinematics.arm import Arm
 from arcor2_hw.kinematics.inverse import CollisionCheck
 from arcor2_hw.kinematics.shapes import Array, Shape
+from arcor2_hw.messages import Message
 
 
 class Contact(Data, frozen=True):
@@ -29,8 +30,13 @@ class Contact(Data, frozen=True):
     second: str
     depth: float
 
+    @property
+    def message(self) -> Message:
+        """The names of both things."""
+        return Message.of("{first} and {second}", first=self.first, second=self.second)
+
     def __str__(self) -> str:
-        return f"{self.first} and {self.second}"
+        return self.message.text
 
 
 class Clearance(Data, frozen=True):

@@ -10,6 +10,7 @@ from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Reach
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
+from arcor2_hw.messages import Message
 
 if TYPE_CHECKING:
     from arcor2_hw.collision.world import CollisionWorld
@@ -89,15 +90,17 @@ def _judge(collisions: "CollisionWorld", robot: str, model: "RobotModel", joints
     try:
         q = model.values(joints)
     except ModelError as error:
-        return t.Judged(Reach.UNKNOWN, str(error))
+        return t.Judged(Reach.UNKNOWN, error.message)
     for column, joint in enumerate(model.joints):
         if not joint.lower - 1e-6 <= q[column] <= joint.upper + 1e-6:
-            return t.Judged(Reach.OUT_OF_REACH, f"The joint {joint.name} is beyond its limits.")
+            message = Message.of("The joint {joint} is beyond its limits.", joint=joint.name)
+            return t.Judged(Reach.OUT_OF_REACH, message)
     if contacts := collisions.contacts(robot, q):
-        return t.Judged(Reach.IN_COLLISION, f"In collision: {contacts[0]}.")
+        return t.Judged(Reach.IN_COLLISION, Message.of("In collision: {contact}.", contact=contacts[0]))
     near = [name for end_effector in model.end_effectors for name in _near(model, end_effector, q)]
     if near:
-        return t.Judged(Reach.NEAR_LIMIT, f"Near a limit: {', '.join(dict.fromkeys(near))}.")
+        names = ", ".join(dict.fromkeys(near))
+        return t.Judged(Reach.NEAR_LIMIT, Message.of("Near a limit: {joints}.", joints=names))
     return t.Judged(Reach.REACHABLE)
 
 

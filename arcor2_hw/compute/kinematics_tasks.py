@@ -14,6 +14,7 @@ from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.editor import Reach
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
+from arcor2_hw.messages import Message
 
 _FUNCTIONS = "arcor2_hw.compute.kinematics_functions"
 
@@ -91,7 +92,7 @@ class Judged(Data, frozen=True):
     """Whether an end effector reaches a pose; `reason` is a sentence when it does not, or only with reservation."""
 
     reach: Reach
-    reason: str = ""
+    reason: Message | None = None
 
 
 class JudgePoses(Task[list[Judged]], frozen=True):

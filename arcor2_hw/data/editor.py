@@ -224,8 +224,11 @@ class Reach(enum.StrEnum):
     UNKNOWN = "unknown"
 
 
-class ReachOfItem(Data, frozen=True):
-    """How an end effector reaches an orientation or joints; `reason` is a sentence when it does not."""
+class ReachOfItem(TranslatableData, frozen=True):
+    """How an end effector reaches an orientation or joints; `reason` is a sentence when it does not.
+
+    `key` and `values` are those of the reason.
+    """
 
     id: str
     reach: Reach

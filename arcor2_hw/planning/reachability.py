@@ -9,11 +9,12 @@ from typing import Final
 import numpy as np
 
 from arcor2_hw.collision.world import CollisionWorld
-from arcor2_hw.data.base import Data
+from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.kinematics.arm import NEAR_SINGULAR, Arm
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
+from arcor2_hw.messages import Message
 
 CACHE_SIZE: Final = 20_000
 """Maximum number of cached poses."""
@@ -38,12 +39,12 @@ class Judgement(Data, frozen=True):
     Attributes:
         reach: How the arm reaches the pose.
         joints: Joint values of the arm, empty when it is out of reach.
-        reason: Why it is not reachable without reservation: a sentence, or empty.
+        reason: Why it is not reachable, or only with reservation; None if it is reachable.
     """
 
     reach: Reach
     joints: tuple[float, ...] = ()
-    reason: str = ""
+    reason: Message | None = None
 
 
 @dataclass(eq=False, slots=True)
@@ -60,7 +61,7 @@ class _Candidate:
 
     q: Array
     whole: Array
-    reservation: str | None = None
+    reservation: Message | Unset | None = UNSET
     box: Array | None = None
     state: _State = (-1, b"")
 
@@ -184,31 +185,39 @@ class Reachability:
             if not self._world.is_free(self._name, one.whole):
                 hit = hit or Judgement(Reach.IN_COLLISION, joints, self._collision(one.whole))
                 continue
-            if one.reservation is None:
+            if isinstance(one.reservation, Unset):
                 one.reservation = self._reservation(one.q)
-            if not one.reservation:
+            if one.reservation is None:
                 return Judgement(Reach.REACHABLE, joints), _around(boxes)
             second = second or Judgement(Reach.NEAR_LIMIT, joints, one.reservation)
         if best := second or hit:
             return best, _around(boxes)
         return Judgement(Reach.OUT_OF_REACH, reason=self._reason(entry.target)), None
 
-    def _collision(self, whole: Array) -> str:
-        found = self._world.contacts(self._name, whole)
-        return f"Reached only in collision: {found[0] if found else 'too close to an obstacle'}."
+    def _collision(self, whole: Array) -> Message:
+        if found := self._world.contacts(self._name, whole):
+            return Message.of("Reached only in collision: {contact}.", contact=found[0])
+        return Message.of("Reached only in collision: too close to an obstacle.")
 
-    def _reservation(self, q: Array) -> str:
-        if near := self.arm.near_limits(q):
-            return f"{', '.join(near)} would be near {'its limit' if len(near) == 1 else 'their limits'}."
+    def _reservation(self, q: Array) -> Message | None:
+        near = self.arm.near_limits(q)
+        if len(near) == 1:
+            return Message.of("{joint} would be near its limit.", joint=near[0])
+        if near:
+            return Message.of("{joints} would be near their limits.", joints=", ".join(near))
         if self.arm.smallest(q) < NEAR_SINGULAR:
-            return "The arm would be near a singularity."
-        return ""
+            return Message.of("The arm would be near a singularity.")
+        return None
 
-    def _reason(self, target: Array) -> str:
+    def _reason(self, target: Array) -> Message:
         distance = float(np.linalg.norm(target[:3, 3] - self.arm.centre))
         if distance > self.arm.reach:
-            return f"The pose is {distance:.2f} m from the robot, which reaches at most {self.arm.reach:.2f} m."
-        return "The robot does not reach the pose with this orientation."
+            return Message.of(
+                "The pose is {distance:.2f} m from the robot, which reaches at most {reach:.2f} m.",
+                distance=distance,
+                reach=self.arm.reach,
+            )
+        return Message.of("The robot does not reach the pose with this orientation.")
 
 
 def _around(boxes: list[Array]) -> Array:

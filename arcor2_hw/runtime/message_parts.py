@@ -4,6 +4,7 @@ from msgspec import Struct, field
 
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectModel
+from arcor2_hw.messages import Message
 
 
 class AddedBody(Struct, frozen=True):
@@ -36,9 +37,9 @@ class HeldPart(Struct, frozen=True):
 class DeviceStop(Struct, frozen=True):
     """The result of a stop on one device.
 
-    reason: why the device was not stopped; empty if it was. method: the call that the stop interrupted; empty for none.
+    reason: why the device was not stopped; None if it was. method: the call that the stop interrupted; empty for none.
     """
 
     object_id: str
-    reason: str = ""
+    reason: Message | None = None
     method: str = ""

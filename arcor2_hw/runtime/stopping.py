@@ -4,6 +4,7 @@ import time
 from typing import Final, NamedTuple
 
 from arcor2_hw.exceptions import Arcor2Error, Cancelled
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe, until
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.message_parts import DeviceStop
@@ -53,7 +54,7 @@ def outcomes(stops: list[SentStop], within: float = STOP_DEADLINE) -> list[Devic
     found = []
     for stop in stops:
         reason = _reason(stop, deadline, within)
-        if stop.call is not None or reason:
+        if stop.call is not None or reason is not None:
             method = "" if stop.running is None else stop.running.method
             found.append(DeviceStop(stop.device.id, reason, method))
     return found
@@ -70,25 +71,29 @@ def _call_error(stop: SentStop, deadline: float, within: float) -> Arcor2Error |
     return describe(device, call.error)
 
 
-def _reason(stop: SentStop, deadline: float, within: float) -> str:
-    """Return why a device was not stopped; empty if it was."""
+def _reason(stop: SentStop, deadline: float, within: float) -> Message | None:
+    """Return why a device was not stopped; None if it was."""
     error = stop.problem or _call_error(stop, deadline, within)
     if error is not None:
-        return str(error)
+        return error.message
     device, running = stop.device, stop.running
     if running is None:
-        return ""
+        return None
     if stop.call is None:
         if _returned(device, running, min(deadline, time.monotonic() + UNSTOPPABLE_AFTER)):
-            return ""
+            return None
         kind = device.recipe.cls.__name__
-        return (
-            f"{device.name}: {running.method} cannot be stopped, because {kind} has neither stop() nor a "
-            f"CANCEL_MAPPING entry for it"
+        return Message.of(
+            "{device}: {method} cannot be stopped, because {kind} has neither stop() nor a CANCEL_MAPPING entry for it",
+            device=device.name,
+            method=running.method,
+            kind=kind,
         )
     if _returned(device, running, deadline):
-        return ""
-    return f"{device.name}: stop() returned, but {running.method} is still running"
+        return None
+    return Message.of(
+        "{device}: stop() returned, but {method} is still running", device=device.name, method=running.method
+    )
 
 
 def _returned(device: Device, running: Job, deadline: float) -> bool:

@@ -9,6 +9,7 @@ from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Box, Sphere
+from arcor2_hw.messages import Message
 from arcor2_hw.planning.reachability import Judgement, Reach, Reachability
 from tests.kinematics.kin_robots import DOBOT, UR, ur
 
@@ -43,14 +44,15 @@ def test_every_reachability_result_has_a_name_and_reason(world: CollisionWorld, 
         Reach.NEAR_LIMIT,
     ]
     assert np.allclose((BASE * ur().arm("tcp").pose(np.array(answers[0].joints))).matrix(), good.matrix(), atol=1e-5)
-    assert answers[0].reason == ""
-    assert "1.4" in answers[1].reason
-    assert "orientation" in answers[2].reason
-    assert "singular" in answers[3].reason
+    assert answers[0].reason is None
+    assert "1.4" in str(answers[1].reason)
+    assert "orientation" in str(answers[2].reason)
+    assert "singular" in str(answers[3].reason)
     world.put("box", Box(0.1, 0.1, 0.1), good)
     (hit,) = reach.judge([good])
     assert hit.reach is Reach.IN_COLLISION
-    assert "box" in hit.reason
+    contact = Message.of("{first} and {second}", first="arm/wrist_3_link", second="box")
+    assert hit.reason == Message.of("Reached only in collision: {contact}.", contact=contact)
     assert hit.joints
 
 
@@ -63,7 +65,7 @@ def test_a_joint_near_its_limit_is_named() -> None:
     good, near = (arm.pose(np.array(q)) for q in ((0.2, 0.6, 0.5, 0.1), (0.2, 0.6, 0.5, math.radians(89.0))))
     answers = reach.judge([good, near])
     assert [each.reach for each in answers] == [Reach.REACHABLE, Reach.NEAR_LIMIT]
-    assert answers[1].reason == "joint_4 would be near its limit."
+    assert answers[1].reason == Message.of("{joint} would be near its limit.", joint="joint_4")
 
 
 def test_only_changed_poses_are_computed_again(world: CollisionWorld, reach: Reachability) -> None:

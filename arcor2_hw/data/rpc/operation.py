@@ -3,7 +3,7 @@
 import enum
 from typing import Final
 
-from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.role import Role
@@ -80,10 +80,10 @@ class StopKind(enum.StrEnum):
     PROGRAM = "program"
 
 
-class StopOutcome(Data, frozen=True):
+class StopOutcome(TranslatableData, frozen=True):
     """The result of StopAll for one device, the action being executed, or the program.
 
-    id, name: of the scene object, the action or the package. reason: why it was not stopped.
+    id, name: of the scene object, the action or the package. reason: why it was not stopped, with `key` and `values`.
     """
 
     kind: StopKind

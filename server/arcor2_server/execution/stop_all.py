@@ -4,10 +4,11 @@ import asyncio
 from typing import TYPE_CHECKING, Final
 
 import structlog
+from msgspec.structs import replace
 
-from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.rpc import StopAllData, StopKind, StopOutcome
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotFound
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime.messages import DeviceStop
 from arcor2_server.documents import Session
 from arcor2_server.execution.service import Execution
@@ -20,22 +21,32 @@ if TYPE_CHECKING:
 
 log = structlog.get_logger(__name__)
 
-SILENT: Final = "the cell host that controls the devices does not answer; go offline to end it"
+SILENT: Final = Message.of("the cell host that controls the devices does not answer; go offline to end it")
 
 
-async def _stop(host: CellHost, board: "DeviceBoard") -> tuple[str, list[DeviceStop]]:
-    """Stop everything in a host; return the reason for a failure, empty on success, and the outcome per device."""
+async def _stop(host: CellHost, board: "DeviceBoard") -> tuple[Message | None, list[DeviceStop]]:
+    """Stop everything in a host; return the reason for a failure, None on success, and the outcome per device."""
     try:
-        return "", await host.stop_all()
+        return None, await host.stop_all()
     except ConnectionLost:  # before a host ends, it stops and disconnects the devices
-        return "", []
+        return None, []
     except DeviceTimeout:
-        return SILENT, [DeviceStop(status.id, f"{status.name}: {SILENT}") for status in board.statuses()]
+        return SILENT, [
+            DeviceStop(status.id, Message.of("{device}: {reason}", device=status.name, reason=SILENT))
+            for status in board.statuses()
+        ]
 
 
-def _outcome(stop: DeviceStop, names: dict[str, str]) -> StopOutcome:
-    name = names.get(stop.object_id, stop.object_id)
-    return StopOutcome(StopKind.DEVICE, stop.object_id, name, not stop.reason, stop.reason or UNSET)
+def _outcome(kind: StopKind, key: str, name: str, reason: Message | None) -> StopOutcome:
+    outcome = StopOutcome(kind, key, name, reason is None)
+    return outcome if reason is None else replace(outcome, reason=reason.text, **reason.translation())
+
+
+def _of_devices(stops: list[DeviceStop], names: dict[str, str]) -> list[StopOutcome]:
+    return [
+        _outcome(StopKind.DEVICE, stop.object_id, names.get(stop.object_id, stop.object_id), stop.reason)
+        for stop in stops
+    ]
 
 
 class StopAll:
@@ -63,28 +74,25 @@ class StopAll:
         execution = self._execution
         package, board = execution.package_id, execution.board
         names = {status.id: status.name for status in board.statuses()}
-        reason, devices = ("", []) if host is None else await _stop(host, board)
-        outcomes = [_outcome(stop, names) for stop in devices]
-        return [StopOutcome(StopKind.PROGRAM, package, package, not reason, reason or UNSET), *outcomes]
+        reason, devices = (None, []) if host is None else await _stop(host, board)
+        return [_outcome(StopKind.PROGRAM, package, package, reason), *_of_devices(devices, names)]
 
     async def _scene(self, host: CellHost, running: RunningAction | None) -> list[StopOutcome]:
         cell = self._online
         names = {status.id: status.name for status in cell.board.statuses()}
         reason, devices = await _stop(host, cell.board)
-        outcomes = [_outcome(stop, names) for stop in devices]
         if running is None:
-            return outcomes
-        missed = reason
-        for outcome in outcomes:
-            if outcome.id == running.object_id and not outcome.stopped:
-                missed = str(outcome.reason)
-                outcomes.remove(outcome)  # reported with the action
+            return _of_devices(devices, names)
+        for stop in devices:
+            if stop.object_id == running.object_id and stop.reason is not None:
+                reason = stop.reason
+                devices.remove(stop)  # reported with the action
                 break
         if cell.running_action is not running:  # it has ended
-            missed = ""
-        running.cancelled = not missed
-        name = self._name(running.action_id)
-        return [*outcomes, StopOutcome(StopKind.ACTION, running.action_id, name, not missed, missed or UNSET)]
+            reason = None
+        running.cancelled = reason is None
+        action = _outcome(StopKind.ACTION, running.action_id, self._name(running.action_id), reason)
+        return [*_of_devices(devices, names), action]
 
     def _name(self, action_id: str) -> str:
         try:

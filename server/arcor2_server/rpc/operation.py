@@ -140,7 +140,7 @@ class OperationRequests:
         data = await self._stop_all.stop_all(context.client.name)
         if any(outcome.kind is StopKind.ACTION and outcome.stopped for outcome in data.outcomes):
             context.emit("ActionCancelled")
-        return data
+        return StopAllData(context.translatable(data.outcomes))
 
     # ------------------------------------------------------------------------------------------------ streams
     @rpc("StreamRobot")

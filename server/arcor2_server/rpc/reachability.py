@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from arcor2_hw.data.editor import ReachabilityData
 from arcor2_hw.data.rpc import ReachabilityArgs
 from arcor2_server.rpc.registry import Context, rpc
@@ -17,4 +19,5 @@ class ReachabilityRequests:
     @rpc("Reachability")
     async def reachability(self, context: Context, args: ReachabilityArgs) -> list[ReachabilityData]:
         """Return the reachable poses of each end effector. ReachabilityChanged publishes results computed later."""
-        return await self._reachability.ask(args)
+        found = await self._reachability.ask(args)
+        return [replace(each, items=context.translatable(each.items)) for each in found]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import structlog
+from msgspec.structs import replace
 
 from arcor2_hw.collision.description import RobotSource, WorldItem
 from arcor2_hw.compute.kinematics_tasks import DescribeRobot, Judged, JudgeJoints, JudgePoses
@@ -18,6 +19,7 @@ from arcor2_hw.data.project_index import global_pose
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, NotFound
+from arcor2_hw.messages import Message
 from arcor2_server.compute.workers import Compute
 from arcor2_server.documents import Session
 from arcor2_server.events import EventHub, make_event
@@ -241,18 +243,18 @@ class ReachabilityBoard:
             if self._wake.is_set():
                 return  # the next computation uses the new state
 
-    async def _describe(self, robot: SceneObject) -> str:
-        """Update the rows of a robot; return why its model cannot be used, empty if it can."""
+    async def _describe(self, robot: SceneObject) -> Message | None:
+        """Update the rows of a robot; return why its model cannot be used, None if it can."""
         model = self._robot_models.find(robot)
         if model is None:
-            return ""
+            return None
         try:
             await self._update_rows(robot, model)
         except Arcor2Error as error:
             if not any(row.robot == robot.id for row in self._rows.values()):
                 self._rows[robot.id, ""] = _Row(robot.id, "")
-            return str(error)
-        return ""
+            return error.message
+        return None
 
     async def _update_rows(self, robot: SceneObject, model: RobotSource) -> None:
         """Create a row for each end effector of a robot's model, and delete the other rows of the robot."""
@@ -291,7 +293,9 @@ class ReachabilityBoard:
         points = project.action_points if project is not None else ()
         return {each.id: each.joints for point in points for each in point.robot_joints if _is_of(each, row)}
 
-    async def _update(self, row: _Row, robots: list[SceneObject], targets: dict[str, Target], problem: str) -> None:
+    async def _update(
+        self, row: _Row, robots: list[SceneObject], targets: dict[str, Target], problem: Message | None
+    ) -> None:
         """Compute new and possibly changed items. `robots`: the robot, and those with which it may collide."""
         for removed in row.results.keys() - targets.keys():
             del row.results[removed]
@@ -302,7 +306,7 @@ class ReachabilityBoard:
             row.targets.clear()
             row.world = world
         new = {key: target for key, target in targets.items() if row.targets.get(key) != target}
-        if problem:
+        if problem is not None:
             self._note(row, {key: Judged(Reach.UNKNOWN, problem) for key in new}, targets)
             return
         for kind in (list, Pose):
@@ -312,7 +316,7 @@ class ReachabilityBoard:
                 try:
                     judged = await self._judge(row, [new[key] for key in batch])
                 except Arcor2Error as error:
-                    judged = [Judged(Reach.UNKNOWN, str(error))] * len(batch)
+                    judged = [Judged(Reach.UNKNOWN, error.message)] * len(batch)
                 self._note(row, dict(zip(batch, judged, strict=True)), targets)
                 if self._wake.is_set():
                     return
@@ -333,7 +337,10 @@ class ReachabilityBoard:
         """Store the results and publish those that changed."""
         changed = []
         for key, one in judged.items():
-            item = ReachOfItem(key, one.reach, self._scene_collisions.with_names(one.reason) or UNSET)
+            item = ReachOfItem(key, one.reach)
+            if one.reason is not None:
+                reason = self._scene_collisions.named(one.reason)
+                item = replace(item, reason=reason.text, **reason.translation())
             row.targets[key] = targets[key]
             if row.results.get(key) != item:
                 row.results[key] = item

@@ -2,6 +2,7 @@
 
 import functools
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import msgspec
 
@@ -61,30 +62,19 @@ class _InfoEvent(msgspec.Struct):
     data: PackageInfoData
 
 
+@dataclass(frozen=True, slots=True)
 class SceneCollisions:
     """The collision world of the open scene, as the compute worker needs it."""
 
-    def __init__(
-        self,
-        assets: AssetStore,
-        types: ObjectTypes,
-        session: Session,
-        compute: Compute,
-        collisions: ObstacleRegistry,
-        robots: SceneRobots,
-        robot_models: RobotModels,
-        scene_host: HostSession,
-        program_host: HostSession,
-    ) -> None:
-        self._assets = assets
-        self._types = types
-        self._session = session
-        self._compute = compute
-        self._collisions = collisions
-        self._robots = robots
-        self._robot_models = robot_models
-        self._scene_host = scene_host
-        self._program_host = program_host
+    _assets: AssetStore
+    _types: ObjectTypes
+    _session: Session
+    _compute: Compute
+    _collisions: ObstacleRegistry
+    _robots: SceneRobots
+    _robot_models: RobotModels
+    _scene_host: HostSession
+    _program_host: HostSession
 
     # ------------------------------------------------------------------------------------------------ bodies
     def mesh_file(self, asset_id: str) -> StoredFile:

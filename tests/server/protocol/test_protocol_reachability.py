@@ -106,6 +106,13 @@ async def test_reachability_is_announced_and_follows_edits(tmp_path: Path) -> No
         await until(lambda: told(bob) == {near: "in_collision"})
         (answer,) = await carol.ask("Reachability", ids=[near])
         assert "box" in answer["items"][0]["reason"]
+        assert answer["items"][0].keys() == {"id", "reach", "reason"}
+        (answer,) = await carol.ask("Reachability", ids=[near], codes=True)
+        (item,) = answer["items"]
+        assert item["key"] == "Reached only in collision: {contact}."
+        contact = item["values"]["contact"]
+        assert (contact["key"], contact["values"]["second"]) == ("{first} and {second}", "box")
+        assert contact["values"]["first"].startswith("ur"), "the name of the robot, not its id"
         bob.take()
         stage.services.collisions.remove("box")
         await until(lambda: told(bob) == {near: "reachable"})
