@@ -166,12 +166,13 @@ class ActionOfRun(Data, frozen=True):
     name: str = ""
 
 
-class Run(Data, frozen=True):
+class Run(TranslatableData, frozen=True):
     """One run of a package.
 
     project_modified: modification time of the built project, which identifies its revision. temporary: run from the
     editor; its package is deleted. started_by, stopped_by: name of a user or token. actions: number of started actions.
-    last_action: action that was active at the end. error: error that ended the run, as in ProjectException.
+    last_action: action that was active at the end. error: error that ended the run, with `key` and `values` as in
+    ProjectException.
     """
 
     number: int
@@ -193,12 +194,13 @@ class Run(Data, frozen=True):
     error_type: str | Unset = UNSET
 
 
-class TraceEntry(Data, frozen=True):
+class TraceEntry(TranslatableData, frozen=True):
     """One action of a run with its parameters, results and duration.
 
     number: number of the action in the run from 1, in the order of their start. started: time of the start. duration:
     s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
-    ActionStateAfter. error: why it failed. thread_id: omitted in the main thread of the script.
+    ActionStateAfter. error: why it failed, with `key` and `values`. thread_id: omitted in the main thread of the
+    script.
     """
 
     run: int

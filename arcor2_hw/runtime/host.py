@@ -24,6 +24,7 @@ import msgspec
 
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped, Refused
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.calls import Calls, error_data
 from arcor2_hw.runtime.cell import Cell, SceneFault, scene_recipes
@@ -245,7 +246,7 @@ class Host:
         """Report that the program is running or paused."""
         self.link.post(m.ProgramChanged(state))
 
-    def action_over(self, number: int, duration: float, error: str) -> None:
+    def action_over(self, number: int, duration: float, error: Message | None) -> None:
         """Report the end of an action for which there is no event."""
         self.link.post(m.ActionFailed(number, duration, error))
 

@@ -294,14 +294,14 @@ class ProgramEvent(ToServer, frozen=True):
 
 
 class ActionFailed(ToServer, frozen=True):
-    """An action has ended without an event: it failed, or (`error` empty) the project declares no actions.
+    """An action has ended without an event: it failed, or (`error` None) the project declares no actions.
 
     number: as in ProgramEvent. duration: s.
     """
 
     number: int
     duration: float
-    error: str = ""
+    error: Message | None = None
 
 
 class ProgramChanged(ToServer, frozen=True):

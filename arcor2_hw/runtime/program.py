@@ -22,6 +22,7 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import Project, ProjectRobotJoints
 from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, InvalidData, NotFound, ProgramStopped, message_of
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.pacing import Gate
@@ -45,7 +46,7 @@ class Channel(Protocol):
     def changed(self, state: str) -> None:
         """Report that the program is running or paused."""
 
-    def action_over(self, number: int, duration: float, error: str) -> None:
+    def action_over(self, number: int, duration: float, error: Message | None) -> None:
         """Report the end of an action for which there is no event: it failed, or the project declares no actions."""
 
 
@@ -190,7 +191,7 @@ class Program:
         """Report the result of an action, then wait while the program is paused. Raises ProgramStopped."""
         duration = time.monotonic() - action.began
         if action.id is None:
-            self.channel.action_over(action.number, duration, "")
+            self.channel.action_over(action.number, duration, None)
         else:
             data = ActionStateAfterData(action.id, results(value) or msgspec.UNSET)
             encoded = _encode(Event("ActionStateAfter", data=data))
@@ -201,7 +202,7 @@ class Program:
         """Report that an action has failed, then wait while the program is paused. Raises ProgramStopped."""
         self._failed = error, action
         duration = time.monotonic() - action.began
-        self.channel.action_over(action.number, duration, str(error) or type(error).__name__)
+        self.channel.action_over(action.number, duration, message_of(error))
         self.gate.after()
 
     def record_error_source(self, device: Device, error: BaseException) -> None:

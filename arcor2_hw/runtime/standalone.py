@@ -14,6 +14,7 @@ import msgspec
 from arcor2_hw.data.events import Event, PackageStateData
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import ProgramStopped
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime.program import Program
 from arcor2_hw.runtime.streaming import Streams
 
@@ -31,7 +32,7 @@ class _StdoutChannel:
             sys.stdout.write(encoded.decode() + "\n")
             sys.stdout.flush()
 
-    def action_over(self, number: int, duration: float, error: str) -> None:
+    def action_over(self, number: int, duration: float, error: Message | None) -> None:
         pass  # the protocol has no event for it
 
     def changed(self, state: str) -> None:

@@ -62,7 +62,9 @@ class PackageRuns:
             await self._execution.run(package_id, how)
             return
         started: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._online.spawn(self._run_in_place(package_id, how, started), "package in place of the open document")
+        self._online.background.spawn(
+            self._run_in_place(package_id, how, started), "package in place of the open document"
+        )
         await started
 
     async def _require_runnable(self, package_id: str) -> None:
@@ -84,14 +86,14 @@ class PackageRuns:
                 await self._go_offline()
                 scene, project = self._session.require_scene(), self._session.project
                 reopen = self._session.set_aside()
-                execution.reserved = True
+                execution.reserve()
             log.info("document closed for a program", scene=scene.name, project=project and project.name, by=how.by)
             self._hub.broadcast(make_event("SceneClosed" if project is None else "ProjectClosed"))
             try:
                 await execution.run_through(package_id, how, temporary=False, started=started)
             finally:
                 reopen()
-                execution.reserved = False
+                execution.release()
                 for event in self._session.greeting(self._online.state):
                     self._hub.broadcast(event)
         except Arcor2Error as error:

@@ -17,6 +17,7 @@ from arcor2_hw.data.editor import ActionOfRun, Run, RunEnd, TraceEntry
 from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData
 from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.exceptions import StorageError
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.storage.shared_data import SharedData
@@ -65,7 +66,8 @@ class _Call:
                 after = msgspec.json.decode(end.encoded, type=_After).data
                 return replace(entry, duration=end.time, results=after.results)
             case m.ActionFailed():
-                return replace(entry, duration=end.duration, error=end.error or UNSET)
+                entry = replace(entry, duration=end.duration)
+                return entry if end.error is None else replace(entry, error=end.error.text, **end.error.translation())
         return entry
 
 
@@ -107,7 +109,9 @@ class Runs:
         for run in await data.runs(MAX_RUNS):
             self._runs[run.number] = run
             if run.end is RunEnd.RUNNING:
-                lost = replace(run, end=RunEnd.LOST, error="The server ended in mid-run.", error_type="ConnectionLost")
+                lost = replace(
+                    run, end=RunEnd.LOST, error="The server ended during the run.", error_type="ConnectionLost"
+                )
                 self._put(lost)
 
     async def close(self) -> None:
@@ -139,7 +143,9 @@ class Runs:
         if (run := self._runs.get(number)) is not None:
             self._put(replace(run, **values))
 
-    def end(self, number: int, end: RunEnd, *, error: str = "", error_type: str = "", stopped_by: str = "") -> None:
+    def end(
+        self, number: int, end: RunEnd, *, error: Message | None = None, error_type: str = "", stopped_by: str = ""
+    ) -> None:
         """Store the end of a run."""
         if (run := self._runs.get(number)) is None:
             return
@@ -154,7 +160,8 @@ class Runs:
                 end=end,
                 ended=now(),
                 last_action=last,
-                error=error or UNSET,
+                error=UNSET if error is None else error.text,
+                **({} if error is None else error.translation()),
                 error_type=error_type or UNSET,
                 stopped_by=stopped_by or UNSET,
             )

@@ -3,16 +3,13 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import Coroutine
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 import structlog
-from msgspec.structs import replace
 
 from arcor2_hw.data import events as e
-from arcor2_hw.data.base import UNSET, Unset
-from arcor2_hw.data.editor import RunEnd
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import Event, MainScreen, ProjectExceptionData
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import Arcor2Error, NotFound
@@ -22,6 +19,7 @@ from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.packages import PackageLibrary
+from arcor2_server.execution.program_run import ProgramRun
 from arcor2_server.execution.run_message import RunMessages
 from arcor2_server.execution.runs import How, Runs
 from arcor2_server.hosts.devices import DeviceBoard, overlay_for
@@ -31,7 +29,6 @@ from arcor2_server.hosts.streams import RobotStreams
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.settings import ServerSettings
-from arcor2_server.storage.package_versions import check_versions
 from arcor2_server.storage.packages import Packages
 from arcor2_server.storage.setting_secrets import SettingSecrets
 
@@ -67,12 +64,10 @@ class Execution(PackageLibrary):
     ) -> None:
         super().__init__(hub, packages)
         self.state = S.UNDEFINED
-        self.package_id = ""
         self.stop_within = STOP_WITHIN
-        self.reserved = False
-        """Whether a document is closed only for the time of the run, or a project is about to run."""
-        self.last_error: m.ErrorData | None = None
-        """The error that ended the last program, None if it finished or was stopped."""
+        self._reserved = False
+        self.program = ProgramRun(runs)
+        """The present or last run."""
         self._host = host
         self._online = online
         self._settings = settings
@@ -80,12 +75,6 @@ class Execution(PackageLibrary):
         self._runs = runs
         self._secrets = secrets
         self._messages = messages
-        self._before: bytes | None = None
-        self._exception: ProjectExceptionData | None = None
-        self._run_number = 0
-        self._stopped_by: str | None = None
-        self._shared_of = ""
-        """The project with the shared breakpoints of the program."""
         self._over: asyncio.Future[None] | None = None
         self._killing: asyncio.TimerHandle | None = None
         self._tasks: set[asyncio.Task[None]] = set()
@@ -103,7 +92,7 @@ class Execution(PackageLibrary):
     @property
     def busy(self) -> bool:
         """Whether no document may be opened and no other program run, including the time before and after a run."""
-        return self.reserved or self.active
+        return self._reserved or self.active
 
     @property
     def active(self) -> bool:
@@ -137,11 +126,6 @@ class Execution(PackageLibrary):
                 raise RequestRefused("{name} is not a robot.", name=found.name)
         return self.streams
 
-    @property
-    def action_in_progress(self) -> bytes | None:
-        """The encoded ActionStateBefore of the running action, or of the action before which the program is paused."""
-        return self._before
-
     def state_and_info(self) -> tuple[Event, bytes | None]:
         """Return the present PackageState, and the encoded PackageInfo while a program runs."""
         return self._state_event(), self._host.package_info
@@ -150,20 +134,20 @@ class Execution(PackageLibrary):
         """Return the events that describe the running program to a new client; empty if no program runs."""
         if self._host.package_info is None:
             return []
-        encoded = [event for event in (self._host.package_info, self._before) if event is not None]
+        encoded = [event for event in (self._host.package_info, self.program.action) if event is not None]
         return [self._state_event(), *(msgspec.json.decode(event, type=Event) for event in encoded)]
 
     def _state_event(self) -> Event:
-        return make_event("PackageState", e.PackageStateData(self.state, self.package_id or UNSET))
+        return make_event("PackageState", e.PackageStateData(self.state, self.program.package_id or UNSET))
 
     def _enter(self, state: PackageStateEnum) -> None:
         self.state = state
-        log.info("package", id=self.package_id, state=state.value)
+        log.info("package", id=self.program.package_id, state=state.value)
         self._hub.broadcast(self._state_event())
 
     # -------------------------------------------------------------------------------- commands
     def _require_not_used(self, package_id: str) -> None:
-        if self.state not in _IDLE and package_id == self.package_id:
+        if self.state not in _IDLE and package_id == self.program.package_id:
             raise RequestRefused("This package is running. Stop it first.")
 
     async def run(self, package_id: str, how: How | None = None) -> None:
@@ -198,20 +182,25 @@ class Execution(PackageLibrary):
         project_id = await asyncio.to_thread(self.packages.project_id, package_id) if how.shared_breakpoints else ""
         self._require_idle()
         self._online.last_stop.require_none_since(requested_at)
-        self.package_id = package_id
-        self._shared_of = project_id
-        self._stopped_by = None
-        self.last_error = None
-        self._host.package_info = self._before = self._exception = None
+        self.program = program = ProgramRun(self._runs, package_id, project_id)
+        self._host.package_info = None
         self.board.clear()
         self._enter(S.STARTED)
         message = self._messages.prepare(package_id, directory, how)
-        self._run_number = self._runs.begin(package_id, by=how.by, temporary=temporary, start_paused=how.start_paused)
-        self._spawn(self._begin(message), "program start")
-        self._spawn(self._describe_run(package_id, self._run_number), "description of the run")
+        program.begin(how, temporary=temporary)
+        self._background.spawn(self._begin(message), "program start")
+        self._background.spawn(program.describe(self.packages), "description of the run")
+
+    def reserve(self) -> None:
+        """Refuse other runs, since a document is closed only for the time of a run, or a project is about to run."""
+        self._reserved = True
+
+    def release(self) -> None:
+        """End `reserve`."""
+        self._reserved = False
 
     def _require_not_reserved(self) -> None:
-        if self.reserved:
+        if self._reserved:
             raise RequestRefused("A project is being run. Wait until it is open again, or stop it.")
 
     def _require_idle(self) -> None:
@@ -223,7 +212,7 @@ class Execution(PackageLibrary):
     async def _begin(self, message: m.RunPackage) -> None:
         try:
             host = await self._host.take()
-            message = await self._messages.complete(message, self._shared_of)
+            message = await self._messages.complete(message, self.program.shared_of)
         except Arcor2Error as error:
             self._fail(error.message, type(error).__name__)
             self._ended()
@@ -235,21 +224,6 @@ class Execution(PackageLibrary):
         self._host.host = host
         host.send(message)
 
-    async def _describe_run(self, package_id: str, number: int) -> None:
-        """Store the names of package and project with the run, and log differences of package versions."""
-        try:
-            summary = await asyncio.to_thread(self.packages.mark_executed, package_id)
-            project = summary.project_meta
-            of: dict[str, Any] = {}
-            if not isinstance(project, Unset):
-                of = {"project_id": project.id, "project_name": project.name, "project_modified": project.modified}
-            self._runs.describe(number, package_name=summary.package_meta.name, **of)
-            directory = self.packages.path_of(package_id)
-            for difference in await asyncio.to_thread(check_versions, directory):
-                log.warning("package was built with another version", package=package_id, difference=difference)
-        except Arcor2Error as error:
-            log.warning("run not described", package=package_id, reason=str(error))
-
     def stop(self, by: str = "") -> None:
         """Stop the devices, then the script. The host is killed if the program does not end in time.
 
@@ -260,7 +234,7 @@ class Execution(PackageLibrary):
         host.send(m.StopProgram())
 
     def _stop(self, by: str) -> None:
-        self._stopped_by = by
+        self.program.stopped_by = by
         self._enter(S.STOPPING)
         if self._host.host is not None:
             self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, self._host.host)
@@ -290,7 +264,7 @@ class Execution(PackageLibrary):
         host.send(m.Step())
 
     def _breakpoints_changed(self, project_id: str, ids: set[str]) -> None:
-        if self._shared_of == project_id and self.state not in _IDLE:
+        if self.program.shared_of == project_id and self.state not in _IDLE:
             self._host.send(m.SetBreakpoints(sorted(ids)))
 
     def _require(self, states: "set[PackageStateEnum] | frozenset[PackageStateEnum]", what: str) -> CellHost:
@@ -300,27 +274,29 @@ class Execution(PackageLibrary):
         return host
 
     def _kill(self, host: CellHost) -> None:
-        log.warning("program killed because it did not stop", package=self.package_id, within=self.stop_within)
+        log.warning("program killed because it did not stop", package=self.program.package_id, within=self.stop_within)
         host.kill()
 
     async def close(self) -> None:
         """Mark the running program as lost when the server ends. The online scene closes the hosts."""
         self._host.host = None  # its end is expected
         if self.state not in _IDLE:
-            error = "The server ended during the run."
-            self._runs.end(self._run_number, RunEnd.LOST, error=error, error_type="ConnectionLost")
+            message = Message.of("The server ended during the run.")
+            self.program.error = m.ErrorData("error", "ConnectionLost", message)
+            self.program.stopped_by = None  # a requested stop was not completed
+            self.program.end(lost=True)
             self.state = S.STOPPED
         if self._killing is not None:
             self._killing.cancel()
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self._background.cancel()
 
     # -------------------------------------------------------------------------------- from the host
     def _handle(self, host: CellHost, message: m.ServerBound) -> None:
         match message:
             case m.ProgramEvent():
-                self._handle_event(message)
+                self.program.handle_event(message)
+                if message.event == "PackageInfo":
+                    self._show_devices(message.encoded)
                 self._hub.broadcast_encoded(message.event, message.encoded)
             case m.ActionFailed():
                 self._runs.ended(message)
@@ -329,34 +305,18 @@ class Execution(PackageLibrary):
             case _:
                 pass
 
-    def _handle_event(self, message: m.ProgramEvent) -> None:
-        """Store the parts of an event of the program that the server needs."""
-        if message.number:
-            self._runs.announced(message)
-        match message.event:
-            case "PackageInfo":
-                self._host.package_info = message.encoded
-                info = msgspec.json.decode(message.encoded, type=_InfoEvent)
-                _, overlaid = overlay_for(self._settings.cell, self._secrets.is_secret, info.data.scene)
-                self.board.show(info.data.scene.objects, overlaid)
-                asyncio.get_running_loop().call_later(SPARE_AFTER, self._host.prepare)
-            case "ActionStateBefore":
-                self._before = message.encoded
-            case "ActionStateAfter":
-                self._before = None
-            case "ProjectException":
-                self._exception = msgspec.json.decode(message.encoded, type=_ExceptionEvent).data
+    def _show_devices(self, package_info: bytes) -> None:
+        self._host.package_info = package_info
+        info = msgspec.json.decode(package_info, type=_InfoEvent)
+        _, overlaid = overlay_for(self._settings.cell, self._secrets.is_secret, info.data.scene)
+        self.board.show(info.data.scene.objects, overlaid)
+        asyncio.get_running_loop().call_later(SPARE_AFTER, self._host.prepare)
 
     def _program_changed(self, host: CellHost, message: m.ProgramChanged) -> None:
         if message.state == "stopped":
-            self.last_error = message.error
-            if message.error is not None and self._exception is not None:  # the published text names the device
-                published = self._exception
-                key, values = published.key or published.message, published.values or {}
-                text = Message(published.message, key, values)
-                self.last_error = replace(message.error, type=published.type, message=text)
+            self.program.handle_end(message.error)
             self._ended()
-            self._spawn(host.wait_or_kill(), "end of the program's host")
+            self._background.spawn(host.wait_or_kill(), "end of the program's host")
         elif self.state is not S.STOPPING:
             state = S(message.state)
             if self.state is not state:
@@ -369,49 +329,28 @@ class Execution(PackageLibrary):
         self._ended(lost=True)
 
     def _fail(self, message: Message, kind: str) -> None:
-        self.last_error = m.ErrorData("error", kind, message)
+        self.program.error = m.ErrorData("error", kind, message)
         data = ProjectExceptionData(message.text, kind, **message.translation())
         self._hub.broadcast(make_event("ProjectException", data))
 
     def _ended(self, *, lost: bool = False) -> None:
         self._host.host = None
-        self._store_end(lost)
+        self.program.end(lost=lost)
         self.streams.clear()
-        self.board.clear(None if self.last_error is None else self.last_error.message)
-        self._host.package_info = self._before = None
+        error = self.program.error
+        self.board.clear(None if error is None else error.message)
+        self._host.package_info = None
         if self._killing is not None:
             self._killing.cancel()
             self._killing = None
         self._enter(S.STOPPED)
         if self._over is None:
-            screen = e.ShowMainScreenData(MainScreen.PACKAGES_LIST, self.package_id)
+            screen = e.ShowMainScreenData(MainScreen.PACKAGES_LIST, self.program.package_id)
             self._hub.broadcast(make_event("ShowMainScreen", screen))
         elif not self._over.done():
             self._over.set_result(None)
         self._host.prepare()
 
-    def _store_end(self, lost: bool) -> None:
-        error = self.last_error
-        end = RunEnd.FINISHED if error is None else RunEnd.LOST if lost else RunEnd.FAILED
-        if self._stopped_by is not None:
-            end = RunEnd.STOPPED
-        self._runs.end(
-            self._run_number,
-            end,
-            error="" if error is None else error.message.text,
-            error_type="" if error is None else error.type,
-            stopped_by=self._stopped_by or "",
-        )
-
-    def _spawn(self, work: Coroutine[Any, Any, None], name: str) -> None:
-        task = asyncio.create_task(work, name=name)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-
 
 class _InfoEvent(msgspec.Struct):
     data: e.PackageInfoData
-
-
-class _ExceptionEvent(msgspec.Struct):
-    data: ProjectExceptionData

@@ -72,7 +72,7 @@ class StopAll:
 
     async def _program(self, host: CellHost | None) -> list[StopOutcome]:
         execution = self._execution
-        package, board = execution.package_id, execution.board
+        package, board = execution.program.package_id, execution.board
         names = {status.id: status.name for status in board.statuses()}
         reason, devices = (None, []) if host is None else await _stop(host, board)
         return [_outcome(StopKind.PROGRAM, package, package, reason), *_of_devices(devices, names)]

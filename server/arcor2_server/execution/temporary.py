@@ -192,7 +192,7 @@ class TemporaryRuns:
             InvalidProject: the project cannot be built.
         """
         built: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self.online.spawn(_Run(self, how).execute(built), "temporary package")
+        self.online.background.spawn(_Run(self, how).execute(built), "temporary package")
         await built
 
     async def open(self, project_id: str) -> OpenProjectData:

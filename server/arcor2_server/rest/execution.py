@@ -215,12 +215,12 @@ class ExecutionOperations:
         execution = self._execution
         state = _STATES.get(execution.state, ExecutionState.PENDING)
         error: str | Unset = UNSET
-        if state is ExecutionState.COMPLETED and execution.last_error is not None:
-            state, error = ExecutionState.FAULTED, execution.last_error.message.text
+        if state is ExecutionState.COMPLETED and execution.program.error is not None:
+            state, error = ExecutionState.FAULTED, execution.program.error.message.text
         points: Any = UNSET
-        if (before := execution.action_in_progress) is not None:
+        if (before := execution.program.action) is not None:
             points = msgspec.json.decode(before, type=_Before).data.action_point_ids
-        return ExecutionInfo(state, execution.package_id or UNSET, error, points)
+        return ExecutionInfo(state, execution.program.package_id or UNSET, error, points)
 
     # ------------------------------------------------------------------------------------------------ tokens
     @operation("POST", "/tokens/create", EXECUTION, Role.PROGRAMMER)

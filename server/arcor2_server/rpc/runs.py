@@ -17,10 +17,11 @@ class RunRequests:
     @rpc("ListRuns")
     async def list_runs(self, context: Context, args: ListRunsArgs) -> ListRunsData:
         """Return the newest runs."""
-        return ListRunsData(self._runs.find(args))
+        return ListRunsData(context.translatable(self._runs.find(args)))
 
     @rpc("GetExecutionTrace")
     async def get_execution_trace(self, context: Context, args: GetExecutionTraceArgs) -> GetExecutionTraceData:
         """Return the newest actions of the present or last run."""
         before = None if isinstance(args.before, Unset) else args.before
-        return GetExecutionTraceData(*self._runs.trace(args.limit, before))
+        run, entries = self._runs.trace(args.limit, before)
+        return GetExecutionTraceData(run, context.translatable(entries))

@@ -4,11 +4,14 @@ import asyncio
 import time
 from typing import Any
 
+import msgspec
 import pytest
 
 from arcor2_hw.data.editor import Run, RunEnd, TraceEntry
 from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import ConnectionLost
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.execution import runs
 from arcor2_server.execution.runs import Runs
@@ -22,6 +25,7 @@ from tests.server.cell.test_execution import LAMP, PROJECT, until_stopped, write
 
 EVENTS = {"RunChanged", "ExecutionTrace"}
 BEFORE = b'{"event": "ActionStateBefore", "data": {"action_id": "act", "thread_id": 7}}'
+LOST = Message.of("{device}: {reason}", device="lamp", reason=ConnectionLost("No answer on {port}.", port="COM1"))
 AFTER = b'{"event": "ActionStateAfter", "data": {"action_id": "act", "results": ["1"]}}'
 
 
@@ -29,12 +33,12 @@ def subscribe(server: Server, *names: str) -> None:
     server.services.hub.subscribe(server.client, set(names) or EVENTS, True)  # type: ignore[arg-type]
 
 
-async def newest(server: Server) -> Run:
-    found: list[Run] = (await server.ask("ListRuns", {"limit": 1})).runs
+async def newest(server: Server, codes: bool = False) -> Run:
+    found: list[Run] = (await server.ask("ListRuns", {"limit": 1}, codes=codes)).runs
     return found[0]
 
 
-def told(server: Server, name: str) -> list[dict[str, Any]]:
+def data_of(server: Server, name: str) -> list[dict[str, Any]]:
     return [event["data"] for event in server.client.got if event["event"] == name]
 
 
@@ -46,7 +50,7 @@ async def test_a_run_is_recorded_from_start_to_end(server: Server) -> None:
     write(server, 'for n in ("a", "b"): lamp.blink(2, an=n)')
     await server.ask("RunPackage", {"id": "pkg_1"})
     await until_stopped(server)
-    async with asyncio.timeout(5):  # names are added beside the run
+    async with asyncio.timeout(30):  # names are added beside the run
         while (await newest(server)).package_name != "demo":
             await asyncio.sleep(0.01)
     run = await newest(server)
@@ -56,9 +60,9 @@ async def test_a_run_is_recorded_from_start_to_end(server: Server) -> None:
     assert run.started < run.ended
     assert (run.actions, run.temporary, run.start_paused) == (2, False, False)
     assert (run.last_action.id, run.last_action.name) == ("act_b", "b")  # type: ignore[union-attr]
-    ends = [event["end"] for event in told(server, "RunChanged")]
+    ends = [event["end"] for event in data_of(server, "RunChanged")]
     assert (ends[0], ends[-1]) == ("running", "finished")
-    trace = told(server, "ExecutionTrace")
+    trace = data_of(server, "ExecutionTrace")
     assert [(entry["number"], "duration" in entry) for entry in trace] == [(1, False), (1, True), (2, False), (2, True)]
     assert trace[0] | {"started": ""} == {
         "run": 1,
@@ -105,6 +109,10 @@ async def test_the_end_of_a_run_is_recorded(server: Server) -> None:
     await server.client.state("stopped", "PackageState")
     run = await newest(server)
     assert (run.end, run.error, run.started_by) == (RunEnd.FAILED, exception["message"], "bob")
+    assert run == run.untranslated()
+    translatable = await newest(server, codes=True)
+    assert (translatable.error, translatable.key) == (run.error, exception["key"])
+    assert msgspec.to_builtins(translatable.values) == exception["values"]
 
     await server.ask("RunPackage", {"id": "pkg_wait"})
     await server.client.event("ActionStateBefore", lambda data: data["action_id"] == "act_b")
@@ -135,6 +143,11 @@ async def test_an_exception_names_its_action(server: Server) -> None:
     entries = (await server.ask("GetExecutionTrace", {})).entries
     assert entries[0].error
     assert entries[0].action_id == "act_b"
+    # Whether an error can be translated depends on the client.
+    server.services.runs.ended(m.ActionFailed(entries[0].number, 0.1, LOST))
+    (translatable,) = (await server.ask("GetExecutionTrace", {"limit": 1}, codes=True)).entries
+    assert (translatable.error, translatable.key, translatable.values) == (LOST.text, LOST.key, LOST.values)
+    assert (await server.ask("GetExecutionTrace", {"limit": 1})).entries == [translatable.untranslated()]
 
 
 # ---------------------------------------------------------------------------------------------- shared breakpoints
@@ -142,14 +155,14 @@ class Shared:
     """What users set on a project, in place of the database."""
 
     def __init__(self, *ids: str) -> None:
-        self.kept = (set(ids), "alice")
+        self.stored = (set(ids), "alice")
 
     async def breakpoints(self, project_id: str) -> tuple[set[str], str]:
         assert project_id == PROJECT.id
-        return self.kept
+        return self.stored
 
     async def put_breakpoints(self, project_id: str, ids: set[str], user: str) -> None:
-        self.kept = (ids, user)
+        self.stored = (ids, user)
 
 
 @serving()
@@ -158,7 +171,7 @@ async def test_shared_breakpoints_apply_on_request_and_can_change(server: Server
     server.services.breakpoints._data = shared
     await server.open(Scene("scene", id="scn_1", objects=[scene_object("lamp", "Lamp")]), PROJECT)
     write(server, 'for n in ("a", "b", "c", "a"): lamp.blink(2, an=n)')
-    await server.ask("RunPackage", {"id": "pkg_1"})  # not asked for
+    await server.ask("RunPackage", {"id": "pkg_1"})  # it was not requested
     assert "paused" not in await until_stopped(server)
     server.client.got.clear()
     await server.ask("RunPackage", {"id": "pkg_1", "shared_breakpoints": True, "breakpoints": ["act_c"]})
@@ -174,35 +187,40 @@ async def test_shared_breakpoints_apply_on_request_and_can_change(server: Server
     await server.services.breakpoints.change(PROJECT.id, set(), {"act_a"}, "bob")  # nobody runs whom it would concern
 
 
-# ---------------------------------------------------------------------------------------------- kept
+# ---------------------------------------------------------------------------------------------- stored runs
 async def test_the_newest_runs_and_actions_are_stored(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runs, "MAX_RUNS", 5)
     monkeypatch.setattr(runs, "MAX_ACTIONS", 3)
     storage = await Storage.open(ServerSettings(data_dir=tmp_path))
     try:
-        kept = Runs(Hub())
-        await kept.open(SharedData(storage))
+        history = Runs(Hub())
+        await history.open(SharedData(storage))
         for _ in range(8):
-            number = kept.begin("pkg", by="", temporary=False, start_paused=False)
+            number = history.begin("pkg", by="", temporary=False, start_paused=False)
             for action in range(1, 6):
-                kept.announced(m.ProgramEvent("ActionStateBefore", BEFORE, action, "a", time.time()))
-                kept.announced(m.ProgramEvent("ActionStateAfter", AFTER, action, time=0.1))
-            if number != 8:
-                kept.end(number, RunEnd.FINISHED)
-        assert [run.number for run in kept.find(ListRunsArgs(limit=100))] == [8, 7, 6, 5, 4]
-        assert kept.find(ListRunsArgs(limit=1))[0].actions == 5
-        _, entries = kept.trace(100)
+                history.announced(m.ProgramEvent("ActionStateBefore", BEFORE, action, "a", time.time()))
+                history.announced(m.ProgramEvent("ActionStateAfter", AFTER, action, time=0.1))
+            if number == 7:
+                history.end(number, RunEnd.FAILED, error=LOST, error_type="ConnectionLost")
+            elif number != 8:
+                history.end(number, RunEnd.FINISHED)
+        assert [run.number for run in history.find(ListRunsArgs(limit=100))] == [8, 7, 6, 5, 4]
+        assert history.find(ListRunsArgs(limit=1))[0].actions == 5
+        _, entries = history.trace(100)
         assert [entry.number for entry in entries] == [5, 4, 3]
         assert entries[0] == TraceEntry(8, 5, "act", entries[0].started, "a", duration=0.1, results=["1"], thread_id=7)
-        kept.ended(m.ActionFailed(1, 0.1))  # not kept any more
-        await kept.close()
+        history.ended(m.ActionFailed(1, 0.1))  # no longer stored
+        await history.close()
         again = Runs(Hub())
         await again.open(SharedData(storage))
         await again.close()
         assert [(run.number, run.end.value) for run in again.find(ListRunsArgs(limit=100))] == [
             (8, "lost"),
-            *((number, "finished") for number in (7, 6, 5, 4)),
+            (7, "failed"),
+            *((number, "finished") for number in (6, 5, 4)),
         ]
+        failed = again.find(ListRunsArgs(limit=100))[1]
+        assert (failed.error, failed.key, failed.values) == (LOST.text, LOST.key, LOST.values)
         assert again.begin("pkg", by="", temporary=False, start_paused=False) == 9
         await again.close()
     finally:

@@ -1,0 +1,100 @@
+"""One run of a package: what its program reports, its error, and its entry in the history of runs."""
+
+import asyncio
+from typing import Any
+
+import msgspec
+import structlog
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.editor import RunEnd
+from arcor2_hw.data.events import ProjectExceptionData
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
+from arcor2_hw.runtime import messages as m
+from arcor2_server.execution.runs import How, Runs
+from arcor2_server.storage.package_versions import check_versions
+from arcor2_server.storage.packages import Packages
+
+log = structlog.get_logger(__name__)
+
+
+class _ExceptionEvent(msgspec.Struct):
+    data: ProjectExceptionData
+
+
+class ProgramRun:
+    """The present or last run of a package.
+
+    Args:
+        runs: the history of runs.
+        package_id: the package; empty before the first run.
+        shared_of: the project with the shared breakpoints of the program; empty for none.
+    """
+
+    def __init__(self, runs: Runs, package_id: str = "", shared_of: str = "") -> None:
+        self.package_id = package_id
+        self.shared_of = shared_of
+        self.stopped_by: str | None = None
+        """The user who stopped the program."""
+        self.error: m.ErrorData | None = None
+        """The error that ended the program, None if it finished or was stopped."""
+        self.action: bytes | None = None
+        """The encoded ActionStateBefore of the running action, or of the action before which the program is paused."""
+        self._runs = runs
+        self._exception: ProjectExceptionData | None = None
+        self._number = 0
+
+    def begin(self, how: How, *, temporary: bool) -> None:
+        """Add the run to the history."""
+        self._number = self._runs.begin(self.package_id, by=how.by, temporary=temporary, start_paused=how.start_paused)
+
+    async def describe(self, packages: Packages) -> None:
+        """Store the names of package and project with the run, and log differences of package versions."""
+        try:
+            summary = await asyncio.to_thread(packages.mark_executed, self.package_id)
+            project = summary.project_meta
+            of: dict[str, Any] = {}
+            if not isinstance(project, Unset):
+                of = {"project_id": project.id, "project_name": project.name, "project_modified": project.modified}
+            self._runs.describe(self._number, package_name=summary.package_meta.name, **of)
+            directory = packages.path_of(self.package_id)
+            for difference in await asyncio.to_thread(check_versions, directory):
+                log.warning("package was built with another version", package=self.package_id, difference=difference)
+        except Arcor2Error as error:
+            log.warning("run not described", package=self.package_id, reason=str(error))
+
+    def handle_event(self, message: m.ProgramEvent) -> None:
+        """Store an event of the program."""
+        if message.number:
+            self._runs.announced(message)
+        match message.event:
+            case "ActionStateBefore":
+                self.action = message.encoded
+            case "ActionStateAfter":
+                self.action = None
+            case "ProjectException":
+                self._exception = msgspec.json.decode(message.encoded, type=_ExceptionEvent).data
+
+    def handle_end(self, error: m.ErrorData | None) -> None:
+        """Store the error with which the program ended, None if it finished."""
+        self.error = error
+        if error is not None and (published := self._exception) is not None:  # the published text names the device
+            key, values = published.key or published.message, published.values or {}
+            self.error = replace(error, type=published.type, message=Message(published.message, key, values))
+
+    def end(self, *, lost: bool) -> None:
+        """Store the end of the run."""
+        error = self.error
+        end = RunEnd.FINISHED if error is None else RunEnd.LOST if lost else RunEnd.FAILED
+        if self.stopped_by is not None:
+            end = RunEnd.STOPPED
+        self._runs.end(
+            self._number,
+            end,
+            error=None if error is None else error.message,
+            error_type="" if error is None else error.type,
+            stopped_by=self.stopped_by or "",
+        )
+        self.action = None
