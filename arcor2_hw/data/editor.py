@@ -8,6 +8,7 @@ from msgspec import Meta, field
 from arcor2_hw.data.base import UNSET, Data, Timestamp, TranslatableData, Unset
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
+from arcor2_hw.messages import Message
 
 Name = Annotated[str, Meta(min_length=1, max_length=200)]
 """A key, or an id that need not exist."""
@@ -114,8 +115,9 @@ class TaskProgress(enum.StrEnum):
 class TaskStateData(TranslatableData, frozen=True):
     """Data of the event TaskState.
 
-    title: sentence for users. started_by: name of a user or token, omitted when it was started automatically. progress:
-    0 to 1, omitted when unknown. message: present activity, or reason of the failure.
+    title: sentence for users; title_message: what is needed to translate it. started_by: name of a user or token,
+    omitted when it was started automatically. progress: 0 to 1, omitted when unknown. message: present activity, or
+    reason of the failure.
     """
 
     id: str
@@ -126,6 +128,7 @@ class TaskStateData(TranslatableData, frozen=True):
     started_by: str | Unset = UNSET
     progress: Annotated[float, Meta(ge=0, le=1)] | Unset = UNSET
     message: str | Unset = UNSET
+    title_message: Message | Unset = UNSET
 
 
 # ---------------------------------------------------------------------------------------------- history

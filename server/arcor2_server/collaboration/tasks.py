@@ -28,10 +28,15 @@ class Task:
         self._tasks = tasks
         self.state = state
 
-    def at(self, progress: float | None, message: str = "") -> None:
+    def at(self, progress: float | None, message: str | Message = "") -> None:
         """Report the progress, 0 to 1 (None: unknown), and the present step."""
         share = UNSET if progress is None else min(max(progress, 0.0), 1.0)
-        self._tasks._update(self, replace(self.state, progress=share, message=message or self.state.message))
+        if not message:
+            self._tasks._update(self, replace(self.state, progress=share))
+            return
+        message = message if isinstance(message, Message) else Message.of(message)
+        fields = {"key": UNSET, "values": UNSET} | message.translation()
+        self._tasks._update(self, replace(self.state, progress=share, message=message.text, **fields))
 
     def finish(self, message: str | Message | None = None) -> None:
         """End the task as finished."""
@@ -47,7 +52,8 @@ class Task:
 
     def _end(self, how: TaskProgress, message: str | Message | None) -> None:
         progress: Any = 1.0 if how is TaskProgress.FINISHED else self.state.progress
-        translation = message.translation() if isinstance(message, Message) else {}
+        translation: dict[str, Any] = {"key": UNSET, "values": UNSET}
+        translation |= message.translation() if isinstance(message, Message) else {}
         text = str(message) if message else UNSET
         self._tasks._update(self, replace(self.state, state=how, progress=progress, message=text, **translation))
 
@@ -60,15 +66,17 @@ class Tasks:
         self._running: dict[str, Task] = {}
         self._events = Throttle(PERIOD, lambda key, event: hub.stream_to_subscribers(NAME, key, event))
 
-    def begin(self, kind: TaskKind, title: str, started_by: str | None = None) -> Task:
+    def begin(self, kind: TaskKind, title: Message, started_by: str | None = None) -> Task:
         """Start a task. `title` is a sentence without a full stop."""
-        state = TaskStateData(new_id("task"), kind, title, TaskProgress.RUNNING, now(), started_by or UNSET)
+        state = TaskStateData(
+            new_id("task"), kind, title.text, TaskProgress.RUNNING, now(), started_by or UNSET, title_message=title
+        )
         task = self._running[state.id] = Task(self, state)
         self._events.put(state.id, encode(make_event(NAME, state)))
         return task
 
     @contextmanager
-    def running(self, kind: TaskKind, title: str, started_by: str | None = None) -> Iterator[Task]:
+    def running(self, kind: TaskKind, title: Message, started_by: str | None = None) -> Iterator[Task]:
         """Show the enclosed work as a task, which fails with the raised error."""
         task = self.begin(kind, title, started_by)
         try:

@@ -83,7 +83,7 @@ class PackageRuns:
                     self._hub.broadcast(event)
             async with self._locks.exclusive():
                 await self._require_runnable(package_id)
-                await self._go_offline()
+                await self._go_offline(how.by)
                 scene, project = self._session.require_scene(), self._session.project
                 reopen = self._session.set_aside()
                 execution.reserve()
@@ -105,11 +105,11 @@ class PackageRuns:
             started.cancel()
             raise
 
-    async def _go_offline(self) -> None:
+    async def _go_offline(self, by: str) -> None:
         cell = self._online
         if cell.running_action is not None:
             raise RequestRefused("An action is running. Stop it first.")
         if cell.online:
-            await cell.begin_stop()
+            await cell.begin_stop(by)
         if await cell.settled() is not SceneStateEnum.STOPPED:
             raise RequestRefused("The scene is {value}. Wait until it is offline.", value=cell.state.value)

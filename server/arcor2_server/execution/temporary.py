@@ -92,7 +92,7 @@ class _Run:
             self._execution.reserved = False
         if self._online and self._session.project is not None:
             try:
-                await self._scene.begin_start()
+                await self._runs.online.begin_start(self._how.by)
             except Arcor2Error as error:
                 log.warning("scene not started again", reason=str(error))
 
@@ -116,22 +116,24 @@ class _Run:
             )
         name = f"Temporary package for project '{project.name}'."
         self._package = new_id("pkg")
-        await asyncio.to_thread(self._execution.packages.mark_temporary, self._package, project.id)
-        with self._tasks.running(TaskKind.BUILD, f"Building {project.name} to run it", self._how.by):
+        await asyncio.to_thread(self._runs.execution.packages.mark_temporary, self._package, project.id)
+        with self._runs.tasks.running(
+            TaskKind.BUILD, Message.of("Building {name} to run it", name=project.name), self._how.by
+        ):
             await self._runs.builder.build(project.id, name, self._package)
         return project
 
     async def _close(self) -> None:
         self._online = self._scene.online
         if self._online:
-            await self._scene.begin_stop()
-            await self._scene.settled()
-        ids = [item.id for item in self._session.document.items()]
-        await self._session.discard()
-        self._locks.drop(ids)
-        self._hub.broadcast(make_event("ProjectClosed"))
-        summary = await asyncio.to_thread(self._execution.packages.summary, self._package)
-        self._hub.broadcast(make_event("PackageChanged", summary, ChangeType.ADD))
+            await self._runs.online.begin_stop(self._how.by)
+            await self._runs.online.settled()
+        ids = [item.id for item in self._runs.session.document.items()]
+        await self._runs.session.discard()
+        self._runs.locks.drop(ids)
+        self._runs.hub.broadcast(make_event("ProjectClosed"))
+        summary = await asyncio.to_thread(self._runs.execution.packages.summary, self._package)
+        self._runs.hub.broadcast(make_event("PackageChanged", summary, ChangeType.ADD))
 
     async def _run(self) -> None:
         try:

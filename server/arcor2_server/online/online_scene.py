@@ -14,6 +14,7 @@ from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
+from arcor2_server.background import BackgroundTasks
 from arcor2_server.collaboration.locks import PROJECT, SCENE, SERVER, Locks
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.documents import Session
@@ -66,8 +67,9 @@ class OnlineScene:
         """Ids of the robots that are moving on request."""
         self.before_start: list[Callable[[], None]] = []
         """Called before the scene goes online; may raise RequestRefused."""
-        self.held = HoldToRun(host, hub, locks, robots, self.moving, self.spawn)
-        self.task = SceneTask(tasks)
+        self.background = BackgroundTasks()
+        """Tasks that are cancelled when the server ends."""
+        self.held = HoldToRun(host, hub, locks, robots, self.moving, self.background)
         self.host = host
         """The devices. Its calls raise RequestRefused while the scene is offline."""
         self._opening = opening
@@ -76,6 +78,9 @@ class OnlineScene:
         self._session = session
         self._robots = robots
         self._robot_calibrations = robot_calibrations
+        self._progress = SceneTask(tasks)
+        self._requested_by = ""
+        """The user who last started or stopped the scene."""
         self._task: asyncio.Task[None] | None = None
         self._answer: asyncio.Future[m.ErrorData | None] | None = None
         self._background: set[asyncio.Task[None]] = set()
@@ -118,14 +123,14 @@ class OnlineScene:
 
     def _connection_changed(self) -> None:
         if self.state is SceneStateEnum.STARTING:
-            self.task.connected(self.board.states())
+            self._progress.connected(self.board.states())
         self._robot_calibrations.read_connected()
 
     def _publish(self, state: SceneStateEnum, message: Message | None = None) -> None:
         self.state = state
         self.host.online = state is SceneStateEnum.STARTED
         scene = self._session.scene
-        self.task.entered(state, "" if scene is None else scene.name, message)
+        self._progress.entered(state, "" if scene is None else scene.name, message, self._requested_by)
         log.info("scene", state=state.value, reason=str(message or ""))
         data = SceneStateData(state)
         if message is not None:
@@ -134,10 +139,11 @@ class OnlineScene:
         self._robot_calibrations.read_connected()
 
     # -------------------------------------------------------------------------------- going online
-    async def begin_start(self, *, dry_run: bool = False, keep_going: bool = False) -> None:
+    async def begin_start(self, by: str, *, dry_run: bool = False, keep_going: bool = False) -> None:
         """Start going online. The event SceneState reports the progress.
 
         Args:
+            by: name of the user, for the task.
             dry_run: only check whether the scene may go online.
             keep_going: leave out objects that cannot be created or connected.
 
@@ -157,9 +163,9 @@ class OnlineScene:
         try:
             self.require_offline()
             if not dry_run:
-                self.state = SceneStateEnum.STARTING
-                self._task = asyncio.create_task(
-                    self._start(self._session.require_scene(), keep_going), name="scene start"
+                self.state, self._requested_by = SceneStateEnum.STARTING, by
+                self._task = self.background.spawn(
+                    self._start(self._session.require_scene(), keep_going), "scene start"
                 )
         finally:
             if self._task is None:
@@ -224,10 +230,11 @@ class OnlineScene:
         self.host.prepare()
 
     # -------------------------------------------------------------------------------- going offline
-    async def begin_stop(self, *, dry_run: bool = False) -> None:
+    async def begin_stop(self, by: str, *, dry_run: bool = False) -> None:
         """Start going offline. The event SceneState reports the progress.
 
         Args:
+            by: name of the user, for the task.
             dry_run: only check whether the scene may go offline.
 
         Raises:
@@ -243,8 +250,8 @@ class OnlineScene:
         try:
             self.require_online()
             if not dry_run:
-                self.state = SceneStateEnum.STOPPING
-                self._task = asyncio.create_task(self._stop(), name="scene stop")
+                self.state, self._requested_by = SceneStateEnum.STOPPING, by
+                self._task = self.background.spawn(self._stop(), "scene stop")
         finally:
             if self._task is None:
                 self._locks.release(SERVER, SCENE, PROJECT)

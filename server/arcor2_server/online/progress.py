@@ -16,21 +16,30 @@ class SceneTask:
         self._tasks = tasks
         self._task: Task | None = None
         self._starting = False
-        self.requested_by = ""
-        """The user who last started or stopped the scene."""
 
-    def entered(self, state: SceneStateEnum, scene: str, message: Message | None) -> None:
-        """Start or end the task after the scene has entered a state; `message` is the reason."""
+    def entered(self, state: SceneStateEnum, scene: str, message: Message | None, by: str) -> None:
+        """Start or end the task after the scene has entered a state.
+
+        Args:
+            state: the state.
+            scene: name of the scene.
+            message: the reason.
+            by: the user who last started or stopped the scene.
+        """
         task = self._task
         match state:
             case SceneStateEnum.STARTING:
                 self._starting = True
-                self._task = self._tasks.begin(TaskKind.SCENE_START, f"Starting the scene {scene}", self.requested_by)
+                self._task = self._tasks.begin(
+                    TaskKind.SCENE_START, Message.of("Starting the scene {name}", name=scene), by
+                )
             case SceneStateEnum.STOPPING:
                 if task is not None:  # the start failed
                     task.fail(message or Message.of("The scene could not be started."))
                 self._starting = False
-                self._task = self._tasks.begin(TaskKind.SCENE_STOP, f"Stopping the scene {scene}", self.requested_by)
+                self._task = self._tasks.begin(
+                    TaskKind.SCENE_STOP, Message.of("Stopping the scene {name}", name=scene), by
+                )
             case SceneStateEnum.STARTED | SceneStateEnum.STOPPED if task is not None:
                 task.finish(message)
                 self._task = None
@@ -43,4 +52,7 @@ class SceneTask:
         if self._task is None or not self._starting or not states:
             return
         connected = sum(state.state in _CONNECTED for state in states)
-        self._task.at(connected / len(states), f"{connected} of {len(states)} objects are connected.")
+        self._task.at(
+            connected / len(states),
+            Message.of("{count} of {all} objects are connected.", count=connected, all=len(states)),
+        )

@@ -249,7 +249,9 @@ class SceneCalibration:
         async def run() -> None:
             verdict = ""
             try:
-                with self._tasks.running(TaskKind.CALIBRATION, f"Calibration of {obj.name}", user) as task:
+                with self._tasks.running(
+                    TaskKind.CALIBRATION, Message.of("Calibration of {name}", name=obj.name), user
+                ) as task:
                     pose, record = await find(task.at)
                     await self._set_pose(user, obj.id, pose)
                     await self._records.put(record)

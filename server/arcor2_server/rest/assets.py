@@ -9,6 +9,7 @@ from msgspec import UNSET
 
 from arcor2_hw.data.base import Data, Timestamp, Unset
 from arcor2_hw.data.role import Role
+from arcor2_hw.messages import translatable
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.rest.operations import MIB, Binary, Upload, operation
 from arcor2_server.rest.scenes import STORAGE, check_id
@@ -56,7 +57,7 @@ class AssetOperations:
         STORAGE,
         Role.TECHNICIAN,
         file="assetData",
-        title="Uploading a file",
+        title=translatable("Uploading a file"),
         shown_from=MIB,
         limit=MAX_ASSET + MIB,
     )

@@ -8,6 +8,7 @@ from typing import IO
 
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
+from arcor2_hw.messages import translatable
 from arcor2_server.build.importing import ImportedIds, ImportOptions, PackageImport
 from arcor2_server.build.service import BuildService
 from arcor2_server.rest.operations import MIB, Binary, Upload, operation
@@ -52,7 +53,7 @@ class BuildOperations:
         BUILD,
         Role.PROGRAMMER,
         file="executionPackage",
-        title="Importing a project",
+        title=translatable("Importing a project"),
         limit=MAX_UPLOAD + MIB,
     )
     async def import_project(self, query: ImportOptions, upload: Upload) -> ImportedIds:

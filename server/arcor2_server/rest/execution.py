@@ -15,6 +15,7 @@ from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import translatable
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.execution.package_runs import PackageRuns
 from arcor2_server.execution.runs import How
@@ -144,7 +145,7 @@ class ExecutionOperations:
         EXECUTION,
         Role.PROGRAMMER,
         file="executionPackage",
-        title="Uploading the package {id}",
+        title=translatable("Uploading the package {id}"),
         limit=MAX_UPLOAD + MIB,
     )
     async def upload_package(self, id: str, upload: Upload) -> None:  # noqa: A002

@@ -10,6 +10,7 @@ from litestar.exceptions import HTTPException
 
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 from arcor2_server.access.route_options import PERSON
 from arcor2_server.collaboration.tasks import Task, Tasks
 
@@ -31,7 +32,7 @@ def receiving(request: Request[Any, Any, Any], tasks: Tasks, title: str, shown_f
     if not title or (size is not None and size < shown_from):
         yield
         return
-    task = tasks.begin(TaskKind.UPLOAD, title.format(**request.path_params), request.state.get(PERSON, ""))
+    task = tasks.begin(TaskKind.UPLOAD, Message.of(title, **request.path_params), request.state.get(PERSON, ""))
     _count(request, task, size)
     try:
         yield
@@ -60,11 +61,12 @@ def _count(request: Request[Any, Any, Any], task: Task, size: int | None) -> Non
         if message["type"] == "http.request":
             received += len(message.get("body", b""))
             if not message.get("more_body", False):
-                task.at(RECEIVED if size else None, "All data is received. Checking and storing it.")
+                task.at(RECEIVED if size else None, Message.of("All data is received. Checking and storing it."))
             elif size:
-                task.at(RECEIVED * received / size, f"{received / 1e6:.1f} of {size / 1e6:.1f} MB received.")
+                text = "{received:.1f} of {size:.1f} MB received."
+                task.at(RECEIVED * received / size, Message.of(text, received=received / 1e6, size=size / 1e6))
             else:
-                task.at(None, f"{received / 1e6:.1f} MB received.")
+                task.at(None, Message.of("{received:.1f} MB received.", received=received / 1e6))
         elif message["type"] == "http.disconnect":
             task.cancel(f"The client disconnected after {received / 1e6:.1f} MB.")
         return message

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.rpc import BuildProjectArgs, BuildProjectData
+from arcor2_hw.messages import Message
 from arcor2_server.build.service import BuildService
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.collaboration.tasks import Tasks
@@ -24,7 +25,7 @@ class BuildRequests:
     async def build_project(self, context: Context, args: BuildProjectArgs) -> BuildProjectData:
         """Build a package from a saved project. PackageChanged publishes the new package."""
         async with self._locks.auto(context.user, args.project_id):
-            title = f"Building the package {args.package_name}"
+            title = Message.of("Building the package {name}", name=args.package_name)
             with self._tasks.running(TaskKind.BUILD, title, context.client.name):
                 package_id = await self._build.build(args.project_id, args.package_name)
         await self._execution.added(package_id)

@@ -14,6 +14,7 @@ from arcor2_hw.data.rpc import (
     TemporaryPackageArgs,
     UploadPackageArgs,
 )
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.locks import ACTION, Locks
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.documents import Session
@@ -50,20 +51,17 @@ class ExecutionRequests:
     @rpc("StartScene")
     async def start_scene(self, context: Context, args: None) -> None:
         """Start the scene: connect its devices. SceneState reports the progress."""
-        self._online.task.requested_by = context.client.name
-        await self._online.begin_start(dry_run=context.dry_run)
+        await self._online.begin_start(context.client.name, dry_run=context.dry_run)
 
     @rpc("StartSceneKeepGoing")
     async def start_scene_keep_going(self, context: Context, args: None) -> None:
         """Start the scene without the devices that cannot be connected. SceneState reports the progress."""
-        self._online.task.requested_by = context.client.name
-        await self._online.begin_start(dry_run=context.dry_run, keep_going=True)
+        await self._online.begin_start(context.client.name, dry_run=context.dry_run, keep_going=True)
 
     @rpc("StopScene")
     async def stop_scene(self, context: Context, args: None) -> None:
         """Stop the scene: disconnect its devices. SceneState reports the progress."""
-        self._online.task.requested_by = context.client.name
-        await self._online.begin_stop(dry_run=context.dry_run)
+        await self._online.begin_stop(context.client.name, dry_run=context.dry_run)
 
     # ------------------------------------------------------------------------------------------------ single actions
     @rpc("ExecuteAction")
@@ -87,7 +85,7 @@ class ExecutionRequests:
                 return
             running = cell.running_action = RunningAction(action.id, object_id, method, context.received_at)
         context.emit("ActionExecution", ActionExecutionData(action.id))
-        cell.spawn(execute(cell, prepared, running), f"action {action.name}")
+        cell.background.spawn(execute(cell, prepared, running), f"action {action.name}")
 
     @rpc("CancelAction")
     async def cancel_action(self, context: Context, args: None) -> None:
@@ -118,7 +116,9 @@ class ExecutionRequests:
     @rpc("UploadPackage")
     async def upload_package(self, context: Context, args: UploadPackageArgs) -> None:
         """Store a package that was sent as a zip file."""
-        with self._tasks.running(TaskKind.UPLOAD, f"Uploading the package {args.id}", context.client.name):
+        with self._tasks.running(
+            TaskKind.UPLOAD, Message.of("Uploading the package {id}", id=args.id), context.client.name
+        ):
             summary = await self._execution.upload(args.id, args.data)
         context.emit("PackageChanged", summary, ChangeType.ADD)
 

@@ -20,6 +20,7 @@ from arcor2_hw.compute.mesh_tasks import CONVERSION, PrepareAsset, PreparedAsset
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.tasks import Task, Tasks
 from arcor2_server.compute.workers import Compute
 from arcor2_server.files import replace_file
@@ -171,7 +172,9 @@ class _ShownTask(contextlib.AbstractContextManager[Callable[[float, str], None]]
         self._timer = asyncio.get_running_loop().call_later(SHOWN_AFTER, self._begin)
 
     def _begin(self) -> None:
-        self._task = self._tasks.begin(TaskKind.COMPUTATION, f"Preparing {self._name} for the editor")
+        self._task = self._tasks.begin(
+            TaskKind.COMPUTATION, Message.of("Preparing {name} for the editor", name=self._name)
+        )
         self._task.at(*self._last)
 
     def _at(self, share: float, message: str) -> None:

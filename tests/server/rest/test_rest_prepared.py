@@ -17,6 +17,7 @@ from arcor2_hw.compute.mesh_tasks import CONVERSION, PrepareAsset
 from arcor2_hw.compute.task import ComputeStopped
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
 from arcor2_server.app import Server
 from arcor2_server.collaboration.tasks import Task
 from arcor2_server.workspace import display_models as prepared_module
@@ -117,8 +118,8 @@ async def test_a_long_conversion_is_announced_as_a_task(
     began: list[str] = []
     begin = services.tasks.begin
 
-    def noted(kind: TaskKind, title: str) -> Task:
-        began.append(title)
+    def noted(kind: TaskKind, title: Message) -> Task:
+        began.append(title.text)
         return begin(kind, title)
 
     monkeypatch.setattr(services.tasks, "begin", noted)

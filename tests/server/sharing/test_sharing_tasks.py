@@ -11,7 +11,7 @@ from arcor2_hw.exceptions import StorageError
 from arcor2_hw.messages import Message
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.websocket.hub import Hub
-from tests.server.protocol.stage import Actor, happens, open_stage, until
+from tests.server.protocol.stage import Actor, happens, open_stage, refused, until
 from tests.server.protocol.test_protocol_temporary import project
 from tests.server.session.session_server import Refused
 
@@ -44,6 +44,23 @@ async def test_a_scene_is_started_and_stopped(tmp_path: Path) -> None:
         assert ended["started_by"] == "bob"
         assert "TaskState" not in alice.names()
         assert stage.services.tasks.running_events() == []
+
+
+async def test_the_tasks_of_a_run_name_the_user_who_requested_it(tmp_path: Path) -> None:
+    async with open_stage(tmp_path) as stage:
+        alice, bob = await stage.person("alice"), await stage.person("bob")
+        await project(stage, alice)
+        await stage.start(alice)
+        await bob.ask("SubscribeEvents", events=["TaskState"])
+        bob.take()
+        await bob.ask("TemporaryPackage", start_paused=True)
+        assert (await happens(bob, "TaskState", kind="scene_stop"))["started_by"] == "bob"
+        await happens(bob, "PackageState", state="paused")
+        await refused(alice, "StartScene")
+        await bob.ask("StopPackage")
+        assert (await happens(bob, "TaskState", kind="scene_start"))["started_by"] == "bob"
+        await happens(bob, "SceneState", state="started")
+        await stage.stop(alice)
 
 
 async def test_a_failed_scene_start_is_a_failed_task(tmp_path: Path) -> None:
@@ -96,7 +113,7 @@ async def test_task_progress_is_throttled_except_its_end() -> None:
     hub = Hub()
     hub.stream_to_subscribers = lambda name, key, message, besides=None: sent.append(message)  # type: ignore[method-assign, assignment]
     board = Tasks(hub)
-    task = board.begin(TaskKind.COMPUTATION, "Counting")
+    task = board.begin(TaskKind.COMPUTATION, Message.of("Counting"))
     for number in range(500):
         task.at(number / 499 * 2, f"step {number}")  # beyond 1 is 1
         if number % 50 == 0:
@@ -108,11 +125,11 @@ async def test_task_progress_is_throttled_except_its_end() -> None:
     before = len(sent)
     task.at(0.5)
     task.fail("too late")
-    with pytest.raises(asyncio.CancelledError), board.running(TaskKind.CALIBRATION, "Looking"):
+    with pytest.raises(asyncio.CancelledError), board.running(TaskKind.CALIBRATION, Message.of("Looking")):
         raise asyncio.CancelledError
     assert len(sent) == before + 2
     assert b'"cancelled"' in sent[-1]
-    with pytest.raises(ZeroDivisionError), board.running(TaskKind.CALIBRATION, "Looking"):
+    with pytest.raises(ZeroDivisionError), board.running(TaskKind.CALIBRATION, Message.of("Looking")):
         1 / 0  # noqa: B018
     assert b"inside the server" in sent[-1]
     assert board.running_events() == []
