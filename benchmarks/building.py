@@ -27,6 +27,7 @@ from arcor2_server.build.combined_types import CombinedTypes
 from arcor2_server.build.reading import from_script
 from arcor2_server.build.script import from_logic
 from arcor2_server.build.service import BuildInput, BuildService
+from arcor2_server.object_types.catalog import KnownTypes
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
@@ -93,7 +94,7 @@ async def build(report: Report) -> None:
         storage = await Storage.open(settings)
         try:
             await storage.put_object_type(ObjectTypeSource("Bench", _SOURCE))
-            types = ObjectTypes(storage, await AssetStore.open(settings.assets_dir))
+            types = ObjectTypes(KnownTypes(), storage, await AssetStore.open(settings.assets_dir))
             await types.load()
             await storage.put_scene(_SCENE)
             service = BuildService(settings, storage, types)

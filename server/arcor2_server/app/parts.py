@@ -2,7 +2,7 @@
 
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
-from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 from arcor2_hw.data.events import Event
 from arcor2_server.access.admission import Access
@@ -31,6 +31,7 @@ from arcor2_server.files import tighten
 from arcor2_server.hosts.pool import CellHosts
 from arcor2_server.hosts.session import HostSession
 from arcor2_server.log.redaction import REDACTION
+from arcor2_server.object_types.catalog import KnownTypes
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.cameras import Cameras
@@ -63,57 +64,116 @@ from arcor2_server.workspace.robots import SceneRobots
 from arcor2_server.workspace.scene_collisions import SceneCollisions
 
 
-@dataclass(frozen=True, slots=True)
 class Server:
     """The parts of a running server. Only the composition root and tests see all of them."""
 
-    settings: ServerSettings
-    access: Access
-    hub: Hub
-    storage: Storage
-    assets: AssetStore
-    damage: DataDamage
-    secrets: SettingSecrets
-    types: ObjectTypes
-    type_notifications: TypeNotifications
-    compute: Compute
-    hosts: CellHosts
-    session: Session
-    dependents: Dependents
-    edit_notifications: EditNotifications
-    saved_problems: SavedProblems
-    locks: Locks
-    users: Users
-    lock_takeover: LockTakeover
-    tasks: Tasks
-    previews: Previews
-    view_states: ViewStates
-    presence: PresenceBoard
-    markers: Markers
-    calibration: Calibration
-    calibration_records: Calibrations
-    scene_calibration: SceneCalibration
-    object_aiming: ObjectAimings
-    robots: SceneRobots
-    robot_calibrations: RobotCalibrations
-    robot_models: RobotModels
-    collisions: ObstacleRegistry
-    scene_collisions: SceneCollisions
-    kinematics: Kinematics
-    reachability: ReachabilityBoard
-    display_models: DisplayModels
-    online: OnlineScene
-    motion: RobotMotion
-    undo: Undo
-    cameras: Cameras
-    build: BuildService
-    package_import: PackageImport
-    execution: Execution
-    runs: Runs
-    breakpoints: SharedBreakpoints
-    package_runs: PackageRuns
-    temporary_runs: TemporaryRuns
-    stop_all: StopAll
+    async def start(self, settings: ServerSettings, stack: AsyncExitStack) -> None:
+        """Build and start all parts; `stack` closes them in reverse order.
+
+        Raises:
+            StorageError: the data directory cannot be used.
+        """
+
+        def closed(part: P) -> P:
+            stack.push_async_callback(_close, part)
+            return part
+
+        self.settings = settings
+        # ------------------------------------------------------------------------------------ stores
+        tighten(settings.data_dir)
+        hub = self.hub = Hub()
+        known_types = KnownTypes()
+        secrets = self.secrets = SettingSecrets(known_types, SecretStore(settings.secrets_file), settings.cell)
+        storage = self.storage = closed(await Storage.open(settings, secrets))
+        assets = self.assets = await AssetStore.open(settings.assets_dir)
+        types = self.types = ObjectTypes(known_types, storage, assets, settings.analysis_file)
+        await types.load()
+        damage = self.damage = DataDamage(settings.data_dir, hub)
+        damage.load()
+        access = self.access = Access(settings)
+        if problem := access.repair():
+            damage.report(problem)
+        secrets.store.load(damage)
+        REDACTION.hide(lambda: secrets.store.values)
+        packages = Packages(settings.packages_dir, secrets.hide_in_package)
+        await migrate_secrets(storage, packages, secrets)
+        shared = SharedData(storage)
+        type_notifications = self.type_notifications = closed(TypeNotifications(types, hub))
+        compute = self.compute = closed(Compute(settings.compute_idle))
+        hosts = self.hosts = CellHosts(settings.device_files_dirs)
+        scene_host = HostSession(hub, hosts, "scene")
+        program_host = HostSession(hub, hosts, "program", to_all_clients=True)
+
+
+        # ------------------------------------------------------------------------------------ session
+        session = self.session = Session(settings, storage, types, damage, secrets)
+        await session.open()
+        closed(session)
+        dependents = self.dependents = Dependents(storage, types, session)
+        self.saved_problems = closed(SavedProblems(storage, types, settings.problems_file))
+        edit_notifications = self.edit_notifications = closed(EditNotifications(hub, session))
+        locks = self.locks = Locks(session, is_stored(types, storage), settings.lock_retries, settings.lock_retry_wait)
+        users = self.users = closed(Users(hub, locks, settings))
+        lock_takeover = self.lock_takeover = LockTakeover(locks, users, session.name_of)
+        tasks = self.tasks = closed(Tasks(hub))
+        presence = self.presence = closed(PresenceBoard(hub, users))
+        previews = self.previews = closed(Previews(hub, locks))
+        view_states = self.view_states = ViewStates(hub, shared)
+
+        # ------------------------------------------------------------------------------------ workspace
+        markers = self.markers = Markers(settings.markers_file, settings.markers)
+        markers.load(damage)
+        robots = self.robots = SceneRobots(assets, types, session, scene_host)
+        robot_calibrations = self.robot_calibrations = closed(
+            RobotCalibrations(settings, hub, types, session, scene_host, compute, damage, robots)
+        )
+        robot_calibrations.load()
+        robot_models = self.robot_models = RobotModels(robots, robot_calibrations)
+        collisions = self.collisions = ObstacleRegistry(settings.scene_inflation)
+        scene_collisions = self.scene_collisions = SceneCollisions(
+            assets, types, session, compute, collisions, robots, robot_models, scene_host, program_host
+        )
+        host_world = HostWorld(collisions, robot_calibrations, assets, scene_host, program_host)
+        kinematics = self.kinematics = Kinematics(types, scene_host, compute, robots, robot_models, scene_collisions)
+        self.reachability = closed(ReachabilityBoard(
+            hub, types, session, scene_host, compute, collisions, robot_calibrations, robots, robot_models,
+            scene_collisions,
+        ))  # fmt: skip
+        self.object_aiming = ObjectAimings()
+        self.display_models = closed(DisplayModels(assets, compute, tasks, settings.prepared_dir))
+
+        # ------------------------------------------------------------------------------------ services
+        opening = SceneOpening(settings, types, session, secrets, host_world)
+        online = self.online = closed(
+            OnlineScene(scene_host, opening, hub, locks, session, robots, tasks, robot_calibrations)
+        )
+        self.undo = Undo(locks, storage, types, session, online, dependents)
+        motion = self.motion = RobotMotion(hub, types, session, online, robots, kinematics)
+        cameras = self.cameras = Cameras(types, session, online)
+        calibration = self.calibration = Calibration(compute, markers)
+        calibration_records = self.calibration_records = Calibrations(storage)
+        self.scene_calibration = SceneCalibration(
+            hub, locks, types, session, online, calibration, calibration_records, markers, tasks, robot_models,
+            motion, cameras,
+        )  # fmt: skip
+        build = self.build = BuildService(settings, storage, types)
+        self.package_import = PackageImport(storage, assets, types, session, type_notifications)
+        runs = self.runs = Runs(hub)
+        await runs.open(shared)
+        closed(runs)
+        breakpoints = self.breakpoints = SharedBreakpoints(hub, storage, session, shared)
+        connect_edits(edit_notifications, previews, breakpoints)
+        messages = RunMessages(settings, secrets, breakpoints, host_world)
+        execution = self.execution = closed(
+            Execution(packages, program_host, online, settings, hub, types, runs, breakpoints, secrets, messages)
+        )
+        self.stop_all = StopAll(session, online, execution)
+        storage.on_deleted += [view_states.forget, breakpoints.forget, session.forget_history]
+        self.package_runs = PackageRuns(hub, users, locks, session, online, execution, presence, lock_takeover)
+        temporary_runs = self.temporary_runs = TemporaryRuns(
+            hub, locks, storage, types, session, online, execution, build, tasks
+        )
+        await temporary_runs.recover()
 
     def greeting(self) -> list[Event]:
         """Return the first events for a client: the open document, the running program or main screen, and notices."""
@@ -121,163 +181,29 @@ class Server:
         return state + self.damage.greeting()
 
 
+class _Closable(Protocol):
+    def close(self) -> Awaitable[None] | None: ...
+
+
+P = TypeVar("P", bound=_Closable)
+
+
+async def _close(part: _Closable) -> None:
+    if (closing := part.close()) is not None:
+        await closing
+
+
 @asynccontextmanager
 async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
-    """Build and start all parts; close them in reverse order at the end.
+    """Start the parts, and close them in reverse order at the end.
 
     Raises:
         StorageError: the data directory cannot be used.
     """
     async with AsyncExitStack() as stack:
-        # ------------------------------------------------------------------------------------ stores
-        tighten(settings.data_dir)
-        storage = await Storage.open(settings)
-        stack.push_async_callback(storage.close)
-        assets = await AssetStore.open(settings.assets_dir)
-        hub = Hub()
-        types = ObjectTypes(storage, assets, settings.analysis_file)
-        await types.load()
-        damage = DataDamage(settings.data_dir, hub)
-        damage.load()
-        access = Access(settings)
-        if problem := access.repair():
-            damage.report(problem)
-        secrets = SettingSecrets(types, SecretStore(settings.secrets_file), settings.cell)
-        secrets.store.load(damage)
-        storage.secrets = secrets
-        REDACTION.secrets = lambda: secrets.store.values
-        packages = Packages(settings.packages_dir, secrets.hide_in_package)
-        await migrate_secrets(storage, packages, secrets)
-        shared = SharedData(storage)
-        type_notifications = TypeNotifications(types, hub)
-        stack.push_async_callback(type_notifications.close)
-        compute = Compute(settings.compute_idle)
-        stack.push_async_callback(compute.close)
-        hosts = CellHosts(settings.device_files_dirs)
-        scene_host = HostSession(hub, hosts, "scene")
-        program_host = HostSession(hub, hosts, "program", to_all_clients=True)
-
-        # ------------------------------------------------------------------------------------ session
-        session = Session(settings, storage, types, damage, secrets)
-        await session.open()
-        stack.push_async_callback(session.close)
-        dependents = Dependents(storage, types, session)
-        saved_problems = SavedProblems(storage, types, settings.problems_file)
-        stack.push_async_callback(saved_problems.close)
-        edit_notifications = EditNotifications(hub, session)
-        stack.callback(edit_notifications.close)
-        locks = Locks(session, is_stored(types, storage), settings.lock_retries, settings.lock_retry_wait)
-        users = Users(hub, locks, settings)
-        stack.callback(users.close)
-        lock_takeover = LockTakeover(locks, users, session.name_of)
-        tasks = Tasks(hub)
-        stack.callback(tasks.close)
-        presence = PresenceBoard(hub, users)
-        stack.callback(presence.close)
-        previews = Previews(hub, locks)
-        stack.callback(previews.close)
-        view_states = ViewStates(hub, shared)
-
-        # ------------------------------------------------------------------------------------ workspace
-        markers = Markers(settings.markers_file, settings.markers)
-        markers.load(damage)
-        robots = SceneRobots(assets, types, session, scene_host)
-        robot_calibrations = RobotCalibrations(settings, hub, types, session, scene_host, compute, damage, robots)
-        robot_calibrations.load()
-        stack.push_async_callback(robot_calibrations.close)
-        robot_models = RobotModels(robots, robot_calibrations)
-        collisions = ObstacleRegistry(settings.scene_inflation)
-        scene_collisions = SceneCollisions(
-            assets, types, session, compute, collisions, robots, robot_models, scene_host, program_host
-        )
-        host_world = HostWorld(collisions, robot_calibrations, assets, scene_host, program_host)
-        kinematics = Kinematics(types, scene_host, compute, robots, robot_models, scene_collisions)
-        reachability = ReachabilityBoard(
-            hub, types, session, scene_host, compute, collisions, robot_calibrations, robots, robot_models,
-            scene_collisions,
-        )  # fmt: skip
-        stack.push_async_callback(reachability.close)
-        display_models = DisplayModels(assets, compute, tasks, settings.prepared_dir)
-        stack.push_async_callback(display_models.close)
-
-        # ------------------------------------------------------------------------------------ services
-        opening = SceneOpening(settings, types, session, secrets, host_world)
-        online = OnlineScene(scene_host, opening, hub, locks, session, robots, tasks, robot_calibrations)
-        stack.push_async_callback(online.close)
-        motion = RobotMotion(hub, types, session, online, robots, kinematics)
-        cameras = Cameras(types, session, online)
-        calibration = Calibration(compute, markers)
-        calibration_records = Calibrations(storage)
-        scene_calibration = SceneCalibration(
-            hub, locks, types, session, online, calibration, calibration_records, markers, tasks, robot_models,
-            motion, cameras,
-        )  # fmt: skip
-        build = BuildService(settings, storage, types)
-        package_import = PackageImport(storage, assets, types, session, type_notifications)
-        runs = Runs(hub)
-        await runs.open(shared)
-        stack.push_async_callback(runs.close)
-        breakpoints = SharedBreakpoints(hub, storage, session, shared)
-        connect_edits(edit_notifications, previews, breakpoints)
-        messages = RunMessages(settings, secrets, breakpoints, host_world)
-        execution = Execution(
-            packages, program_host, online, settings, hub, types, runs, breakpoints, secrets, messages
-        )
-        stack.push_async_callback(execution.close)
-        storage.on_deleted += [view_states.forget, breakpoints.forget, session.forget_history]
-        package_runs = PackageRuns(hub, users, locks, session, online, execution, presence, lock_takeover)
-        temporary_runs = TemporaryRuns(hub, locks, storage, types, session, online, execution, build, tasks)
-        await temporary_runs.recover()
-
-        yield Server(
-            settings=settings,
-            access=access,
-            hub=hub,
-            storage=storage,
-            assets=assets,
-            damage=damage,
-            secrets=secrets,
-            types=types,
-            type_notifications=type_notifications,
-            compute=compute,
-            hosts=hosts,
-            session=session,
-            dependents=dependents,
-            edit_notifications=edit_notifications,
-            saved_problems=saved_problems,
-            locks=locks,
-            users=users,
-            lock_takeover=lock_takeover,
-            tasks=tasks,
-            previews=previews,
-            view_states=view_states,
-            presence=presence,
-            markers=markers,
-            calibration=calibration,
-            calibration_records=calibration_records,
-            scene_calibration=scene_calibration,
-            object_aiming=ObjectAimings(),
-            robots=robots,
-            robot_calibrations=robot_calibrations,
-            robot_models=robot_models,
-            collisions=collisions,
-            scene_collisions=scene_collisions,
-            kinematics=kinematics,
-            reachability=reachability,
-            display_models=display_models,
-            online=online,
-            motion=motion,
-            undo=Undo(locks, storage, types, session, online, dependents),
-            cameras=cameras,
-            build=build,
-            package_import=package_import,
-            execution=execution,
-            runs=runs,
-            breakpoints=breakpoints,
-            package_runs=package_runs,
-            temporary_runs=temporary_runs,
-            stop_all=StopAll(session, online, execution),
-        )
+        server = Server()
+        await server.start(settings, stack)
+        yield server
 
 
 def is_stored(types: ObjectTypes, storage: Storage) -> Callable[[str], Awaitable[bool]]:

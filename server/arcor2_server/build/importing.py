@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -181,24 +182,17 @@ def _without_times(document: Scene | Project) -> Scene | Project:
     return msgspec.structs.replace(document, **_WITHOUT_TIMES)
 
 
+@dataclass(frozen=True, slots=True)
 class PackageImport:
     """Imports packages into the storage."""
 
-    def __init__(
-        self,
-        storage: Storage,
-        assets: AssetStore,
-        types: ObjectTypes,
-        session: Session,
-        type_notifications: TypeNotifications,
-    ) -> None:
-        self._storage = storage
-        self._assets = assets
-        self._types = types
-        self._session = session
-        self._type_notifications = type_notifications
-        self._importing = asyncio.Lock()
-        """Serializes imports."""
+    _storage: Storage
+    _assets: AssetStore
+    _types: ObjectTypes
+    _session: Session
+    _type_notifications: TypeNotifications
+    _importing: asyncio.Lock = field(init=False, default_factory=asyncio.Lock)
+    """Serializes imports."""
 
     async def _saved(self, package: Imported) -> _Saved:
         storage = self._storage

@@ -1,6 +1,7 @@
 """Runs packages. An open scene or project that no connected user works on is closed during the run."""
 
 import asyncio
+from dataclasses import dataclass
 
 import structlog
 
@@ -21,28 +22,18 @@ from arcor2_server.online.online_scene import OnlineScene
 log = structlog.get_logger(__name__)
 
 
+@dataclass(frozen=True, slots=True)
 class PackageRuns:
     """Runs packages, also while a scene or project is open on which no connected user works."""
 
-    def __init__(
-        self,
-        hub: EventHub,
-        users: Users,
-        locks: Locks,
-        session: Session,
-        online: OnlineScene,
-        execution: Execution,
-        presence: PresenceBoard,
-        lock_takeover: LockTakeover,
-    ) -> None:
-        self._hub = hub
-        self._users = users
-        self._locks = locks
-        self._session = session
-        self._online = online
-        self._execution = execution
-        self._presence = presence
-        self._lock_takeover = lock_takeover
+    _hub: EventHub
+    _users: Users
+    _locks: Locks
+    _session: Session
+    _online: OnlineScene
+    _execution: Execution
+    _presence: PresenceBoard
+    _lock_takeover: LockTakeover
 
     def is_left_open(self) -> bool:
         """Return whether a scene or project is open on which no connected user works or holds locks."""

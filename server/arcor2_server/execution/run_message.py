@@ -1,6 +1,7 @@
 """Creates the message that runs a package in a cell host."""
 
 import asyncio
+from dataclasses import dataclass
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -13,20 +14,14 @@ from arcor2_server.storage.setting_secrets import SettingSecrets
 from arcor2_server.workspace.host_world import HostWorld
 
 
+@dataclass(frozen=True, slots=True)
 class RunMessages:
     """Creates the messages with settings, secrets, breakpoints and collision models."""
 
-    def __init__(
-        self,
-        settings: ServerSettings,
-        secrets: SettingSecrets,
-        breakpoints: SharedBreakpoints,
-        host_world: HostWorld,
-    ) -> None:
-        self._settings = settings
-        self._secrets = secrets
-        self._breakpoints = breakpoints
-        self._host_world = host_world
+    _settings: ServerSettings
+    _secrets: SettingSecrets
+    _breakpoints: SharedBreakpoints
+    _host_world: HostWorld
 
     def prepare(self, package_id: str, directory: Path, how: How) -> m.RunPackage:
         """Return the message without the parts that may change until the host is ready.

@@ -15,6 +15,7 @@ from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
+from arcor2_server.background import BackgroundTasks
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.execution.breakpoints import SharedBreakpoints
@@ -77,9 +78,8 @@ class Execution(PackageLibrary):
         self._messages = messages
         self._over: asyncio.Future[None] | None = None
         self._killing: asyncio.TimerHandle | None = None
-        self._tasks: set[asyncio.Task[None]] = set()
-        host.on_message = self._handle
-        host.on_end = self._host_ended
+        self._background = BackgroundTasks()
+        host.observe(self._handle, self._host_ended)
         online.before_start.append(self.require_no_program)
         breakpoints.on_change.append(self._breakpoints_changed)
 

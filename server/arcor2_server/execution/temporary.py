@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import time
+from dataclasses import dataclass
 
 import structlog
 
@@ -44,12 +45,6 @@ class _Run:
 
     def __init__(self, runs: "TemporaryRuns", how: How) -> None:
         self._runs = runs
-        self._hub = runs.hub
-        self._locks = runs.locks
-        self._session = runs.session
-        self._scene = runs.online
-        self._execution = runs.execution
-        self._tasks = runs.tasks
         self._how = how
         self._package = ""
         self._requested_at = time.monotonic()
@@ -61,15 +56,15 @@ class _Run:
         The exclusive lock is held from the checks until the project is closed.
         """
         try:
-            async with self._locks.exclusive():
+            async with self._runs.locks.exclusive():
                 project = await self._build()
-                self._scene.last_stop.require_none_since(self._requested_at)
-                self._execution.reserved = True
+                self._runs.online.last_stop.require_none_since(self._requested_at)
+                self._runs.execution.reserve()
                 _settle(built)
                 await asyncio.sleep(0)  # the answer is sent first
                 await self._close()
         except Exception as error:
-            self._execution.reserved = False
+            self._runs.execution.release()
             await self._discard_package()
             if not built.done():
                 _settle(built, error)
@@ -89,8 +84,8 @@ class _Run:
             await self._open_again(project)
             raise
         finally:
-            self._execution.reserved = False
-        if self._online and self._session.project is not None:
+            self._runs.execution.release()
+        if self._online and self._runs.session.project is not None:
             try:
                 await self._runs.online.begin_start(self._how.by)
             except Arcor2Error as error:
@@ -100,19 +95,19 @@ class _Run:
         """Delete the package without an event. No client knows it."""
         if self._package:
             with contextlib.suppress(Arcor2Error):
-                await asyncio.to_thread(self._execution.packages.delete_temporary, self._package)
+                await asyncio.to_thread(self._runs.execution.packages.delete_temporary, self._package)
 
     async def _build(self) -> Project:
-        project = self._session.require_project()
-        if self._session.has_changes:
+        project = self._runs.session.require_project()
+        if self._runs.session.has_changes:
             raise RequestRefused("{name} has unsaved changes. Save it first.", name=project.name)
-        if self._execution.busy:
+        if self._runs.execution.busy:
             raise RequestRefused("A program is running. Stop it first.")
-        if self._scene.running_action is not None:
+        if self._runs.online.running_action is not None:
             raise RequestRefused("An action is running. Wait until it ends, or stop it.")
-        if self._scene.state not in (SceneStateEnum.STOPPED, SceneStateEnum.STARTED):
+        if self._runs.online.state not in (SceneStateEnum.STOPPED, SceneStateEnum.STARTED):
             raise RequestRefused(
-                "The scene is {value}. Wait until it is started or stopped.", value=self._scene.state.value
+                "The scene is {value}. Wait until it is started or stopped.", value=self._runs.online.state.value
             )
         name = f"Temporary package for project '{project.name}'."
         self._package = new_id("pkg")
@@ -124,7 +119,7 @@ class _Run:
         return project
 
     async def _close(self) -> None:
-        self._online = self._scene.online
+        self._online = self._runs.online.online
         if self._online:
             await self._runs.online.begin_stop(self._how.by)
             await self._runs.online.settled()
@@ -137,18 +132,18 @@ class _Run:
 
     async def _run(self) -> None:
         try:
-            self._scene.last_stop.require_none_since(self._requested_at)
-            await self._execution.run_through(self._package, self._how)
+            self._runs.online.last_stop.require_none_since(self._requested_at)
+            await self._runs.execution.run_through(self._package, self._how)
         except Arcor2Error as error:
             log.warning("run of the temporary package failed", package=self._package, reason=str(error))
 
     async def _delete(self) -> None:
         try:
-            summary = await self._execution.delete(self._package)
+            summary = await self._runs.execution.delete(self._package)
         except Arcor2Error as error:
             log.warning("temporary package not deleted", package=self._package, reason=str(error))
         else:
-            self._hub.broadcast(make_event("PackageChanged", summary, ChangeType.REMOVE))
+            self._runs.hub.broadcast(make_event("PackageChanged", summary, ChangeType.REMOVE))
 
     async def _open_again(self, project: Project) -> None:
         """Open the saved project. If that fails, send clients to the list of projects."""
@@ -156,35 +151,26 @@ class _Run:
             opened = await self._runs.open(project.id)
         except Arcor2Error as error:
             log.warning("project not opened again", project=project.name, reason=str(error))
-            self._hub.broadcast(make_event("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id)))
+            self._runs.hub.broadcast(
+                make_event("ShowMainScreen", ShowMainScreenData(MainScreen.PROJECTS_LIST, project.id))
+            )
             return
-        self._hub.broadcast(make_event("OpenProject", opened))
+        self._runs.hub.broadcast(make_event("OpenProject", opened))
 
 
+@dataclass(frozen=True, slots=True)
 class TemporaryRuns:
     """Runs the open project as a temporary package, and opens the project again afterwards."""
 
-    def __init__(
-        self,
-        hub: EventHub,
-        locks: Locks,
-        storage: Storage,
-        types: ObjectTypes,
-        session: Session,
-        online: OnlineScene,
-        execution: Execution,
-        build: BuildService,
-        tasks: Tasks,
-    ) -> None:
-        self.hub = hub
-        self.locks = locks
-        self.session = session
-        self.online = online
-        self.execution = execution
-        self.builder = build
-        self.tasks = tasks
-        self._storage = storage
-        self._types = types
+    hub: EventHub
+    locks: Locks
+    _storage: Storage
+    _types: ObjectTypes
+    session: Session
+    online: OnlineScene
+    execution: Execution
+    builder: BuildService
+    tasks: Tasks
 
     async def run(self, how: How) -> None:
         """Run the open project and close it for the time of the run; return when the package is built.

@@ -41,13 +41,20 @@ class HostSession:
         """The encoded event PackageInfo while a program runs. Set by the owner of the session."""
         self.board = DeviceBoard(hub)
         self.streams = RobotStreams(hub, self.send, to_all_clients=to_all_clients)
-        self.on_message: Callable[[CellHost, m.ServerBound], None] = lambda _host, _message: None
-        """Receives the messages that the session does not handle."""
-        self.on_end: Callable[[str], None] = lambda _reason: None
-        """Called with the reason when the host has ended by itself."""
+        self._on_message: Callable[[CellHost, m.ServerBound], None] = lambda _host, _message: None
+        self._on_end: Callable[[str], None] = lambda _reason: None
         self._pool = pool
         self._what = what
         hub.on_leave.append(self.streams.forget)
+
+    def observe(self, on_message: Callable[[CellHost, m.ServerBound], None], on_end: Callable[[str], None]) -> None:
+        """Register the owner of the session.
+
+        Args:
+            on_message: receives the messages that the session does not handle.
+            on_end: called with the reason when the host has ended by itself.
+        """
+        self._on_message, self._on_end = on_message, on_end
 
     # -------------------------------------------------------------------------------- the process
     async def take(self) -> CellHost:
@@ -87,7 +94,7 @@ class HostSession:
             case m.LogLine():
                 log.info(self._what, level=message.level, text=message.text, object=message.object_id)
             case _:
-                self.on_message(host, message)
+                self._on_message(host, message)
 
     def host_silent(self, host: CellHost, silent: bool) -> None:
         """Note whether the host answers."""
@@ -98,7 +105,7 @@ class HostSession:
     def host_ended(self, host: CellHost, reason: str) -> None:
         """Report that the host has ended."""
         if host is self.host:
-            self.on_end(reason)
+            self._on_end(reason)
 
     async def close(self) -> None:
         """Close all hosts of the pool when the server ends."""

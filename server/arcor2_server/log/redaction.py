@@ -57,12 +57,15 @@ class LogRedaction:
     """Hides the secret settings of devices in log lines (a processor of structlog)."""
 
     def __init__(self) -> None:
-        self.secrets: Callable[[], Set[str]] = frozenset
-        """Returns the secrets to hide."""
+        self._secrets: Callable[[], Set[str]] = frozenset
+
+    def hide(self, secrets: Callable[[], Set[str]]) -> None:
+        """Hide the secrets that a function returns. The log exists before the secrets are read."""
+        self._secrets = secrets
 
     def __call__(self, _logger: Any, _name: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
         """Return an event without secrets."""
-        secrets = [secret for secret in self.secrets() if len(secret) >= MIN_LENGTH]
+        secrets = [secret for secret in self._secrets() if len(secret) >= MIN_LENGTH]
         return {key: _without(value, secrets) for key, value in event.items()} if secrets else event
 
 

@@ -38,14 +38,46 @@ class Known(Struct, frozen=True):
     digest: str = ""
 
 
+class KnownTypes:
+    """The results of the last analysis.
+
+    The registry of object types reads its storage, and the storage hides settings that the types declare as secret. So
+    that neither waits for the other, both receive this object.
+    """
+
+    def __init__(self) -> None:
+        self.results = Known()
+
+    def replace(self, results: Known) -> None:
+        """Use the results of a new analysis."""
+        self.results = results
+
+    def names(self) -> list[str]:
+        """Return the names of all types."""
+        return list(self.results.metas)
+
+    def meta(self, name: str) -> ObjectTypeMeta:
+        """Return one type. Raise NotFound if there is none."""
+        try:
+            return self.results.metas[name]
+        except KeyError:
+            raise NotFound("Object type {name!r} does not exist.", name=name) from None
+
+
 class TypeCatalog:
     """The known object types. Look-ups raise NotFound for an unknown type or action."""
 
-    def __init__(self) -> None:
+    def __init__(self, known: KnownTypes) -> None:
+        self.names = known.names
+        self.meta = known.meta
+        self._known_types = known
         self._library = Library()
         self._installed: dict[str, InstalledType] = {}
         self._uploaded: dict[str, ObjectTypeSource] = {}
-        self._known = Known()
+
+    @property
+    def _known(self) -> Known:
+        return self._known_types.results
 
     # ------------------------------------------------------------------------------------------------ look-ups
     def installed_folders(self) -> list[Path]:
@@ -57,10 +89,6 @@ class TypeCatalog:
         """A digest of all types, robots and actions, which does not depend on the process."""
         return self._known.digest
 
-    def names(self) -> list[str]:
-        """Return the names of all types."""
-        return list(self._known.metas)
-
     def known(self, name: str) -> bool:
         """Return whether there is such a type."""
         return name in self._known.metas
@@ -68,13 +96,6 @@ class TypeCatalog:
     def metas(self) -> list[ObjectTypeMeta]:
         """Return all types, sorted by name, including built-in and disabled ones."""
         return list(self._known.metas.values())
-
-    def meta(self, name: str) -> ObjectTypeMeta:
-        """Return one type."""
-        try:
-            return self._known.metas[name]
-        except KeyError:
-            raise NotFound("There is no object type {name!r}.", name=name) from None
 
     def _analysis(self, name: str) -> TypeAnalysis:
         self.meta(name)

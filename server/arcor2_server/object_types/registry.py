@@ -16,7 +16,7 @@ from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import Message
 from arcor2_server.files import write_private
-from arcor2_server.object_types.catalog import Known, TypeCatalog
+from arcor2_server.object_types.catalog import Known, KnownTypes, TypeCatalog
 from arcor2_server.object_types.changes import Changes, PendingChanges
 from arcor2_server.object_types.robot_packages import robot_packages
 
@@ -64,8 +64,10 @@ class ObjectTypes(TypeCatalog):
     or mesh is missing. A robot's model is listed only if the asset exists.
     """
 
-    def __init__(self, storage: SourceStore, assets: ModelStore, stored_analysis: Path | None = None) -> None:
-        super().__init__()
+    def __init__(
+        self, known: KnownTypes, storage: SourceStore, assets: ModelStore, stored_analysis: Path | None = None
+    ) -> None:
+        super().__init__(known)
         self.revision = 0
         self._stored_analysis = stored_analysis
         self._storage = storage
@@ -141,7 +143,7 @@ class ObjectTypes(TypeCatalog):
         # In a thread, since the analysis of many types would block the event loop.
         complete = await self._analyse_huge()
         known = await asyncio.to_thread(self._analyse, await self._storage.types_without_model(), complete)
-        self._known = known
+        self._known_types.replace(known)
         self._pending.set_current(known.metas)
         if first:
             self._pending.take()

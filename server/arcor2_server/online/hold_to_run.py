@@ -7,7 +7,8 @@ and connections.
 import asyncio
 import itertools
 import math
-from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import msgspec
@@ -22,6 +23,7 @@ from arcor2_hw.data.rpc.operation import LONGEST_LEASE_MS
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
+from arcor2_server.background import BackgroundTasks
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import Connection, EventHub, make_event
@@ -91,29 +93,21 @@ class _Scale(Data, frozen=True):
     scale: float
 
 
+@dataclass(frozen=True, eq=False, slots=True)
 class HoldToRun:
     """The active holds, at most one per robot."""
 
-    def __init__(
-        self,
-        host: HostSession,
-        hub: EventHub,
-        locks: Locks,
-        robots: SceneRobots,
-        moving: set[str],
-        spawn: Callable[[Coroutine[Any, Any, None], str], None],
-    ) -> None:
-        self._host = host
-        self._hub = hub
-        self._locks = locks
-        self._robots = robots
-        self._moving = moving
-        self._spawn = spawn
-        self._numbers = itertools.count(1)
-        self._held: dict[str, _Press] = {}
-        self._spent: dict[Connection, int] = {}
-        """The number of the newest ended press by client. Messages of it and earlier presses are refused."""
-        self._delays: dict[Connection, Delay] = {}
+    _host: HostSession
+    _hub: EventHub
+    _locks: Locks
+    _robots: SceneRobots
+    _moving: set[str]
+    _background: BackgroundTasks
+    _numbers: Iterator[int] = field(init=False, default_factory=lambda: itertools.count(1))
+    _held: dict[str, _Press] = field(init=False, default_factory=dict)
+    _spent: dict[Connection, int] = field(init=False, default_factory=dict)
+    """The number of the newest ended press by client. Messages of it and earlier presses are refused."""
+    _delays: dict[Connection, Delay] = field(init=False, default_factory=dict)
 
     def holder(self, robot_id: str) -> str | None:
         """Return the user who holds a robot, None if it is not held."""
@@ -260,7 +254,7 @@ class HoldToRun:
         """Start stopping the robot, with a reason for the user."""
         if not press.over:
             press.over, press.reason = True, press.reason or reason
-            self._spawn(self._release(press, quietly=True), f"end of a hold of {press.robot_id}")
+            self._background.spawn(self._release(press, quietly=True), f"end of a hold of {press.robot_id}")
 
     async def _release(self, press: _Press, *, quietly: bool = False) -> None:
         press.over = True

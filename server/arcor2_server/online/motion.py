@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import structlog
@@ -45,24 +46,16 @@ def require_speed(speed: float) -> None:
         raise RequestRefused("The speed must be more than 0 and at most 1, not {speed:g}.", speed=speed)
 
 
+@dataclass(frozen=True, slots=True)
 class RobotMotion:
     """Robot motion requested by a user."""
 
-    def __init__(
-        self,
-        hub: EventHub,
-        types: ObjectTypes,
-        session: Session,
-        online: OnlineScene,
-        robots: SceneRobots,
-        kinematics: Kinematics,
-    ) -> None:
-        self._hub = hub
-        self._types = types
-        self._session = session
-        self._online = online
-        self._robots = robots
-        self._kinematics = kinematics
+    _hub: EventHub
+    _types: ObjectTypes
+    _session: Session
+    _online: OnlineScene
+    _robots: SceneRobots
+    _kinematics: Kinematics
 
     def require_feature(self, robot_id: str, feature: str) -> None:
         """Raise RequestRefused if the robot's type does not have the feature."""

@@ -83,10 +83,8 @@ class OnlineScene:
         """The user who last started or stopped the scene."""
         self._task: asyncio.Task[None] | None = None
         self._answer: asyncio.Future[m.ErrorData | None] | None = None
-        self._background: set[asyncio.Task[None]] = set()
         self._preparing = asyncio.get_running_loop().call_later(SPARE_AFTER, host.prepare)
-        host.on_message = self._handle
-        host.on_end = self._host_ended
+        host.observe(self._handle, self._host_ended)
         host.board.on_connection.append(self._connection_changed)
         hub.on_leave.append(self.held.forget)
 
@@ -279,10 +277,7 @@ class OnlineScene:
         """Close the hosts when the server ends. They stop all motion and disconnect."""
         self._preparing.cancel()
         await self.host.close()
-        tasks = [task for task in (self._task, *self._background) if task is not None]
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await self.background.cancel()
 
     # -------------------------------------------------------------------------------- from the host
     def _handle(self, host: CellHost, message: m.ServerBound) -> None:  # noqa: ARG002
@@ -361,13 +356,6 @@ class OnlineScene:
     def arm(self, robot_id: str, arm_id: str | None) -> dict[str, Any]:
         """Return the argument for the arm. Raise RequestRefused unless an arm is given only for multi-arm robots."""
         return self._robots.arm(robot_id, arm_id)
-
-    # -------------------------------------------------------------------------------- in the background
-    def spawn(self, work: Any, name: str) -> None:
-        """Run a coroutine in the background. It is cancelled when the server ends."""
-        task = asyncio.create_task(work, name=name)
-        self._background.add(task)
-        task.add_done_callback(self._background.discard)
 
     def action_ended(self, action: RunningAction, results: list[str] | None, error: Message | None) -> None:
         """Store the results of the running action, and publish its end unless it was cancelled."""

@@ -1,5 +1,7 @@
 """Creates the message that opens a scene in a cell host."""
 
+from dataclasses import dataclass
+
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.scene import Scene
@@ -12,22 +14,15 @@ from arcor2_server.storage.setting_secrets import SettingSecrets
 from arcor2_server.workspace.host_world import HostWorld
 
 
+@dataclass(frozen=True, slots=True)
 class SceneOpening:
     """Creates the message with settings, secrets, object types and collision models."""
 
-    def __init__(
-        self,
-        settings: ServerSettings,
-        types: ObjectTypes,
-        session: Session,
-        secrets: SettingSecrets,
-        host_world: HostWorld,
-    ) -> None:
-        self._settings = settings
-        self._types = types
-        self._session = session
-        self._secrets = secrets
-        self._host_world = host_world
+    _settings: ServerSettings
+    _types: ObjectTypes
+    _session: Session
+    _secrets: SettingSecrets
+    _host_world: HostWorld
 
     async def prepare(self, scene: Scene, keep_going: bool) -> tuple[m.OpenScene, dict[str, list[str]]]:
         """Return the message without the workspace, and the names of overridden settings by id of the object.

@@ -2,6 +2,7 @@
 
 import functools
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
 from typing import Final
 
 import msgspec
@@ -53,6 +54,7 @@ Find = Callable[[ProgressCallback], Awaitable[tuple[Pose, CalibrationRecord]]]
 """Measures an object; returns its pose and the record of the calibration."""
 
 
+@dataclass(frozen=True, slots=True)
 class SceneCalibration:
     """Calibrates the cameras and robots of the online scene, each at most once at a time.
 
@@ -60,34 +62,19 @@ class SceneCalibration:
     ProcessState reports its end.
     """
 
-    def __init__(
-        self,
-        hub: EventHub,
-        locks: Locks,
-        types: ObjectTypes,
-        session: Session,
-        online: OnlineScene,
-        calibration: Calibration,
-        records: Calibrations,
-        markers: Markers,
-        tasks: Tasks,
-        robot_models: RobotModels,
-        motion: RobotMotion,
-        cameras: Cameras,
-    ) -> None:
-        self._hub = hub
-        self._locks = locks
-        self._types = types
-        self._session = session
-        self._online = online
-        self._calibration = calibration
-        self._records = records
-        self._markers = markers
-        self._tasks = tasks
-        self._robot_models = robot_models
-        self._motion = motion
-        self._cameras = cameras
-        self._running: set[str] = set()
+    _hub: EventHub
+    _locks: Locks
+    _types: ObjectTypes
+    _session: Session
+    _online: OnlineScene
+    _calibration: Calibration
+    _records: Calibrations
+    _markers: Markers
+    _tasks: Tasks
+    _robot_models: RobotModels
+    _motion: RobotMotion
+    _cameras: Cameras
+    _running: set[str] = field(init=False, default_factory=set)
 
     # ------------------------------------------------------------------------------------------------ cameras
     async def start_camera(self, user: str, camera_id: str) -> None:
@@ -271,7 +258,7 @@ class SceneCalibration:
                 end()
 
         self._running.add(obj.id)
-        self._online.spawn(run(), f"calibration of {obj.name}")
+        self._online.background.spawn(run(), f"calibration of {obj.name}")
 
     async def _set_pose(self, user: str, object_id: str, pose: Pose) -> None:
         """Set the pose of an object and of its device, and publish the change."""

@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 
 from arcor2_hw.data.base import Unset
 from arcor2_server.collaboration.locks import Locked, Locks
@@ -19,24 +20,16 @@ def _moves(change: Change) -> bool:
     return bool(change.before.pose != change.after.pose)
 
 
+@dataclass(frozen=True, slots=True)
 class Undo:
     """Applies changes that revert edits, with the locks and checks of the ordinary requests for such changes."""
 
-    def __init__(
-        self,
-        locks: Locks,
-        storage: Storage,
-        types: ObjectTypes,
-        session: Session,
-        online: OnlineScene,
-        dependents: Dependents,
-    ) -> None:
-        self._locks = locks
-        self._storage = storage
-        self._types = types
-        self._session = session
-        self._online = online
-        self._dependents = dependents
+    _locks: Locks
+    _storage: Storage
+    _types: ObjectTypes
+    _session: Session
+    _online: OnlineScene
+    _dependents: Dependents
 
     def find_edit(self, user: str, number: int | Unset, kind: EditKind) -> Edit:
         """Return the edit that a user can undo or redo: the one with a number, else the latest.

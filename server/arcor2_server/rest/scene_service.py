@@ -142,7 +142,7 @@ class SceneServiceOperations:
     @operation("PUT", "/system/start", SCENE, Role.TECHNICIAN)
     async def start_system(self) -> None:
         """Mark the scene as started. No device is connected; use StartScene of the websocket for that."""
-        self._collisions.started = True
+        self._collisions.start()
 
     @operation("PUT", "/system/stop", SCENE, Role.TECHNICIAN)
     async def stop_system(self) -> None:

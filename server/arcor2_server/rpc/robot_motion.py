@@ -109,7 +109,7 @@ class RobotMotionRequests:
                 if lock_owner:
                     self._locks.release(lock_owner, robot_id)
 
-        self._online.spawn(run(), f"motion of {robot_id}")
+        self._online.background.spawn(run(), f"motion of {robot_id}")
 
     def _start_pose_motion(
         self,

@@ -5,7 +5,7 @@ import functools
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from contextvars import ContextVar
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import msgspec
 from sqlalchemy import event, select
@@ -23,6 +23,28 @@ _PER_QUERY: Final = 100
 """Number of documents read by one query; each may have some hundred kilobytes."""
 
 
+async def open_engine(settings: ServerSettings) -> tuple[AsyncEngine, str]:
+    """Open or create the database; return it with its name in messages.
+
+    Raises:
+        StorageError: It is damaged, not writable or of a newer version.
+    """
+    place = settings.database_url.rpartition("@")[2] or str(settings.documents_database)
+    if settings.database_url:
+        engine = create_async_engine(settings.database_url)
+    else:
+        check_opens(settings.documents_database)
+        # One connection, since SQLite allows one writer, and each connection needs a thread.
+        engine = create_async_engine(f"sqlite+aiosqlite:///{settings.documents_database}", pool_size=1, max_overflow=0)
+        event.listen(engine.sync_engine, "connect", prepare)
+    try:
+        await create_or_migrate(engine, place)
+    except BaseException:
+        await engine.dispose()
+        raise
+    return engine, place
+
+
 class Database:
     """The database with its transactions. All methods may raise StorageError, which names the database.
 
@@ -35,26 +57,6 @@ class Database:
         self._engine = engine
         self._place = place
         self._sessions = async_sessionmaker(engine, expire_on_commit=False)
-
-    @classmethod
-    async def open(cls, settings: ServerSettings) -> Self:
-        """Open or create the database. Raise StorageError if it is damaged, not writable or of a newer version."""
-        place = settings.database_url.rpartition("@")[2] or str(settings.documents_database)
-        if settings.database_url:
-            engine = create_async_engine(settings.database_url)
-        else:
-            check_opens(settings.documents_database)
-            # One connection, since SQLite allows one writer, and each connection needs a thread.
-            engine = create_async_engine(
-                f"sqlite+aiosqlite:///{settings.documents_database}", pool_size=1, max_overflow=0
-            )
-            event.listen(engine.sync_engine, "connect", prepare)
-        try:
-            await create_or_migrate(engine, place)
-        except BaseException:
-            await engine.dispose()
-            raise
-        return cls(engine, place)
 
     async def purge(self) -> None:
         """Overwrite replaced and deleted data in an SQLite file."""

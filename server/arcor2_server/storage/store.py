@@ -1,7 +1,7 @@
 """Saved scenes, projects, object types and models. Written data is on disk when a method returns."""
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Final
+from typing import Final, Self
 
 import msgspec
 from msgspec import UNSET
@@ -13,7 +13,8 @@ from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Model3dType, Models,
 from arcor2_hw.data.project import BareProject, Project
 from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_hw.exceptions import StorageError
-from arcor2_server.storage.database import Database
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage.database import Database, open_engine
 from arcor2_server.storage.models import ModelRow, ObjectTypeRow, ProjectRow, ProjectSourceRow, SceneRow
 from arcor2_server.storage.setting_secrets import SettingSecrets
 
@@ -22,6 +23,7 @@ _decode_scene = msgspec.json.Decoder(Scene).decode
 _decode_project = msgspec.json.Decoder(Project).decode
 _SCENE_COLUMNS: Final = [name for name in BareScene.__struct_fields__ if name != "int_modified"]
 _PROJECT_COLUMNS: Final = [name for name in BareProject.__struct_fields__ if name != "int_modified"]
+_decode_modules = msgspec.json.Decoder(dict[str, str]).decode
 _MODEL_DECODERS: Final = {kind.__name__: msgspec.json.Decoder(kind).decode for kind in (Box, Cylinder, Sphere, Mesh)}
 
 
@@ -33,14 +35,24 @@ class DocumentId(Data, frozen=True):
 
 
 class Storage(Database):
-    """The data of the Project service. All methods may raise StorageError, which names the database."""
+    """The data of the Project service. All methods may raise StorageError, which names the database.
 
-    def __init__(self, engine: AsyncEngine, place: str) -> None:
+    Args:
+        engine: the database.
+        place: names the database in messages.
+        secrets: moves secrets out of documents before they are saved; None: documents are saved unchanged.
+    """
+
+    def __init__(self, engine: AsyncEngine, place: str, secrets: SettingSecrets | None) -> None:
         super().__init__(engine, place)
+        self.secrets = secrets
         self.on_deleted: list[Callable[[str], Awaitable[None]]] = []
         """Called with the id of a deleted scene or project."""
-        self.secrets: SettingSecrets | None = None
-        """Moves secrets out of documents before they are saved."""
+
+    @classmethod
+    async def open(cls, settings: ServerSettings, secrets: SettingSecrets | None = None) -> Self:
+        """Open or create the database. Raise StorageError if it is damaged, not writable or of a newer version."""
+        return cls(*await open_engine(settings), secrets)
 
     # ------------------------------------------------------------------------------------------------ scenes
     async def scenes(self) -> list[BareScene]:

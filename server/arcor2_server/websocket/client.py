@@ -59,19 +59,32 @@ ABORT_AFTER: Final = 1.0
 
 
 class Client:
-    """A connected client. Messages are sent in order. Of each stream only the newest message is queued."""
+    """A connected client. Messages are sent in order. Of each stream only the newest message is queued.
 
-    def __init__(self, wire: Wire, settings: ServerSettings) -> None:
+    Args:
+        wire: the transport.
+        settings: limits of the queue.
+        address: the address of the client.
+        greeting: returns the first events for the client, sent when it is admitted.
+        events: names of the events for the client, None for all.
+    """
+
+    def __init__(
+        self,
+        wire: Wire,
+        settings: ServerSettings,
+        address: str = "",
+        greeting: Callable[[], list[Event]] = list,
+        events: frozenset[str] | None = None,
+    ) -> None:
         self.number = next(_numbers)
         self.user: str | None = None
-        self.address = ""
+        self.address = address
+        self.greeting = greeting
+        self.events = events
         self.role: Role = Role.OPERATOR
         self.token: Token | None = None
         """The token of the client, if it sent one."""
-        self.greeting: Callable[[], list[Event]] = list
-        """Returns the first events for the client, sent when it is admitted."""
-        self.events: frozenset[str] | None = None
-        """Names of the events for the client, None for all."""
         self.follows: frozenset[str] = frozenset()
         """Other users whose view states the client receives."""
         self.admitted = False

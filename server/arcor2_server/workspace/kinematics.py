@@ -1,5 +1,7 @@
 """Kinematics from robot models, for robots that are offline or do not compute it themselves."""
 
+from dataclasses import dataclass
+
 from arcor2_hw.collision.description import WorldRobot
 from arcor2_hw.compute.kinematics_tasks import SolveForward, SolveInverse
 from arcor2_hw.data.base import Unset
@@ -16,24 +18,16 @@ from arcor2_server.workspace.robots import SceneRobots, end_effector_link
 from arcor2_server.workspace.scene_collisions import SceneCollisions
 
 
+@dataclass(frozen=True, slots=True)
 class Kinematics:
     """Forward and inverse kinematics from the models of robots, computed by the compute worker."""
 
-    def __init__(
-        self,
-        types: ObjectTypes,
-        host: HostSession,
-        compute: Compute,
-        robots: SceneRobots,
-        robot_models: RobotModels,
-        scene_collisions: SceneCollisions,
-    ) -> None:
-        self._types = types
-        self._host = host
-        self._compute = compute
-        self._robots = robots
-        self._robot_models = robot_models
-        self._scene_collisions = scene_collisions
+    _types: ObjectTypes
+    _host: HostSession
+    _compute: Compute
+    _robots: SceneRobots
+    _robot_models: RobotModels
+    _scene_collisions: SceneCollisions
 
     def solves(self, robot: SceneObject, feature: str) -> bool:
         """Return whether the robot itself computes kinematics: it is online, and its type has the feature."""

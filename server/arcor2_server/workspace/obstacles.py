@@ -51,6 +51,10 @@ class ObstacleRegistry:
             raise NotFound("Collision model {key!r} does not exist.", key=key)
         self._removed([key])
 
+    def start(self) -> None:
+        """Mark the scene as started."""
+        self.started = True
+
     def stop(self) -> None:
         """Stop and remove all obstacles."""
         self.started = False

@@ -8,6 +8,7 @@ import asyncio
 import enum
 import hashlib
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Final
 
 import msgspec
@@ -21,6 +22,8 @@ from arcor2_hw.data.events import NotificationData, NotificationLevel
 from arcor2_hw.data.robot import KinematicCalibration
 from arcor2_hw.data.scene import SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
+from arcor2_hw.messages import Message
+from arcor2_server.background import BackgroundTasks
 from arcor2_server.compute.workers import Compute
 from arcor2_server.documents import Session
 from arcor2_server.events import EventHub, make_event
@@ -69,37 +72,26 @@ class InForce(enum.StrEnum):
     """Calibrated for this robot, read from its controller."""
 
 
+@dataclass(eq=False, slots=True)
 class RobotCalibrations:
     """The stored calibrations, for use on one event loop."""
 
-    def __init__(
-        self,
-        settings: ServerSettings,
-        hub: EventHub,
-        types: ObjectTypes,
-        session: Session,
-        host: HostSession,
-        compute: Compute,
-        damage: DataDamage,
-        robots: SceneRobots,
-    ) -> None:
-        self._settings = settings
-        self._hub = hub
-        self._types = types
-        self._session = session
-        self._host = host
-        self._compute = compute
-        self._damage = damage
-        self._robots = robots
-        self._path = settings.arm_calibrations_file
-        self._stored: dict[str, RobotCalibration] = {}
-        """By the object's id."""
-        self._asked: set[str] = set()
-        """Robots whose calibration was requested since they connected."""
-        self._reading: set[asyncio.Task[None]] = set()
-        self._writing = asyncio.Lock()
-        self.on_change: list[Callable[[SceneObject], None]] = []
-        """Called with a robot whose calibration in use changed."""
+    _settings: ServerSettings
+    _hub: EventHub
+    _types: ObjectTypes
+    _session: Session
+    _host: HostSession
+    _compute: Compute
+    _damage: DataDamage
+    _robots: SceneRobots
+    _stored: dict[str, RobotCalibration] = field(init=False, default_factory=dict)
+    """By the object's id."""
+    _asked: set[str] = field(init=False, default_factory=set)
+    """Robots whose calibration was requested since they connected."""
+    _reading: BackgroundTasks = field(init=False, default_factory=BackgroundTasks)
+    _writing: asyncio.Lock = field(init=False, default_factory=asyncio.Lock)
+    on_change: list[Callable[[SceneObject], None]] = field(init=False, default_factory=list)
+    """Called with a robot whose calibration in use changed."""
 
     @property
     def any(self) -> bool:
@@ -109,7 +101,7 @@ class RobotCalibrations:
     def load(self) -> None:
         """Read the stored calibrations; report a damaged file. Raise StorageError if it cannot be read."""
         loss = "Kinematics are nominal until each robot is connected again."
-        stored = self._damage.read_json(self._path, list[RobotCalibration], loss) or []
+        stored = self._damage.read_json(self._settings.arm_calibrations_file, list[RobotCalibration], loss) or []
         self._stored = {each.object_id: each for each in stored}
 
     def stored(self, robot: SceneObject, overrides: list[SceneObjectOverride] | None = None) -> RobotCalibration | None:
@@ -137,21 +129,15 @@ class RobotCalibrations:
         for robot in self._session.require_scene().objects:
             if robot.id in connected - self._asked and self._is_readable(robot):
                 self._asked.add(robot.id)
-                task = asyncio.create_task(self._read(robot), name=f"kinematics of {robot.name}")
-                self._reading.add(task)
-                task.add_done_callback(self._reading.discard)
+                self._reading.spawn(self._read(robot), f"kinematics of {robot.name}")
 
     async def settled(self) -> None:
         """Wait for the pending reads."""
-        while self._reading:
-            await asyncio.wait(self._reading)
+        await self._reading.settled()
 
     async def close(self) -> None:
         """Cancel the pending reads."""
-        reading = list(self._reading)
-        for task in reading:
-            task.cancel()
-        await asyncio.gather(*reading, return_exceptions=True)
+        await self._reading.cancel()
 
     # ------------------------------------------------------------------------------------------------ internals
     def _is_readable(self, robot: SceneObject) -> bool:
@@ -178,8 +164,13 @@ class RobotCalibrations:
         except Arcor2Error as error:
             if self._host.online:
                 log.warning("kinematic calibration cannot be read", robot=robot.name, reason=str(error))
-                used = "The stored one is" if self.in_force(robot) else "Nominal kinematics are"
-                self._publish(robot, f"The calibration cannot be read from the controller. {used} used. {error}")
+                text = (
+                    "{robot}: The calibration cannot be read from the controller. The stored one is used. {reason}"
+                    if self.in_force(robot)
+                    else "{robot}: The calibration cannot be read from the controller. "
+                    "Nominal kinematics are used. {reason}"
+                )
+                self._publish(Message.of(text, robot=robot.name, reason=error))
             return
         before = self.stored(robot)
         refused = await self._refused(robot, calibration)
@@ -202,9 +193,11 @@ class RobotCalibrations:
         for notify in self.on_change:
             notify(robot)
         if refused:
-            self._publish(robot, f"The calibration in the controller cannot be used. Kinematics are nominal. {refused}")
+            text = "{robot}: The calibration in the controller cannot be used. Kinematics are nominal. {reason}"
+            self._publish(Message.of(text, robot=robot.name, reason=refused))
         else:
-            self._publish(robot, "The calibration in the controller is now used.", bad=False)
+            used = "{robot}: The calibration in the controller is now used."
+            self._publish(Message.of(used, robot=robot.name), bad=False)
 
     async def _refused(self, robot: SceneObject, calibration: KinematicCalibration) -> str:
         """Return why a calibration cannot be used, empty if it can."""
@@ -220,15 +213,20 @@ class RobotCalibrations:
             log.warning("kinematic calibration not checked", robot=robot.name, reason=str(error))
         return ""
 
-    def _publish(self, robot: SceneObject, what: str, *, bad: bool = True) -> None:
+    def _publish(self, message: Message, *, bad: bool = True) -> None:
         """Notify all clients which kinematics of a robot are used, and why."""
         level = NotificationLevel.WARN if bad else NotificationLevel.INFO
-        self._hub.broadcast(make_event("Notification", NotificationData(f"{robot.name}: {what}", level)))
+        data = NotificationData(message.text, level, **message.translation())
+        self._hub.broadcast(make_event("Notification", data))
 
     async def _save(self) -> None:
         async with self._writing:
             content = msgspec.json.format(msgspec.json.encode(list(self._stored.values())))
             try:
-                await asyncio.to_thread(write_private, self._path, content)
+                await asyncio.to_thread(write_private, self._settings.arm_calibrations_file, content)
             except OSError as error:
-                log.error("kinematic calibrations cannot be stored", file=str(self._path), reason=str(error))
+                log.error(
+                    "kinematic calibrations cannot be stored",
+                    file=str(self._settings.arm_calibrations_file),
+                    reason=str(error),
+                )

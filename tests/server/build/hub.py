@@ -13,7 +13,7 @@ from arcor2_hw.analysis import InstalledType, SourceFile
 from arcor2_hw.data.object_type import ObjectModel, ObjectTypeSource
 from arcor2_server.build.importing import PackageImport
 from arcor2_server.build.service import BuildService
-from arcor2_server.object_types.catalog import PackageType
+from arcor2_server.object_types.catalog import KnownTypes, PackageType
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.settings import ServerSettings
@@ -46,7 +46,7 @@ async def opened(
                 )
         monkeypatch.setattr("arcor2_server.object_types.registry.installed_types", lambda: installed)
         assets = await AssetStore.open(directory / "assets")
-        object_types = ObjectTypes(storage, assets)
+        object_types = ObjectTypes(KnownTypes(), storage, assets)
         await object_types.load()
         told: list[Any] = []
         services: Any = types.SimpleNamespace(
