@@ -72,6 +72,11 @@ def _import(module: str, type_name: str) -> ModuleType:
         ) from error
 
 
+def shown_name(cls: type[Generic]) -> str:
+    """Return the name of a type for users: its own display name, else the name of the class."""
+    return cls.__dict__.get("display_name") or cls.__name__
+
+
 def write_sources(types: Iterable[TypeCode]) -> str | None:
     """Write uploaded sources as package `object_types` into a private directory and add that to the import path.
 
@@ -139,7 +144,7 @@ def settings_type(cls: type[Generic]) -> type[Settings] | None:
         except (NameError, TypeError, AttributeError) as error:
             raise InvalidData(
                 "object type {cls}: the type hints of __init__ cannot be evaluated: {reason}",
-                cls=cls.__name__,
+                cls=shown_name(cls),
                 reason=error,
             ) from error
         if hint is None:
@@ -194,7 +199,7 @@ def fill_settings(cls: type[Generic], name: str, parameters: Mapping[str, Parame
             raise InvalidData(
                 "{name}: {cls} has no settings, but received {parameters}",
                 name=name,
-                cls=cls.__name__,
+                cls=shown_name(cls),
                 parameters=", ".join(parameters),
             )
         return None
@@ -206,7 +211,7 @@ def fill_settings(cls: type[Generic], name: str, parameters: Mapping[str, Parame
             raise InvalidData(
                 "{name}: {cls} has no setting {parameter_name}",
                 name=name,
-                cls=cls.__name__,
+                cls=shown_name(cls),
                 parameter_name=parameter.name,
             )
         try:
@@ -282,7 +287,7 @@ def recipe(
     """
     name = scene_object.name
     if cls.abstract():
-        raise InvalidData("{name}: object type {cls} is abstract", name=name, cls=cls.__name__)
+        raise InvalidData("{name}: object type {cls} is abstract", name=name, cls=shown_name(cls))
     parameters = {parameter.name: parameter for parameter in scene_object.parameters}
     for override in overrides:
         if override.id == scene_object.id:
@@ -291,7 +296,7 @@ def recipe(
     arguments: list[Any] = [scene_object.id, name]
     if issubclass(cls, GenericWithPose):
         if isinstance(scene_object.pose, Unset):
-            raise InvalidData("{name}: {cls} needs a pose", name=name, cls=cls.__name__)
+            raise InvalidData("{name}: {cls} needs a pose", name=name, cls=shown_name(cls))
         arguments.append(scene_object.pose)
         if issubclass(cls, CollisionObject):
             arguments.append(None if model is None or model.type.value == "None" else model.model())

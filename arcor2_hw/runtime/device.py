@@ -21,7 +21,7 @@ from arcor2_hw.objects import CollisionObject, Generic, HoldsParts, Robot
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.objects.surroundings import Surroundings
-from arcor2_hw.runtime.creation import Recipe
+from arcor2_hw.runtime.creation import Recipe, shown_name
 from arcor2_hw.runtime.lane import Job, Lane
 from arcor2_hw.runtime.methods import OBSERVING, STOP_RACE_TIME, overrides, stop_of
 from arcor2_hw.runtime.own_process.process import START_TIMEOUT, DeviceProcess
@@ -230,7 +230,7 @@ class Device:
         instance = self.require()
         if method.startswith("_") or (not hasattr(type(instance), method) and method not in vars(instance)):
             raise InvalidData(
-                "{name} ({type}) has no method {method}", name=self.name, type=type(instance).__name__, method=method
+                "{name} ({type}) has no method {method}", name=self.name, type=shown_name(type(instance)), method=method
             )
         static = inspect.getattr_static(type(instance), method, None)
         if not callable(static) and not isinstance(static, staticmethod | classmethod):

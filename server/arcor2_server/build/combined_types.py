@@ -5,12 +5,13 @@ from collections.abc import Iterable, Mapping
 import msgspec
 
 from arcor2_hw.analysis import Enumeration, Library, SourceFile, TypeAnalysis, module_name
-from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource, find_action
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidData, InvalidPackage, NotFound
 from arcor2_server.build import snapshot
 from arcor2_server.build.frame import TypeFacts
+from arcor2_server.object_types.catalog import action_of, robot_of
 
 
 class CombinedTypes:
@@ -46,15 +47,13 @@ class CombinedTypes:
 
     def action(self, type_name: str, name: str) -> ObjectAction:
         """Return an action by its present or a former name."""
-        if (action := find_action(self.analysis(type_name).actions, name)) is not None:
-            return action
-        raise NotFound("The object type {type_name} has no action {name!r}.", type_name=type_name, name=name)
+        found = self.analysis(type_name)
+        return action_of(found.meta, found.actions, name)
 
     def robot_meta(self, name: str) -> RobotMeta:
         """Return the metadata of a robot type. Raise NotFound if the type is not a robot."""
-        if (robot := self.analysis(name).robot) is None:
-            raise NotFound("The object type {name} is not a robot.", name=name)
-        return robot
+        found = self.analysis(name)
+        return robot_of(found.meta, found.robot)
 
     def enumerations(self, name: str) -> dict[tuple[str, str], Enumeration]:
         """Return the enumerations that are parameter types of a type's actions, by action and parameter."""
@@ -66,7 +65,6 @@ class CombinedTypes:
         for name in {obj.type for obj in scene.objects}:
             found = self.analysis(name)
             module = f"{snapshot.FOLDER}.{module_name(name)}"
-            facts[name] = TypeFacts(
-                module, {one.name: one for one in found.actions}, found.enumerations, found.keyword_only
-            )
+            actions = {one.name: one for one in found.actions}
+            facts[name] = TypeFacts(module, found.meta.shown_name, actions, found.enumerations, found.keyword_only)
         return facts

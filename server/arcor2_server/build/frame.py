@@ -8,7 +8,6 @@ from typing import Final, NamedTuple
 
 from arcor2_hw.actions.parameter_types import PARAMETER_TYPES
 from arcor2_hw.analysis import Enumeration
-from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import Action, Project
@@ -45,12 +44,14 @@ class TypeFacts:
 
     Args:
         module: the module from which the script imports the type.
+        shown_name: its name for users.
         actions: its actions by name.
         enumerations: parameter types of its actions, by action and parameter, with the module that defines them.
         keyword_only: keyword-only parameters, by action and parameter.
     """
 
     module: str
+    shown_name: str
     actions: Mapping[str, ObjectAction]
     enumerations: Mapping[tuple[str, str], Enumeration] = field(default_factory=dict)
     keyword_only: frozenset[tuple[str, str]] = frozenset()
@@ -155,15 +156,18 @@ class Frame:
         found = facts.actions.get(method)
         if found is None:
             raise InvalidProject(
-                "action {name!r}: {type} has no action {method}", name=action.name, type=obj.type, method=method
+                "action {name!r}: {type} has no action {method}",
+                name=action.name,
+                type=facts.shown_name,
+                method=method,
             )
         if found.disabled:
-            why = "" if isinstance(found.problem, Unset) else f": {found.problem}"
             raise InvalidProject(
-                "action {name!r}: {type}.{method} cannot be used{reason}",
+                "action {name!r}: {method} of {type} cannot be used: {reason}",
                 name=action.name,
                 method=method,
-                reason=why,
+                type=facts.shown_name,
+                reason=found.why_disabled,
             )
         return ActionCall(object_id, obj.type, method, found)
 

@@ -51,9 +51,11 @@ class ImportedIds(Data, frozen=True, rename="camel"):
 def _check(package: Imported, types: CombinedTypes) -> None:
     """Raise an error for documents that could not be opened or run after they are saved."""
     for name in package.types:
-        if (problem := types.analysis(name).problem) is not None:
+        if (found := types.analysis(name)).problem is not None:
             raise InvalidPackage(
-                "The object type {name} of the package cannot be used: {problem}.", name=name, problem=problem
+                "The object type {name} of the package cannot be used: {problem}.",
+                name=found.meta.shown_name,
+                problem=found.problem,
             )
     for name in dict.fromkeys([*package.installed, *(obj.type for obj in package.scene.objects)]):
         types.analysis(name)  # NotFound

@@ -63,7 +63,7 @@ def _facts(types: ObjectTypes, scene: Scene, project: Project, code: Iterable[Pa
         if code_of is not None and not code_of.source:
             # The copied driver folder may have another name; the module of the type imports the enumerations.
             kinds = {key: msgspec.structs.replace(kind, module=module) for key, kind in kinds.items()}
-        facts[name] = TypeFacts(module, used, kinds, types.keyword_only(name))
+        facts[name] = TypeFacts(module, types.meta(name).shown_name, used, kinds, types.keyword_only(name))
     return facts
 
 
@@ -134,8 +134,9 @@ class BuildService:
         used = dict.fromkeys(obj.type for obj in scene.objects)
         for name in used:
             if (meta := types.meta(name)).disabled:
-                problem = "" if isinstance(meta.problem, Unset) else f": {meta.problem}"
-                raise InvalidProject("object type {name} cannot be used{problem}", name=name, problem=problem)
+                raise InvalidProject(
+                    "object type {name} cannot be used: {problem}", name=meta.shown_name, problem=meta.why_disabled
+                )
         extra = [] if isinstance(project.project_objects_ids, Unset) else project.project_objects_ids
         # With the bases, since an uploaded type may derive from an installed one.
         code = types.sources_for([*(each for name in used for each in (*reversed(types.bases(name)), name)), *extra])

@@ -62,7 +62,8 @@ def _show(out: Console, analysis: TypeAnalysis) -> bool:
     problems = [] if isinstance(meta.problem, Unset) else [meta.problem]
     problems += [f"{action.name}: {action.problem}" for action in analysis.actions if action.disabled]
     kind = f"{meta.base}, abstract: it cannot be placed in a scene" if meta.abstract else meta.base
-    out.print(f"[bold]{meta.type}[/] ({escape(kind)})", soft_wrap=True)
+    shown = "" if meta.shown_name == meta.type else f" “{escape(meta.shown_name)}”"
+    out.print(f"[bold]{meta.type}[/]{shown} ({escape(kind)})", soft_wrap=True)
     out.print(f"  {escape(meta.description)}", soft_wrap=True)
     if analysis.implemented:
         out.print(f"  implements {', '.join(sorted(analysis.implemented))}", soft_wrap=True)

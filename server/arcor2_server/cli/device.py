@@ -48,17 +48,18 @@ def list_devices() -> int:
         sys.stdout.write("No device types are installed. Install a driver, or upload a type to a server.\n")
         return ExitStatus.OK
     library = Library(one.file for one in installed if one.file is not None)
-    table = Table("type", "kind", "actions", "distribution", "description", box=None, pad_edge=False)
+    table = Table("name", "type", "kind", "actions", "distribution", "description", box=None, pad_edge=False)
     unusable = False
     for one in installed:
         origin = f"{one.distribution} {one.version}".strip()
         if one.file is None:
-            table.add_row(one.name, "", "", origin, f"[red]cannot be used: {one.problem}")
+            table.add_row("", one.name, "", "", origin, f"[red]cannot be used: {one.problem}")
             unusable = True
             continue
         analysis = library.analyse(one.name)
         unusable |= analysis.meta.disabled
-        table.add_row(one.name, analysis.meta.base, str(len(analysis.actions)), origin, _description(analysis.meta))
+        meta = analysis.meta
+        table.add_row(meta.shown_name, one.name, meta.base, str(len(analysis.actions)), origin, _description(meta))
     console().print(table)
     return ExitStatus.ANALYSIS_PROBLEMS if unusable else ExitStatus.OK
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
+from msgspec.structs import replace
 
 from arcor2_hw.analysis import Library, SourceFile, TypeAnalysis, module_name
 from arcor2_hw.client import Rest
@@ -111,8 +112,12 @@ def list_types(*, as_json: export_files.Json = False, server: Server = HERE) -> 
     """List the uploaded object types of a server."""
 
     async def work() -> None:
-        async with server.rest() as rest:
-            export_files.show_list(await rest.object_types(), "There are no uploaded object types.", as_json)
+        async with server.client() as client:
+            listed = await client.rest.object_types()
+            if not as_json:
+                shown = {meta.type: meta.shown_name for meta in await client.get_object_types()}
+                listed = [replace(each, name=shown.get(each.name, each.name)) for each in listed]
+        export_files.show_list(listed, "No object type was uploaded.", as_json)
 
     return run("object-type list", work)
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from arcor2_hw.analysis import SourceFile
 from arcor2_hw.data.base import Data
-from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, find_action
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta
 from arcor2_hw.data.project import END, START, Project
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.data.scene import Scene
@@ -17,6 +17,7 @@ from arcor2_server.documents.checks.project import project_findings
 from arcor2_server.documents.checks.scene import scene_findings
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.exchange.archive import PROJECT, SCENE, SCRIPT, Archive, mesh_of
+from arcor2_server.object_types.catalog import action_of, robot_of
 
 
 class Finding(Data, frozen=True):
@@ -69,18 +70,13 @@ class Known:
         """Return one action. Raise NotFound if there is none."""
         if not self._from_elsewhere(type_name):
             return self.candidates.action(type_name, name)
-        if (action := find_action(self._actions.get(type_name, {}).values(), name)) is not None:
-            return action
-        raise NotFound("The object type {type_name} has no action {name!r}.", type_name=type_name, name=name)
+        return action_of(self._elsewhere[type_name], self._actions.get(type_name, {}).values(), name)
 
     def robot_meta(self, name: str) -> RobotMeta:
         """Return the features of a robot type. Raise NotFound if the type is not a robot."""
         if not self._from_elsewhere(name):
             return self.candidates.robot_meta(name)
-        try:
-            return self._robots[name]
-        except KeyError:
-            raise NotFound("The object type {name} is not a robot.", name=name) from None
+        return robot_of(self._elsewhere[name], self._robots.get(name))
 
 
 def find_problems(archive: Archive, types: Known, assets: Iterable[str] | None = None) -> Iterator[Finding]:

@@ -29,6 +29,20 @@ class PackageType(Data, frozen=True):
     version: str = ""
 
 
+def action_of(meta: ObjectTypeMeta, actions: Iterable[ObjectAction], name: str) -> ObjectAction:
+    """Return the action of a type with this present or former name. Raise NotFound if there is none."""
+    if (action := find_action(actions, name)) is not None:
+        return action
+    raise NotFound("The object type {type_name} has no action {name!r}.", type_name=meta.shown_name, name=name)
+
+
+def robot_of(meta: ObjectTypeMeta, robot: RobotMeta | None) -> RobotMeta:
+    """Return the features of a robot type. Raise NotFound if it has none, since it is not a robot."""
+    if robot is None:
+        raise NotFound("The object type {name} is not a robot.", name=meta.shown_name)
+    return robot
+
+
 class Known(Struct, frozen=True):
     """All results of the analysis. They are replaced as a whole."""
 
@@ -93,6 +107,10 @@ class TypeCatalog:
         """Return whether there is such a type."""
         return name in self._known.metas
 
+    def shown_name(self, name: str) -> str:
+        """Return the name of a type for users; of an unknown type the given name."""
+        return self.meta(name).shown_name if self.known(name) else name
+
     def metas(self) -> list[ObjectTypeMeta]:
         """Return all types, sorted by name, including built-in and disabled ones."""
         return list(self._known.metas.values())
@@ -115,9 +133,7 @@ class TypeCatalog:
 
     def action(self, type_name: str, name: str) -> ObjectAction:
         """Return one action, by its name or a former one."""
-        if (action := find_action(self._analysis(type_name).actions, name)) is not None:
-            return action
-        raise NotFound("The object type {type_name} has no action {name!r}.", type_name=type_name, name=name)
+        return action_of(self.meta(type_name), self._known.analyses[type_name].actions, name)
 
     def enumerations(self, name: str) -> dict[tuple[str, str], Enumeration]:
         """Return the enumerations that the actions of a type take, by action and parameter."""
@@ -133,10 +149,7 @@ class TypeCatalog:
 
     def robot_meta(self, name: str) -> RobotMeta:
         """Return the features of a robot type. Raise NotFound if it is not a robot."""
-        self.meta(name)
-        if (robot := self._known.robots.get(name)) is None:
-            raise NotFound("The object type {name} is not a robot.", name=name)
-        return robot
+        return robot_of(self.meta(name), self._known.robots.get(name))
 
     def implements(self, name: str, method: str) -> bool:
         """Return whether a type or one of its ancestors implements an optional method."""

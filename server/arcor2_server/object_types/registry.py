@@ -281,16 +281,16 @@ class ObjectTypes(TypeCatalog):
     def require_replaceable(self, name: str) -> None:
         """Raise InvalidData for a base class, which cannot be replaced."""
         if name in BUILT_IN:
-            raise InvalidData("The object type {name} is built in and cannot be replaced.", name=name)
+            raise InvalidData("The object type {name} is built in and cannot be replaced.", name=self.shown_name(name))
 
     def require_deletable(self, name: str) -> None:
         """Raise InvalidData for a base class or an installed type, which cannot be deleted."""
         if name in BUILT_IN:
-            raise InvalidData("The object type {name} is built in and cannot be deleted.", name=name)
+            raise InvalidData("The object type {name} is built in and cannot be deleted.", name=self.shown_name(name))
         if name in self._installed and name not in self._uploaded:
             origin = self._origin(name) or "an installed distribution"
             raise InvalidData(
                 "The object type {name} belongs to {origin} and cannot be deleted: uninstall {origin}.",
-                name=name,
+                name=self.shown_name(name),
                 origin=origin,
             )

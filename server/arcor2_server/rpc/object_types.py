@@ -125,18 +125,21 @@ class ObjectTypeRequests:
             )
         base = types.meta(new.base)
         if base.disabled:
-            problem = "" if isinstance(base.problem, Unset) else f" ({base.problem})"
-            raise RequestRefused("The object type {type} cannot be used{problem}.", type=base.type, problem=problem)
+            raise RequestRefused(
+                "The object type {type} cannot be used ({problem}).", type=base.shown_name, problem=base.why_disabled
+            )
         if types.derives_from(base.type, "Robot"):
             raise RequestRefused(
                 "The object type of a robot cannot be derived without changes. Upload its source instead."
             )
         if isinstance(new.object_model, Unset):
             if types.derives_from(base.type, "CollisionObject"):
-                raise RequestRefused("An object type derived from {type} needs a collision model.", type=base.type)
+                raise RequestRefused(
+                    "An object type derived from {type} needs a collision model.", type=base.shown_name
+                )
             return
         if not types.derives_from(base.type, "CollisionObject"):
-            raise RequestRefused("An object type derived from {type} takes no collision model.", type=base.type)
+            raise RequestRefused("An object type derived from {type} takes no collision model.", type=base.shown_name)
         try:
             model = new.object_model.model()
         except ValueError as error:
@@ -165,26 +168,29 @@ class ObjectTypeRequests:
                     failed.append(DeleteObjectTypesData(name, str(error)))
         if failed:
             raise RequestRefused(
-                "These object types were not deleted: {failed}.", failed, failed=", ".join(one.id for one in failed)
+                "These object types were not deleted: {failed}.",
+                failed,
+                failed=", ".join(types.shown_name(one.id) for one in failed),
             )
         return None
 
     async def _require_unused(self, name: str) -> None:
         """Raise RequestRefused if an object type is used; NotFound or InvalidData if it cannot be deleted at all."""
         types, session = self._types, self._session
-        types.meta(name)
+        shown = types.meta(name).shown_name
         types.require_deletable(name)
-        if derived := [other for other in types.names() if other != name and name in types.bases(other)]:
+        derived = [meta.shown_name for meta in types.metas() if meta.type != name and name in types.bases(meta.type)]
+        if derived:
             raise RequestRefused(
-                "The object type {name} is the base of {derived}.", name=name, derived=", ".join(derived)
+                "The object type {name} is the base of {derived}.", name=shown, derived=", ".join(derived)
             )
         if (opened := session.scene) is not None and any(placed.type == name for placed in opened.objects):
             raise RequestRefused(
-                "The object type {name} is used in the open scene {opened_name}.", name=name, opened_name=opened.name
+                "The object type {name} is used in the open scene {opened_name}.", name=shown, opened_name=opened.name
             )
         if scenes := await self._scenes_with(name):
             raise RequestRefused(
-                "The object type {name} is used in the scenes {scenes}.", name=name, scenes=", ".join(sorted(scenes))
+                "The object type {name} is used in the scenes {scenes}.", name=shown, scenes=", ".join(sorted(scenes))
             )
 
     # ------------------------------------------------------------------------------------------------ dynamic values

@@ -96,7 +96,7 @@ class ParameterRequests:
         meta = self._types.meta(obj.type)
         settings = {setting.name: setting for setting in meta.settings}
         if given.name not in settings:
-            raise NotFound("{type} has no setting {name}.", type=obj.type, name=given.name)
+            raise NotFound("{type} has no setting {name}.", type=meta.shown_name, name=given.name)
         check_setting(given, settings[given.name])
         item = document.find(Kind.OVERRIDE, object_id)
         return document, [] if item is None else list(item.value.parameters)

@@ -197,9 +197,9 @@ class SceneObjectRequests:
         self._session.require_scene_alone()
         meta = self._types.meta(args.object_type_id)
         if meta.disabled or not self._types.derives_from(meta.type, "CollisionObject"):
-            raise RequestRefused("{type} takes no collision model.", type=meta.type)
+            raise RequestRefused("{type} takes no collision model.", type=meta.shown_name)
         if meta.object_model == args.object_model:
-            raise RequestRefused("{type} has this model already.", type=meta.type)
+            raise RequestRefused("{type} has this model already.", type=meta.shown_name)
         if _model_of(args.object_model).id != meta.type:
             raise InvalidData("The model of {type} needs the id {type}.", type=meta.type)
         require_mesh(self._assets, _model_of(args.object_model))
@@ -208,7 +208,7 @@ class SceneObjectRequests:
             stored = await self._storage.object_type(meta.type)
         except NotFound:
             raise RequestRefused(
-                "{type} comes with an installed driver: its model cannot be changed.", type=meta.type
+                "{type} comes with an installed driver: its model cannot be changed.", type=meta.shown_name
             ) from None
         if not context.dry_run:
             updated = await self._types.add(replace(stored, model=args.object_model))

@@ -146,12 +146,12 @@ ACTIONS = {
 GRIP = Enumeration("object_types.arm", "Grip", {member.value: member.name for member in Grip})
 MODE = Enumeration("object_types.acme_reader", "Mode", {1: "ONCE", 2: "TWICE"})
 FACTS = {
-    name: TypeFacts(f"object_types.{module}", {one.name: one for one in ACTIONS[name]}, kinds)
-    for name, module, kinds in (
-        ("Arm", "arm", {("pick", "grip"): GRIP}),
-        ("AcmeReader", "acme_reader", {("scan", "mode"): MODE}),
-        ("FlowActions", "flow_actions", {}),
-        ("table", "table", {}),
+    name: TypeFacts(f"object_types.{module}", shown_name, {one.name: one for one in ACTIONS[name]}, kinds)
+    for name, module, shown_name, kinds in (
+        ("Arm", "arm", "Robot arm", {("pick", "grip"): GRIP}),
+        ("AcmeReader", "acme_reader", "ACME reader", {("scan", "mode"): MODE}),
+        ("FlowActions", "flow_actions", "Program flow", {}),
+        ("table", "table", "table", {}),
     )
 }
 

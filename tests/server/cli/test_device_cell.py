@@ -16,10 +16,10 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.cell import Cell, CellDevice, read_cell, write_cell
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.parameter import Parameter
+from arcor2_server.cli.main import app
 from tests.fakes.conftest import FakeProcess
 from tests.server.core.serving import running
 
-pytestmark = pytest.mark.timeout(90)
 NOBODY = "socket://127.0.0.1:9"
 
 
@@ -83,7 +83,7 @@ def test_every_problem_is_reported(tmp_path: Path, scale: FakeProcess) -> None:
     assert NOBODY in found["printer"]["problem"]
     assert found["printer"]["connection"] == "failed"
     assert found["stranger"]["problem"] == "object type Unknown is not installed and was not uploaded"
-    assert "typo: MtSicsScale has no setting prt" in found["typo"]["problem"]
+    assert "typo: Mettler Toledo scale has no setting prt" in found["typo"]["problem"]
 
 
 CRASHER = """
@@ -246,3 +246,12 @@ def test_a_crashing_library_does_not_hide_other_results(libraries: str) -> None:
     assert done.returncode == 0
     assert "/dev/ttyUSB3" in done.stdout
     assert "OAK cameras" in done.stderr
+
+
+def test_types_are_listed_by_the_names_for_users(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    assert app(["device", "list"]) == 0
+    lines = [line.split()[:3] for line in capsys.readouterr().out.splitlines()]
+    assert ["Luxonis", "OAK-D", "OakD"] in lines

@@ -146,13 +146,14 @@ class LoopReader:
         facts = self._frame.types[obj.type]
         declared = find_action(facts.actions.values(), method)
         if declared is None:
-            raise NotUnderstood(call.lineno, "{type} has no action {method}", type=obj.type, method=method)
+            raise NotUnderstood(call.lineno, "{type} has no action {method}", type=facts.shown_name, method=method)
         if declared.disabled:
             raise NotUnderstood(
                 call.lineno,
                 "{method} of {type} cannot be used: {problem}",
                 method=method,
-                problem=declared.problem,
+                type=facts.shown_name,
+                problem=declared.why_disabled,
             )
         name = self._name(call)
         if outputs and len(outputs) != len(declared.returns):
