@@ -15,7 +15,7 @@ from arcor2_hw.analysis.module import ClassInfo, Import, Module, Value, garbage_
 from arcor2_hw.analysis.presentation import display_name, of_type
 from arcor2_hw.analysis.robots import robot_meta
 from arcor2_hw.analysis.settings import SettingsReader
-from arcor2_hw.analysis.source import Broken, Problem, SourceFile, Stamp, sendable, stamp_of
+from arcor2_hw.analysis.source import UPLOADED, Broken, Problem, SourceFile, Stamp, sendable, stamp_of
 from arcor2_hw.analysis.symbols import External, Resolver, is_framework
 from arcor2_hw.analysis.type_analysis import TypeAnalysis
 from arcor2_hw.data.base import UNSET
@@ -34,9 +34,6 @@ BUILT_IN: Final = (
     "VirtualCollisionObject",
 )
 """Object types that are built in according to the protocol. Our other bases are not visible to clients."""
-
-UPLOADED: Final = "object_types"
-"""The package of uploaded types."""
 
 NO_DESCRIPTION: Final = "No description available."
 
@@ -74,7 +71,7 @@ class Library:
             self.remove(file.name)
         self._files[file.name] = file
         dotted = _dotted(file)
-        self._by_module[dotted] = file
+        self._by_module |= {dotted: file} | {each.module: each for each in file.modules}
         top = dotted.partition(".")[0]
         if file.path and top != UPLOADED:
             up = dotted.count(".") + (1 if file.is_package else 0)
@@ -92,7 +89,8 @@ class Library:
         """
         file = self._file(name)
         del self._files[name]
-        self._by_module.pop(_dotted(file), None)
+        for dotted in (_dotted(file), *(each.module for each in file.modules)):
+            self._by_module.pop(dotted, None)
         # Several types may share a module.
         for other in self._files.values():
             if _dotted(other) == _dotted(file):
@@ -143,13 +141,19 @@ class Library:
         if dotted not in self._modules:
             try:
                 file = self._by_module.get(dotted) or self._on_disk(dotted)
-                self._modules[dotted] = None if file is None else self._parse(file, dotted)
+                self._modules[dotted] = self._shared(dotted) if file is None else self._parse(file, dotted)
             except Broken as error:
                 self._modules[dotted] = error
         found = self._modules[dotted]
         if isinstance(found, Broken):
             raise Broken(found.message, found.problem.path, found.problem.line)
         return found
+
+    def _shared(self, dotted: str) -> Module | None:
+        """Return the shared module that a type with modules of its own imports relatively."""
+        package, _, name = dotted.rpartition(".")
+        owner = self._by_module.get(package)
+        return self._load(f"{UPLOADED}.{name}") if owner is not None and owner.modules else None
 
     def _parse(self, file: SourceFile, dotted: str) -> Module:
         file = msgspec.structs.replace(file, module=dotted)

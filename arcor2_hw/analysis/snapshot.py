@@ -27,17 +27,20 @@ class StoredSource(Data, frozen=True, array_like=True):
     is_package: bool
     text: str | None
     content: bytes
+    modules: "tuple[StoredSource, ...]" = ()
 
     @classmethod
     def of(cls, file: SourceFile) -> "StoredSource":
         """Return the stored form of a file."""
         text, content = (file.source, b"") if isinstance(file.source, str) else (None, file.source)
-        return cls(file.name, file.module, file.path, file.is_package, text, content)
+        modules = tuple(map(cls.of, file.modules))
+        return cls(file.name, file.module, file.path, file.is_package, text, content, modules)
 
     def file(self) -> SourceFile:
         """Return the original file."""
         source = self.content if self.text is None else self.text
-        return SourceFile(self.name, self.module, source, self.path, self.is_package)
+        modules = tuple(each.file() for each in self.modules)
+        return SourceFile(self.name, self.module, source, self.path, self.is_package, modules)
 
 
 class StoredAnalysis(TypeAnalysis, frozen=True):

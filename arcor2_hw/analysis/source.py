@@ -1,11 +1,18 @@
 """Source files, and problems in them."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Final
 
 import humps
+from msgspec.structs import replace
 
 from arcor2_hw.data.base import Data
+from arcor2_hw.data.object_type import ObjectTypeSource
 from arcor2_hw.messages import Message
+
+UPLOADED: Final = "object_types"
+"""The package of uploaded types."""
 
 
 def module_name(type_name: str) -> str:
@@ -36,6 +43,7 @@ class SourceFile(Data, frozen=True):
         name: Name of the class; empty for a file that is only needed by others.
         module: Dotted name; `module_name(name)` for uploaded types, the full name for those of a distribution.
         path: Path of the file, or empty; it is shown in problems, and files are looked for next to it.
+        modules: Modules that belong to this type only, with their full names. The type is a package then.
     """
 
     name: str
@@ -43,6 +51,18 @@ class SourceFile(Data, frozen=True):
     source: str | bytes
     path: str = ""
     is_package: bool = False
+    modules: "tuple[SourceFile, ...]" = ()
+
+    def with_modules(self, modules: "Mapping[str, SourceFile]") -> "SourceFile":
+        """Return an uploaded type with the modules that belong to it, by name."""
+        own = tuple(replace(each, name="", module=f"{UPLOADED}.{self.module}.{name}") for name, each in modules.items())
+        return replace(self, modules=own, is_package=bool(own))
+
+    @classmethod
+    def of_upload(cls, uploaded: ObjectTypeSource) -> "SourceFile":
+        """Return the file of an uploaded type."""
+        file = cls(uploaded.id, module_name(uploaded.id), uploaded.source)
+        return file.with_modules({name: cls("", name, text) for name, text in uploaded.own_modules.items()})
 
 
 class Problem(Data, frozen=True):

@@ -11,7 +11,7 @@ import msgspec
 
 from arcor2_hw.analysis.library import BUILT_IN, Library
 from arcor2_hw.analysis.snapshot import StoredSource, take
-from arcor2_hw.analysis.source import Problem
+from arcor2_hw.analysis.source import Problem, SourceFile
 from arcor2_hw.analysis.type_analysis import TypeAnalysis
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.exceptions import InvalidData
@@ -26,7 +26,11 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 def _huge(library: Library) -> list[str]:
-    return [name for name in library.names() if name not in BUILT_IN and len(library.file(name).source) > HUGE]
+    return [name for name in library.names() if name not in BUILT_IN and _longest(library.file(name)) > HUGE]
+
+
+def _longest(file: SourceFile) -> int:
+    return max(len(each.source) for each in (file, *file.modules))
 
 
 def is_needed(library: Library) -> bool:

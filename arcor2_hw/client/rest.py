@@ -68,6 +68,7 @@ class _Type(Data, frozen=True):
     model: ModelName | Unset = UNSET
     created: Timestamp | Unset = UNSET
     modified: Timestamp | Unset = UNSET
+    modules: dict[str, str] | Unset = UNSET
 
 
 class _Sources(Data, frozen=True):
@@ -247,12 +248,21 @@ class Rest:
     async def object_type(self, name: str) -> ObjectTypeSource:
         """Return an uploaded object type, without its model."""
         one: _Type = await self.request("GET", f"/object-types/{_part(name)}", _Type)
-        return ObjectTypeSource(one.id, one.source, one.description, created=one.created, modified=one.modified)
+        return ObjectTypeSource(one.id, one.source, one.description, UNSET, one.created, one.modified, one.modules)
 
-    async def put_object_type(self, name: str, source: str, model: Models | None = None) -> None:
-        """Upload a new or changed object type. Its model has to be saved before."""
+    async def put_object_type(
+        self, name: str, source: str, model: Models | None = None, modules: dict[str, str] | Unset = UNSET
+    ) -> None:
+        """Upload a new or changed object type. Its model has to be saved before.
+
+        Args:
+            name: Name of the class.
+            source: Source of the module that declares the class.
+            model: Its collision model.
+            modules: Sources of the modules that belong to this type only, by name. UNSET leaves the stored ones.
+        """
         named = UNSET if model is None else ModelName(name, model.type())
-        await self.request("PUT", "/object-types", body=_Type(name, name, source, model=named))
+        await self.request("PUT", "/object-types", body=_Type(name, name, source, model=named, modules=modules))
 
     async def delete_object_type(self, name: str) -> None:
         """Delete an object type."""

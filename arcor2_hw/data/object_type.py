@@ -215,7 +215,12 @@ class ObjectTypeMeta(Disableable, frozen=True):
 
 
 class ObjectTypeSource(Data, frozen=True):
-    """A stored object type: its Python module and its collision model."""
+    """A stored object type: its Python module and its collision model.
+
+    Attributes:
+        modules: Sources of the modules that belong to this type only, by name. UNSET: none, or when saving, the stored
+            ones remain.
+    """
 
     id: str
     source: str
@@ -223,3 +228,14 @@ class ObjectTypeSource(Data, frozen=True):
     model: ObjectModel | Unset = UNSET
     created: Timestamp | Unset = UNSET
     modified: Timestamp | Unset = UNSET
+    modules: dict[str, str] | Unset = UNSET
+
+    @property
+    def own_modules(self) -> dict[str, str]:
+        """The sources of the modules of this type; empty if it has none."""
+        return {} if isinstance(self.modules, Unset) else self.modules
+
+    @property
+    def code(self) -> tuple[str, dict[str, str]]:
+        """The source and the modules, to compare types."""
+        return self.source, self.own_modules

@@ -27,6 +27,7 @@ from arcor2_hw.exceptions import AddressChanged, Arcor2Error, InvalidData, NotFo
 from arcor2_hw.objects import CollisionObject, Generic, GenericWithPose, Settings
 from arcor2_hw.runtime import older
 from arcor2_hw.runtime.messages import TypeCode
+from arcor2_hw.runtime.type_files import files_of_type
 
 ENTRY_POINTS: Final = "arcor2_hw.object_types"
 """Entry point group of installed object types; the name of an entry is that of the type."""
@@ -92,11 +93,14 @@ def write_sources(types: Iterable[TypeCode]) -> str | None:
     (package / "__init__.py").write_text("")
     for code in uploaded:
         module = code.module or module_name(code.name)
-        if not module.isidentifier():
-            raise InvalidData(
-                "object type {name}: {module!r} is not a valid module name", name=code.name, module=module
-            )
-        (package / f"{module}.py").write_text(code.source, encoding="utf-8")
+        for each in (module, *code.modules):
+            if not each.isidentifier():
+                raise InvalidData(
+                    "object type {name}: {module!r} is not a valid module name", name=code.name, module=each
+                )
+        for path, text in files_of_type(module, code.source, code.modules).items():
+            (package / path).parent.mkdir(exist_ok=True)
+            (package / path).write_text(text, encoding="utf-8")
     for known in [name for name in sys.modules if name == "object_types" or name.startswith("object_types.")]:
         del sys.modules[known]
     sys.path.insert(0, root)

@@ -42,12 +42,16 @@ class ErrorData(Struct, frozen=True):
 
 
 class TypeCode(Struct, frozen=True):
-    """Where the host finds an object type: entry point ("module:Class") if installed, else module and source code."""
+    """Where the host finds an object type: entry point ("module:Class") if installed, else module and source code.
+
+    modules: sources of the modules that belong to this type only, by name.
+    """
 
     name: str
     entry_point: str = ""
     module: str = ""
     source: str = ""
+    modules: dict[str, str] = {}
 
 
 # ------------------------------------------------------------------------------------------------ server to host

@@ -27,7 +27,7 @@ class CombinedTypes:
         self._library = Library(known)
         for name, packaged_type in packaged.items():
             try:
-                self._library.add(SourceFile(name, module_name(name), packaged_type.source))
+                self._library.add(SourceFile.of_upload(packaged_type))
             except InvalidData as error:
                 raise InvalidPackage("object type {name}: {reason}", name=name, reason=error) from error
 

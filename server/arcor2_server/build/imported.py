@@ -17,6 +17,7 @@ from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import InvalidPackage, TextTooLong
 from arcor2_hw.parsing import parse
 from arcor2_hw.runtime.documents import decode_document
+from arcor2_hw.runtime.type_files import own_modules, sibling_modules
 from arcor2_server.build import package, snapshot
 
 T = TypeVar("T")
@@ -89,14 +90,23 @@ def _text(files: Mapping[str, bytes], path: str) -> str:
         raise InvalidPackage("{path} of the package is not UTF-8 text: {reason}", path=path, reason=error) from error
 
 
-def _class_in(path: str, source: str) -> tuple[str, _Kind]:
+def _folders(files: Mapping[str, bytes]) -> dict[str, dict[str, str]]:
+    """Return the modules of the folders in the package of object types, by folder and module."""
+    found: dict[str, dict[str, str]] = {}
+    for path in files:
+        match PurePosixPath(path).parts:
+            case (snapshot.FOLDER, folder, name):
+                found.setdefault(folder, {})[name.removesuffix(".py")] = _text(files, path)
+    return found
+
+
+def _class_in(path: str, stem: str, source: str) -> tuple[str, _Kind]:
     """Return the name of a module's type and the kind of the module.
 
     Returns:
         "type" if the module defines a class of its name, "installed" if it imports the class from a copied driver,
         "helper" if it has no such class.
     """
-    stem = PurePosixPath(path).stem
     try:
         tree = parse(source)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -131,17 +141,22 @@ def read(data: Path | bytes) -> Imported:
     types: dict[str, ObjectTypeSource] = {}
     installed: list[str] = []
     helpers: list[str] = []
-    for path in sorted(files):
-        if not path.startswith(f"{snapshot.FOLDER}/"):
-            continue
+    copied: set[str] = set()
+    for path in sorted(path for path in files if PurePosixPath(path).parent.name == snapshot.FOLDER):
         text = _text(files, path)
-        name, kind = _class_in(path, text)
+        name, kind = _class_in(path, PurePosixPath(path).stem, text)
         if kind == "installed":
             installed.append(name)
+            copied |= sibling_modules(text)
         else:
             if kind == "helper":
                 helpers.append(name)
-            types[name] = ObjectTypeSource(name, text, model=_model(files, name))
+            types[name] = ObjectTypeSource(name, text, model=_model(files, name), modules={})
+    for folder, texts in _folders(files).items():
+        if "__init__" not in texts or folder in copied:
+            continue  # the folder of an installed driver, or in one
+        name, _ = _class_in(f"{snapshot.FOLDER}/{folder}/__init__.py", folder, text := texts["__init__"])
+        types[name] = ObjectTypeSource(name, text, model=_model(files, name), modules=own_modules(texts))
     modules = {module_name(name) for name in (*types, *installed)}
     for path in files:
         if path.startswith("data/models/") and PurePosixPath(path).stem not in modules:

@@ -153,9 +153,9 @@ def _plan(package: Imported, saved: _Saved, options: ImportOptions) -> tuple[_Pl
         if other_model and old_model is not None:
             differs(f"The collision model of {name}", "overwriteCollisionModels", options.overwrite_collision_models)
         lost_model = old is not None and isinstance(old.model, Unset) != isinstance(one.model, Unset)
-        if old is not None and (old.source != one.source or lost_model):
+        if old is not None and (old.code != one.code or lost_model):
             differs(f"The object type {name}", "overwriteObjectTypes", options.overwrite_object_types)
-        if old is None or old.source != one.source or other_model or lost_model:
+        if old is None or old.code != one.code or other_model or lost_model:
             description = UNSET if old is None else old.description
             written.append(msgspec.structs.replace(one, description=description))
     scene = saved.scene is None or _without_times(saved.scene) != _without_times(package.scene)

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 from arcor2_hw.analysis import Enumeration
 from arcor2_hw.exceptions import InvalidProject
 from arcor2_hw.parsing import parse
+from arcor2_hw.runtime.type_files import files_of_type
 from arcor2_server.build.naming import Names
 from arcor2_server.build.style import docstring
 from arcor2_server.object_types.catalog import PackageType
@@ -145,7 +146,8 @@ def files_of(types: Sequence[PackageType], enumerations: Mapping[str, Iterable[E
                 "object type {name}: {module!r} is not a valid module name", name=one.name, module=one.module
             )
         if one.source:
-            files[f"{FOLDER}/{one.module}.py"] = one.source.encode()
+            texts = files_of_type(one.module, one.source, one.modules)
+            files |= {f"{FOLDER}/{path}": text.encode() for path, text in texts.items()}
     names = Names(one.module for one in types)
     folders: dict[Path, str] = {}
     for one in types:

@@ -8,12 +8,12 @@ from cyclopts import App, Parameter
 from msgspec.structs import replace
 
 from arcor2_hw.analysis import Library, SourceFile, TypeAnalysis, module_name
-from arcor2_hw.client import Rest
 from arcor2_hw.data.base import Unset, is_valid_name
 from arcor2_hw.parsing import parse
 from arcor2_server.cli import export_files
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.server_connection import HERE, Failed, Server, run
+from arcor2_server.cli.uploads import plan_uploads
 from arcor2_server.exchange.archive import Archive
 from arcor2_server.exchange.export import Exporter
 
@@ -56,24 +56,6 @@ def _analysis(name: str, source: str) -> TypeAnalysis:
     return Library([SourceFile(name, module_name(name), source)]).analyse(name)
 
 
-async def _in_order(given: dict[str, SourceFile], rest: Rest) -> list[SourceFile]:
-    """Return files after those that they import. Raise Failed if one has a problem with the types on the server."""
-    library = Library(given.values())
-    if any(library.analyse(name).problem for name in given):
-        for entry in await rest.object_types():
-            if entry.id not in given:
-                stored = await rest.object_type(entry.id)
-                library.add(SourceFile(stored.id, module_name(stored.id), stored.source))
-    ordered: dict[str, SourceFile] = {}
-    for name, file in given.items():
-        analysis = library.analyse(name)
-        if analysis.problem is not None:
-            raise Failed(ExitStatus.ANALYSIS_PROBLEMS, str(analysis.problem))
-        ordered |= {each.name: given[each.name] for each in analysis.modules if each.name in given}
-        ordered[name] = file
-    return list(ordered.values())
-
-
 @app.command
 def add(
     *files: Path,
@@ -82,7 +64,9 @@ def add(
 ) -> int:
     """Upload new or changed object types from Python files. The files are read, not executed.
 
-    Upload bases, mixins and other modules that they import relatively before or together with them.
+    A module without an object type (a mixin, constants, functions) belongs to the type that imports it relatively, and
+    replaces no module of the same name of other types. If several of the files import it, they share it. Upload bases
+    before or together with the types that derive from them.
     """
 
     async def work() -> None:
@@ -94,10 +78,9 @@ def add(
             chosen = _class_in(source, file, name)
             given[chosen] = SourceFile(chosen, module_name(chosen), source, str(file))
         async with server.client() as client:
-            for one in await _in_order(given, client.rest):
-                source = one.source if isinstance(one.source, str) else one.source.decode()
-                await client.rest.put_object_type(one.name, source)
-                export_files.print_line(f"{one.name} uploaded")
+            for one in await plan_uploads(given, client.rest):
+                await client.rest.put_object_type(one.name, one.source, modules=one.modules)
+                export_files.print_line(str(one))
             for meta in await client.get_object_types():
                 if meta.type in given and not isinstance(meta.shadows, Unset):
                     export_files.print_line(

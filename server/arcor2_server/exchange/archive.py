@@ -1,6 +1,5 @@
 """The export file, a zip: documents as JSON, object types as source, models and assets."""
 
-import ast
 from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, Literal, TypeVar
@@ -15,6 +14,7 @@ from arcor2_hw.data.project import Project, ProjectParameter
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import InvalidPackage, NotFound, StorageError, TextTooLong
+from arcor2_hw.runtime.type_files import shared_modules
 from arcor2_server.build import imported, package
 from arcor2_server.files import replace_file
 
@@ -103,6 +103,7 @@ def files_of(archive: Archive) -> dict[str, bytes]:
         module = module_name(name)
         types[f"object_types/{module}.py"] = name
         files[f"object_types/{module}.py"] = one.source.encode()
+        files |= {f"object_types/{module}/{own}.py": text.encode() for own, text in one.own_modules.items()}
         if not isinstance(one.model, Unset):
             files[f"data/models/{module}.json"] = _json(one.model)
     assets = []
@@ -147,6 +148,8 @@ def _wanted(path: PurePosixPath) -> bool:
             return name.endswith(".json")
         case ("object_types", name):
             return name.endswith(".py") and name != "__init__.py"
+        case ("object_types", _, name):
+            return name.endswith(".py")
         case ("assets", _):
             return True
     return False
@@ -181,6 +184,7 @@ def _text(files: Mapping[str, bytes], path: str) -> str:
 
 def _types(files: Mapping[str, bytes], head: _Head) -> dict[str, ObjectTypeSource]:
     types: dict[str, ObjectTypeSource] = {}
+    own: set[str] = set()
     for path, name in head.types.items():
         if not is_valid_name(name) or path != f"object_types/{module_name(name)}.py":
             raise InvalidPackage(
@@ -189,8 +193,11 @@ def _types(files: Mapping[str, bytes], head: _Head) -> dict[str, ObjectTypeSourc
                 path=path[:80],
                 name=name[:80],
             )
-        types[name] = ObjectTypeSource(name, _text(files, path), model=_model(files, name))
-    stray = {path for path in files if path.startswith("object_types/")} - head.types.keys()
+        folder = f"{path.removesuffix('.py')}/"
+        modules = {PurePosixPath(each).stem: _text(files, each) for each in files if each.startswith(folder)}
+        types[name] = ObjectTypeSource(name, _text(files, path), model=_model(files, name), modules=modules)
+        own |= {f"{folder}{each}.py" for each in modules if is_valid_name(each)}
+    stray = {path for path in files if path.startswith("object_types/")} - head.types.keys() - own
     stray |= {path for path in files if path.startswith("data/models/")} - {_model_path(name) for name in types}
     if stray:
         raise InvalidPackage("{stray}: it belongs to no object type in {head}.", stray=min(stray), head=HEAD)
@@ -296,19 +303,6 @@ def _from_package(path: Path) -> Archive:
 
 
 # ------------------------------------------------------------------------------------------------ dependencies
-def needed_modules(source: str) -> set[str]:
-    """Return the sibling modules that an object type's module imports (`from .arm import Arm`)."""
-    found: set[str] = set()
-    try:
-        tree = ast.parse(source)
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return found  # the analysis reports errors of the source
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.level == 1:
-            found |= {node.module.partition(".")[0]} if node.module else {alias.name for alias in node.names}
-    return found
-
-
 def with_needed(names: Iterable[str], sources: Mapping[str, ObjectTypeSource]) -> dict[str, ObjectTypeSource]:
     """Return the sources of these types and of the bases, mixins and other modules that they import."""
     of_module = {module_name(name): name for name in sources}
@@ -319,7 +313,7 @@ def with_needed(names: Iterable[str], sources: Mapping[str, ObjectTypeSource]) -
         if name in chosen:
             continue
         chosen[name] = sources[name]
-        waiting += [of_module[module] for module in needed_modules(sources[name].source) if module in of_module]
+        waiting += [of_module[module] for module in shared_modules(*sources[name].code) if module in of_module]
     return dict(sorted(chosen.items()))
 
 

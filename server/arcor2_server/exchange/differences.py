@@ -70,7 +70,8 @@ def _tree(archive: Archive) -> dict[str, Any]:
 
 def _type(one: ObjectTypeSource) -> dict[str, Any]:
     model = UNSET if isinstance(one.model, Unset) else msgspec.to_builtins(one.model)
-    return {"source": _Text(one.source), "model": model}
+    modules = {name: _Text(text) for name, text in one.own_modules.items()}
+    return {"source": _Text(one.source), "modules": modules, "model": model}
 
 
 class _Text(str):

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 from msgspec import UNSET
 from msgspec.structs import replace
 
-from arcor2_hw.analysis import SourceFile, module_name
+from arcor2_hw.analysis import SourceFile
 from arcor2_hw.client import Client, NothingThere
 from arcor2_hw.client.rest import Asset, Listed
 from arcor2_hw.data.base import Data, Unset, new_id
@@ -98,7 +98,7 @@ class Importer:
         }
         robots = {robot.type: robot for robot in await client.get_robot_meta()}
         # Sources of the export may import sources on the server.
-        on_server = [_file(one) for name, one in uploaded.items() if name not in archive.types]
+        on_server = [SourceFile.of_upload(one) for name, one in uploaded.items() if name not in archive.types]
         local = [file for file in installed if file.name not in uploaded]
         known = Known(archive, [*local, *on_server], metas, actions, robots)
         for finding in find_problems(archive, known, [asset.id for asset in await self._rest.assets()]):
@@ -134,7 +134,7 @@ class Importer:
         existing = await self._exporter.uploaded()
         for name in types:
             new, old = types[name], existing.get(name)
-            same = old is not None and (old.source, old.model) == (new.source, new.model)
+            same = old is not None and (old.code, old.model) == (new.code, new.model)
             if old is not None and not same:
                 self._check_overwrite("types", f"The object type {name}")
             shadows = old is None and name in self._metas
@@ -247,8 +247,8 @@ class Importer:
         if old is None:
             rollback.before_step(what, lambda: rest.delete_object_type(name))
         else:
-            rollback.before_step(what, lambda: rest.put_object_type(name, old.source, old_model))
-        await rest.put_object_type(name, one.source, model)
+            rollback.before_step(what, lambda: rest.put_object_type(name, old.source, old_model, old.own_modules))
+        await rest.put_object_type(name, one.source, model, one.own_modules)
 
     async def _put_scene(self, rollback: Rollback, scene: Scene) -> None:
         rest, old = self._rest, self._old_scene
@@ -283,10 +283,6 @@ class Importer:
 
 def _model(one: ObjectTypeSource) -> Models | None:
     return None if isinstance(one.model, Unset) else one.model.model()
-
-
-def _file(one: ObjectTypeSource) -> SourceFile:
-    return SourceFile(one.id, module_name(one.id), one.source)
 
 
 def _bases_first(types: dict[str, ObjectTypeSource]) -> list[str]:

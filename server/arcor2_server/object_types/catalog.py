@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from msgspec import Struct
+from msgspec import Struct, field
 
 from arcor2_hw.analysis import Enumeration, InstalledType, Library, SourceFile, TypeAnalysis, module_name
 from arcor2_hw.data.base import Data
@@ -16,8 +16,8 @@ from arcor2_hw.runtime.messages import TypeCode
 class PackageType(Data, frozen=True):
     """The code of one object type in a package.
 
-    An uploaded type has `module` and `source`. An installed type has `entry_point` ("module:Class") and the `folder`
-    of its code, which is copied.
+    An uploaded type has `module`, `source`, and the `modules` that belong to it. An installed type has `entry_point`
+    ("module:Class") and the `folder` of its code, which is copied.
     """
 
     name: str
@@ -27,6 +27,7 @@ class PackageType(Data, frozen=True):
     folder: Path | None = None
     distribution: str = ""
     version: str = ""
+    modules: dict[str, str] = field(default_factory=dict)
 
 
 def action_of(meta: ObjectTypeMeta, actions: Iterable[ObjectAction], name: str) -> ObjectAction:
@@ -172,7 +173,7 @@ class TypeCatalog:
 
     def _code(self, name: str) -> TypeCode:
         if (one := self._uploaded.get(name)) is not None:
-            return TypeCode(name, module=module_name(name), source=one.source)
+            return TypeCode(name, module=module_name(name), source=one.source, modules=one.own_modules)
         if (installed := self._installed.get(name)) is not None:
             return TypeCode(name, entry_point=installed.entry_point)
         return TypeCode(name, entry_point=f"arcor2_hw.objects:{name}")
@@ -198,7 +199,7 @@ class TypeCatalog:
         found = []
         for name in self._with_needed(names):
             if (one := self._uploaded.get(name)) is not None:
-                found.append(PackageType(name, module_name(name), source=one.source))
+                found.append(PackageType(name, module_name(name), source=one.source, modules=one.own_modules))
             elif (installed := self._installed.get(name)) is not None:
                 found.append(
                     PackageType(

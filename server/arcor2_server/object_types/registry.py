@@ -9,7 +9,7 @@ import msgspec
 import structlog
 from msgspec.structs import replace
 
-from arcor2_hw.analysis import BUILT_IN, SourceFile, TypeAnalysis, installed_types, module_name, snapshot, worker
+from arcor2_hw.analysis import BUILT_IN, SourceFile, TypeAnalysis, installed_types, snapshot, worker
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.object_type import ObjectTypeMeta, ObjectTypeSource
 from arcor2_hw.data.robot import RobotMeta
@@ -133,7 +133,7 @@ class ObjectTypes(TypeCatalog):
             if self._uploaded.get(name) == one:
                 continue
             try:
-                self._library.add(SourceFile(name, module_name(name), one.source))
+                self._library.add(SourceFile.of_upload(one))
             except InvalidData as error:
                 log.warning("uploaded object type ignored", type=name, reason=str(error))
                 continue

@@ -21,11 +21,16 @@ from arcor2_server.storage import Storage
 from arcor2_server.storage.assets import TooLarge
 
 MAX_SOURCE: Final = 1024 * 1024
-"""Maximum size of a module, bytes."""
+"""Maximum size of the modules of a type, bytes."""
 
 
 class ObjectType(Data, frozen=True):
-    """An object type with the source of the module that declares its class."""
+    """An object type with the source of the module that declares its class.
+
+    Attributes:
+        modules: Sources of the modules that belong to this type only, by name. In a request, an absent field leaves
+            the stored ones.
+    """
 
     id: str
     name: str
@@ -34,11 +39,21 @@ class ObjectType(Data, frozen=True):
     model: MetaModel3d | Unset = UNSET
     created: Timestamp | Unset = UNSET
     modified: Timestamp | Unset = UNSET
+    modules: dict[str, str] | Unset = UNSET
 
 
 def _document(stored: ObjectTypeSource) -> ObjectType:
     model = UNSET if isinstance(stored.model, Unset) else MetaModel3d(stored.id, stored.model.type)
-    return ObjectType(stored.id, stored.id, stored.source, stored.description, model, stored.created, stored.modified)
+    return ObjectType(
+        stored.id,
+        stored.id,
+        stored.source,
+        stored.description,
+        model,
+        stored.created,
+        stored.modified,
+        stored.modules,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,10 +93,13 @@ class ObjectTypeOperations:
             raise InvalidData(
                 "{id!r} cannot be the id of an object type. Id and name must be the name of its class.", id=body.id[:80]
             )
-        if len(body.source.encode()) > MAX_SOURCE:
+        source = ObjectTypeSource(body.id, body.source, body.description, modules=body.modules)
+        for name in source.own_modules:
+            if not is_valid_name(name) or name.startswith("__"):
+                raise InvalidData("{id}: {name!r} is not a valid module name.", id=body.id, name=name[:80])
+        if sum(len(text.encode()) for text in (body.source, *source.own_modules.values())) > MAX_SOURCE:
             raise TooLarge("The source of {id} has more than {max_source} bytes.", id=body.id, max_source=MAX_SOURCE)
         self._types.require_replaceable(body.id)
-        source = ObjectTypeSource(body.id, body.source, body.description)
         if not isinstance(body.model, Unset) and body.model.type is not Model3dType.NONE:
             if body.model.id != body.id:
                 raise InvalidData(

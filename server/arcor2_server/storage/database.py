@@ -136,10 +136,10 @@ class Database:
             found += await asyncio.to_thread(list, map(functools.partial(self.decoded, decode), rows))
         return found
 
-    def decoded(self, decode: Any, row: Any) -> Any:
+    def decoded(self, decode: Any, row: Any, column: str = "document") -> Any:
         """Return the document of a row. Raise StorageError that names the row if the document is damaged."""
         try:
-            return decode(row.document)
+            return decode(getattr(row, column))
         except msgspec.DecodeError as error:
             raise StorageError(
                 "the document {id!r} in the database {place} is damaged: {reason}",

@@ -46,7 +46,10 @@ class ProjectSourceRow(Base):
 
 
 class ObjectTypeRow(Base):
-    """An uploaded object type: its module. `model_kind` is set if it has a collision model, of the same id."""
+    """An uploaded object type: its module. `model_kind` is set if it has a collision model, of the same id.
+
+    `modules`: sources of the modules that belong to it, by name, as JSON.
+    """
 
     __tablename__ = "object_type"
 
@@ -56,6 +59,7 @@ class ObjectTypeRow(Base):
     model_kind: Mapped[str | None] = mapped_column(String(20))
     created: Mapped[str] = mapped_column(String(40))
     modified: Mapped[str] = mapped_column(String(40))
+    modules: Mapped[bytes | None] = mapped_column(LargeBinary)
 
 
 class ModelRow(Base):

@@ -180,6 +180,9 @@ class Storage(Database):
         async with self.writing() as session:
             row = await session.get(ObjectTypeRow, object_type.id)
             saved = msgspec.structs.replace(object_type, created=row.created if row else stamp, modified=stamp)
+            modules = row.modules if row else None
+            if not isinstance(saved.modules, msgspec.UnsetType):
+                modules = _encode(saved.modules) if saved.modules else None
             model = None
             if not isinstance(saved.model, msgspec.UnsetType) and saved.model.type is not Model3dType.NONE:
                 model = saved.model.model()
@@ -192,6 +195,7 @@ class Storage(Database):
                     model_kind=None if model is None else model.type().value,
                     created=saved.created,
                     modified=saved.modified,
+                    modules=modules,
                 )
             )
         self.types_revision += 1
@@ -276,6 +280,7 @@ class Storage(Database):
             model=UNSET if row.model_kind is None or model is None else ObjectModel.of(self._model(model)),
             created=row.created,
             modified=row.modified,
+            modules=UNSET if row.modules is None else self.decoded(_decode_modules, row, "modules"),
         )
 
 

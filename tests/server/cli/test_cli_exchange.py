@@ -25,8 +25,6 @@ from arcor2_server.cli.main import app
 from tests.runtime.older_sources import SOURCES
 from tests.server.core.serving import ServerProcess
 
-pytestmark = pytest.mark.timeout(120)
-
 CRATE = '''"""A crate with a mesh."""
 
 from arcor2_hw.actions import action
@@ -598,7 +596,7 @@ def test_failures_have_an_exit_status(cli: Any, place: Place, exported: Path, tm
     half.write_bytes(exported.read_bytes()[:2000])
     for words, status, told in (
         (("scene", "list", "--url", "ws://127.0.0.1:9"), ExitStatus.NO_SERVER, "127.0.0.1:9"),
-        (("scene", "export", "nowhere", "--url", place.first), ExitStatus.NOT_FOUND, "no scene nowhere"),
+        (("scene", "export", "nowhere", "--url", place.first), ExitStatus.NOT_FOUND, "has no scene nowhere"),
         (("project", "import", "missing.zip", "--url", place.first), ExitStatus.NOT_FOUND, "missing.zip"),
         (("project", "validate", "none.zip"), ExitStatus.DOCUMENT_PROBLEMS, "none.zip"),
         (("project", "validate", "half.zip"), ExitStatus.DOCUMENT_PROBLEMS, "not a valid zip archive"),

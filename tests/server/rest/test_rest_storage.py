@@ -13,6 +13,7 @@ from arcor2_server.app import Server
 from arcor2_server.object_types import notifications
 from arcor2_server.rest.field_names import camelized, snaked
 from tests.server.build import workplace
+from tests.server.core.serving import until
 from tests.server.rest.asking import granted, refused
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -257,7 +258,7 @@ async def test_reserved_names_cannot_be_uploaded(http: httpx.AsyncClient, name: 
 
 
 async def test_installed_types_cannot_be_deleted_and_sources_are_limited(http: httpx.AsyncClient) -> None:
-    refused(await http.delete("/object-types/FlowActions"), 400, "Argument", "FlowActions")
+    refused(await http.delete("/object-types/FlowActions"), 400, "Argument", "Program flow")
     huge = lamp("Huge") | {"source": "#" * (1024 * 1024 + 1)}
     refused(await http.put("/object-types", json=huge), 413, "Argument", "Huge")
     refused(await http.put("/object-types", json=lamp("One") | {"name": "Other"}), 400, "Argument")
@@ -266,28 +267,28 @@ async def test_installed_types_cannot_be_deleted_and_sources_are_limited(http: h
 async def test_a_series_of_uploads_is_announced_once(
     http: httpx.AsyncClient, services: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told: list[tuple[str, list[str]]] = []
+    announced: list[tuple[str, list[str]]] = []
 
     def note(event: Any) -> None:
-        told.append((str(event.change_type), [meta.type for meta in event.data]))
+        announced.append((str(event.change_type), [meta.type for meta in event.data]))
 
     async def end_of(*bodies: dict[str, Any]) -> None:
-        """Send all, none of which may be told of, and wait until it is quiet."""
-        before = len(told)
+        """Send all, none of which may be announced at once, and wait until they are announced."""
+        before = len(announced)
         monkeypatch.setattr(notifications, "QUIET", 600)
         for body in bodies:
             granted(await http.put("/object-types", json=body))
-        assert len(told) == before
+        assert len(announced) == before
         monkeypatch.setattr(notifications, "QUIET", 0.01)
         granted(await http.put("/object-types", json=bodies[-1]))
-        await asyncio.sleep(0.5)
+        await until(lambda: len(announced) > before)
 
     await services.type_notifications.close()
     await services.types.refresh()
     monkeypatch.setattr(services.hub, "broadcast", note)
-    # One that comes twice is not two pieces of news.
+    # A type that is uploaded twice is announced once.
     await end_of(lamp("LampA"), lamp("LampB"), lamp("LampC"), lamp("LampB"))
-    assert told == [("add", ["LampA", "LampB", "LampC"])]
+    assert announced == [("add", ["LampA", "LampB", "LampC"])]
 
     monkeypatch.setattr(notifications, "QUIET", 600)
     granted(await http.delete("/object-types/LampC"))
@@ -295,15 +296,15 @@ async def test_a_series_of_uploads_is_announced_once(
     granted(await http.delete("/object-types/LampD"))
     granted(await http.put("/models/sphere", json={"id": "LampA", "radius": 1}))
     await end_of(lamp("LampA", model={"id": "LampA", "type": "Sphere"}))
-    assert told[1:] == [("remove", ["LampC"]), ("update", ["LampA"])], "LampD came and went: no news"
+    assert announced[1:] == [("remove", ["LampC"]), ("update", ["LampA"])], "LampD was added and deleted: no change"
 
-    # Who opens a scene, or asks for a list, is told before: nothing is left for the timer.
+    # Requests that open a scene or list types announce changes before: nothing is left for the timer.
     monkeypatch.setattr(notifications, "QUIET", 0.05)
     granted(await http.put("/object-types", json=lamp("LampE")))
     changes = await services.types.refresh()
     assert [meta.type for meta in changes.added] == ["LampE"]
     await asyncio.sleep(0.3)
-    assert len(told) == 3
+    assert len(announced) == 3
 
 
 # ------------------------------------------------------------------------------------------------ assets
