@@ -1,11 +1,16 @@
 """Object types of installed distributions, found by their entry points without importing them."""
 
 import importlib.util
+import os
+import site
 import sys
+from collections.abc import Iterator
 from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import Distribution, EntryPoint, distributions
 from pathlib import Path
 from typing import Final
+
+import humps
 
 from arcor2_hw.analysis.source import Problem, SourceFile
 from arcor2_hw.data.base import Data
@@ -35,28 +40,76 @@ class InstalledType(Data, frozen=True):
 
 
 def installed_types() -> list[InstalledType]:
-    """Return the object types of all installed distributions by name, for equal names the first one."""
+    """Return the object types of all installed distributions by name, for equal names the first one.
+
+    A distribution whose metadata cannot be read is listed as a type with a problem, named after its files.
+    """
     found: dict[str, InstalledType] = {}
-    for point in entry_points(group=GROUP):
-        each = _installed(point)
-        found.setdefault(each.name, each)
+    seen: set[str] = set()
+    for distribution in distributions():
+        folder = Path(str(getattr(distribution, "_path", "")))
+        own = folder.name.partition("-")[0]
+        if own.lower() not in seen:  # of two versions in the search path, the first one is imported
+            seen.add(own.lower())
+            for each in _types_of(distribution, folder, own):
+                found.setdefault(each.name, each)
     return [found[name] for name in sorted(found)]
 
 
-def _installed(point: EntryPoint) -> InstalledType:
-    distribution = point.dist
+def installation_stamp() -> frozenset[tuple[str, int]]:
+    """Return a value that differs after a distribution was installed, changed or removed."""
+    found: set[tuple[str, int]] = set()
+    for folder in tuple(sys.path):
+        try:
+            with os.scandir(folder or ".") as entries:
+                marks = [each for each in entries if each.name.endswith((".dist-info", ".egg-info", ".pth"))]
+            found |= {(each.path, each.stat().st_mtime_ns) for each in marks}
+        except OSError:
+            continue  # an archive, a missing folder, or a distribution that is just being removed
+    return frozenset(found)
+
+
+def find_new_distributions() -> None:
+    """Let this process find distributions that were installed after it started, also editable ones."""
+    for folder in {*site.getsitepackages(), site.getusersitepackages()} & set(sys.path):
+        site.addsitedir(folder)
+    importlib.invalidate_caches()
+
+
+def _problem(template: str, place: Path | str, **values: object) -> Problem:
+    return Problem(Message.of(template, **values), str(place), 1)
+
+
+def _types_of(distribution: Distribution, folder: Path, own: str) -> Iterator[InstalledType]:
+    try:
+        points = [point for point in distribution.entry_points if point.group == GROUP]
+        origin = (distribution.name or own, distribution.version or "") if points else ("", "")
+    except (OSError, ValueError, LookupError, AttributeError, TypeError) as error:
+        text = "the metadata of the distribution {own} cannot be read: {error!r}"
+        problem = _problem(text, folder, own=own, error=error)
+        yield InstalledType(str(humps.pascalize(own)), "", own, "", "", None, problem)
+        return
+    for point in points:
+        if EntryPoint.pattern.fullmatch(point.value) is None:
+            text = "the entry point {name} is invalid: {value!r}"
+            problem = _problem(text, folder, name=point.name, value=point.value)
+            yield InstalledType(point.name, point.value, *origin, "", None, problem)
+        else:
+            yield _installed(point, origin)
+
+
+def _installed(point: EntryPoint, origin: tuple[str, str]) -> InstalledType:
     name = point.attr or point.name
-    origin = (distribution.name, distribution.version) if distribution is not None else ("", "")
     located = _locate(point.module)
     if located is None:
         text = "the module {module} of the entry point {name} is not installed"
-        problem = Problem(Message.of(text, module=point.module, name=point.name), point.value, 1)
+        problem = _problem(text, point.value, module=point.module, name=point.name)
         return InstalledType(name, point.value, *origin, "", None, problem)
     path, is_package = located
     try:
         source = _read(str(path), path.stat().st_mtime_ns)
     except OSError as error:
-        problem = Problem(Message.of("the file cannot be read: {reason}", reason=error.strerror), str(path), 1)
+        problem = _problem("the file cannot be read: {reason}", path, reason=error.strerror)
         return InstalledType(name, point.value, *origin, str(path.parent), None, problem)
     file = SourceFile(name, point.module, source, str(path), is_package)
     return InstalledType(name, point.value, *origin, str(path.parent), file)

@@ -1,5 +1,6 @@
 """Object types of installed distributions are found and read, and never imported."""
 
+import site
 import sys
 import textwrap
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 from msgspec import UNSET
 
 from arcor2_hw.analysis import Library, SourceFile, installed_types
+from arcor2_hw.analysis.installed import find_new_distributions, installation_stamp
 
 POISON = "raise RuntimeError('this was imported')\n"
 
@@ -111,7 +113,7 @@ def test_an_entry_point_without_target_is_a_problem(distribution: Path, name: st
     (found,) = [each for each in installed_types() if each.name == name]
     assert found.file is None
     assert found.problem is not None
-    assert text in found.problem.text
+    assert text in found.problem.what.text
 
 
 def test_a_file_that_changed_is_read_again(distribution: Path) -> None:
@@ -145,3 +147,23 @@ def test_jog_and_acknowledge_features_of_installed_robots() -> None:
     assert features["YuMi"] is not None
     assert features["YuMi"].features.acknowledge_stop is True
     assert features["YuMi"].features.kinematic_calibration is UNSET
+
+
+def test_an_editable_installation_is_found_by_a_process_that_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    packages, checkout = tmp_path / "site-packages", tmp_path / "checkout"
+    packages.mkdir()
+    monkeypatch.setattr(sys, "path", [*sys.path, str(packages)])
+    monkeypatch.setattr(site, "getsitepackages", lambda: [str(packages)])
+    before = installation_stamp()
+    for name, text in FILES.items():
+        path = (packages if "dist-info" in name else checkout) / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(textwrap.dedent(text))
+    (packages / "__editable__.vendor_cell.pth").write_text(f"{checkout}\n")
+    assert installation_stamp() != before
+    assert {each.name: each for each in installed_types()}["Arm"].file is None
+    find_new_distributions()
+    arm = {each.name: each for each in installed_types()}["Arm"]
+    assert arm.folder == str(checkout / "vendor_cell" / "arm")

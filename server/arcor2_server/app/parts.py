@@ -32,6 +32,7 @@ from arcor2_server.hosts.pool import CellHosts
 from arcor2_server.hosts.session import HostSession
 from arcor2_server.log.redaction import REDACTION
 from arcor2_server.object_types.catalog import KnownTypes
+from arcor2_server.object_types.installations import InstallationWatch
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.cameras import Cameras
@@ -104,6 +105,9 @@ class Server:
         scene_host = HostSession(hub, hosts, "scene")
         program_host = HostSession(hub, hosts, "program", to_all_clients=True)
 
+        installations = InstallationWatch(types, type_notifications, hosts.renew)
+        installations.start()
+        closed(installations)
 
         # ------------------------------------------------------------------------------------ session
         session = self.session = Session(settings, storage, types, damage, secrets)

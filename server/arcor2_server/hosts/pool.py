@@ -56,18 +56,29 @@ class CellHosts:
         host.ended.add_done_callback(lambda _: self._taken.discard(host))
         return host
 
+    async def renew(self) -> None:
+        """Replace the spare host, which does not find packages that were installed after its start."""
+        if self._spare is not None:
+            hosts = await self._withdraw_spare()
+            self.prepare()
+            await asyncio.gather(*(host.close() for host in hosts))
+
     async def close(self) -> None:
         """Close all hosts."""
         self._closed = True
-        hosts = set(self._taken)
+        hosts = self._taken | await self._withdraw_spare()
+        await asyncio.gather(*(host.close() for host in hosts))
+
+    async def _withdraw_spare(self) -> set[CellHost]:
+        """Return the spare host, which the caller closes; empty if there is none."""
         spare, self._spare = self._spare, None
         if spare is not None:
             # Completing a start takes less time than interrupting it.
             await asyncio.wait({spare}, timeout=CLOSE_TIMEOUT)
             spare.cancel()
             with contextlib.suppress(Arcor2Error, asyncio.CancelledError):
-                hosts.add(await spare)
-        await asyncio.gather(*(host.close() for host in hosts))
+                return {await spare}
+        return set()
 
     async def _start(self) -> CellHost:
         host = await CellHost.start(self._environment)

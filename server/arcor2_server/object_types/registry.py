@@ -10,6 +10,7 @@ import structlog
 from msgspec.structs import replace
 
 from arcor2_hw.analysis import BUILT_IN, SourceFile, TypeAnalysis, installed_types, snapshot, worker
+from arcor2_hw.analysis.installed import find_new_distributions
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.object_type import ObjectTypeMeta, ObjectTypeSource
 from arcor2_hw.data.robot import RobotMeta
@@ -106,11 +107,31 @@ class ObjectTypes(TypeCatalog):
             if self._stored_revision != self._read_at:
                 await self._read_uploaded()
 
+    async def rescan(self) -> bool:
+        """Read the installed types again; return whether they have changed. The next `refresh` returns the changes."""
+        async with self._reading:
+            before = self._installed
+            await asyncio.to_thread(find_new_distributions)
+            await asyncio.to_thread(self._read_installed)
+            if self._installed == before:
+                return False
+            await self._offer_models()
+            await self._read_uploaded()
+            return True
+
     def _read_installed(self) -> None:
-        for installed in installed_types():
-            self._installed[installed.name] = installed
-            if installed.file is not None:
-                self._library.add(installed.file)
+        found = {each.name: each for each in installed_types()}
+        files = {name: each.file for name, each in found.items() if each.file is not None}
+        for name in self._installed.keys() - self._uploaded.keys() - files.keys():
+            if name in self._library:
+                self._library.remove(name)
+        for name in files.keys() - self._uploaded.keys():
+            if (before := self._installed.get(name)) is None or before.file != files[name]:
+                self._library.add(files[name])
+        for name, each in found.items():
+            if each.problem is not None and self._installed.get(name) != each:
+                log.warning("installed object type cannot be used", type=name, reason=str(each.problem))
+        self._installed = found
 
     async def _offer_models(self) -> None:
         """Offer the robot models of installed drivers as assets."""
@@ -185,9 +206,9 @@ class ObjectTypes(TypeCatalog):
                 meta = replace(meta, built_in=True)
             metas[name] = meta
         for name, installed in self._installed.items():
-            if installed.file is None and name not in self._uploaded:
-                meta = ObjectTypeMeta(name, "", built_in=True, abstract=True, disabled=True)
-                metas[name] = meta = replace(meta, problem=str(installed.problem))
+            if installed.problem is not None and name not in self._uploaded:
+                meta = ObjectTypeMeta(name, "", built_in=True, abstract=True)
+                metas[name] = meta = meta.disabled_because(installed.problem.message)
                 analyses[name] = TypeAnalysis(meta, problem=installed.problem)
         robots = {name: self._with_asset(a.robot) for name, a in analyses.items() if a.robot and name in metas}
         metas, robots = dict(sorted(metas.items())), dict(sorted(robots.items()))

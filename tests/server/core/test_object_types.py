@@ -12,8 +12,10 @@ import pytest
 from msgspec import UNSET
 
 from arcor2_hw.analysis import Library, worker
+from arcor2_hw.client import Client
 from arcor2_hw.data.object_type import Box, Mesh, ObjectModel, ObjectTypeSource, Sphere
 from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_server.object_types.catalog import KnownTypes
 from arcor2_server.object_types.changes import Changes
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.settings import ServerSettings
@@ -77,7 +79,7 @@ async def assets(tmp_path: Path) -> AssetStore:
 
 @pytest.fixture
 async def types(storage: Storage, assets: AssetStore) -> ObjectTypes:
-    registry = ObjectTypes(storage, assets)
+    registry = ObjectTypes(KnownTypes(), storage, assets)
     await registry.load()
     return registry
 
@@ -129,6 +131,17 @@ async def test_uploaded_type(types: ObjectTypes, storage: Storage) -> None:
         await types.remove("Lamp")
 
 
+async def test_refusals_name_types_as_users_know_them(types: ObjectTypes) -> None:
+    for look_up, refusal in (
+        (lambda: types.action("OakD", "fly"), "The object type Luxonis OAK-D has no action 'fly'."),
+        (lambda: types.robot_meta("OakD"), "The object type Luxonis OAK-D is not a robot."),
+    ):
+        with pytest.raises(NotFound) as caught:
+            look_up()
+        assert str(caught.value) == refusal
+    assert types.shown_name("Unknown") == "Unknown"
+
+
 async def test_base_classes_cannot_be_replaced_or_deleted(types: ObjectTypes, storage: Storage) -> None:
     source = ObjectTypeSource("Generic", "class Generic: ...")
     with pytest.raises(InvalidData, match="Generic"):
@@ -146,7 +159,9 @@ async def test_an_upload_shadows_an_installed_type_until_it_is_deleted(types: Ob
     installed, code = types.meta("UR5e"), types.type_code("UR5e")
     others = {name: types.actions(name) for name in ("UR3e", "UR10e")}
     assert installed.built_in
-    with pytest.raises(InvalidData, match=r"belongs to arcor2-hw .* cannot be deleted"):
+    with pytest.raises(
+        InvalidData, match=r"^The object type Universal Robots UR5e belongs to arcor2-hw .* cannot be deleted"
+    ):
         await types.remove("UR5e")
 
     source = LAMP.replace("class Lamp", "class UR5e")
@@ -178,7 +193,7 @@ async def test_an_upload_shadows_an_installed_type_until_it_is_deleted(types: Ob
 
 async def test_an_upload_shadows_after_a_restart(types: ObjectTypes, storage: Storage, assets: AssetStore) -> None:
     shadow = await types.add(ObjectTypeSource("FlowActions", LAMP.replace("class Lamp", "class FlowActions")))
-    again = ObjectTypes(storage, assets)
+    again = ObjectTypes(KnownTypes(), storage, assets)
     await again.load()
     assert again.meta("FlowActions") == shadow
 
@@ -366,7 +381,7 @@ async def test_dependencies_of_a_type_come_first(types: ObjectTypes, storage: St
 
 async def test_uploaded_types_survive_a_restart(types: ObjectTypes, storage: Storage, assets: AssetStore) -> None:
     await types.add(ObjectTypeSource("Lamp", LAMP))
-    again = ObjectTypes(storage, assets)
+    again = ObjectTypes(KnownTypes(), storage, assets)
     await again.load()
     assert again.metas() == types.metas()
     assert await again.refresh() == Changes(), "what was there at the start is no news"
@@ -442,6 +457,56 @@ async def test_an_invalid_new_type_is_refused(server: ServerProcess, new: dict[s
         await ann.nothing_more()
 
 
+UNREADABLE = """
+from arcor2_hw.actions import action
+from arcor2_hw.objects import Generic
+
+
+class Unreadable(Generic):
+    def __init__(self, obj_id: str, name: str, settings) -> None: ...
+
+    @action
+    def run(self, *, an: str | None = None): ...
+"""
+
+
+async def test_problems_contain_what_is_needed_to_translate_them_if_codes_are_requested(server: ServerProcess) -> None:
+    async with talking(server.url, "ann") as ann, Client(server.url) as client:
+        await client.rest.put_object_type("Unreadable", UNREADABLE)
+        # Events contain it for all clients.
+        (told,) = (await ann.event("ChangedObjectTypes"))["data"]
+        plain = next(one for one in await ann.granted("GetObjectTypes") if one["type"] == "Unreadable")
+        answer = await ann.request("GetObjectTypes", codes=True)
+        full = next(one for one in answer["data"] if one["type"] == "Unreadable")
+        assert told == full
+        assert (full["disabled"], full["problem"]) == (plain["disabled"], plain["problem"])
+        assert (full.pop("key"), full.pop("values")) == (
+            "{path}:{line}: {problem}",
+            {
+                "path": "object_types/unreadable.py",
+                "line": "7",
+                "problem": {
+                    "text": "Unreadable: settings is not annotated",
+                    "key": "{cls}: settings is not annotated",
+                    "values": {"cls": "Unreadable"},
+                },
+            },
+        )
+        assert full == plain
+
+        arguments = {"type": "Unreadable"}
+        (plain_action,) = await ann.granted("GetActions", arguments)
+        (action,) = (await ann.request("GetActions", arguments, codes=True))["data"]
+        assert action.pop("values")["problem"]["key"] == "{action}: the return annotation is missing"
+        assert action.pop("key") == "{path}:{line}: {problem}"
+        assert action == plain_action
+        assert action["problem"].endswith("run: the return annotation is missing")
+
+        refusal = await ann.request("NewObjectType", {"type": "Heir", "base": "Unreadable"}, codes=True)
+        assert refusal["values"]["problem"]["key"] == "{path}:{line}: {problem}"
+        await ann.granted("DeleteObjectTypes", ["Unreadable"])
+
+
 async def test_lists_follow_saved_documents(tmp_path: Path) -> None:
     async with running(tmp_path / "data") as server, talking(server.url, "ann") as ann:
         assert await ann.granted("ListScenes") == []
@@ -503,7 +568,7 @@ async def test_a_huge_source_that_takes_too_long_is_disabled(
     storage: Storage, assets: AssetStore, tmp_path: Path, parsed: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stored = tmp_path / "analysis"
-    types = ObjectTypes(storage, assets, stored)
+    types = ObjectTypes(KnownTypes(), storage, assets, stored)
     await types.load()
     before = stored.read_bytes()
     monkeypatch.setattr(worker, "WITHIN", 0.0)

@@ -42,8 +42,8 @@ async def following(client: Talker) -> dict[str, Any]:
     return client.events.pop(0) if client.events else await client.receive(30)
 
 
-async def told(client: Talker, *kinds: str) -> dict[str, Any]:
-    """Give the next news of object types; what else is told on the way is let by."""
+async def type_change(client: Talker, *kinds: str) -> dict[str, Any]:
+    """Return the next change of an object type of one of these kinds. Drop other events."""
     while True:
         event = await following(client)
         if event.get("event") == "ChangedObjectTypes":
@@ -63,7 +63,7 @@ async def scene_is(client: Talker, state: str) -> None:
 
 async def test_a_type_is_added_changed_and_removed(server: ServerProcess) -> None:
     base = server.url.replace("ws://", "http://")
-    async with talking(server.url, "ann") as ann, httpx.AsyncClient(base_url=base, trust_env=False) as http:
+    async with talking(server.url, "ann") as ann, httpx.AsyncClient(timeout=60, base_url=base, trust_env=False) as http:
 
         async def put(route: str, body: dict[str, Any]) -> None:
             answer = await http.put(route, json=body)
@@ -77,16 +77,16 @@ async def test_a_type_is_added_changed_and_removed(server: ServerProcess) -> Non
 
         await put("/models/mesh", MESH)
         await put_type("Shelf", SHELF, model={"id": "Shelf", "type": "Mesh"})
-        meta = await told(ann, "add")
+        meta = await type_change(ann, "add")
         assert meta["disabled"]
         assert "labels" in meta["problem"]
         await put_type("Labels", LABELS)
-        meta = await told(ann, "update")
+        meta = await type_change(ann, "update")
         assert meta["disabled"]
         assert "shelf.stl" in meta["problem"]
         answer = await http.post("/assets?id=shelf.stl", files={"assetData": ("shelf.stl", b"solid")})
         assert answer.status_code == 200, answer.text
-        meta = await told(ann, "update")
+        meta = await type_change(ann, "update")
         assert (meta["disabled"], "problem" in meta, meta["category"]) == (False, False, "Collision objects")
         actions = {action["name"]: action for action in await ann.granted("GetActions", {"type": "Shelf"})}
         board, height = actions["take"]["parameters"]
@@ -114,10 +114,10 @@ async def test_a_type_is_added_changed_and_removed(server: ServerProcess) -> Non
         await scene_is(ann, "stopped")
 
         await http.delete("/assets/shelf.stl")
-        assert "shelf.stl" in (await told(ann, "update"))["problem"]
+        assert "shelf.stl" in (await type_change(ann, "update"))["problem"]
         await ann.granted("CloseScene", {"force": True})
         await http.delete("/object-types/Shelf")
-        assert (await told(ann, "remove"))["type"] == "Shelf"
+        assert (await type_change(ann, "remove"))["type"] == "Shelf"
         await ann.refused("GetActions", {"type": "Shelf"})
         await http.delete("/object-types/Labels")
 
@@ -157,7 +157,7 @@ class Counter(Generic):
 async def test_a_program_with_an_older_type_is_built_and_run(server: ServerProcess) -> None:
     async with (
         talking(server.url, "ann") as ann,
-        httpx.AsyncClient(base_url=server.url.replace("ws://", "http://"), trust_env=False) as http,
+        httpx.AsyncClient(timeout=60, base_url=server.url.replace("ws://", "http://"), trust_env=False) as http,
     ):
 
         async def event(name: str) -> Any:
@@ -166,7 +166,7 @@ async def test_a_program_with_an_older_type_is_built_and_run(server: ServerProce
             return found["data"]
 
         await http.put("/object-types", json={"id": "Counter", "name": "Counter", "source": COUNTER})
-        await told(ann, "add")
+        await type_change(ann, "add")
         await ann.granted("NewScene", {"name": "Counting"})
         scene = (await event("OpenScene"))["scene"]["id"]
         await ann.granted("AddObjectToScene", {"name": "counter", "type": "Counter"})
