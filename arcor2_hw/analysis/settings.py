@@ -21,13 +21,14 @@ _KINDS: Final = frozenset({"boolean", "integer", "double", "string", "string_enu
 
 
 class _Field(NamedTuple):
-    """A field of a dataclass. `secret` and `address` are None where its metadata does not declare them."""
+    """A field of a dataclass. `secret`, `address`, `for_control` are None where its metadata lacks them."""
 
     default: ast.expr | None
     in_constructor: bool = True
     keyword_only: bool = False
     secret: bool | None = None
     address: bool | None = None
+    for_control: bool | None = None
 
 
 class SettingsReader:
@@ -117,8 +118,8 @@ class SettingsReader:
             if "default_factory" in given:
                 raise info.problem("the default of a setting must be a constant in the source", expression)
             in_constructor = not _is(given.get("init"), False)
-            secret, address = (_declared(given.get("metadata"), key) for key in ("secret", "address"))
-            return _Field(given.get("default"), in_constructor, _is(given.get("kw_only"), True), secret, address)
+            declared = (_declared(given.get("metadata"), key) for key in ("secret", "address", "for_control"))
+            return _Field(given.get("default"), in_constructor, _is(given.get("kw_only"), True), *declared)
         return _Field(expression)
 
     def _setting(
@@ -154,6 +155,7 @@ class SettingsReader:
             extra=extra,
             secret=secret or UNSET,
             address=UNSET if field.address is None else field.address,
+            for_control=field.for_control or UNSET,
         )
 
 

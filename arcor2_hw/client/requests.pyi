@@ -76,8 +76,9 @@ from arcor2_hw.data.rpc.object_types import DeleteObjectTypesData, ObjectAimingA
 from arcor2_hw.data.rpc.operation import JogFrame, JogRobotData, StopAllData
 from arcor2_hw.data.rpc.projects import ListProjectsData
 from arcor2_hw.data.rpc.robots import RobotEventKind, StepAxis, StepMode, StepWhat
-from arcor2_hw.data.rpc.scenes import ListScenesData, Pivot
+from arcor2_hw.data.rpc.scenes import CheckConnectionData, ListScenesData, Pivot
 from arcor2_hw.data.scene import BareScene, Scene, SceneObject
+from arcor2_hw.messages import Message
 
 class Requests(ABC):
     @abstractmethod
@@ -203,6 +204,23 @@ class Requests(ABC):
     ) -> None:
         """AddProjectParameter. Needs the role advanced user."""
 
+    async def add_scene_object(
+        self,
+        *,
+        name: str,
+        type: str,
+        pose: Pose | Unset = UNSET,
+        parameters: Sequence[Parameter] = (),
+        dry_run: bool = False,
+        timeout: float | None = None,
+    ) -> None:
+        """AddSceneObject. Needs the role technician."""
+
+    async def add_scene_shape(
+        self, *, name: str, pose: Pose, model: ObjectModel, dry_run: bool = False, timeout: float | None = None
+    ) -> None:
+        """AddSceneShape. Needs the role technician."""
+
     async def add_virtual_collision_object_to_scene(
         self, *, name: str, pose: Pose, model: ObjectModel, dry_run: bool = False, timeout: float | None = None
     ) -> None:
@@ -250,6 +268,14 @@ class Requests(ABC):
         """CheckCalibration: a record, a pose in its frame, and the limits of the difference (m, rad).
 
         Needs the role operator.
+        """
+
+    async def check_connection(
+        self, type: str, *, parameters: Sequence[Parameter] = (), id: str = "", timeout: float | None = None
+    ) -> CheckConnectionData:
+        """CheckConnection: type and settings of a device, and its id if it is an object of the scene.
+
+        Needs the role technician.
         """
 
     async def close_project(self, *, force: bool = False, dry_run: bool = False, timeout: float | None = None) -> None:
@@ -525,14 +551,16 @@ class Requests(ABC):
         needs_parent_type: str | Unset = UNSET,
         has_pose: bool = False,
         abstract: bool = False,
-        disabled: bool = False,
-        problem: str | Unset = UNSET,
         settings: Sequence[ParameterMeta] = (),
         modified: str | Unset = UNSET,
         display_name: str | Unset = UNSET,
         category: str | Unset = UNSET,
         icon: str | Unset = UNSET,
         shadows: str | Unset = UNSET,
+        key: str | Unset = UNSET,
+        values: dict[str, str | Message] | Unset = UNSET,
+        disabled: bool = False,
+        problem: str | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:
@@ -969,6 +997,21 @@ class Requests(ABC):
         self, *, scene_id: str, new_description: str, timeout: float | None = None
     ) -> None:
         """UpdateSceneDescription. Needs the role technician."""
+
+    async def update_scene_object_pose(
+        self, *, object_id: str, pose: Pose, dry_run: bool = False, timeout: float | None = None
+    ) -> None:
+        """UpdateSceneObjectPose. Needs the role technician."""
+
+    async def update_scene_object_settings(
+        self, id: str, *, parameters: Sequence[Parameter] = (), dry_run: bool = False, timeout: float | None = None
+    ) -> None:
+        """UpdateSceneObjectSettings. Needs the role technician."""
+
+    async def update_scene_shape(
+        self, *, object_type_id: str, object_model: ObjectModel, dry_run: bool = False, timeout: float | None = None
+    ) -> None:
+        """UpdateSceneShape. Needs the role technician."""
 
     async def upload_package(self, *, id: str, data: str, timeout: float | None = None) -> None:
         """UploadPackage. Needs the role programmer."""

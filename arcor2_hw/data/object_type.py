@@ -112,7 +112,7 @@ class ParameterMeta(Data, frozen=True):
 
     former_names (not in ARCOR2): names in older projects. secret: the value of this setting is stored by the server and
     never sent to clients. address: whether this setting contains the address of the device; omitted when its name
-    decides.
+    decides. for_control: whether the device can only be observed while this setting has its default value.
     """
 
     name: str
@@ -125,6 +125,7 @@ class ParameterMeta(Data, frozen=True):
     former_names: list[str] | Unset = UNSET
     secret: bool | Unset = UNSET
     address: bool | Unset = UNSET
+    for_control: bool | Unset = UNSET
 
 
 class ActionMetadata(Data, frozen=True):

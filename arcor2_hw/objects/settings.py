@@ -60,6 +60,9 @@ class Settings:
 
     A stored secret is sent only to the address that it was entered for. A str whose name indicates an address (`host`,
     `url`, `address`, `port`, ...) is part of that address; metadata `"address": True` or `False` overrides this.
+
+    A setting with the metadata `"for_control": True` must be set before the device can be controlled. Its default means
+    "not set". The editor asks for it when a device is added, and names it where it is missing.
     """
 
     def __post_init__(self) -> None:

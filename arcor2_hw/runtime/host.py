@@ -16,11 +16,13 @@ import socket
 import sys
 import threading
 import types
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Final
 
 import msgspec
+from msgspec.structs import replace
 
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped, Refused
@@ -85,8 +87,8 @@ class Host:
         self._shutting_down = threading.Event()
         self._stop_requested = threading.Event()
         self._scene: m.OpenScene | None = None
-        self._retrying = threading.Lock()
-        self._types: str | None = None
+        self._connecting = threading.Lock()
+        self._types: list[str] = []
         self._wake, wake_up = socket.socketpair()
         wake_up.setblocking(False)
         signal.set_wakeup_fd(wake_up.detach(), warn_on_full_buffer=False)
@@ -117,8 +119,8 @@ class Host:
                 case _:
                     self._close_scene()
                     break
-        if self._types is not None:
-            shutil.rmtree(self._types, ignore_errors=True)
+        for directory in self._types:
+            shutil.rmtree(directory, ignore_errors=True)
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, ValueError):
                 stream.flush()
@@ -132,7 +134,7 @@ class Host:
         self._cell.assets = message.assets
         failed = self._skip_object if message.keep_going else None
         try:
-            self._types = write_sources(message.types)
+            self._write_sources(message.types)
             self._cell.open(scene_recipes(message, failed), failed)
         except SceneFault as caught:
             fault = caught
@@ -159,28 +161,68 @@ class Host:
         self._cell.mark_absent(fault)
         self._watch.report(fault.object_id, Connection.FAILED, fault.error.message)
 
+    # Objects are connected on threads of their own, because loading a type may take long.
     def _retry(self, message: m.RetryObject) -> None:
-        """Create and connect an object again. Runs on its own thread, because loading the type may take long."""
-        object_id = message.object_id
-        try:
-            assert self._scene is not None
-            self._cell.require_failure(object_id)
-            if not self._retrying.acquire(blocking=False):
+        """Create and connect a failed object again."""
+        with self._answering(message.id, message.object_id):
+            self._cell.require_failure(message.object_id)
+            if not self._connecting.acquire(blocking=False):
                 raise Refused("another object is being connected again. Wait until that has ended.")
             try:
-                self._watch.report(object_id, Connection.CONNECTING)
-                (recipe,) = scene_recipes(self._scene, only=object_id)
-                self._cell.retry(recipe)
-            except SceneFault as fault:
-                self._skip_object(fault)
-                raise fault.error from fault
+                self._connect(message.object_id)
             finally:
-                self._retrying.release()
+                self._connecting.release()
+
+    def _add(self, message: m.AddObject) -> None:
+        """Create and connect a new object."""
+        (added,) = message.opening.scene.objects
+        with self._answering(message.id, added.id), self._connecting:
+            self._extend_scene(message.opening)
+            self._connect(added.id)
+
+    @contextlib.contextmanager
+    def _answering(self, number: int, object_id: str) -> Iterator[None]:
+        """Answer the request with this number when the object is connected, or with an error."""
+        try:
+            yield
         except Exception as error:  # noqa: BLE001 - loading an object type may raise anything
-            self.link.post(m.CallFailed(message.id, error_data(error, object_id)))
+            self.link.post(m.CallFailed(number, error_data(error, object_id)))
             return
         self._watch.check_connection(self._cell[object_id])
-        self.link.post(m.CallDone(message.id))
+        self.link.post(m.CallDone(number))
+
+    def _connect(self, object_id: str) -> None:
+        assert self._scene is not None
+        self._watch.report(object_id, Connection.CONNECTING)
+        try:
+            (recipe,) = scene_recipes(self._scene, only=object_id)
+            self._cell.retry(recipe)
+        except SceneFault as fault:
+            self._skip_object(fault)
+            raise fault.error from fault
+
+    def _extend_scene(self, opening: m.OpenScene) -> None:
+        """Add the object of another scene with its type, model, settings and secrets to the open scene."""
+        assert self._scene is not None
+        scene, objects = self._scene, opening.scene.objects
+        known = {code.name for code in scene.types}
+        types = [*scene.types, *(code for code in opening.types if code.name not in known)]
+        if any(code.source for code in types[len(scene.types) :]):
+            self._write_sources(types)
+        added = {one.id for one in objects}
+        self._scene = replace(
+            scene,
+            scene=replace(scene.scene, objects=[*scene.scene.objects, *objects]),
+            types=types,
+            models=scene.models | opening.models,
+            overrides=[*scene.overrides, *(each for each in opening.overrides if each.id in added)],
+            secrets=scene.secrets | opening.secrets,
+        )
+
+    def _write_sources(self, types: Sequence[m.TypeCode]) -> None:
+        """Write uploaded sources for import. Files of types that are loaded already stay for their tracebacks."""
+        if (directory := write_sources(types)) is not None:
+            self._types.append(directory)
 
     def _close_scene(self) -> None:
         active = (
@@ -287,6 +329,8 @@ class Host:
                 self._holds.lease(message)
             case m.RetryObject():
                 threading.Thread(target=self._retry, args=(message,), name="retry", daemon=True).start()
+            case m.AddObject():
+                threading.Thread(target=self._add, args=(message,), name="add", daemon=True).start()
             case m.Stream():
                 self._rated.set_rates(message)
             case m.Subscribe():

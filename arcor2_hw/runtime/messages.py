@@ -87,6 +87,13 @@ class RetryObject(ToHost, frozen=True):
     object_id: str
 
 
+class AddObject(ToHost, frozen=True):
+    """Create and connect the only object of `opening` in addition to the present ones. Answer as to RetryObject."""
+
+    id: int
+    opening: OpenScene
+
+
 class RunPackage(ToHost, frozen=True):
     """Run script.py of a package directory. ProgramChanged and ProgramEvent report its progress.
 
@@ -354,6 +361,7 @@ class LogLine(ToServer, frozen=True):
 HostBound = (
     OpenScene
     | RetryObject
+    | AddObject
     | RunPackage
     | AddBody
     | RemoveBodies

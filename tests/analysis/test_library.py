@@ -703,6 +703,7 @@ def test_secret_settings_are_marked() -> None:
             token: str = field(default="part", metadata={"unit": "x", "secret": False})
             pin: int = 3
             empty_secret: str = ""
+            mass: float = field(default=-1.0, metadata={"for_control": True})
         class Bank(Generic):
             def __init__(self, obj_id: str, name: str, settings: BankSettings) -> None: ...
         """,
@@ -728,6 +729,7 @@ def test_secret_settings_are_marked() -> None:
         "empty_secret": (True, '""'),
         "mass": (msgspec.UNSET, "-1.0"),
     }
+    assert [each.name for each in lib.analyse("Bank").meta.settings if each.for_control is True] == ["mass"]
     declared = {
         each.name: each.address for each in lib.analyse("Bank").meta.settings if each.address is not msgspec.UNSET
     }

@@ -90,5 +90,6 @@ OBJECT_TYPE_RPCS: Final = (
     Rpc("ObjectTypeUsage", IdArgs, set[str], Role.OPERATOR),
     Rpc("UpdateObjectModel", UpdateObjectModelArgs, None, Role.TECHNICIAN, dry_run=True),
     Rpc("UpdateOverride", UpdateOverrideArgs, None, Role.ADVANCED_USER, dry_run=True),
+    Rpc("UpdateSceneShape", UpdateObjectModelArgs, None, Role.TECHNICIAN, dry_run=True, additional=True),
 )
 """Requests about object types."""

@@ -7,6 +7,7 @@ from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.data.device import Alarm, Health, Identity
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.parameter import Parameter
@@ -52,6 +53,26 @@ class CameraColorParametersArgs(Data, frozen=True):
     """Arguments of CameraColorParameters."""
 
     id: str
+
+
+class CheckConnectionArgs(Data, frozen=True):
+    """Arguments of CheckConnection: type and settings of a device, and its id if it is an object of the scene.
+
+    The id gives access to the stored secrets of the object.
+    """
+
+    type: str
+    parameters: list[Parameter] = field(default_factory=list)
+    id: str = ""
+
+
+class CheckConnectionData(Data, frozen=True):
+    """Answer to CheckConnection: what the connected device reports, and the time to connect, s."""
+
+    identity: Identity
+    health: Health
+    alarms: list[Alarm]
+    seconds: float
 
 
 class CloseSceneArgs(Data, frozen=True):
@@ -130,10 +151,13 @@ class UpdateSceneDescriptionArgs(Data, frozen=True):
 
 SCENE_RPCS: Final = (
     Rpc("AddObjectToScene", AddObjectToSceneArgs, None, Role.TECHNICIAN, dry_run=True),
+    Rpc("AddSceneObject", AddObjectToSceneArgs, None, Role.TECHNICIAN, dry_run=True, additional=True),
+    Rpc("AddSceneShape", AddVirtualCollisionObjectToSceneArgs, None, Role.TECHNICIAN, dry_run=True, additional=True),
     Rpc("AddVirtualCollisionObjectToScene", AddVirtualCollisionObjectToSceneArgs, None, Role.TECHNICIAN, dry_run=True),
     Rpc("CalibrateCamera", CalibrateCameraArgs, None, Role.TECHNICIAN),
     Rpc("CameraColorImage", CameraColorImageArgs, str, Role.OPERATOR),
     Rpc("CameraColorParameters", CameraColorParametersArgs, CameraParameters, Role.OPERATOR),
+    Rpc("CheckConnection", CheckConnectionArgs, CheckConnectionData, Role.TECHNICIAN, additional=True),
     Rpc("CloseScene", CloseSceneArgs, None, Role.STANDARD_USER, args_optional=True, dry_run=True),
     Rpc("CopyScene", CopySceneArgs, str, Role.TECHNICIAN),
     Rpc("DeleteScene", IdArgs, set[str], Role.TECHNICIAN, dry_run=True),
@@ -154,5 +178,7 @@ SCENE_RPCS: Final = (
     Rpc("UpdateObjectPose", UpdateObjectPoseArgs, None, Role.TECHNICIAN, dry_run=True),
     Rpc("UpdateObjectPoseUsingRobot", UpdateObjectPoseUsingRobotArgs, None, Role.TECHNICIAN),
     Rpc("UpdateSceneDescription", UpdateSceneDescriptionArgs, None, Role.TECHNICIAN),
+    Rpc("UpdateSceneObjectSettings", UpdateObjectParametersArgs, None, Role.TECHNICIAN, dry_run=True, additional=True),
+    Rpc("UpdateSceneObjectPose", UpdateObjectPoseArgs, None, Role.TECHNICIAN, dry_run=True, additional=True),
 )
 """Requests about scenes."""

@@ -67,7 +67,7 @@ class YumiSettings(Settings):
     password: str = dataclasses.field(default="robotics", repr=False, metadata={"secret": True})  # what ABB delivers
     left_port: Annotated[int, Range(1, 65534)] = 6101
     right_port: Annotated[int, Range(1, 65534)] = 6111
-    left_mass: float = -1.0
+    left_mass: float = dataclasses.field(default=-1.0, metadata={"for_control": True})
     left_cog_x: Annotated[float, Range(-0.5, 0.5)] = 0.0
     left_cog_y: Annotated[float, Range(-0.5, 0.5)] = 0.0
     left_cog_z: Annotated[float, Range(-0.5, 0.5)] = 0.05
@@ -77,7 +77,7 @@ class YumiSettings(Settings):
     left_tcp_rx: Annotated[float, Range(-TURN, TURN)] = 0.0
     left_tcp_ry: Annotated[float, Range(-TURN, TURN)] = 0.0
     left_tcp_rz: Annotated[float, Range(-TURN, TURN)] = 0.0
-    right_mass: float = -1.0
+    right_mass: float = dataclasses.field(default=-1.0, metadata={"for_control": True})
     right_cog_x: Annotated[float, Range(-0.5, 0.5)] = 0.0
     right_cog_y: Annotated[float, Range(-0.5, 0.5)] = 0.0
     right_cog_z: Annotated[float, Range(-0.5, 0.5)] = 0.05

@@ -50,7 +50,7 @@ class UrSettings(Settings):
     """
 
     host: str
-    payload_mass: float = -1.0
+    payload_mass: float = dataclasses.field(default=-1.0, metadata={"for_control": True})
     payload_cog_x: Annotated[float, Range(-1.0, 1.0)] = 0.0
     payload_cog_y: Annotated[float, Range(-1.0, 1.0)] = 0.0
     payload_cog_z: Annotated[float, Range(-1.0, 1.0)] = 0.0

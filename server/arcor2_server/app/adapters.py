@@ -57,7 +57,9 @@ def request_handlers(s: Server) -> Handlers:
     answers = AnswerCache()
     editing = Editing(s.locks, s.storage, s.session, s.execution, s.secrets)
     scenes = SceneRequests(s.locks, s.storage, s.session, s.online, s.type_notifications, s.dependents, editing)
-    objects = SceneObjectRequests(s.locks, s.storage, s.assets, s.types, s.session, s.online, s.dependents, editing)
+    objects = SceneObjectRequests(
+        s.locks, s.storage, s.assets, s.types, s.session, s.online, s.dependents, editing, s.connection_check
+    )
     return Handlers(
         ActionPointRequests(s.locks, s.session, s.online, editing),
         ActionRequests(s.locks, s.types, s.session, editing),

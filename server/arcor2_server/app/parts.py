@@ -36,6 +36,7 @@ from arcor2_server.object_types.installations import InstallationWatch
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.cameras import Cameras
+from arcor2_server.online.connection_check import ConnectionCheck
 from arcor2_server.online.motion import RobotMotion
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.online.opening import SceneOpening
@@ -148,6 +149,7 @@ class Server:
 
         # ------------------------------------------------------------------------------------ services
         opening = SceneOpening(settings, types, session, secrets, host_world)
+        self.connection_check = ConnectionCheck(hosts, opening)
         online = self.online = closed(
             OnlineScene(scene_host, opening, hub, locks, session, robots, tasks, robot_calibrations)
         )

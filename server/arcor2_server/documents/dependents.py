@@ -18,6 +18,16 @@ from arcor2_server.storage import Storage
 VIRTUAL = "VirtualCollisionObject"
 
 
+def invalid_joints_below(document: Document, parent_id: str) -> list[Change]:
+    """Return the changes that mark the joints at all action points below an object or action point as invalid."""
+    return [
+        document.update(Kind.JOINTS, item.id, replace(item.value, is_valid=False))
+        for point in document.descendants(parent_id)
+        for item in document.owned(point.id, Kind.JOINTS)
+        if item.value.is_valid
+    ]
+
+
 def project_after(scene: Scene, project: Project, removed: Iterable[str], moved: Iterable[str]) -> Project:
     """Update a project after objects of its scene were removed or moved.
 
@@ -40,10 +50,7 @@ def project_after(scene: Scene, project: Project, removed: Iterable[str], moved:
         changes.extend(new)
 
     for object_id in moved:
-        for point in document.descendants(object_id):
-            for item in document.owned(point.id, Kind.JOINTS):
-                if item.value.is_valid:
-                    apply([document.update(Kind.JOINTS, item.id, replace(item.value, is_valid=False))])
+        apply(invalid_joints_below(document, object_id))
     for object_id in removed:
         for point in document.points_of(object_id):
             apply(changes_for_parent(document, point.id, "")[0])
@@ -78,9 +85,9 @@ class Dependents:
         self._session = session
 
     async def after_saving(self, save: Callable[[], Awaitable[None]]) -> list[ObjectTypeMeta]:
-        """Save the open scene; mark joints at moved objects as invalid in all its projects.
+        """Save the open scene; mark joints at moved objects as invalid in all its projects but the open one.
 
-        Items of removed objects are removed from the projects. Return the deleted object types.
+        Items of removed objects are removed from these projects. Return the deleted object types.
         """
         scene = self._session.require_scene()
         try:
@@ -99,7 +106,10 @@ class Dependents:
         moved = [obj.id for obj in before.objects if obj.id in present and present[obj.id].pose != obj.pose]
         if not removed and not moved:
             return
+        opened = self._session.project  # its joints became invalid when the object was moved
         for project_id in await self._storage.projects_with_scene(after.id):
+            if opened is not None and project_id == opened.id:
+                continue
             project = await self._storage.project(project_id)
             changed = project_after(before, project, removed, moved)
             if changed is not project:

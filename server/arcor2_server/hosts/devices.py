@@ -129,6 +129,10 @@ class DeviceBoard:
         self._objects = {obj.id: obj for obj in objects}
         self._overlaid = overlaid
 
+    def add(self, obj: SceneObject, overlaid: list[str]) -> None:
+        """Add an object, and the names of its settings that the cell file overrides."""
+        self.show([*self._objects.values(), obj], {**self._overlaid, obj.id: overlaid})
+
     def object(self, object_id: str) -> SceneObject:
         """Return an object of the scene. Raise NotFound if there is none."""
         if (found := self._objects.get(object_id)) is None:

@@ -232,6 +232,15 @@ class CellHost:
         """Create and connect a failed object again. Raise CellError or ConnectionLost if that is impossible."""
         await self._request(m.RetryObject, object_id)
 
+    async def add(self, opening: m.OpenScene) -> None:
+        """Create and connect the only object of a scene in addition to the present ones.
+
+        Raises:
+            CellError: the object cannot be created or connected; it is reported as failed.
+            ConnectionLost: the host ended.
+        """
+        await self._request(m.AddObject, opening)
+
     async def _request(
         self, message: Callable[..., m.ToHost], *fields: Any, limit: float | None = None, **more: Any
     ) -> bytes:

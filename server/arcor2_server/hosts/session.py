@@ -165,6 +165,10 @@ class HostSession:
         """Create and connect a failed device again."""
         await self.require_online().retry(object_id)
 
+    async def add(self, opening: m.OpenScene) -> None:
+        """Create and connect the only object of a scene in addition to the present ones."""
+        await self.require_online().add(opening)
+
     async def stop_motion(self, object_id: str) -> None:
         """Stop a device, also while it executes a call."""
         await self.require_online().stop_motion(object_id)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import structlog
+from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import ActionResultData, Event, SceneStateData, SceneStateEnum
@@ -226,6 +227,18 @@ class OnlineScene:
         self.streams.clear()
         self._done(SceneStateEnum.STOPPED, message)
         self.host.prepare()
+
+    def connect_added(self, obj: SceneObject) -> None:
+        """Create and connect an object that was added to the online scene. ObjectState reports the result."""
+        self.background.spawn(self._connect_added(obj), f"connection of {obj.name}")
+
+    async def _connect_added(self, obj: SceneObject) -> None:
+        try:
+            message, overlaid = await self._opening.prepare(replace(self._session.require_scene(), objects=[obj]), True)
+            self.board.add(obj, overlaid.get(obj.id, []))
+            await self.host.add(message)
+        except Arcor2Error as error:  # ObjectState has reported the reason, unless the scene went offline meanwhile
+            log.warning("added object is not connected", object=obj.name, reason=str(error))
 
     # -------------------------------------------------------------------------------- going offline
     async def begin_stop(self, by: str, *, dry_run: bool = False) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from arcor2_hw.data.base import Unset
 from arcor2_server.collaboration.locks import Locked, Locks
 from arcor2_server.documents import Session
-from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Kind
+from arcor2_server.documents.changes import Change, Edit, EditKind, Kind
 from arcor2_server.documents.dependents import Dependents
 from arcor2_server.documents.undo import ids_to_lock, moved_ids, require_applicable
 from arcor2_server.errors import RequestRefused
@@ -100,10 +100,10 @@ class Undo:
         return revision
 
     def _require_allowed(self, changes: Sequence[Change]) -> None:
-        """Refuse changes of the scene while a project is open, and those that are impossible online."""
-        session, cell = self._session, self._online
-        if any(change.kind in OF_SCENE for change in changes):
-            session.require_scene_alone()
+        """Refuse a new name of the scene while a project is open, and changes that are impossible online."""
+        cell = self._online
+        if any(change.kind is Kind.SCENE for change in changes):
+            self._session.require_scene_alone()
         for change in changes:
             if change.kind is not Kind.OBJECT:
                 continue

@@ -144,8 +144,7 @@ class ProjectRequests:
                 raise RequestRefused("{name} has no changes to save.", name=project.name)
             if context.dry_run:
                 return
-            await session.save()
-        context.emit("ProjectSaved")
+            await self._scene_requests.save_project_and_scene(context)
 
     @rpc("CloseProject")
     async def close_project(self, context: Context, args: CloseProjectArgs) -> None:

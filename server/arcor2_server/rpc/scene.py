@@ -7,6 +7,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.base import new_id
 from arcor2_hw.data.events import ChangeType, MainScreen, OpenSceneData, SceneStateData, ShowMainScreenData
+from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.rpc import (
     CloseSceneArgs,
     CopySceneArgs,
@@ -105,6 +106,19 @@ class SceneRequests:
         """Save the open scene; update its projects, and delete generated object types that it no longer uses."""
         removed_types = await self._dependents.after_saving(self._session.save)
         context.emit("SceneSaved")
+        self._emit_removed_types(context, removed_types)
+
+    async def save_project_and_scene(self, context: Context) -> None:
+        """Save the open project; if its scene has changes, also the scene, as `save_open_scene` does."""
+        removed_types: list[ObjectTypeMeta] = []
+        if self._session.scene_changed:
+            removed_types = await self._dependents.after_saving(self._session.save)
+        else:
+            await self._session.save()
+        context.emit("ProjectSaved")
+        self._emit_removed_types(context, removed_types)
+
+    def _emit_removed_types(self, context: Context, removed_types: list[ObjectTypeMeta]) -> None:
         if removed_types:
             context.emit("ChangedObjectTypes", removed_types, ChangeType.REMOVE)
 

@@ -4,13 +4,15 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from arcor2_hw.data.base import Unset, new_id
-from arcor2_hw.data.events import ChangeType
+from arcor2_hw.data.base import UNSET, Unset, new_id
+from arcor2_hw.data.events import ChangeType, SceneStateEnum
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models, ObjectModel, ObjectTypeSource
 from arcor2_hw.data.rpc import (
     AddObjectToSceneArgs,
     AddVirtualCollisionObjectToSceneArgs,
+    CheckConnectionArgs,
+    CheckConnectionData,
     RemoveFromSceneArgs,
     RenameArgs,
     UpdateObjectModelArgs,
@@ -26,11 +28,14 @@ from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks.names import check_name
 from arcor2_server.documents.checks.scene import object_problems, settings_problems
-from arcor2_server.documents.dependents import VIRTUAL, Dependents
+from arcor2_server.documents.dependents import VIRTUAL, Dependents, invalid_joints_below
+from arcor2_server.documents.document import Document
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.derived_types import virtual_source
 from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.online.connection_check import ConnectionCheck
 from arcor2_server.online.online_scene import OnlineScene
+from arcor2_server.rpc.change_events import emit_all
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.object_types import require_mesh
 from arcor2_server.rpc.registry import Context, rpc
@@ -59,17 +64,35 @@ class SceneObjectRequests:
     _online: OnlineScene
     _dependents: Dependents
     _editing: Editing
+    _connection_check: ConnectionCheck
 
+    def _document(self, *, with_project: bool) -> Document:
+        """Return the document if its scene may be edited: with a project open, only by the additional requests."""
+        return self._session.require_scene_open() if with_project else self._session.require_scene_alone()
+
+    # ------------------------------------------------------------------------------------ adding
     @rpc("AddObjectToScene")
     async def add_object_to_scene(self, context: Context, args: AddObjectToSceneArgs) -> None:
         """Add an object of a known type to the scene."""
         async with self._locks.auto(context.user, SCENE):
             self._session.require_scene_alone()
             self._online.require_offline()
-            obj = SceneObject(args.name, args.type, args.pose, id=new_id("obj"))
-            await self._add(
-                context, replace(obj, parameters=await self._editing.hide_secrets(context, obj, args.parameters))
-            )
+            await self._add_object(context, args)
+
+    @rpc("AddSceneObject")
+    async def add_scene_object(self, context: Context, args: AddObjectToSceneArgs) -> None:
+        """Add an object also while a project is open or the scene is online; then it is connected, too."""
+        async with self._locks.auto(context.user, SCENE):
+            self._session.require_scene_open()
+            obj = await self._add_object(context, args)
+        if not context.dry_run and self._online.online:
+            self._online.connect_added(obj)
+
+    async def _add_object(self, context: Context, args: AddObjectToSceneArgs) -> SceneObject:
+        obj = SceneObject(args.name, args.type, args.pose, id=new_id("obj"))
+        obj = replace(obj, parameters=await self._editing.hide_secrets(context, obj, args.parameters))
+        await self._add(context, obj)
+        return obj
 
     async def _add(self, context: Context, obj: SceneObject) -> None:
         self._editing.require_name_free(Kind.OBJECT, obj.name, "an object")
@@ -82,26 +105,46 @@ class SceneObjectRequests:
         """Add an object that consists of a collision model, with an object type created for it."""
         async with self._locks.auto(context.user, SCENE, ADDING_OBJECT):
             self._session.require_scene_alone()
-            self._online.require_offline()
-            if self._types.known(args.name):
-                raise RequestRefused(
-                    "There is an object type called {name} already: choose another name.", name=args.name
-                )
-            self._editing.require_name_free(Kind.OBJECT, args.name, "an object")
-            check_name(args.name, "object")
-            if _model_of(args.model).id != args.name:
-                raise InvalidData("The model of {name} needs the id {name}.", name=args.name)
-            if context.dry_run:
-                return
-            source = ObjectTypeSource(args.name, virtual_source(args.name, VIRTUAL), model=args.model)
-            meta = await self._types.add(source)
-            context.emit("ChangedObjectTypes", [meta], ChangeType.ADD)
-            try:
-                await self._add(context, SceneObject(args.name, args.name, args.pose, [], new_id("obj")))
-            except BaseException:
-                await self._types.remove(args.name)
-                raise
+            await self._add_shape(context, args)
 
+    @rpc("AddSceneShape")
+    async def add_scene_shape(self, context: Context, args: AddVirtualCollisionObjectToSceneArgs) -> None:
+        """Add an object that consists of a collision model, also while a project is open."""
+        async with self._locks.auto(context.user, SCENE, ADDING_OBJECT):
+            self._session.require_scene_open()
+            await self._add_shape(context, args)
+
+    async def _add_shape(self, context: Context, args: AddVirtualCollisionObjectToSceneArgs) -> None:
+        self._online.require_offline()
+        if self._types.known(args.name):
+            raise RequestRefused("There is an object type called {name} already: choose another name.", name=args.name)
+        self._editing.require_name_free(Kind.OBJECT, args.name, "an object")
+        check_name(args.name, "object")
+        if _model_of(args.model).id != args.name:
+            raise InvalidData("The model of {name} needs the id {name}.", name=args.name)
+        if context.dry_run:
+            return
+        source = ObjectTypeSource(args.name, virtual_source(args.name, VIRTUAL), model=args.model)
+        meta = await self._types.add(source)
+        context.emit("ChangedObjectTypes", [meta], ChangeType.ADD)
+        try:
+            await self._add(context, SceneObject(args.name, args.name, args.pose, [], new_id("obj")))
+        except BaseException:
+            await self._types.remove(args.name)
+            raise
+
+    @rpc("CheckConnection")
+    async def check_connection(self, context: Context, args: CheckConnectionArgs) -> CheckConnectionData:
+        """Connect a device that is not online, and return what it reports."""
+        if args.id and self._online.state is not SceneStateEnum.STOPPED:
+            raise RequestRefused("The scene is online. Its devices are connected already.")
+        pose = Pose() if self._types.meta(args.type).has_pose else UNSET
+        obj = SceneObject(args.type, args.type, pose, args.parameters, args.id or new_id("obj"))
+        if problems := object_problems(obj, self._types):
+            raise InvalidData(Message.joined(problems))
+        return await self._connection_check.run(obj)
+
+    # ------------------------------------------------------------------------------------ changing
     @rpc("RemoveFromScene")
     async def remove_from_scene(self, context: Context, args: RemoveFromSceneArgs) -> None:
         """Remove an object. With `force`, also if projects use it; saving the scene removes its items from them."""
@@ -126,7 +169,17 @@ class SceneObjectRequests:
     @rpc("UpdateObjectParameters")
     async def update_object_parameters(self, context: Context, args: UpdateObjectParametersArgs) -> None:
         """Replace all settings of an object."""
-        document = self._session.require_scene_alone()
+        await self._update_parameters(context, args, with_project=False)
+
+    @rpc("UpdateSceneObjectSettings")
+    async def update_scene_object_parameters(self, context: Context, args: UpdateObjectParametersArgs) -> None:
+        """Replace all settings of an object, also while a project is open."""
+        await self._update_parameters(context, args, with_project=True)
+
+    async def _update_parameters(
+        self, context: Context, args: UpdateObjectParametersArgs, *, with_project: bool
+    ) -> None:
+        document = self._document(with_project=with_project)
         self._online.require_offline()
         obj = document.scene_object(args.id)
         if problems := settings_problems(obj.name, args.parameters, self._types.meta(obj.type)):
@@ -142,14 +195,23 @@ class SceneObjectRequests:
     @rpc("UpdateObjectPose")
     async def update_object_pose(self, context: Context, args: UpdateObjectPoseArgs) -> None:
         """Change the pose of an object, while online also that of its device."""
-        obj = self._session.require_scene_alone().scene_object(args.object_id)
+        await self._update_pose(context, args, with_project=False)
+
+    @rpc("UpdateSceneObjectPose")
+    async def update_scene_object_pose(self, context: Context, args: UpdateObjectPoseArgs) -> None:
+        """Change the pose of an object, also while a project is open. Joints at its action points become invalid."""
+        await self._update_pose(context, args, with_project=True)
+
+    async def _update_pose(self, context: Context, args: UpdateObjectPoseArgs, *, with_project: bool) -> None:
+        document = self._document(with_project=with_project)
+        obj = document.scene_object(args.object_id)
         if self._online.online and self._types.derives_from(obj.type, "Robot"):
             raise RequestRefused(
                 "{name} is a robot: it cannot be moved in the scene while it is online.", name=obj.name
             )
         if isinstance(obj.pose, Unset):
             raise RequestRefused("{name} has no pose.", name=obj.name)
-        self._editing.require_locked(context, args.object_id)
+        self._editing.require_locked(context, args.object_id, tree=bool(document.points_of(args.object_id)))
         await self.move_object(context, obj, args.pose)
 
     async def move_object(self, context: Context, obj: SceneObject, pose: Pose) -> None:
@@ -157,8 +219,11 @@ class SceneObjectRequests:
         # The device comes first, since it may fail: a refused request must not leave an edit without event.
         if not context.dry_run and self._online.online:
             await self._online.object_pose_changed(obj.id, pose)
-        obj = self._session.document.scene_object(obj.id)
-        await self._update(context, replace(obj, pose=pose))
+        document = self._session.document
+        moved = document.update(Kind.OBJECT, obj.id, replace(document.scene_object(obj.id), pose=pose))
+        changes = [*invalid_joints_below(document, obj.id), moved]
+        if await self._editing.commit(context, changes):
+            emit_all(context, self._session, changes)
 
     @rpc("UpdateObjectPoseUsingRobot")
     async def update_object_pose_using_robot(self, context: Context, args: UpdateObjectPoseUsingRobotArgs) -> None:
@@ -195,6 +260,16 @@ class SceneObjectRequests:
         """Replace the collision model of an object type."""
         self._online.require_offline()
         self._session.require_scene_alone()
+        await self._update_model(context, args)
+
+    @rpc("UpdateSceneShape")
+    async def update_scene_shape(self, context: Context, args: UpdateObjectModelArgs) -> None:
+        """Replace the collision model of an object type, also while a project is open."""
+        self._online.require_offline()
+        self._session.require_scene_open()
+        await self._update_model(context, args)
+
+    async def _update_model(self, context: Context, args: UpdateObjectModelArgs) -> None:
         meta = self._types.meta(args.object_type_id)
         if meta.disabled or not self._types.derives_from(meta.type, "CollisionObject"):
             raise RequestRefused("{type} takes no collision model.", type=meta.shown_name)

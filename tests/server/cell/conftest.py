@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from arcor2_hw.data.object_type import ActionMetadata, ObjectAction, ObjectTypeMeta
+from arcor2_hw.data.object_type import ActionMetadata, ObjectAction, ObjectTypeMeta, ParameterMeta
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.robot import RobotFeatures, RobotMeta, RobotType
 from arcor2_hw.data.role import Role
@@ -33,6 +33,7 @@ from arcor2_server.execution.service import Execution
 from arcor2_server.execution.stop_all import StopAll
 from arcor2_server.hosts.pool import CellHosts
 from arcor2_server.hosts.session import HostSession
+from arcor2_server.online.connection_check import ConnectionCheck
 from arcor2_server.online.motion import RobotMotion
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.online.opening import SceneOpening
@@ -98,6 +99,7 @@ class Types:
         self.codes: dict[str, TypeCode] = {}
         self.known: dict[str, dict[str, ObjectAction]] = {}
         self.robots: dict[str, RobotMeta] = {}
+        self.settings: dict[str, list[ParameterMeta]] = {}
 
     def add(self, name: str, source: str, actions: Iterable[ObjectAction] = (), robot: RobotMeta | None = None) -> None:
         self.codes[name] = type_code(name, source)
@@ -106,7 +108,7 @@ class Types:
             self.robots[name] = robot
 
     def meta(self, name: str) -> ObjectTypeMeta:
-        return ObjectTypeMeta(name)
+        return ObjectTypeMeta(name, settings=self.settings.get(name, []))
 
     def type_codes(self, names: Iterable[str]) -> list[TypeCode]:
         return [self.codes[name] for name in names]
@@ -132,10 +134,10 @@ class Server:
         self.client = Recorder("alice")
         services.hub.add(self.client)  # type: ignore[arg-type]
 
-    async def ask(self, name: str, args: Any = None, client: Recorder | None = None) -> Any:
+    async def ask(self, name: str, args: Any = None, client: Recorder | None = None, codes: bool = False) -> Any:
         """Send a request as the endpoint does: the response takes its place among the events."""
         client = client or self.client
-        context = Context(client)  # type: ignore[arg-type]
+        context = Context(client, codes=codes)  # type: ignore[arg-type]
         if isinstance(args, dict):
             args = msgspec.convert(args, RPCS[name].args)
         data = await self.handlers[name](context, args)
@@ -197,6 +199,8 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
         users=users,
         locks=locks,
         assets=assets,
+        secrets=secrets,
+        connection_check=ConnectionCheck(hosts, opening),
         types=types,
         session=session,
         compute=compute,

@@ -1,6 +1,5 @@
 """Starting a scene with unreachable devices, connecting them later; streams at each client's rate."""
 
-import asyncio
 import itertools
 import json
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 import pytest
 
 from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.object_type import ParameterMeta
 from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error
@@ -18,7 +18,7 @@ from arcor2_server.rpc import operation as _operation  # noqa: F401 - for its ha
 from tests.runtime.conftest import scene_object
 from tests.server.core.serving import until
 
-from .conftest import PATIENCE, Recorder, Server, action, robot_meta, serving
+from .conftest import Recorder, Server, action, robot_meta, serving
 
 BOX = """
 from arcor2_hw.data.device import Alarm, Health, Severity
@@ -73,6 +73,62 @@ def subscribed(server: Server, *events: str) -> Recorder:
     return server.client
 
 
+CLOCK = """
+class Clock(Generic):
+    _ABSTRACT = False
+    @action
+    def read(self, *, an: str | None = None) -> bool: return True
+"""
+
+
+def _file(path: Path) -> list[dict[str, str]]:
+    return [{"name": "file", "type": "string", "value": json.dumps(str(path))}]
+
+
+@serving()
+async def test_objects_are_added_to_the_online_scene(server: Server) -> None:
+    boxes, client = Boxes(server), subscribed(server, "ObjectState")
+    server.types.settings["Box"] = [ParameterMeta("file", "string")]
+    server.types.add("Clock", CLOCK, [action("read", "boolean")])
+    await boxes.open()
+    boxes.away.touch()
+    await server.start()
+
+    await server.ask("AddSceneObject", {"name": "clock", "type": "Clock"})
+    added = (await client.event("SceneObjectChanged"))["id"]
+    states = [await client.event("ObjectState", lambda data: data["object_id"] == added) for _ in range(2)]
+    assert [state["state"] for state in states] == ["connecting", "online"]
+    assert await server.services.online.call(added, "read", deadline=5.0) == b"true"
+
+    missing = boxes.away.with_name("missing")
+    await server.ask("AddSceneObject", {"name": "late", "type": "Box", "parameters": _file(missing)})
+    failed = await client.event("ObjectState", lambda data: data["state"] == "failed")
+    assert "192.0.2.7:502" in failed["reason"]
+    missing.touch()
+    await server.ask("RetryObject", {"object_id": failed["object_id"]})
+    assert await server.services.online.call(failed["object_id"], "open", deadline=5.0) == b"true"
+    # The types of the devices that were online before can still be loaded.
+    assert [state.state for state in server.services.online.board.states()] == ["online"] * 4
+
+
+@serving()
+async def test_a_connection_is_checked_without_a_scene_object(server: Server) -> None:
+    boxes = Boxes(server)
+    server.types.settings["Box"] = [ParameterMeta("file", "string")]
+    await boxes.open()
+    check = {"type": "Box", "parameters": _file(boxes.away)}
+    with pytest.raises(Arcor2Error, match=r"192\.0\.2\.7:502"):
+        await server.ask("CheckConnection", check)
+    boxes.away.touch()
+    answer = await server.ask("CheckConnection", check)
+    assert answer.health == "normal"
+    assert len(server.services.session.require_scene().objects) == 2
+    await server.start()
+    with pytest.raises(RequestRefused, match="connected already"):
+        await server.ask("CheckConnection", check | {"id": "obj_away"})
+    assert (await server.ask("CheckConnection", check)).alarms == [], "another device can be checked meanwhile"
+
+
 @serving()
 async def test_a_scene_starts_without_a_device_and_a_retry_connects_it(server: Server) -> None:
     boxes, client = Boxes(server), subscribed(server, "ObjectState")
@@ -91,17 +147,15 @@ async def test_a_scene_starts_without_a_device_and_a_retry_connects_it(server: S
         await server.ask("ExecuteAction", {"action_id": "act_away"})
     await server.ask("ExecuteAction", {"action_id": "act_here"})
     assert (await client.event("ActionResult"))["results"] == ["true"]
-    async with asyncio.timeout(PATIENCE):  # what is told of one that is there comes with the next look at it
-        while [one.state for one in server.services.online.board.states()] != ["online", "failed"]:
-            await asyncio.sleep(0.01)
+    await until(lambda: [one.state for one in server.services.online.board.states()] == ["online", "failed"])
 
     with pytest.raises(Arcor2Error, match=r"192\.0\.2\.7:502"):
         await server.ask("RetryObject", {"object_id": "obj_away"})
     boxes.away.touch()
     client.got.clear()
     await server.ask("RetryObject", {"object_id": "obj_away"})
-    told = [await client.event("ObjectState") for _ in range(2)]
-    assert [one["state"] for one in told] == ["connecting", "online"]
+    states = [await client.event("ObjectState") for _ in range(2)]
+    assert [state["state"] for state in states] == ["connecting", "online"]
     await server.ask("ExecuteAction", {"action_id": "act_away"})
     assert (await client.event("ActionResult"))["results"] == ["true"]
     with pytest.raises(Arcor2Error, match="away has not failed"):

@@ -13,9 +13,9 @@ from tests.protocol import PROTOCOL
 
 TRANSLATION = {"key", "values"}
 ADDED = {
-    "ObjectTypeMeta": {"category", "display_name", "icon", "shadows"},
-    "ParameterMeta": {"address", "former_names", "secret"},
-    "ObjectAction": {"category", "former_names", "icon"},
+    "ObjectTypeMeta": {"category", "display_name", "icon", "shadows"} | TRANSLATION,
+    "ParameterMeta": {"address", "for_control", "former_names", "secret"},
+    "ObjectAction": {"category", "former_names", "icon"} | TRANSLATION,
     "RobotEef.Data": {"time_ms"},
     "RobotFeatures": {"jog", "acknowledge_stop", "kinematic_calibration"},
     "RobotJoints.Data": {"time_ms"},
