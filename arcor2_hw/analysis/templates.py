@@ -1,23 +1,26 @@
-"""Message templates in source files: the keys of translations.
-
-`python -m arcor2_hw.analysis.templates FOLDER` prints those of a folder as a translation that has to be filled in.
-"""
+"""Message templates in source files: the keys of translations."""
 
 import ast
-import json
-import sys
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from string import Formatter
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from arcor2_hw.data.base import Data
 from arcor2_hw.messages import key_of
+from arcor2_hw.parsing import parse
 
 LIBRARY: Final = Path(__file__).resolve().parents[1]
 """Folder of `arcor2_hw`, whose errors drivers raise and derive from."""
 _ROOT: Final = "Arcor2Error"
+_NOT_IMPLEMENTED: Final = "Arcor2NotImplemented"
+"""Error whose message is the name of a method."""
+_ALARM: Final = ("text", "remedy", "severity", "health")
+_MARKED: Final = {"Message.of": ("template",), "translatable": ("texts",), "AlarmText": _ALARM, "Fault": _ALARM}
+"""Parameters of other calls that take texts for users. `Fault` is a tuple that a driver declares for its alarms."""
+_TEXTS: Final = frozenset({"message", "template", "texts", "text", "remedy"})
 
 
 class Template(Data, frozen=True):
@@ -62,19 +65,88 @@ def templates(files: Iterable[Path]) -> list[Template]:
     Raises:
         SyntaxError: A file is not valid Python.
     """
-    trees = {path: ast.parse(path.read_bytes(), str(path)) for path in files}
-    errors = dict(_errors_of_library()) | _errors(trees.values(), _errors_of_library())
-    return [found for path, tree in trees.items() for found in _templates(tree, errors, str(path))]
+    scans = {path: _Scan.of(parse(path.read_bytes(), str(path))) for path in files}
+    errors = dict(_errors_of_library())
+    errors |= _errors((scan for path, scan in scans.items() if LIBRARY not in path.parents), errors)
+    return [found for path, scan in scans.items() for found in _templates(scan, errors, str(path))]
+
+
+class _Scan(NamedTuple):
+    """What is needed of a syntax tree.
+
+    Attributes:
+        classes: All classes.
+        calls: All calls, with the innermost function around each; None at the level of the module.
+        assigned: Expressions that each function assigns to its variables, by function and name.
+    """
+
+    classes: list[ast.ClassDef]
+    calls: list[tuple[ast.Call, ast.AST | None]]
+    assigned: defaultdict[tuple[ast.AST | None, str], list[ast.expr]]
+
+    @classmethod
+    def of(cls, tree: ast.AST) -> "_Scan":
+        found = cls([], [], defaultdict(list))
+        found._visit(tree, None)
+        return found
+
+    def _visit(self, node: ast.AST, function: ast.AST | None) -> None:
+        match node:
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
+                function = node
+            case ast.ClassDef():
+                self.classes.append(node)
+            case ast.Call():
+                self.calls.append((node, function))
+            case (
+                ast.Assign(targets=[ast.Name(id=name)], value=value)
+                | ast.AnnAssign(target=ast.Name(id=name), value=ast.expr() as value)
+            ):
+                self.assigned[function, name].append(value)
+            case ast.Assign(targets=[ast.Tuple(elts=targets)], value=ast.Tuple(elts=given)):
+                for target, value in zip(targets, given, strict=False):
+                    if isinstance(target, ast.Name):
+                        self.assigned[function, target.id].append(value)
+        for child in ast.iter_child_nodes(node):
+            self._visit(child, function)
+
+    def literals(
+        self, node: ast.expr | None, function: ast.AST | None, passed: frozenset[str] = frozenset()
+    ) -> Iterator[str]:
+        """Yield the texts that an argument can be: literals, those of an expression, a variable or a table."""
+        match node:
+            case ast.Constant(value=str(text)) if text:
+                yield text
+            case ast.IfExp(body=body, orelse=orelse):
+                yield from self.literals(body, function, passed)
+                yield from self.literals(orelse, function, passed)
+            case ast.Name(id=name) if name not in passed:
+                for value in self.assigned.get((function, name)) or self.assigned.get((None, name)) or []:
+                    yield from self.literals(value, function, passed | {name})
+            case ast.Dict(values=elements) | ast.Tuple(elts=elements) | ast.List(elts=elements):
+                for element in elements:
+                    yield from self.literals(element, function, passed)
+            case ast.BinOp(left=left, op=ast.Add(), right=right):
+                yield from self._joined([left, right], function, passed)
+            case ast.JoinedStr(values=parts):
+                found = [part.value if isinstance(part, ast.FormattedValue) else part for part in parts]
+                yield from self._joined(found, function, passed)
+
+    def _joined(self, parts: list[ast.expr], function: ast.AST | None, passed: frozenset[str]) -> Iterator[str]:
+        """Yield the text that constants form, if all parts are constants."""
+        found = ["".join(self.literals(part, function, passed)) for part in parts]
+        if all(found):
+            yield "".join(found)
 
 
 @lru_cache(maxsize=1)
 def _errors_of_library() -> _Errors:
-    return _errors((ast.parse(path.read_bytes(), str(path)) for path in sources(LIBRARY)), {_ROOT: ()})
+    return _errors((_Scan.of(parse(path.read_bytes(), str(path))) for path in sources(LIBRARY)), {_ROOT: ()})
 
 
-def _errors(trees: Iterable[ast.AST], known: _Errors) -> dict[str, tuple[str, ...] | None]:
+def _errors(scans: Iterable[_Scan], known: _Errors) -> dict[str, tuple[str, ...] | None]:
     """Return the error classes that derive from known ones, by the names of the bases."""
-    classes = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+    classes = [node for scan in scans for node in scan.classes]
     found = dict(known)
     while True:
         before = len(found)
@@ -95,32 +167,19 @@ def _parameters(node: ast.ClassDef, inherited: tuple[str, ...] | None) -> tuple[
     return inherited
 
 
-def _templates(tree: ast.AST, errors: _Errors, path: str) -> Iterator[Template]:
-    for node in ast.walk(tree):
-        if not isinstance(node, ast.Call):
-            continue
+def _templates(scan: _Scan, errors: _Errors, path: str) -> Iterator[Template]:
+    for node, function in scan.calls:
         called = ast.unparse(node.func)
-        parameters = ("template",) if called == "Message.of" else errors.get(called.rpartition(".")[2])
-        if not parameters:
+        parameters = _MARKED.get(called) or errors.get(called.rpartition(".")[2])
+        if not parameters or called == _NOT_IMPLEMENTED:
             continue
-        place = parameters.index("template" if called == "Message.of" else "message")
         given = {keyword.arg: keyword.value for keyword in node.keywords if keyword.arg is not None}
-        argument = given.get("message") or (node.args[place] if place < len(node.args) else None)
         values = frozenset(given).difference(parameters)
-        for text in _literals(argument):
-            fields = fields_of(text) if values else frozenset()
-            yield Template(key_of(text) if values else text, fields, values, path, node.lineno)
-
-
-def _literals(node: ast.expr | None) -> Iterator[str]:
-    """Yield the texts that an argument can be: a literal, or the literals of a conditional expression."""
-    if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value:
-        yield node.value
-    elif isinstance(node, ast.IfExp):
-        yield from _literals(node.body)
-        yield from _literals(node.orelse)
-
-
-if __name__ == "__main__":
-    empty = {each.key: "" for each in templates(sources(Path(sys.argv[1])))}
-    sys.stdout.write(json.dumps(dict(sorted(empty.items())), indent=2, ensure_ascii=False) + "\n")
+        unknown = any(keyword.arg is None for keyword in node.keywords)  # **values
+        for name in _TEXTS.intersection(parameters):
+            place = parameters.index(name)
+            argument = given.get(name) or (node.args[place] if place < len(node.args) else None)
+            for text in scan.literals(argument, function):
+                fields = fields_of(text) if values or unknown else frozenset()
+                key = key_of(text) if values or unknown else text
+                yield Template(key, fields, fields | values if unknown else values, path, node.lineno)

@@ -1,6 +1,7 @@
 """Translations of a driver: `translations/<language>.json` next to its source, by English text."""
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
@@ -16,6 +17,8 @@ from arcor2_hw.exceptions import InvalidData
 FOLDER: Final = "translations"
 MAX_SIZE: Final = 4 * 1024 * 1024
 """Maximum size of a file, bytes."""
+GROUPED: Final = 3
+"""Number of settings with a common first word from which the editor shows them as a group with this title."""
 _LANGUAGE: Final = re.compile(r"[a-z]{2,3}(-[A-Z]{2})?")
 
 
@@ -46,10 +49,13 @@ def read(file: Path) -> dict[str, str]:
 
 
 def texts_of(found: TypeAnalysis) -> Iterator[str]:
-    """Yield the texts of an object type that the editor shows: names and descriptions."""
+    """Yield the texts of an object type that the editor shows: names, descriptions and categories."""
     meta = found.meta
     yield meta.type if isinstance(meta.display_name, Unset) else meta.display_name
     yield meta.description
+    yield from (each for each in (meta.category, *(action.category for action in found.actions)) if each)
+    first_words = Counter(each.name.split("_")[0] for each in meta.settings)
+    yield from (word for word, count in first_words.items() if count >= GROUPED)
     parameters = [each for action in found.actions for each in action.parameters]
     described: list[ObjectAction | ParameterMeta] = [*found.actions, *meta.settings, *parameters]
     for each in described:

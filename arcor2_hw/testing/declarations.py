@@ -10,6 +10,7 @@ from arcor2_hw.analysis import (
     Library,
     SourceFile,
     TypeAnalysis,
+    extraction,
     installed_types,
     templates,
     translations,
@@ -62,19 +63,12 @@ def faults(file: SourceFile) -> list[str]:
     return wrong
 
 
-def texts(file: SourceFile) -> set[str]:
-    """Return the texts of a driver that can be translated: of all object types and messages in its folder."""
-    folder = Path(file.path).parent
-    kinds = [each.file for each in drivers() if each.folder == str(folder) and each.file is not None] or [file]
-    library = Library(kinds)
-    found = {template.key for template in templates.templates(templates.sources(folder))}
-    return found.union(*(translations.texts_of(library.analyse(each.name)) for each in kinds))
-
-
 def translation_faults(file: SourceFile) -> list[str]:
     """Return a sentence for each fault of the translations of a driver."""
     folder = Path(file.path).parent
-    return translations.faults(folder, texts(file)) if (folder / translations.FOLDER).is_dir() else []
+    if not (folder / translations.FOLDER).is_dir():
+        return []
+    return translations.faults(folder, extraction.texts(folder, [file]) | extraction.texts(templates.LIBRARY))
 
 
 def own_actions(found: TypeAnalysis) -> list[ObjectAction]:
