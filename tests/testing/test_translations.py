@@ -5,11 +5,14 @@ from pathlib import Path
 
 import pytest
 
+from arcor2_hw.analysis.extraction import texts, update
 from arcor2_hw.analysis.templates import LIBRARY, sources, templates
-from arcor2_hw.analysis.translations import FOLDER, faults, is_language
+from arcor2_hw.analysis.translations import FOLDER, faults, file_of, is_language, read
 from arcor2_hw.testing import declarations
 
 ROOT = LIBRARY.parent
+DRIVERS = sorted({Path(each.folder) for each in declarations.drivers()})
+OURS = [LIBRARY, ROOT / "server" / "arcor2_server", *DRIVERS]
 DRIVER = '''
 from arcor2_hw.exceptions import DeviceTimeout, Refused
 from arcor2_hw.messages import Message
@@ -23,6 +26,9 @@ def problems(self, open):
     yield DeviceTimeout("{device} did not answer within {limit:.1f} s.", "detail", device=self.who, limit=1)
     yield Jammed("Remove the {x}." if open else "Open it.")
     yield Message.of("{count} parts", count=2)
+    text = "Close it."
+    text = text if open else "Wait."
+    yield Jammed(text)
     yield ValueError("not a message")
     yield Refused(str(self))
 '''
@@ -34,7 +40,14 @@ def keys(folder: Path) -> set[str]:
 
 
 def test_templates_are_found_in_errors_and_messages(tmp_path: Path) -> None:
-    expected = {"{device} did not answer within {limit} s.", "Remove the {x}.", "Open it.", "{count} parts"}
+    expected = {
+        "{device} did not answer within {limit} s.",
+        "Remove the {x}.",
+        "Open it.",
+        "{count} parts",
+        "Close it.",
+        "Wait.",
+    }
     assert keys(tmp_path) == expected
 
 
@@ -77,5 +90,26 @@ def test_a_file_is_named_by_its_language(tmp_path: Path) -> None:
 def test_texts_of_the_type_are_known_too() -> None:
     scale = next(each for each in declarations.drivers() if each.name == "MtSicsScale")
     assert scale.file is not None
-    known = declarations.texts(scale.file)
-    assert {"Mettler Toledo scale", "tare"} <= known
+    known = texts(Path(scale.folder))
+    assert {"Mettler Toledo scale", "tare", "the load is above the weighing range", "remove the load"} <= known
+    assert not known & texts(LIBRARY)
+
+
+def test_extraction_keeps_translations_and_removes_unused_ones(tmp_path: Path) -> None:
+    expected = keys(tmp_path)
+    file = tmp_path / FOLDER / "cs.json"
+    assert update(tmp_path, "cs") == len(expected)
+    file.write_text(json.dumps({"Open it.": "Otevřete ji.", "gone": "pryč"}))
+    assert update(tmp_path, "cs") == len(expected) - 1
+    content = json.loads(file.read_text())
+    assert content == {key: "Otevřete ji." if key == "Open it." else "" for key in expected}
+    assert list(content) == sorted(content)
+
+
+@pytest.mark.parametrize("folder", OURS, ids=lambda folder: folder.name)
+@pytest.mark.parametrize("language", ["cs", "de"])
+def test_our_texts_are_translated(folder: Path, language: str) -> None:
+    """A fault is fixed by `python -m arcor2_hw.analysis.extraction FOLDER`, and by translating the new texts."""
+    found, known = read(file_of(folder, language)), texts(folder)
+    assert sorted(known - set(found)) == []
+    assert faults(folder, known) == []

@@ -18,6 +18,7 @@ def put(folder: Path, text: str, language: str = "cs") -> Path:
 def test_translations_of_drivers_are_merged_and_those_of_the_server_win(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(translations, "LIBRARY", tmp_path / "library")
     monkeypatch.setattr(translations, "SERVER", put(tmp_path / "server", '{"Stop": "Zastavit"}'))
     scale = put(tmp_path / "scale", '{"Stop": "Stůj", "weight": "hmotnost"}')
     broken = put(tmp_path / "broken", "{")
