@@ -1,4 +1,4 @@
-"""Run a script of package.json, `build` by default, with the machine's Node.js or the one from PyPI.
+"""Run a script of package.json, by default `build`, with the machine's Node.js or the one from PyPI.
 
 `make run` and `make test` run it when the sources changed, `make check` runs `check`, and the build hook of
 `pip install .` (hatch_build.py) runs `build`.
@@ -36,7 +36,7 @@ def npm() -> tuple[list[str], Path]:
     """Return the npm command and the directory of the Node.js that it needs.
 
     Raises:
-        RuntimeError: if there is no Node.js.
+        RuntimeError: if Node.js is missing.
     """
     if (directory := node_of_machine()) is not None:
         return [str(directory / "npm")], directory
@@ -55,7 +55,7 @@ def run(script: str) -> None:
     """Run a script of package.json, after installing the locked packages where they are missing or outdated.
 
     Raises:
-        RuntimeError: if there is no Node.js.
+        RuntimeError: if Node.js is missing.
         subprocess.CalledProcessError: if npm fails.
     """
     command, path = npm()

@@ -14,14 +14,19 @@ _spec.loader.exec_module(editor)
 
 
 class EditorBuild(BuildHookInterface[Any]):
-    """Builds the editor before the wheel is packed."""
+    """Build hook that builds the editor before the wheel is packed."""
 
     def dependencies(self) -> list[str]:
-        """Ask for Node.js from PyPI only where the machine has none."""
+        """Return the requirement of Node.js from PyPI if the machine has no recent Node.js."""
         return [] if editor.node_of_machine() else [editor.NODE_REQUIREMENT]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Build, and pack the output although version control ignores it."""
+        """Build the editor, and add the output, which version control ignores, to the wheel.
+
+        Raises:
+            RuntimeError: if Node.js is missing.
+            subprocess.CalledProcessError: if npm fails.
+        """
         if version == "editable":
             return
         editor.run("build")

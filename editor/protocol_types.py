@@ -1,7 +1,7 @@
-"""Writes src/protocol/types.ts, the protocol as TypeScript, from the Structs that the server itself decodes with.
+"""Generate src/protocol/types.ts, the protocol as TypeScript, from the Structs with which the server decodes.
 
-`python editor/protocol_types.py` writes; with `--check` it only tells, by its exit status, whether the file is as it
-would be written.
+`python editor/protocol_types.py` writes the file. With `--check` it compares only: the exit status is 1 if the file is
+outdated.
 """
 
 import enum
@@ -21,10 +21,11 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
 
 TARGET: Final = Path(__file__).resolve().parent / "src" / "protocol" / "types.ts"
+"""Generated file."""
 HEAD: Final = """/**
- * The protocol's data, requests and events. Made by editor/protocol_types.py from arcor2_hw.data: do not edit.
+ * The protocol's data, requests and events. Generated from arcor2_hw.data by editor/protocol_types.py: do not edit.
  *
- * A field with `?` may be left out. Lengths are in m, angles in rad, quaternions x, y, z, w.
+ * A field with `?` may be omitted. Lengths are in m, angles in rad, quaternions x, y, z, w.
  */
 """
 _SCALARS: Final[dict[Any, str]] = {
@@ -38,63 +39,69 @@ _SCALARS: Final[dict[Any, str]] = {
 }
 
 
-class Writer:
-    """Collects the types that are reached, each once."""
+class Declarations:
+    """TypeScript declarations of Python types, each type once."""
 
     def __init__(self) -> None:
-        self.declared: dict[str, str] = {}
-        self.answered: set[type] = set()
-        """Structs that the server sends, where fields with a default are always there."""
+        self.by_name: dict[str, str] = {}
+        """Declarations by the name of the type."""
+        self.sent: set[type] = set()
+        """Structs that the server sends. Their fields with a default are always present."""
 
-    def reach(self, kind: Any) -> None:
-        """Note the Structs in what the server sends."""
+    def add_sent(self, kind: Any) -> None:
+        """Add the Structs that a type hint of the server's data contains to `sent`."""
         if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
-            if kind in self.answered:
+            if kind in self.sent:
                 return
-            self.answered.add(kind)
+            self.sent.add(kind)
             for field in msgspec.structs.fields(kind):
-                self.reach(field.type)
+                self.add_sent(field.type)
         for argument in typing.get_args(kind):
-            self.reach(argument)
+            self.add_sent(argument)
 
-    def name(self, kind: Any) -> str:
-        """Give the TypeScript for a hint, declaring what it names."""
+    def expression(self, kind: Any) -> str:
+        """Return the TypeScript type of a type hint, and declare the Structs and enums that it contains.
+
+        Raises:
+            TypeError: if the hint has no TypeScript counterpart.
+        """
         if kind is None or kind in _SCALARS:
             return "null" if kind is None else _SCALARS[kind]
         origin, arguments = typing.get_origin(kind), typing.get_args(kind)
         if origin is typing.Annotated:
-            return self.name(arguments[0])
+            return self.expression(arguments[0])
         if origin in (typing.Union, types.UnionType):
-            return " | ".join(dict.fromkeys(self.name(one) for one in arguments if one is not UnsetType))
+            return " | ".join(dict.fromkeys(self.expression(each) for each in arguments if each is not UnsetType))
         if origin is typing.Literal:
-            return " | ".join(json.dumps(one) for one in arguments)
+            return " | ".join(json.dumps(each) for each in arguments)
         if origin in (list, set, frozenset) or (origin is tuple and arguments[1:] == (...,)):
-            inner = self.name(arguments[0])
+            inner = self.expression(arguments[0])
             return f"({inner})[]" if "|" in inner else f"{inner}[]"
         if origin is tuple:
-            return f"[{', '.join(self.name(one) for one in arguments)}]"
+            return f"[{', '.join(self.expression(each) for each in arguments)}]"
         if origin is dict:
-            return f"Record<string, {self.name(arguments[1])}>"
+            return f"Record<string, {self.expression(arguments[1])}>"
         if isinstance(kind, type) and issubclass(kind, enum.Enum):
-            if kind.__name__ not in self.declared:
-                values = " | ".join(json.dumps(one.value) for one in kind)
-                self.declared[kind.__name__] = f"{_comment(kind)}export type {kind.__name__} = {values};\n"
+            if kind.__name__ not in self.by_name:
+                values = " | ".join(json.dumps(each.value) for each in kind)
+                self.by_name[kind.__name__] = f"{_comment(kind)}export type {kind.__name__} = {values};\n"
             return kind.__name__
         if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
-            self._struct(kind)
+            self._declare(kind)
             return kind.__name__
-        raise TypeError(f"no TypeScript for {kind!r}")
+        raise TypeError(f"{kind!r} has no TypeScript counterpart. Extend {Path(__file__).name}.")
 
-    def _struct(self, kind: type[msgspec.Struct]) -> None:
-        if kind.__name__ in self.declared:
+    def _declare(self, kind: type[msgspec.Struct]) -> None:
+        if kind.__name__ in self.by_name:
             return
-        self.declared[kind.__name__] = ""  # it may name itself
+        self.by_name[kind.__name__] = ""  # the Struct may contain itself
         lines = []
         for field in msgspec.structs.fields(kind):
             unset = UnsetType in typing.get_args(field.type) or field.type is UnsetType
-            optional = unset or (not field.required and kind not in self.answered)
-            lines.append(f"  {field.encode_name}{'?' if optional else ''}: {self.name(field.type)};\n")
-        self.declared[kind.__name__] = f"{_comment(kind)}export interface {kind.__name__} {{\n{''.join(lines)}}}\n"
+            sent = kind in self.sent and not kind.__struct_config__.omit_defaults
+            optional = unset or (not field.required and not sent)
+            lines.append(f"  {field.encode_name}{'?' if optional else ''}: {self.expression(field.type)};\n")
+        self.by_name[kind.__name__] = f"{_comment(kind)}export interface {kind.__name__} {{\n{''.join(lines)}}}\n"
 
 
 def _comment(kind: type) -> str:
@@ -108,51 +115,51 @@ def _comment(kind: type) -> str:
 
 
 def typescript() -> str:
-    """Give the text of the file."""
-    writer = Writer()
+    """Return the content of the generated file."""
+    declarations = Declarations()
     for rpc in RPCS.values():
-        writer.reach(rpc.data)
+        declarations.add_sent(rpc.data)
     for event in EVENTS.values():
-        writer.reach(event.data)
-    requests, facts = [], []
+        declarations.add_sent(event.data)
+    requests, roles_of_requests = [], []
     for name, rpc in sorted(RPCS.items()):
-        args = "undefined" if rpc.args is None else writer.name(rpc.args)
+        args = "undefined" if rpc.args is None else declarations.expression(rpc.args)
         if rpc.args is not None and rpc.args_optional:
             args += " | undefined"
-        data = "undefined" if rpc.data is None else writer.name(rpc.data)
+        data = "undefined" if rpc.data is None else declarations.expression(rpc.data)
         requests.append(f"  {name}: {{ args: {args}; data: {data} }};\n")
-        facts.append(f"  {name}: {int(rpc.role)},\n")
+        roles_of_requests.append(f"  {name}: {int(rpc.role)},\n")
     events = [
-        f"  {name}: {'undefined' if event.data is None else writer.name(event.data)};\n"
+        f"  {name}: {'undefined' if event.data is None else declarations.expression(event.data)};\n"
         for name, event in sorted(EVENTS.items())
     ]
     additional = [f'  "{name}",\n' for name, event in sorted(EVENTS.items()) if event.additional]
-    change = writer.name(ChangeType)
-    declared = "\n".join(text for _, text in sorted(writer.declared.items()))
+    change = declarations.expression(ChangeType)
+    declared = "\n".join(text for _, text in sorted(declarations.by_name.items()))
     roles = "".join(f"  {role.name.lower()}: {int(role)},\n" for role in Role)
     return (
         f"{HEAD}\n{declared}\n"
-        f"/** Arguments and answer of each request. */\nexport interface Requests {{\n{''.join(requests)}}}\n\n"
-        f"/** The data of each event. */\nexport interface Events {{\n{''.join(events)}}}\n\n"
-        "/** An event as it comes. */\n"
+        f"/** Arguments and response data of each request. */\nexport interface Requests {{\n{''.join(requests)}}}\n\n"
+        f"/** Data of each event. */\nexport interface Events {{\n{''.join(events)}}}\n\n"
+        "/** An event as the server sends it. */\n"
         "export type ServerEvent = {\n  [Name in keyof Events]: {\n    event: Name;\n    data: Events[Name];\n"
         f"    change_type?: {change};\n    parent_id?: string;\n  }};\n}}[keyof Events];\n\n"
-        "/** Roles, each of which may do what the ones before may. */\n"
+        "/** Roles. Each includes the permissions of the lower ones. */\n"
         f"export const ROLES = {{\n{roles}}} as const;\n\n"
-        "/** The least role of each request. */\n"
-        f"export const LEAST_ROLE: Record<keyof Requests, number> = {{\n{''.join(facts)}}};\n\n"
-        "/** Events beside the protocol, sent to who subscribed. */\n"
+        "/** Lowest role that may send each request. */\n"
+        f"export const LEAST_ROLE: Record<keyof Requests, number> = {{\n{''.join(roles_of_requests)}}};\n\n"
+        "/** Additional events, sent only to clients that subscribed to them. */\n"
         f"export const ADDITIONAL_EVENTS = [\n{''.join(additional)}] as const satisfies (keyof Events)[];\n"
     )
 
 
 def main() -> int:
-    """Write or check the file; gives the exit status."""
+    """Write the file, or compare it with `--check`, and return the exit status."""
     text = typescript()
     if sys.argv[1:] == ["--check"]:
         if TARGET.is_file() and TARGET.read_text() == text:
             return 0
-        sys.stderr.write(f"{TARGET.name} is not as the Structs are: run python editor/protocol_types.py\n")
+        sys.stderr.write(f"{TARGET.name} is outdated. Run: python editor/protocol_types.py\n")
         return 1
     TARGET.parent.mkdir(parents=True, exist_ok=True)
     TARGET.write_text(text)

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { against } from "./crosshair";
 
-test("a tool that stands on a surface looks against its normal", () => {
+test("the z axis of a tool on a surface is opposite to the normal", () => {
   for (const normal of [
     { x: 0, y: 0, z: 1 },
     { x: 1, y: 0, z: 0 },

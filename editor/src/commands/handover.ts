@@ -6,23 +6,23 @@ import { notify, now, store } from "../store/store";
 import { nameOf } from "../viewmodel/names";
 import { storeViewState } from "./viewstate";
 
-export function askFor(id: string): void {
+export function requestItem(id: string): void {
   storeViewState("shared", { [keyOf(id)]: { by: now().connection.user, at: Date.now() } });
 }
 
-export function noLongerAsk(id: string): void {
+export function withdrawRequest(id: string): void {
   storeViewState("shared", { [keyOf(id)]: null });
 }
 
 /** Notify the user of requests from now on. Return a function that ends it. */
-export function followWishes(): () => void {
+export function followItemRequests(): () => void {
   return store.subscribe((state, before) => {
     const { wanted, free } = handOver(state, before);
     for (const { id, by } of wanted)
       notify("warn", t`${by} asks for ${nameOf(state, id)}, which you are using. Finish your change to release it.`);
     for (const id of free) {
       notify("info", t`${nameOf(state, id)} is free now.`);
-      noLongerAsk(id);
+      withdrawRequest(id);
     }
   });
 }

@@ -253,17 +253,17 @@ export async function removeAction(id: string): Promise<void> {
 // ------------------------------------------------------------------------------------------------ connections
 
 /** Start a connection: the next tap on an action ends it. */
-export function beginStep(from: string, condition?: ProjectLogicIf, item?: string): void {
+export function startConnecting(from: string, condition?: ProjectLogicIf, item?: string): void {
   setUi({ connecting: { from, condition, item } });
 }
 
-export const cancelStep = (): void => setUi({ connecting: null });
+export const cancelConnecting = (): void => setUi({ connecting: null });
 
-/** End the connection at an item. */
-export async function endStep(to: string): Promise<void> {
+/** Finish the connection at an item. */
+export async function finishConnecting(to: string): Promise<void> {
   const { connecting } = now().ui;
   if (!connecting) return;
-  cancelStep();
+  cancelConnecting();
   const { from, condition, item } = connecting;
   if (item !== undefined) {
     const step = now().doc?.logic[item];

@@ -9,7 +9,7 @@ import { now } from "../store/store";
 import { refusal } from "./requests";
 
 /** Return the objects that the problems of a scene name: the server starts each problem with the object's name. */
-export const atFault = (problems: readonly string[], names: readonly string[]): string[] =>
+export const namedObjects = (problems: readonly string[], names: readonly string[]): string[] =>
   names.filter((name) => problems.some((each) => each.startsWith(`${name}: `)));
 
 interface StoredScene {
@@ -28,14 +28,14 @@ const read = async (id: string) => (await stored(`/scenes/${encodeURIComponent(i
 
 /** Return the names of faulty objects of a scene; reject if no object is named. */
 export async function faultyObjects(id: string, problems: readonly string[]): Promise<string[]> {
-  return atFault(
+  return namedObjects(
     problems,
     (await read(id)).objects.map((each) => each.name),
   );
 }
 
 /** Remove objects from a saved scene, after storing a backup. Return why it failed, or an empty string. */
-export function takeOut(id: string, name: string, objects: readonly string[]): Promise<string> {
+export function removeObjects(id: string, name: string, objects: readonly string[]): Promise<string> {
   return refusal(async () => {
     const taken = new Set(now().lists.scenes?.map((each) => each.name));
     let copy = t`${name} backup`;

@@ -28,7 +28,7 @@ export interface EngineOptions {
   labels: HTMLElement;
   telemetry: Telemetry;
   asset: Context["asset"];
-  trouble: Context["trouble"];
+  reportFault: Context["reportFault"];
   quality: Quality;
   dark: boolean;
 }
@@ -100,7 +100,7 @@ export class Engine {
       quality,
       period: PERIODS[quality],
       asset: options.asset,
-      trouble: options.trouble,
+      reportFault: options.reportFault,
       thing: (id) => this.things.get(id),
       metresPerPixel: (at) =>
         (2 * this.view.camera.position.distanceTo(at) * Math.tan((this.view.camera.fov * Math.PI) / 360)) / this.height,

@@ -26,7 +26,7 @@ export interface ObjectItem extends Base {
   kind: "object";
   pose: Pose;
   shape: Shape;
-  trouble: boolean;
+  fault: boolean;
 }
 
 export interface RobotItem extends Base {
@@ -38,7 +38,7 @@ export interface RobotItem extends Base {
   axes: boolean;
   /** Joints are expected; without reports it is marked as outdated. */
   online: boolean;
-  trouble: boolean;
+  fault: boolean;
   /** Pose of the ghost, shown in addition to the robot. */
   ghost?: { joints: Record<string, number>; possible: boolean; at?: Pose | undefined } | undefined;
 }

@@ -10,7 +10,7 @@ export interface Palette {
   robot: Color;
   selected: Color;
   locked: Color;
-  trouble: Color;
+  fault: Color;
   point: Color;
   breakpoint: Color;
   running: Color;
@@ -31,7 +31,7 @@ const ACTIONS = [0x0072b2, 0x009e73, 0xcc79a7, 0x56b4e9, 0xe69f00, 0x8a6fc0, 0x5
 const COMMON = {
   selected: color(0xff9500),
   locked: color(0x8a8f98),
-  trouble: color(0xd5392b),
+  fault: color(0xd5392b),
   breakpoint: color(0xc4161c),
   running: color(0xc13bd6),
   start: color(0x1f8a4c),

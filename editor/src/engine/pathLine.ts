@@ -57,7 +57,7 @@ export class PathLine {
     if (!this.shown || !from || !to) return true;
     const { state } = this.shown;
     this.material.color.copy(
-      state === "free" ? palette.reach.reachable : state === "blocked" ? palette.trouble : palette.locked,
+      state === "free" ? palette.reach.reachable : state === "blocked" ? palette.fault : palette.locked,
     );
     this.mesh.geometry.dispose();
     this.mesh.geometry = pieces(length, DASHES[state]);

@@ -17,7 +17,7 @@ export interface Context {
   /** Load an asset of the server for display. */
   asset: (id: string) => Promise<ArrayBuffer>;
   /** Report what cannot be shown, and why. */
-  trouble: (sentence: string) => void;
+  reportFault: (sentence: string) => void;
   /** Return the model with an id. */
   thing: (id: string) => Thing | undefined;
   /** Return the size of a pixel at a point in the world, m. */

@@ -1,7 +1,7 @@
 import { expect, it } from "vitest";
-import { beyond, openedOf } from "./opened";
+import { openedOf, toForget } from "./opened";
 
-it("gives what was opened, the last first, and nothing else that is kept", () => {
+it("returns the opened documents, newest first, and no other stored values", () => {
   expect(openedOf({ "opened/a": 1, stars: ["a"], "opened/b": 3, "opened/c": "yesterday", "opened/d": 2 })).toEqual([
     "b",
     "d",
@@ -9,9 +9,9 @@ it("gives what was opened, the last first, and nothing else that is kept", () =>
   ]);
 });
 
-it("forgets the oldest, and never what is opened again", () => {
+it("forgets the oldest documents, but not the one that is opened", () => {
   const many = Array.from({ length: 52 }, (_, n) => `d${n}`);
-  expect(beyond(many, "new")).toEqual(["d49", "d50", "d51"]);
-  expect(beyond(many, "d51")).toEqual(["d49", "d50"]);
-  expect(beyond(["a"], "a")).toEqual([]);
+  expect(toForget(many, "new")).toEqual(["d49", "d50", "d51"]);
+  expect(toForget(many, "d51")).toEqual(["d49", "d50"]);
+  expect(toForget(["a"], "a")).toEqual([]);
 });

@@ -17,6 +17,6 @@ export function openedOf(values: Record<string, unknown>): Opened {
 }
 
 /** Return the documents to forget when `id` is opened. */
-export function beyond(opened: Opened, id: string): Opened {
+export function toForget(opened: Opened, id: string): Opened {
   return opened.filter((each) => each !== id).slice(MOST - 1);
 }

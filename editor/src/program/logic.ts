@@ -6,7 +6,7 @@ import type { Of, OpenDocument, State } from "../store/state";
 
 export const START = "START";
 export const END = "END";
-const BRANCHABLE = new Set(["boolean", "integer", "integer_enum", "string_enum"]);
+const BRANCHABLE: ReadonlySet<string> = new Set(["boolean", "integer", "integer_enum", "string_enum"]);
 
 /** Return the action, START or END at one end of a connection, without the name of the flow. */
 export const placeOf = (end: string): string => end.split("/")[0] ?? end;

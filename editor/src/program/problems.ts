@@ -45,7 +45,7 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
   const used = after(doc, START);
   if (outgoing(doc, START).length === 0) error(START, t`Start has no next step. Connect it to the first action.`);
   for (const action of Object.values(doc.actions)) {
-    const ways = outgoing(doc, action.id);
+    const steps = outgoing(doc, action.id);
     if (!used.has(action.id)) {
       const loose = incoming(doc, action.id).length === 0;
       warn(
@@ -56,12 +56,12 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
       );
       continue;
     }
-    if (ways.length === 0) {
+    if (steps.length === 0) {
       error(action.id, t`${action.name} has no next step. Connect it to an action or to End.`);
       continue;
     }
-    const conditions = ways.flatMap((way) => (way.condition ? [way.condition] : []));
-    const otherwise = ways.length > conditions.length;
+    const conditions = steps.flatMap((step) => (step.condition ? [step.condition] : []));
+    const otherwise = steps.length > conditions.length;
     const first = conditions[0];
     if (!first || otherwise) continue;
     const result = resultAt(doc, types, first.what);

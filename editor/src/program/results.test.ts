@@ -32,7 +32,7 @@ function withHistory(state: State, ...runs: Run[]): State {
 }
 
 describe("the result of a run", () => {
-  it("names the action and the error, and the project of a temporary package", () => {
+  it("names the action, the error, and the project of a temporary package", () => {
     expect(resultOf(RUN)).toBeNull();
     expect(resultOf(FAILED)).toEqual({
       tone: "bad",
@@ -58,7 +58,7 @@ describe("the result of a run", () => {
     expect(undismissedRun(withHistory(dismissed, { ...FAILED, number: 8 }))?.number).toBe(8);
   });
 
-  it("is shown to users who come later only if the run failed or was interrupted", () => {
+  it("is shown to users who join later only if the run failed or was interrupted", () => {
     const later = (run: Run): State => ({ ...initialState(), program: { ...initialState().program, runs: [run] } });
     expect(undismissedRun(later(FAILED))).toEqual(FAILED);
     expect(undismissedRun(later({ ...FAILED, end: "lost" }))).not.toBeNull();
@@ -66,7 +66,7 @@ describe("the result of a run", () => {
     expect(undismissedRun(withHistory(initialState(), RUN, { ...RUN, end: "finished" }))).not.toBeNull();
   });
 
-  it("is that of the open project where one is asked for", () => {
+  it("is that of the open project if a project is given", () => {
     const state = withHistory(initialState(), FAILED, { ...FAILED, number: 8, project_id: "other" });
     expect(lastRun(state)?.number).toBe(8);
     expect(lastRun(state, "pro")?.number).toBe(7);

@@ -24,7 +24,7 @@ export class ConnectionLost extends Error {
     /** Whether the request was sent, and may have been carried out. */
     readonly sent: boolean,
   ) {
-    super(sent ? t`The connection was lost before ${request} was answered.` : t`There is no connection to the server.`);
+    super(sent ? t`The connection was lost before ${request} was answered.` : t`Not connected to the server.`);
   }
 }
 

@@ -1,7 +1,7 @@
 /**
- * The protocol's data, requests and events. Made by editor/protocol_types.py from arcor2_hw.data: do not edit.
+ * The protocol's data, requests and events. Generated from arcor2_hw.data by editor/protocol_types.py: do not edit.
  *
- * A field with `?` may be left out. Lengths are in m, angles in rad, quaternions x, y, z, w.
+ * A field with `?` may be omitted. Lengths are in m, angles in rad, quaternions x, y, z, w.
  */
 
 /** Arguments of AcknowledgeStop: the stop or fault of a robot; with `code`, an alarm of any device. */
@@ -169,13 +169,19 @@ export interface AddVirtualCollisionObjectToSceneArgs {
   model: ObjectModel;
 }
 
-/** A condition that needs attention; `remedy` says what to do. */
+/**
+ * A condition that needs attention; `remedy` says what to do.
+ *
+ * text_message, remedy_message: the text and the remedy with what is needed to translate them, if they have values.
+ */
 export interface Alarm {
   code: string;
   severity: Severity;
   text: string;
   remedy: string;
   since: string;
+  text_message?: Message;
+  remedy_message?: Message;
 }
 
 /** Arguments of Authenticate. */
@@ -346,6 +352,25 @@ export interface CheckCalibrationArgs {
   pose?: Pose;
   distance_limit?: number;
   angle_limit?: number;
+}
+
+/**
+ * Arguments of CheckConnection: type and settings of a device, and its id if it is an object of the scene.
+ *
+ * The id gives access to the stored secrets of the object.
+ */
+export interface CheckConnectionArgs {
+  type: string;
+  parameters?: Parameter[];
+  id?: string;
+}
+
+/** Answer to CheckConnection: what the connected device reports, and the time to connect, s. */
+export interface CheckConnectionData {
+  identity: Identity;
+  health: Health;
+  alarms: Alarm[];
+  seconds: number;
 }
 
 /** Arguments of CloseProject. */
@@ -630,6 +655,14 @@ export interface IdValue {
   value: string;
 }
 
+/** Identity of a device; unknown fields are empty. */
+export interface Identity {
+  vendor: string;
+  model: string;
+  serial: string;
+  firmware: string;
+}
+
 /** Arguments of InverseKinematics. */
 export interface InverseKinematicsArgs {
   robot_id: string;
@@ -689,7 +722,7 @@ export interface ListCalibrationsData {
   records: CalibrationRecord[];
 }
 
-/** Answer to ListProjects. */
+/** Answer to ListProjects; `problem_messages` as in ListScenes. */
 export interface ListProjectsData {
   name: string;
   scene_id: string;
@@ -700,6 +733,7 @@ export interface ListProjectsData {
   int_modified?: string;
   id: string;
   problems?: string[];
+  problem_messages?: Message[];
 }
 
 /** Arguments of ListRuns: maximum number, number before which runs are listed, package or project. */
@@ -715,7 +749,7 @@ export interface ListRunsData {
   runs: Run[];
 }
 
-/** Answer to ListScenes. */
+/** Answer to ListScenes. `problem_messages`: the problems with what is needed to translate them, if requested. */
 export interface ListScenesData {
   id: string;
   name: string;
@@ -723,6 +757,7 @@ export interface ListScenesData {
   modified: string;
   description?: string;
   problems?: string[];
+  problem_messages?: Message[];
 }
 
 /** Data of the events ObjectsLocked and ObjectsUnlocked. */
@@ -783,7 +818,7 @@ export interface Mesh {
 export interface Message {
   text: string;
   key: string;
-  values: Record<string, string | Message>;
+  values?: Record<string, string | Message>;
 }
 
 /** Kinds of collision model. */
@@ -880,7 +915,7 @@ export interface NotificationData {
 export type NotificationLevel = "Info" | "Warn" | "Error";
 
 /**
- * One action of an object type; category, icon and former_names are not in ARCOR2.
+ * One action of an object type; category, icon, former_names, key and values are not in ARCOR2.
  *
  * former_names: names in older projects.
  */
@@ -891,11 +926,13 @@ export interface ObjectAction {
   meta: ActionMetadata;
   origins?: string;
   returns: string[];
-  disabled: boolean;
-  problem?: string;
   category?: string;
   icon?: string;
   former_names?: string[];
+  key?: string;
+  values?: Record<string, string | Message>;
+  disabled: boolean;
+  problem?: string;
 }
 
 /** Arguments of ObjectAimingAddPoint. */
@@ -952,7 +989,7 @@ export interface ObjectStateData {
 }
 
 /**
- * Metadata of an object type; display_name, category, icon and shadows are not in ARCOR2.
+ * Metadata of an object type; display_name, category, icon, shadows, key and values are not in ARCOR2.
  *
  * display_name: name for users; omitted when the type declares none.
  * built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
@@ -967,14 +1004,16 @@ export interface ObjectTypeMeta {
   needs_parent_type?: string;
   has_pose: boolean;
   abstract: boolean;
-  disabled: boolean;
-  problem?: string;
   settings: ParameterMeta[];
   modified?: string;
   display_name?: string;
   category?: string;
   icon?: string;
   shadows?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
+  disabled: boolean;
+  problem?: string;
 }
 
 /** Data of the event OpenProject. */
@@ -1044,7 +1083,7 @@ export interface Parameter {
  *
  * former_names (not in ARCOR2): names in older projects. secret: the value of this setting is stored by the server and
  * never sent to clients. address: whether this setting contains the address of the device; omitted when its name
- * decides.
+ * decides. for_control: whether the device can only be observed while this setting has its default value.
  */
 export interface ParameterMeta {
   name: string;
@@ -1057,6 +1096,7 @@ export interface ParameterMeta {
   former_names?: string[];
   secret?: boolean;
   address?: boolean;
+  for_control?: boolean;
 }
 
 /** Values of PivotEnum in UpdateObjectPoseUsingRobot. */
@@ -1192,11 +1232,17 @@ export interface Range {
 /** How an end effector reaches a pose. */
 export type Reach = "reachable" | "near_limit" | "in_collision" | "out_of_reach" | "unknown";
 
-/** How an end effector reaches an orientation or joints; `reason` is a sentence when it does not. */
+/**
+ * How an end effector reaches an orientation or joints; `reason` is a sentence when it does not.
+ *
+ * `key` and `values` are those of the reason.
+ */
 export interface ReachOfItem {
   id: string;
   reach: Reach;
   reason?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /**
@@ -1463,7 +1509,8 @@ export type RobotType = "articulated" | "cartesian" | "scara";
  *
  * project_modified: modification time of the built project, which identifies its revision. temporary: run from the
  * editor; its package is deleted. started_by, stopped_by: name of a user or token. actions: number of started actions.
- * last_action: action that was active at the end. error: error that ended the run, as in ProjectException.
+ * last_action: action that was active at the end. error: error that ended the run, with `key` and `values` as in
+ * ProjectException.
  */
 export interface Run {
   number: number;
@@ -1483,6 +1530,8 @@ export interface Run {
   last_action?: ActionOfRun;
   error?: string;
   error_type?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** How a run ended: completed, stopped by a user, by an error, or with the server or its host. */
@@ -1616,7 +1665,7 @@ export type StopKind = "device" | "action" | "program";
 /**
  * The result of StopAll for one device, the action being executed, or the program.
  *
- * id, name: of the scene object, the action or the package. reason: why it was not stopped.
+ * id, name: of the scene object, the action or the package. reason: why it was not stopped, with `key` and `values`.
  */
 export interface StopOutcome {
   kind: StopKind;
@@ -1624,6 +1673,8 @@ export interface StopOutcome {
   name: string;
   stopped: boolean;
   reason?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Arguments of StopRobot. */
@@ -1677,8 +1728,9 @@ export type TaskProgress = "running" | "finished" | "failed" | "cancelled";
 /**
  * Data of the event TaskState.
  *
- * title: sentence for users. started_by: name of a user or token, omitted when it was started automatically. progress:
- * 0 to 1, omitted when unknown. message: present activity, or reason of the failure.
+ * title: sentence for users; title_message: what is needed to translate it. started_by: name of a user or token,
+ * omitted when it was started automatically. progress: 0 to 1, omitted when unknown. message: present activity, or
+ * reason of the failure.
  */
 export interface TaskStateData {
   id: string;
@@ -1689,6 +1741,7 @@ export interface TaskStateData {
   started_by?: string;
   progress?: number;
   message?: string;
+  title_message?: Message;
   key?: string;
   values?: Record<string, string | Message>;
 }
@@ -1709,7 +1762,8 @@ export interface TemporaryPackageArgs {
  *
  * number: number of the action in the run from 1, in the order of their start. started: time of the start. duration:
  * s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
- * ActionStateAfter. error: why it failed. thread_id: omitted in the main thread of the script.
+ * ActionStateAfter. error: why it failed, with `key` and `values`. thread_id: omitted in the main thread of the
+ * script.
  */
 export interface TraceEntry {
   run: number;
@@ -1722,6 +1776,8 @@ export interface TraceEntry {
   results?: string[];
   error?: string;
   thread_id?: number;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Arguments of GetActions. */
@@ -1901,7 +1957,7 @@ export interface WriteUnlockArgs {
   object_id: string;
 }
 
-/** Arguments and answer of each request. */
+/** Arguments and response data of each request. */
 export interface Requests {
   AcknowledgeStop: { args: AcknowledgeStopArgs; data: undefined };
   ActionParamValues: { args: ActionParamValuesArgs; data: string[] };
@@ -1924,6 +1980,7 @@ export interface Requests {
   CameraColorParameters: { args: CameraColorParametersArgs; data: CameraParameters };
   CancelAction: { args: undefined; data: undefined };
   CheckCalibration: { args: CheckCalibrationArgs; data: CalibrationCheck };
+  CheckConnection: { args: CheckConnectionArgs; data: CheckConnectionData };
   CloseProject: { args: CloseProjectArgs | undefined; data: undefined };
   CloseScene: { args: CloseSceneArgs | undefined; data: undefined };
   CopyActionPoint: { args: CopyActionPointArgs; data: undefined };
@@ -2049,7 +2106,7 @@ export interface Requests {
   WriteUnlock: { args: WriteUnlockArgs; data: undefined };
 }
 
-/** The data of each event. */
+/** Data of each event. */
 export interface Events {
   ActionCancelled: undefined;
   ActionChanged: BareAction;
@@ -2104,7 +2161,7 @@ export interface Events {
   ViewStateChanged: ViewState;
 }
 
-/** An event as it comes. */
+/** An event as the server sends it. */
 export type ServerEvent = {
   [Name in keyof Events]: {
     event: Name;
@@ -2114,7 +2171,7 @@ export type ServerEvent = {
   };
 }[keyof Events];
 
-/** Roles, each of which may do what the ones before may. */
+/** Roles. Each includes the permissions of the lower ones. */
 export const ROLES = {
   operator: 1,
   standard_user: 2,
@@ -2123,7 +2180,7 @@ export const ROLES = {
   programmer: 5,
 } as const;
 
-/** The least role of each request. */
+/** Lowest role that may send each request. */
 export const LEAST_ROLE: Record<keyof Requests, number> = {
   AcknowledgeStop: 1,
   ActionParamValues: 2,
@@ -2146,6 +2203,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CameraColorParameters: 1,
   CancelAction: 1,
   CheckCalibration: 1,
+  CheckConnection: 4,
   CloseProject: 2,
   CloseScene: 2,
   CopyActionPoint: 2,
@@ -2271,7 +2329,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   WriteUnlock: 2,
 };
 
-/** Events beside the protocol, sent to who subscribed. */
+/** Additional events, sent only to clients that subscribed to them. */
 export const ADDITIONAL_EVENTS = [
   "BreakpointsChanged",
   "ExecutionTrace",

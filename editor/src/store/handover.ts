@@ -9,13 +9,13 @@ const KEY = "asked/";
 /** Time after which a request is no longer announced, ms. */
 const STALE = 10 * 60_000;
 
-interface Wish {
+interface ItemRequest {
   by: string;
   /** Clock time of the requesting client, ms since 1970. */
   at: number;
 }
 
-function wish(value: unknown): Wish | null {
+function itemRequest(value: unknown): ItemRequest | null {
   const { by, at } = (value ?? {}) as Record<string, unknown>;
   return typeof by === "string" && typeof at === "number" ? { by, at } : null;
 }
@@ -23,8 +23,8 @@ function wish(value: unknown): Wish | null {
 export const keyOf = (id: string): string => KEY + id;
 
 /** Return whether the user has requested an item. */
-export function hasAsked(state: State, id: string): boolean {
-  return wish(state.view.shared[keyOf(id)])?.by === state.connection.user;
+export function hasRequested(state: State, id: string): boolean {
+  return itemRequest(state.view.shared[keyOf(id)])?.by === state.connection.user;
 }
 
 export interface HandOver {
@@ -42,7 +42,7 @@ export function handOver(state: State, before: State, present = Date.now()): Han
   for (const [key, value] of Object.entries(state.view.shared)) {
     if (!key.startsWith(KEY)) continue;
     const id = key.slice(KEY.length);
-    const asked = wish(value);
+    const asked = itemRequest(value);
     if (!asked) continue;
     if (asked.by === me) {
       if (state.locks[id] === undefined && before.locks[id] !== undefined) found.free.push(id);

@@ -6,7 +6,7 @@ import type { State } from "./state";
 
 /** Return why the user cannot send a request now; an empty string if they can. */
 export function whyUnavailable(state: State, request: keyof Requests): string {
-  if (state.connection.status !== "ready") return t`There is no connection to the server.`;
+  if (state.connection.status !== "ready") return t`Not connected to the server.`;
   if (state.connection.role < LEAST_ROLE[request]) return t`Your role does not allow this.`;
   return "";
 }

@@ -46,6 +46,40 @@ function after(...events: ServerEvent[]): State {
 }
 const OPEN: ServerEvent = { event: "OpenProject", data: { scene: SCENE, project: PROJECT } };
 
+describe("a draft", () => {
+  const moved: ServerEvent = {
+    event: "SceneObjectChanged",
+    change_type: "update",
+    data: { id: "obj", name: "robot", type: "UR5e", pose: POSE, parameters: [] },
+  };
+  const drafted = (continues: boolean): State => {
+    const state = after(OPEN);
+    return { ...state, ui: { ...state.ui, draft: { id: "obj", of: state.doc?.objects.obj, pose: POSE, continues } } };
+  };
+
+  test("ends with the event of its edit", () => {
+    expect(reduce(drafted(false), moved, NOW).ui?.draft).toBeUndefined();
+  });
+
+  test("continues from the changed item while the user is still changing it", () => {
+    const { doc, ui } = reduce(drafted(true), moved, NOW);
+    expect(ui?.draft).toMatchObject({ id: "obj", continues: true });
+    expect(ui?.draft?.of).toBe(doc?.objects.obj);
+  });
+
+  test("ends when its item is removed or the document is closed", () => {
+    expect(reduce(drafted(true), { ...moved, change_type: "remove" }, NOW).ui?.draft).toBeUndefined();
+    const closed: ServerEvent = { event: "ShowMainScreen", data: { what: "ScenesList" } };
+    expect(reduce(drafted(true), closed, NOW).ui?.draft).toBeUndefined();
+  });
+
+  test("is not ended by events about other items", () => {
+    const state = drafted(false);
+    const other: ServerEvent = { event: "JointsChanged", change_type: "remove", data: { id: "x" } as never };
+    expect(reduce(state, other, NOW).ui).toBe(state.ui);
+  });
+});
+
 describe("the open document", () => {
   test("is taken apart by ids", () => {
     const { doc } = after(OPEN);
@@ -137,7 +171,7 @@ describe("what others do", () => {
     expect(Object.keys(held.lockedAt)).toEqual(["b"]);
   });
 
-  test("who left is gone, and a preview that is over, too", () => {
+  test("users who left and ended previews are removed", () => {
     const presence = (online: boolean): ServerEvent => ({
       event: "UserPresence",
       data: { user: "Eva", online, role: "operator" },
@@ -209,7 +243,7 @@ describe("operation", () => {
     expect(state.messageLog).toEqual(state.notices);
   });
 
-  test("a program's actions run until they are told to have ended, and none after it stopped", () => {
+  test("actions are running until their end is reported or the program is stopped", () => {
     const before = (id: string): ServerEvent => ({ event: "ActionStateBefore", data: { action_id: id } });
     const state = after({ event: "PackageState", data: { state: "running" } }, before("a"), before("b"), {
       event: "ActionStateAfter",

@@ -19,7 +19,7 @@ it.each([
   expect(Math.abs(pose.orientation.w)).toBeCloseTo(1); // upright
 });
 
-it("says that a mesh has neither top nor bottom", () => {
+it("reports that a mesh has no top and no bottom", () => {
   expect(pivotOffset({ type: "Mesh" }, "top")).toContain("Use the middle");
   expect(pivotOffset(undefined, "middle")).toBe(0);
 });

@@ -8,21 +8,21 @@ const BOX: ObjectModel = { type: "Box", box: { id: "b", size_x: 0.2, size_y: 0.4
 const CYLINDER: ObjectModel = { type: "Cylinder", cylinder: { id: "c", radius: 0.05, height: 0.3 } };
 const UP = { x: 0, y: 0, z: 1 };
 
-describe("pulling a face", () => {
-  it("keeps the opposite one: the middle goes half the way", () => {
+describe("dragging a face", () => {
+  it("keeps the opposite face and moves the centre by half the distance", () => {
     const { model, shift } = pulled(BOX, "y", 0.1);
     expect(model.box?.size_y).toBeCloseTo(0.5, 12);
     expect(shift).toBeCloseTo(0.05, 12);
     expect(model.box?.size_x).toBe(0.2);
   });
 
-  it("ends where nothing is left", () => {
+  it("stops at the smallest size", () => {
     const { model, shift } = pulled(BOX, "z", -3);
     expect(model.box?.size_z).toBe(THINNEST);
     expect(shift).toBeCloseTo((THINNEST - 0.1) / 2, 12);
   });
 
-  it("of round things grows about the axis", () => {
+  it("of round shapes changes the size about the axis", () => {
     expect(pulled(CYLINDER, "x", 0.01)).toMatchObject({
       model: { cylinder: { radius: 0.060000000000000005, height: 0.3 } },
       shift: 0,
@@ -31,7 +31,7 @@ describe("pulling a face", () => {
   });
 });
 
-it("measures are what can be typed, and each changes one", () => {
+it("each dimension can be typed and changes one size", () => {
   expect(measures(BOX).map((each) => [each.label, each.value])).toEqual([
     ["X", 0.2],
     ["Y", 0.4],
@@ -41,7 +41,7 @@ it("measures are what can be typed, and each changes one", () => {
   expect(halfOf(CYLINDER)).toEqual({ x: 0.05, y: 0.05, z: 0.15 });
 });
 
-it("what is put onto a surface stands on it, also turned", () => {
+it("an item placed on a surface touches it, also if it is rotated", () => {
   const at = { x: 1, y: 2, z: 0.5 };
   expect(lifted(at, UP, { pose: ORIGIN, model: BOX }).z).toBeCloseTo(0.55, 12);
   const lying = { ...ORIGIN, orientation: fromAngles({ x: Math.PI / 2, y: 0, z: 0 }) };

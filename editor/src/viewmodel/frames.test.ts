@@ -11,18 +11,18 @@ function close(a: object, b: object): void {
     expect((a as Record<string, number>)[key]).toBeCloseTo(value as number, 9);
 }
 
-test("what was composed is seen from the frame as it was", () => {
+test("relativeTo is the inverse of composed", () => {
   const back = relativeTo(frame, composed(frame, pose));
   close(back.position, pose.position);
   close(back.orientation, pose.orientation);
 });
 
-test("roll, pitch and yaw there and back", () => {
+test("roll, pitch and yaw are converted to a rotation and back", () => {
   const angles = rollPitchYaw(fromRollPitchYaw([12, -34, 156]));
   [12, -34, 156].forEach((wanted, n) => expect(angles[n]).toBeCloseTo(wanted, 6));
 });
 
-test("z points where it is told, also the other way round", () => {
+test("alongZ turns z to the given direction, also to the opposite one", () => {
   for (const direction of [
     { x: 0, y: 0, z: -1 },
     { x: 0.6, y: 0, z: 0.8 },
@@ -32,7 +32,7 @@ test("z points where it is told, also the other way round", () => {
   }
 });
 
-test("a point on a point on an object is where both are put together", () => {
+test("the world pose of a nested point is composed of those of its parents", () => {
   const quarter = { position: { x: 1, y: 0, z: 0 }, orientation: turn({ x: 0, y: 0, z: 1 }, Math.PI / 2) };
   const doc = {
     objects: { o: { id: "o", name: "o", type: "T", pose: quarter, parameters: [] } },

@@ -8,7 +8,7 @@ import { GhostRobot } from "./ghost";
 const model = () => Object.assign(new Object3D(), { joints: {} }) as unknown as URDFRobot;
 const turned = { x: 0, y: 0, z: Math.SQRT1_2, w: Math.SQRT1_2 };
 
-it("stands where it is told to, wherever the robot's own base is", () => {
+it("the ghost is at the given pose, independent of the robot's base", () => {
   const host = new Group();
   const ghost = new GhostRobot(host);
   setPose(host, { position: { x: 1, y: 2, z: 0 }, orientation: turned });

@@ -39,7 +39,7 @@ export class GhostRobot {
     }
     this.place(ghost.at);
     // Its colour differs from that of a selected robot.
-    this.material.color.copy(ghost.at ? palette.point : ghost.possible ? palette.selected : palette.trouble);
+    this.material.color.copy(ghost.at ? palette.point : ghost.possible ? palette.selected : palette.fault);
     for (const [name, value] of Object.entries(ghost.joints)) this.robot.joints[name]?.setJointValue(value);
   }
 

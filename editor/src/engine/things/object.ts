@@ -49,8 +49,8 @@ export class ObjectThing extends Thing<ObjectItem> {
     const { palette } = this.context;
     const color = item.selected
       ? palette.selected
-      : item.trouble || this.reason
-        ? palette.trouble
+      : item.fault || this.reason
+        ? palette.fault
         : item.lockedBy
           ? palette.locked
           : null;
@@ -120,7 +120,7 @@ export class ObjectThing extends Thing<ObjectItem> {
     } catch (error) {
       if (mine !== this.loading) return;
       this.reason = error instanceof Error ? error.message : String(error);
-      this.context.trouble(t`The model of ${this.item.name} cannot be shown. ${this.reason}`);
+      this.context.reportFault(t`The model of ${this.item.name} cannot be shown. ${this.reason}`);
       this.show(new OctahedronGeometry(0.06));
     }
   }

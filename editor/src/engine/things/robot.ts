@@ -142,8 +142,8 @@ export class RobotThing extends Thing<RobotItem> {
 
   private paint(): void {
     const { palette } = this.context;
-    const { selected, trouble, faint } = this.item;
-    const highlight = selected ? palette.selected : trouble ? palette.trouble : this.stale ? palette.locked : null;
+    const { selected, fault, faint } = this.item;
+    const highlight = selected ? palette.selected : fault ? palette.fault : this.stale ? palette.locked : null;
     this.material.color.copy(highlight ?? palette.robot);
     if (highlight) this.coloured.color.copy(highlight);
     else this.coloured.color.setRGB(1, 1, 1);
@@ -203,7 +203,7 @@ export class RobotThing extends Thing<RobotItem> {
     if (!current()) return;
     this.reason = reason;
     if (reason)
-      this.context.trouble(
+      this.context.reportFault(
         robot
           ? t`Part of ${this.item.name} cannot be shown. ${reason}`
           : t`The model of ${this.item.name} cannot be shown. ${reason}`,

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { atEdge } from "./edge";
 
-test("the arrow stands at the edge, on the way to what it points at", () => {
+test("the arrow is at the edge, in the direction of its item", () => {
   expect(atEdge({ x: 2000, y: 300 }, 800, 600, [])).toEqual({ x: 766, y: 300, angle: 0 });
   expect(atEdge({ x: 400, y: 4000 }, 800, 600, [])).toEqual({ x: 400, y: 566, angle: 90 });
   const { x, y, angle } = atEdge({ x: -800, y: -300 }, 800, 600, []);
@@ -9,7 +9,7 @@ test("the arrow stands at the edge, on the way to what it points at", () => {
   expect(angle).toBeCloseTo(-180 + (Math.atan2(600, 1200) * 180) / Math.PI);
 });
 
-test("it goes out of the way of what is there, along its edge, and stays in the view", () => {
+test("the arrow moves along the edge to avoid controls and stays in the view", () => {
   const stop = { left: 600, top: 250, right: 800, bottom: 350 };
   const beside = atEdge({ x: 2000, y: 310 }, 800, 600, [stop]);
   expect(beside.x).toBe(766);

@@ -39,8 +39,8 @@ export function atEdge(
     first ??= start;
     const upright = Math.abs(dx) * scale >= wide - 1e-6; // at the left or right edge
     for (let by = 0; by <= (upright ? height : width); by += STEP) {
-      for (const way of [1, -1]) {
-        const place = upright ? { x: start.x, y: start.y + way * by } : { x: start.x + way * by, y: start.y };
+      for (const side of [1, -1]) {
+        const place = upright ? { x: start.x, y: start.y + side * by } : { x: start.x + side * by, y: start.y };
         const inside = upright ? Math.abs(place.y - height / 2) <= tall : Math.abs(place.x - width / 2) <= wide;
         if (inside && free(place)) return { ...place, angle };
       }

@@ -5,7 +5,7 @@ import { expect, test } from "vitest";
 import { textOfZip } from "./package";
 import { pieces } from "./python";
 
-test("a file is read out of a zip, packed or not", async () => {
+test("a file is read from a zip archive, compressed or stored", async () => {
   const files: [string, string, boolean][] = [
     ["a.txt", "first", false],
     ["script.py", "print('hello')\n".repeat(50), true],
@@ -40,7 +40,7 @@ test("a file is read out of a zip, packed or not", async () => {
   await expect(textOfZip(new ArrayBuffer(40), "a.txt")).rejects.toThrow("cannot be downloaded");
 });
 
-test("Python in pieces keeps every character, and texts over lines stay texts", () => {
+test("tokens contain every character, and strings can span lines", () => {
   const source = 'def f(x):  # why\n    """One\n    two."""\n    return x_1 + 2.5e-3';
   const lines = pieces(source);
   expect(lines.map((line) => line.map((each) => each.text).join("")).join("\n")).toBe(source);

@@ -5,7 +5,7 @@ export interface Piece {
   kind: "plain" | "word" | "text" | "number" | "comment" | "name";
 }
 
-const KEYWORDS = new Set(
+const KEYWORDS: ReadonlySet<string> = new Set(
   (
     "and as assert async await break class continue def del elif else except finally for from global " +
     "if import in is lambda None nonlocal not or pass raise return True False try while with yield"

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { Handle, type Node, type NodeProps, Position } from "@xyflow/react";
-import { beginStep, notEditable } from "../../commands/program";
+import { notEditable, startConnecting } from "../../commands/program";
 import { notify, now } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { ReachBadge } from "../points/Reach";
@@ -72,5 +72,5 @@ export function conditionOf(way: Way) {
 function begin(id: string, way: Way): void {
   const why = notEditable(now(), "AddLogicItem");
   if (why) notify("info", why);
-  else beginStep(id, conditionOf(way));
+  else startConnecting(id, conditionOf(branch));
 }

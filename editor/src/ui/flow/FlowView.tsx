@@ -13,7 +13,7 @@ import {
 } from "@xyflow/react";
 import { useEffect, useMemo, useRef } from "react";
 import "@xyflow/react/dist/base.css";
-import { connect, endStep, notEditable, removeAction, removeStep } from "../../commands/program";
+import { connect, finishConnecting, notEditable, removeAction, removeStep } from "../../commands/program";
 import { cannotLead } from "../../program/logic";
 import { problemsOf } from "../../program/problems";
 import { notify, now, select, setUi, useEditor } from "../../store/store";
@@ -33,6 +33,26 @@ const COLOURS = { always: "var(--ink-2)", true: "var(--good)", false: "var(--war
 const nameIn = (graph: { boxes: Box[] }, id: string): string => graph.boxes.find((each) => each.id === id)?.name ?? "";
 
 const DASHES = { always: undefined, true: "14 4", false: "3 5", value: "9 6" } as const;
+
+/** Return the handler of taps on nodes and connections. */
+function useChoose(): (box: Pick<Box, "id" | "kind" | "run">) => void {
+  /** The node that ended a connection: the graph reports one tap twice, as a tap and as a selection. */
+  const ended = useRef("");
+  return (box) => {
+    const id = firstIn(box);
+    if (now().ui.connecting) {
+      if (selectionOf(now(), id)?.kind === "logic") return;
+      ended.current = id;
+      setTimeout(() => (ended.current = ""));
+      void finishConnecting(id);
+      return;
+    }
+    if (ended.current === id) return;
+    if (box.kind === "fold") return unfold(box.run);
+    select(selectionOf(now(), id));
+    setUi({ tool: "" });
+  };
+}
 
 export default function FlowView() {
   return (
@@ -60,6 +80,7 @@ function Flow() {
     () => (doc ? graphOf(doc, types, folds.folded) : { boxes: [], lines: [] }),
     [doc, types, folds.folded],
   );
+  const choose = useChoose();
   const host = useRef<HTMLDivElement>(null);
   const graph = usePressed(host, latest);
   const { fitView } = useReactFlow();
@@ -173,24 +194,6 @@ function Flow() {
       </ReactFlow>
     </div>
   );
-}
-
-/** The node that ended a connection: the graph reports one tap twice, as a tap and as a selection. */
-let ended = "";
-
-function choose(box: Pick<Box, "id" | "kind" | "run">): void {
-  const id = firstIn(box);
-  if (now().ui.connecting) {
-    if (selectionOf(now(), id)?.kind === "logic") return;
-    ended = id;
-    setTimeout(() => (ended = ""));
-    void endStep(id);
-    return;
-  }
-  if (ended === id) return;
-  if (box.kind === "fold") return unfold(box.run);
-  select(selectionOf(now(), id));
-  setUi({ tool: "" });
 }
 
 /** Remove only the selected node: the command removes its connections. */

@@ -3,7 +3,7 @@
 import { plural, t } from "@lingui/core/macro";
 import { useState } from "react";
 import * as documents from "../../commands/documents";
-import { faultyObjects, takeOut } from "../../commands/repair";
+import { faultyObjects, removeObjects } from "../../commands/repair";
 import { sentence } from "../../commands/requests";
 import type { Entry } from "../../home/entries";
 import { whyUnavailable } from "../../store/permissions";
@@ -19,7 +19,7 @@ interface ProblemsProps {
   onScene: () => void;
 }
 
-export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, onScene }: ProblemsProps) {
+export function Problems({ entry: { kind, id, name, problems, explanations, from }, whyOpen, onScene }: ProblemsProps) {
   const [faulty, setFaulty] = useState<string[] | null>(null);
   const noScene = useEditor((state) => whyUnavailable(state, "SaveScene"));
   const ofScene = useEditor((state) => state.lists.scenes?.find((each) => each.id === from?.id)?.problems?.length ?? 0);
@@ -31,7 +31,7 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
         </span>
       </summary>
       <ul>
-        {problems.map((each) => (
+        {explanations.map((each) => (
           <li key={each}>{each}</li>
         ))}
       </ul>
@@ -57,7 +57,7 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
           aria-label={t`Repair ${name}`}
           onPress={() => void faultyObjects(id, problems).then(setFaulty, (error) => notify("error", sentence(error)))}
         >
-          {t`Mend`}
+          {t`Repair`}
         </Button>
       )}
       {faulty && (
@@ -67,7 +67,7 @@ export function Problems({ entry: { kind, id, name, problems, from }, whyOpen, o
           not={faulty.length > 0 ? "" : t`No single object causes the problem. Import the scene again.`}
           onClose={() => setFaulty(null)}
           onYes={() =>
-            void takeOut(id, name, faulty).then((wrong) =>
+            void removeObjects(id, name, faulty).then((wrong) =>
               wrong ? notify("error", wrong) : notify("info", t`${name} can be opened again.`),
             )
           }

@@ -1,7 +1,7 @@
 /** Documents opened recently by the user, and templates shared by all users. Both are stored on the server. */
 
 import { storeGeneralState } from "../../commands/viewstate";
-import { beyond, type Opened, openedOf } from "../../home/opened";
+import { type Opened, openedOf, toForget } from "../../home/opened";
 import { memoized } from "../../store/memo";
 import type { State } from "../../store/state";
 import { now } from "../../store/store";
@@ -15,7 +15,7 @@ export function recentOf(state: State): Opened {
 
 /** Store that the user opened a document; each has its own key, so that two devices do not conflict. */
 export function storeOpened(id: string): void {
-  const forgotten = beyond(recentOf(now()), id).map((each) => [`opened/${each}`, null] as const);
+  const forgotten = toForget(recentOf(now()), id).map((each) => [`opened/${each}`, null] as const);
   storeGeneralState({ ...Object.fromEntries(forgotten), [`opened/${id}`]: Date.now() });
 }
 

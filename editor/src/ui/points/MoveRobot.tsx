@@ -27,7 +27,7 @@ const MoveRobot: Section["Body"] = ({ selection: { kind, id } }) => {
       ? chosen?.effector || joints
         ? ""
         : t`Go online first. The end effectors are unknown offline.`
-      : t`There is no connection to the server.`,
+      : t`Not connected to the server.`,
   );
   const why = useEditor((state) => notReady(state, chosen && { ...chosen, robotId }, "MoveToActionPoint"));
   const { speed } = useMotionOptions();

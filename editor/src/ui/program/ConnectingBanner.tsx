@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
-import { cancelStep } from "../../commands/program";
+import { cancelConnecting } from "../../commands/program";
 import { now, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
@@ -12,7 +12,7 @@ export default function ConnectingBanner() {
   useEffect(() => {
     if (!connecting) return;
     const onKey = (event: KeyboardEvent) => {
-      if (event.key === "Escape") cancelStep();
+      if (event.key === "Escape") cancelConnecting();
     };
     window.addEventListener("keydown", onKey);
     return () => window.removeEventListener("keydown", onKey);
@@ -21,7 +21,7 @@ export default function ConnectingBanner() {
   return (
     <div className="banner" role="status">
       <span>{t`Tap the step that follows ${nameOf(now(), connecting.from)}.`}</span>
-      <Button look="plain" onPress={cancelStep}>
+      <Button look="plain" onPress={cancelConnecting}>
         {t`Cancel`}
       </Button>
     </div>

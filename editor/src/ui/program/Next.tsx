@@ -1,7 +1,7 @@
 /** The next steps of an action, and buttons to connect further ones. */
 
 import { plural, t } from "@lingui/core/macro";
-import { beginStep, endStep, notEditable, removeStep } from "../../commands/program";
+import { finishConnecting, notEditable, removeStep, startConnecting } from "../../commands/program";
 import {
   cannotLead,
   conditionsOf,
@@ -28,63 +28,63 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
   const { doc, types } = state;
   const { connecting } = state.ui;
   if (!doc) return null;
-  const ways = outgoing(doc, id);
+  const steps = outgoing(doc, id);
   const why = notEditable(state, "AddLogicItem");
   if (connecting?.from === id) return <Targets from={id} />;
   const own = conditionsOf(doc, types, id)[0];
-  const asked = ways.find((each) => each.condition)?.condition;
+  const asked = steps.find((each) => each.condition)?.condition;
   const result = asked ? resultAt(doc, types, asked.what) : own?.action.id === id ? own : undefined;
   const run =
     state.ui.mode === "flow" || state.ui.mode === "split" ? runsOf(doc).find((each) => each.includes(id)) : undefined;
-  const free = (value: string) => !ways.some((each) => each.condition?.value === value);
+  const free = (value: string) => !steps.some((each) => each.condition?.value === value);
   const on = (value: string): ProjectLogicIf => ({
     what: asked?.what ?? linkTo(result as NonNullable<typeof result>),
     value,
   });
   return (
     <>
-      {ways.length === 0 && <p className="quiet small">{t`None`}</p>}
-      <ul className="ways">
-        {ways.map((way) => (
-          <li key={way.id}>
-            <Button look="plain" className="way" onPress={() => select({ kind: "logic", id: way.id })}>
-              {conditionWords(doc, types, way) && (
-                <span className={`branch ${branchOf(way.condition)}`}>{conditionWords(doc, types, way)}</span>
+      {steps.length === 0 && <p className="quiet small">{t`None`}</p>}
+      <ul className="next-steps">
+        {steps.map((step) => (
+          <li key={step.id}>
+            <Button look="plain" className="next-step" onPress={() => select({ kind: "logic", id: step.id })}>
+              {conditionWords(doc, types, step) && (
+                <span className={`branch ${branchOf(step.condition)}`}>{conditionWords(doc, types, step)}</span>
               )}
-              <span aria-hidden="true">→</span> {nameOf(state, placeOf(way.end))}
+              <span aria-hidden="true">→</span> {nameOf(state, placeOf(step.end))}
             </Button>
             <Button
               look="plain"
               icon="close"
-              aria-label={t`Remove the connection to ${nameOf(state, placeOf(way.end))}`}
+              aria-label={t`Remove the connection to ${nameOf(state, placeOf(step.end))}`}
               why={why}
-              onPress={() => void removeStep(way.id)}
+              onPress={() => void removeStep(step.id)}
             />
           </li>
         ))}
       </ul>
       <div className="row">
-        {(ways.length === 0 || (result && result.type !== "boolean")) && (
-          <Button icon="plus" why={why} onPress={() => beginStep(id)}>
+        {(steps.length === 0 || (result && result.type !== "boolean")) && (
+          <Button icon="plus" why={why} onPress={() => startConnecting(id)}>
             {t`Connect`}
           </Button>
         )}
-        {result?.type === "boolean" && ways.every((each) => each.condition) && (
+        {result?.type === "boolean" && steps.every((each) => each.condition) && (
           <>
             {free("true") && (
-              <Button why={why} onPress={() => beginStep(id, on("true"))}>
+              <Button why={why} onPress={() => startConnecting(id, on("true"))}>
                 <span className="branch true">{t`yes`}</span> {t`If ${result.name}`}
               </Button>
             )}
             {free("false") && (
-              <Button why={why} onPress={() => beginStep(id, on("false"))}>
+              <Button why={why} onPress={() => startConnecting(id, on("false"))}>
                 <span className="branch false">{t`no`}</span> {t`If not`}
               </Button>
             )}
           </>
         )}
-        {result?.type === "boolean" && ways.length === 1 && !ways[0]?.condition && (
-          <Button icon="plus" why={why} onPress={() => beginStep(id)}>
+        {result?.type === "boolean" && steps.length === 1 && !steps[0]?.condition && (
+          <Button icon="plus" why={why} onPress={() => startConnecting(id)}>
             {t`Branch`}
           </Button>
         )}
@@ -121,10 +121,10 @@ function Targets({ from }: { from: string }) {
       <p className="small">
         {t`Tap the step that follows ${nameOf(state, from)}, in the view or here. Press Escape to cancel.`}
       </p>
-      <ul className="ways targets" aria-label={t`Possible next steps`}>
+      <ul className="next-steps targets" aria-label={t`Possible next steps`}>
         {targets.map((id) => (
           <li key={id}>
-            <Button look="plain" className="way" onPress={() => void endStep(id)}>
+            <Button look="plain" className="next-step" onPress={() => void finishConnecting(id)}>
               <Icon name={id === END ? "check" : "action"} size={16} /> {nameOf(state, id)}
             </Button>
           </li>

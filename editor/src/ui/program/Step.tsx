@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
-import { beginStep, notEditable, removeStep, setCondition } from "../../commands/program";
+import { notEditable, removeStep, setCondition, startConnecting } from "../../commands/program";
 import { conditionsOf, linkTo, outgoing, placeOf, resultAt, START } from "../../program/logic";
 import { now, select, useEditor } from "../../store/store";
 import { nameOf, selectionOf } from "../../viewmodel/names";
@@ -83,7 +83,7 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
         </p>
       )}
       <div className="row">
-        <Button why={why} onPress={() => beginStep(from, undefined, id)}>
+        <Button why={why} onPress={() => startConnecting(from, undefined, id)}>
           {t`Change target`}
         </Button>
         <Button look="plain" why={why} onPress={() => void removeStep(id)}>

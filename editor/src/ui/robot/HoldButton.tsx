@@ -1,6 +1,6 @@
 /**
  * A button that acts while it is held, by finger, mouse or key. Other causes that end it (page hidden, disconnect) are
- * in holds.ts.
+ * in commands/holdToRun.ts.
  */
 
 import { t } from "@lingui/core/macro";

@@ -15,9 +15,12 @@ export function Kinematics({ robotId }: { robotId: string }) {
   const [found, setFound] = useState<RobotKinematics | null>(null);
   useEffect(() => {
     if (!reports) return;
-    const ended = new AbortController();
-    readKinematics(robotId, ended.signal).then(setFound, () => setFound(null));
-    return () => ended.abort();
+    let ended = false;
+    const show = (answer: RobotKinematics | null) => ended || setFound(answer);
+    readKinematics(robotId).then(show, () => show(null));
+    return () => {
+      ended = true;
+    };
   }, [robotId, reports, lastNotice, scene]);
   if (!reports || found?.object_id !== robotId) return null;
   return <p className="quiet small">{sentence(found)}</p>;

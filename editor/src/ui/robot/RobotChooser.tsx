@@ -1,4 +1,4 @@
-/** Which robot, arm and end effector the panels and buttons mean. */
+/** Choice of the active robot, its arm and end effector. */
 
 import { t } from "@lingui/core/macro";
 import { armOf, chooseRobot, chosenRobot } from "../../commands/robot";

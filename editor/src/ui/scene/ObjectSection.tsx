@@ -11,7 +11,7 @@ import { Button } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
 import { NameField } from "../points/NameField";
 import type { Section } from "../workplace/section";
-import { putAside } from "./hidden";
+import { setHidden } from "./hidden";
 import "./scene.css";
 
 const Body: Section["Body"] = ({ selection: { id } }) => {
@@ -73,7 +73,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
 
 /** Visibility for this user only. */
 function Seeing({ id }: { id: string }) {
-  const aside = useEditor(
+  const hidden = useEditor(
     (state) => Array.isArray(state.view.user.blocklist) && state.view.user.blocklist.includes(id),
   );
   const opacity = useEditor((state) =>
@@ -88,10 +88,10 @@ function Seeing({ id }: { id: string }) {
   };
   return (
     <>
-      <OnOff isSelected={aside} onChange={(on) => putAside(id, on)}>
+      <OnOff isSelected={hidden} onChange={(on) => setHidden(id, on)}>
         {t`Hide`}
       </OnOff>
-      {!aside && (
+      {!hidden && (
         <MoreOrLess
           label={t`Transparency`}
           value={1 - (now_ ?? opacity)}

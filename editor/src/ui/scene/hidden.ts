@@ -6,12 +6,12 @@ import { now } from "../../store/store";
 
 const NOTHING: string[] = [];
 
-export function asideOf(state: State): string[] {
+export function hiddenOf(state: State): readonly string[] {
   const stored = state.view.user.blocklist;
   return Array.isArray(stored) ? (stored as string[]) : NOTHING;
 }
 
-export function putAside(id: string, on: boolean): void {
-  const rest = asideOf(now()).filter((each) => each !== id);
+export function setHidden(id: string, on: boolean): void {
+  const rest = hiddenOf(now()).filter((each) => each !== id);
   storeViewState("user", { blocklist: on ? [...rest, id] : rest });
 }

@@ -10,7 +10,7 @@ import { now, select, setUi, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 import { flat, type Row } from "../../viewmodel/things";
 import { Icon, type IconName } from "../kit/icons";
-import { asideOf } from "../scene/hidden";
+import { hiddenOf } from "../scene/hidden";
 
 export const ICONS: Record<Kind, IconName> = {
   object: "box",
@@ -44,7 +44,7 @@ interface ThingTreeProps {
 
 export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
   const locks = useEditor((state) => state.locks);
-  const aside = useEditor(asideOf);
+  const hidden = useEditor(hiddenOf);
   const folded = foldedOf(useEditor((state) => state.view.user.collapsed));
   const parents = flat(rows).filter((row) => row.below.length > 0);
   const open = new Set(parents.map((row) => row.id).filter((id) => unfolded || !folded.includes(id)));
@@ -58,7 +58,7 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
   };
   const item = (row: Row) => {
     const holder = heldBy(now(), row.id);
-    const detail = holder ? t`In use by ${holder}` : aside.includes(row.id) ? "hidden" : row.detail;
+    const detail = holder ? t`In use by ${holder}` : hidden.includes(row.id) ? "hidden" : row.detail;
     return (
       <TreeItem
         id={row.id}
@@ -95,7 +95,7 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
             </>
           )}
         </TreeItemContent>
-        <Collection items={row.below} dependencies={[locks, aside, unfolded]}>
+        <Collection items={row.below} dependencies={[locks, hidden, unfolded]}>
           {item}
         </Collection>
       </TreeItem>
@@ -106,7 +106,7 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
       aria-label={label}
       className="things"
       items={rows}
-      dependencies={[locks, aside, unfolded]}
+      dependencies={[locks, hidden, unfolded]}
       expandedKeys={open}
       onExpandedChange={fold}
       onAction={(key) => goTo(String(key))}

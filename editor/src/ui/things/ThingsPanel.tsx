@@ -9,7 +9,7 @@ import { useEditor } from "../../store/store";
 import { allOf, counts, fitting, narrowed, type Row, thingsOf } from "../../viewmodel/things";
 import { GROUPS, type Group } from "../../viewmodel/visibility";
 import { OneOf } from "../kit/fields";
-import { asideOf } from "../scene/hidden";
+import { hiddenOf } from "../scene/hidden";
 import { AtCrosshair } from "./AtCrosshair";
 import { ThingTree } from "./ThingTree";
 import { ViewSettings } from "./ViewSettings";
@@ -48,21 +48,21 @@ function All() {
   const doc = useEditor((state) => state.doc);
   const types = useEditor((state) => state.types);
   const stored = useEditor((state) => state.view.user.filters);
-  const aside = useEditor(asideOf);
+  const hiddenIds = useEditor(hiddenOf);
   const [search, setSearch] = useState("");
   const things = useMemo(() => thingsOf({ doc, types }), [doc, types]);
   const rows = useMemo(() => allOf(things), [things]);
   const number = useMemo(() => counts(rows), [rows]);
-  const hidden = rows.filter((row) => aside.includes(row.id)).length;
+  const hiddenRows = rows.filter((row) => hiddenIds.includes(row.id)).length;
   const groups = new Set<string>(
     Array.isArray(stored)
       ? stored.filter((each) =>
-          each === HIDDEN ? hidden > 0 : GROUPS.includes(each as Group) && number[each as Group] > 0,
+          each === HIDDEN ? hiddenRows > 0 : GROUPS.includes(each as Group) && number[each as Group] > 0,
         )
       : [],
   );
   const ofKind = fitting(new Set([...groups].filter((each) => each !== HIDDEN)), search);
-  const fits = (row: Row) => ofKind(row) && (!groups.has(HIDDEN) || aside.includes(row.id));
+  const fits = (row: Row) => ofKind(row) && (!groups.has(HIDDEN) || hiddenIds.includes(row.id));
   const narrow = search.trim() !== "" || groups.size > 0;
   const parts: [string, string, Row[]][] = [
     [t`Objects`, "", narrowed(things.placed, fits)],
@@ -88,9 +88,9 @@ function All() {
             {i18n._(WORDS[group])} <small>{number[group]}</small>
           </ToggleButton>
         ))}
-        {hidden > 0 && (
+        {hiddenRows > 0 && (
           <ToggleButton id={HIDDEN} className="button chip">
-            {t`Hidden`} <small>{hidden}</small>
+            {t`Hidden`} <small>{hiddenRows}</small>
           </ToggleButton>
         )}
       </ToggleButtonGroup>

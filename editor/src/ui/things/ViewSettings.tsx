@@ -10,7 +10,7 @@ import { fadesOthers, opacityOfAll } from "../../viewmodel/visibility";
 import { MoreOrLess, OnOff } from "../kit/fields";
 
 /** Parts of the view that users can hide, with the keys under which the server stores that. */
-const SIGHTS = [
+const HIDEABLE = [
   ["hide_orientations", msg`Orientation arrows`],
   ["hide_axes", msg`End effector axes`],
   ["hide_steps", msg`Program steps`],
@@ -42,7 +42,7 @@ export function ViewSettings({ narrowed }: { narrowed: boolean }) {
           setMoved(null);
         }}
       />
-      {SIGHTS.map(([key, words]) => (
+      {HIDEABLE.map(([key, words]) => (
         <OnOff
           key={key}
           isSelected={view[key] !== true}

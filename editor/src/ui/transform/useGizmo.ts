@@ -108,37 +108,37 @@ class Follower {
     const { snap, lengthStep, angleStep, length, angle } = toolSettings(state);
     const { handle } = drag;
     const grid = snap === "grid";
-    const say = (text: string) => engine.note(start.id, text);
+    const note = (text: string) => engine.note(start.id, text);
     const frame = toolFrame(state, start);
     switch (handle.do) {
       case "axis": {
         const by = rounded(drag.length, grid ? lengthStep : FINE);
         one.to({ ...start.pose, position: plusOf(start.pose.position, drag.axis, by) });
-        return say(`${handle.axis.toUpperCase()} ${signed(show(by, length))} ${length}`);
+        return note(`${handle.axis.toUpperCase()} ${signed(show(by, length))} ${length}`);
       }
       case "plane": {
         const free = { ...start.pose, position: plusOf(start.pose.position, drag.translation, 1) };
         const along = (["x", "y", "z"] as Axis[]).filter((each) => each !== handle.axis);
         const position = onGrid(free.position, frame, grid ? lengthStep : FINE, along);
         one.to({ ...free, position });
-        return say(way(minus(position, start.pose.position), length));
+        return note(translationText(minus(position, start.pose.position), length));
       }
       case "free": {
         const pose = this.freely(engine, drag, start);
         one.to(pose);
-        return say(way(minus(pose.position, start.pose.position), length));
+        return note(translationText(minus(pose.position, start.pose.position), length));
       }
       case "ring": {
         const by = rounded(drag.angle, grid ? angleStep : FINE_TURN);
         one.to(turnedAbout(start.pose, drag.axis, by));
-        return say(`${signed(show(by, angle))}${angle === "°" ? "°" : " rad"}`);
+        return note(`${signed(show(by, angle))}${angle === "°" ? "°" : " rad"}`);
       }
       case "face": {
         if (!start.model) return;
         const { model, shift } = pulled(start.model, handle.axis, rounded(drag.length, grid ? lengthStep : FINE));
         one.to(moved(start.pose, start.pose, handle.axis, shift * handle.sign), model);
         const half = halfOf(model);
-        return say(`${show(half[handle.axis] * 2, length)} ${length}`);
+        return note(`${show(half[handle.axis] * 2, length)} ${length}`);
       }
     }
   }
@@ -178,7 +178,7 @@ function signed(text: string): string {
   return text.startsWith("-") ? `−${text.slice(1)}` : `+${text}`;
 }
 
-function way(by: Position, unit: ReturnType<typeof toolSettings>["length"]): string {
+function translationText(by: Position, unit: ReturnType<typeof toolSettings>["length"]): string {
   const part = (axis: "x" | "y" | "z") => `${axis.toUpperCase()} ${signed(show(rounded(by[axis], FINE), unit))}`;
   return `${part("x")}  ${part("y")}  ${part("z")} ${unit}`;
 }

@@ -3,7 +3,7 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useEffect, useRef, useState } from "react";
-import { followWishes } from "../../commands/handover";
+import { followItemRequests } from "../../commands/handover";
 import { storeGeneralState, storeViewState } from "../../commands/viewstate";
 import type { ViewMode, ViewName, Viewpoint } from "../../engine/camera";
 import type { Engine } from "../../engine/engine";
@@ -58,7 +58,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
   const always = useEditor(aimsAlways);
   const listed = useAiming((state) => state.listed);
   useCrosshairKey();
-  useEffect(followWishes, []);
+  useEffect(followItemRequests, []);
   const change = (next: ViewMode) => {
     engine.view.setMode(next);
     setMode(next);

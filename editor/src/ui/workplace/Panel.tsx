@@ -37,7 +37,8 @@ export default function Panel() {
         <Button look="plain" icon="close" aria-label={t`Close the panel`} onPress={close} />
       </header>
       <div className="panel-body">
-        <Suspense fallback={<Waiting>{t`Loading…`}</Waiting>}>
+        {/** A boundary for each tool: the state of the last tool must not stay while the next one is loading. */}
+        <Suspense key={toolId} fallback={<Waiting>{t`Loading…`}</Waiting>}>
           {tool ? <tool.Panel /> : selection && <Sections />}
         </Suspense>
       </div>

@@ -1,4 +1,4 @@
-/** The tools: icon and word. A tool that is not available says why when it is tapped. */
+/** The tools: icon and word. A tap on an unavailable tool shows the reason. */
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";

@@ -9,7 +9,7 @@ export function pick(ids: readonly string[]): void {
   const found = ids.map((id) => selectionOf(state, id)).filter((each) => each !== null);
   if (state.ui.connecting) {
     const target = found.find(({ kind }) => kind === "action" || kind === "terminal");
-    if (target) void import("../../commands/program").then(({ endStep }) => endStep(target.id));
+    if (target) void import("../../commands/program").then(({ finishConnecting }) => finishConnecting(target.id));
     return;
   }
   // So every item can be selected.

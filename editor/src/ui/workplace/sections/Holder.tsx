@@ -2,9 +2,9 @@
 
 import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useState } from "react";
-import { askFor, noLongerAsk } from "../../../commands/handover";
+import { requestItem, withdrawRequest } from "../../../commands/handover";
 import { serves } from "../../../session/connection";
-import { hasAsked } from "../../../store/handover";
+import { hasRequested } from "../../../store/handover";
 import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { Icon } from "../../kit/icons";
@@ -18,7 +18,7 @@ export default function Holder({ id }: { id: string }) {
   const holder = useEditor((state) => heldBy(state, id));
   const since = useEditor((state) => state.lockedAt[id] ?? 0);
   const here = useEditor((state) => state.users[holder]?.online === true);
-  const asked = useEditor((state) => hasAsked(state, id));
+  const asked = useEditor((state) => hasRequested(state, id));
   const [, tick] = useState(0);
   const [taking, setTaking] = useState(false);
   useEffect(() => {
@@ -42,10 +42,10 @@ export default function Holder({ id }: { id: string }) {
         (asked ? (
           <p className="small">
             {t`Request sent to ${holder}. You are notified when it is available.`}{" "}
-            <Button onPress={() => noLongerAsk(id)}>{t`Cancel request`}</Button>
+            <Button onPress={() => withdrawRequest(id)}>{t`Cancel request`}</Button>
           </p>
         ) : (
-          <Button icon="people" onPress={() => askFor(id)}>
+          <Button icon="people" onPress={() => requestItem(id)}>
             {t`Ask ${holder} for it`}
           </Button>
         ))}

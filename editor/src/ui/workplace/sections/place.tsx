@@ -1,4 +1,4 @@
-/** Pose of the selected item, and the ways to change it. */
+/** Pose of the selected item, and its controls. */
 
 import { msg } from "@lingui/core/macro";
 import { lazyComponent } from "../../kit/lazy";
