@@ -1,16 +1,23 @@
-/** Entry of the editor: load the texts, show the page, join as the user who was here last. */
+/**
+ * Entry of the editor: create the client and the session, load the texts, show the page, and join as the user who was
+ * here last.
+ */
 
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { loadCatalogue, preferredLanguage } from "./i18n/catalogue";
+import { createClient } from "./session/connection";
 import { remembered, takeTokenFromAddress } from "./session/localStorage";
-import { session } from "./session/session";
+import { recordErrors } from "./session/log";
+import { createSession } from "./session/session";
 import { App } from "./ui/App";
 import { persistently } from "./ui/kit/lazy";
 import "./ui/tokens.css";
 import "./ui/base.css";
 
 async function start(): Promise<void> {
+  recordErrors();
+  const session = createSession(createClient());
   takeTokenFromAddress();
   const name = remembered("name");
   // A document is probably open: load the view at the same time.

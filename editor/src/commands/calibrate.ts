@@ -1,16 +1,15 @@
 /** Poses of objects measured by robots and cameras. Functions return why they were refused, or an empty string. */
 
 import { t } from "@lingui/core/macro";
-import { createStore } from "zustand/vanilla";
 import type { Pivot, Pose, Position } from "../protocol/types";
 import { refusedWith } from "../session/assets";
 import { call } from "../session/connection";
 import { remembered } from "../session/localStorage";
 import { now, setUi, store } from "../store/store";
 import { FLIPPED, pivotOffset } from "../transform/pivots";
-import { composed } from "../viewmodel/frames";
+import { composed, ORIGIN } from "../viewmodel/frames";
 import { held, refusal } from "./requests";
-import { type Chosen, robotArg } from "./robot";
+import { type Chosen, effectorPose, robotArg } from "./robot";
 
 /** Set the pose of an object from the robot tool; `pivot` is the touched part of the object. */
 export const placeByRobot = (id: string, chosen: Chosen, pivot: Pivot) =>
@@ -33,71 +32,104 @@ export function hideAtTool(id: string): void {
 }
 
 // ------------------------------------------------------------------------------------------------ focus points
-/** A running measurement of focus points. It locks the object and the robot until it ends. */
-export interface Aiming {
-  /** Record the tool position as a focus point. Return the numbers of the recorded points. */
-  add: (index: number) => Promise<number[]>;
-  /** Set the pose of the object from the recorded points. */
-  done: () => Promise<void>;
-  cancel: () => Promise<void>;
+declare module "../store/runtime" {
+  interface Runtime {
+    /** Releases the locks of the measurement; its state is `ui.measurement`. */
+    endMeasurement?: (() => void) | undefined;
+  }
 }
 
-/** Start; reject with the reason if refused. `onLost` is called when the measurement ends by itself. */
-export function beginAiming(id: string, chosen: Chosen, onLost: () => void): Promise<Aiming> {
+/** Start to measure an object, which locks it and the robot until the end. Reject with the reason if refused. */
+export function startMeasurement(objectId: string, chosen: Chosen): Promise<void> {
   return new Promise((resolve, reject) => {
-    held(id, () =>
+    held(objectId, () =>
       held(chosen.robotId, async () => {
-        await call("ObjectAimingStart", { object_id: id, robot: robotArg(chosen) });
+        await call("ObjectAimingStart", { object_id: objectId, robot: robotArg(chosen) });
         await new Promise<void>((over) => {
           // The server cancels it on disconnect and when the scene goes offline.
           const stop = store.subscribe((state) => {
-            if (state.connection.status === "ready" && state.live.state === "started") return;
+            if (state.connection.status !== "ready" || state.live.state !== "started") endMeasurement();
+          });
+          now().runtime.endMeasurement = () => {
             stop();
-            onLost();
             over();
-          });
-          resolve({
-            add: async (point_idx) => (await call("ObjectAimingAddPoint", { point_idx })).finished_indexes,
-            done: async () => {
-              await call("ObjectAimingDone");
-              stop();
-              over();
-            },
-            cancel: () =>
-              call("ObjectAimingCancel")
-                .catch(() => {}) // the connection or the scene is closed, and the measurement with it
-                .then(() => {
-                  stop();
-                  over();
-                }),
-          });
+          };
+          setUi({ measurement: { objectId, recorded: [], touched: {}, fit: null } });
+          resolve();
         });
       }),
     ).catch(reject);
   });
 }
 
+/** Number of points that define a frame; one more shows the error. */
+const NEEDED = 3;
+
+/** Record the tool position as a focus point, and update the fit. `known`: coordinates of the focus points. */
+export async function recordFocusPoint(
+  index: number,
+  chosen: Chosen | null,
+  known: readonly Position[],
+): Promise<void> {
+  // The server reads the tool position itself; this one is for the preview of the fit.
+  const tool = chosen && effectorPose(chosen);
+  const recorded = (await call("ObjectAimingAddPoint", { point_idx: index })).finished_indexes;
+  const { measurement } = now().ui;
+  if (!measurement) return;
+  const touched = tool ? { ...measurement.touched, [index]: tool.position } : measurement.touched;
+  const fit = tool ? null : measurement.fit;
+  setUi({ measurement: { ...measurement, recorded, touched, fit } });
+  const numbers = Object.keys(touched).map(Number);
+  if (numbers.length < NEEDED) return;
+  const { checked, residual, residuals, worst } = await frameByPoints(
+    numbers.map((n) => known[n] ?? ORIGIN.position),
+    numbers.map((n) => touched[n] ?? ORIGIN.position),
+  );
+  const latest = now().ui.measurement;
+  if (latest?.touched !== touched) return; // another point was recorded meanwhile
+  const found = { checked, rms: residual, worst: residuals[worst] ?? 0, worstPoint: numbers[worst] ?? 0 };
+  setUi({ measurement: { ...latest, fit: found } });
+}
+
+/** Set the pose of the object from the recorded points, and end the measurement. */
+export async function finishMeasurement(): Promise<void> {
+  await call("ObjectAimingDone");
+  endMeasurement();
+}
+
+export async function cancelMeasurement(): Promise<void> {
+  // If the connection or the scene is closed, the server has cancelled it.
+  await call("ObjectAimingCancel").catch(() => {});
+  endMeasurement();
+}
+
+function endMeasurement(): void {
+  const { runtime } = now();
+  runtime.endMeasurement?.();
+  runtime.endMeasurement = undefined;
+  setUi({ measurement: null });
+}
+
 // ------------------------------------------------------------------------------------------------ cameras
 export const calibrateCamera = (id: string) =>
-  refusal(() => held(id, () => remembering(id, () => call("CalibrateCamera", { id }, { deadline: 30 }))));
+  refusal(() => held(id, () => storingOldPose(id, () => call("CalibrateCamera", { id }, { deadline: 30 }))));
 
 export const calibrateRobot = (robot_id: string, camera_id: string, move_to_calibration_pose: boolean) =>
   refusal(() =>
     held(robot_id, () =>
-      remembering(robot_id, () =>
+      storingOldPose(robot_id, () =>
         call("CalibrateRobot", { robot_id, camera_id, move_to_calibration_pose }, { deadline: 30 }),
       ),
     ),
   );
 
-/** Pose of the last calibrated object before the calibration, until the user accepts or reverts the new one. */
-export const before = createStore<{ id: string; pose: Pose | null }>(() => ({ id: "", pose: null }));
-export const keepPlace = (): void => before.setState({ id: "", pose: null });
+/** Forget the pose before the calibration: the user has accepted or reverted the new one. */
+export const forgetOldPose = (): void => setUi({ beforeCalibration: null });
 
-async function remembering(id: string, begin: () => Promise<unknown>): Promise<void> {
+async function storingOldPose(id: string, begin: () => Promise<unknown>): Promise<void> {
   const pose = now().doc?.objects[id]?.pose ?? null;
   await begin();
-  before.setState({ id, pose });
+  setUi({ beforeCalibration: pose && { id, pose } });
 }
 
 /** Take a picture. Return a JPEG with one character per byte. Reject with the reason if refused. */

@@ -4,7 +4,6 @@ import { t } from "@lingui/core/macro";
 import { version } from "../../package.json";
 import { refusedWith } from "../session/assets";
 import { remembered } from "../session/localStorage";
-import { diary } from "../session/log";
 import { now } from "../store/store";
 import { saveAs } from "./files";
 import { refusal } from "./requests";
@@ -17,15 +16,15 @@ export function saveDiagnosis(): Promise<string> {
     const response = await fetch("/api/diagnosis", {
       method: "POST",
       headers,
-      body: JSON.stringify({ client: seen() }),
+      body: JSON.stringify({ client: recorded() }),
     });
     if (!response.ok) throw new Error(await refusedWith(response, t`The diagnosis file is not available`));
     saveAs(await response.blob(), `diagnosis-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.zip`);
   });
 }
 
-function seen() {
-  const { connection, ui, notices, tasks, live } = now();
+function recorded() {
+  const { connection, ui, notices, tasks, live, runtime } = now();
   return {
     editor: version,
     browser: navigator.userAgent,
@@ -40,6 +39,6 @@ function seen() {
     live: live.state,
     notices: notices.map(({ level, text, time }) => ({ level, text, time: new Date(time).toISOString() })),
     tasks: Object.values(tasks),
-    seen: diary(),
+    seen: runtime.diary,
   };
 }

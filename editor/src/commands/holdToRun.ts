@@ -5,7 +5,7 @@
 
 import type { JogRobotArgs } from "../protocol/types";
 import { call } from "../session/connection";
-import { store } from "../store/store";
+import { now, store } from "../store/store";
 import { Lease, type LeaseRequest } from "./lease";
 import { held, sentence } from "./requests";
 
@@ -17,11 +17,16 @@ export interface Held {
   over: Promise<string>;
 }
 
-let current: Lease | null = null;
+declare module "../store/runtime" {
+  interface Runtime {
+    /** The lease of the held motion. */
+    lease?: Lease | undefined;
+  }
+}
 
 /** Release everything. */
 export function endHolds(): void {
-  current?.end();
+  now().runtime.lease?.end();
 }
 
 export function holdJog(robot_id: string, what: JogWhat): Held {
@@ -34,8 +39,10 @@ export function holdHandTeaching(robot_id: string, arm_id?: string): Held {
 
 function hold(robotId: string, send: (request: LeaseRequest) => Promise<unknown>): Held {
   endHolds();
-  const lease = new Lease(send);
-  current = lease;
+  const { runtime } = now();
+  const lease = new Lease(++runtime.holds, send);
+  runtime.lease = lease;
+  const unwatch = endWhenLeft(lease);
   const over = held(robotId, () => {
     lease.begin();
     return lease.over;
@@ -43,17 +50,24 @@ function hold(robotId: string, send: (request: LeaseRequest) => Promise<unknown>
     .catch(sentence)
     .then((reason) => {
       lease.end(); // not started if the lock was refused
-      if (current === lease) current = null;
+      unwatch();
+      if (runtime.lease === lease) runtime.lease = undefined;
       return reason;
     });
   return { end: () => lease.end(), over };
 }
 
-store.subscribe((state) => {
-  if (current && state.connection.status !== "ready") endHolds();
-});
-
-if (typeof window !== "undefined") {
-  for (const event of ["blur", "pagehide"]) window.addEventListener(event, endHolds);
-  for (const event of ["freeze", "visibilitychange"]) document.addEventListener(event, endHolds);
+/** End a lease when the connection is lost or the user leaves the page. Return the function that stops watching. */
+function endWhenLeft(lease: Lease): () => void {
+  const watching = new AbortController();
+  const end = () => lease.end();
+  for (const event of ["blur", "pagehide"]) window.addEventListener(event, end, watching);
+  for (const event of ["freeze", "visibilitychange"]) document.addEventListener(event, end, watching);
+  const unsubscribe = store.subscribe(({ connection }) => {
+    if (connection.status !== "ready") end();
+  });
+  return () => {
+    watching.abort();
+    unsubscribe();
+  };
 }

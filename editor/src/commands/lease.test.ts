@@ -15,8 +15,8 @@ beforeEach(() => {
 });
 afterEach(() => vi.useRealTimers());
 
-test("is renewed ten times a second while it is held, and let go at once", async () => {
-  const lease = new Lease(send, () => 5);
+test("a lease is renewed ten times a second while it is held, and released at once", async () => {
+  const lease = new Lease(1, send, () => 5);
   lease.begin();
   await vi.advanceTimersByTimeAsync(1000);
   expect(sent.length).toBe(11);
@@ -29,30 +29,20 @@ test("is renewed ten times a second while it is held, and let go at once", async
   expect(sent.length).toBe(12);
 });
 
-test("let go before it began, it never begins", async () => {
-  const lease = new Lease(send);
+test("a lease that was released before its start never starts", async () => {
+  const lease = new Lease(1, send);
   lease.end();
   lease.begin();
   await expect(lease.over).resolves.toBe("");
   expect(sent).toEqual([]);
 });
 
-test("a refusal ends it, says why, and is not asked again", async () => {
+test("a refusal ends the lease with its reason, without further requests", async () => {
   answer = () => Promise.reject(new Error("robot: the joint elbow is at its limit."));
-  const lease = new Lease(send);
+  const lease = new Lease(1, send);
   lease.begin();
   await expect(lease.over).resolves.toBe("robot: the joint elbow is at its limit.");
   await vi.advanceTimersByTimeAsync(1000);
   expect(sent.length).toBe(1);
   expect(lease.held).toBe(false);
-});
-
-test("each press has a larger number than the one before", () => {
-  const first = new Lease(send);
-  const second = new Lease(send);
-  first.begin();
-  second.begin();
-  expect(sent[1]?.hold).toBeGreaterThan(sent[0]?.hold ?? Infinity);
-  first.end();
-  second.end();
 });

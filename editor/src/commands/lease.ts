@@ -14,19 +14,18 @@ export interface LeaseRequest {
 export const RENEW = 100;
 export const VALID = 300;
 
-let numberOfHold = 0;
-
 export class Lease {
   /**
    * Resolves when the robot is at standstill or its state is unknown, with the reason if the lease was not released.
    */
   readonly over: Promise<string>;
-  private readonly hold = ++numberOfHold;
   private timer: ReturnType<typeof setInterval> | undefined;
   private state: "new" | "held" | "over" = "new";
   private resolve: (reason: string) => void = () => {};
 
+  /** `hold`: its number, larger than those of earlier leases of this page. */
   constructor(
+    private readonly hold: number,
     private readonly send: (request: LeaseRequest) => Promise<unknown>,
     private readonly clock: () => number = () => performance.now(),
   ) {

@@ -5,6 +5,7 @@
 
 import type { ObjectModel, Pose } from "../protocol/types";
 import { call, serves } from "../session/connection";
+import { itemOf } from "../store/document";
 import { now, setUi, store } from "../store/store";
 import { same } from "../transform/placing";
 import type { Target } from "../transform/target";
@@ -15,6 +16,13 @@ import { ask, holding } from "./requests";
 const PREVIEW = 1 / 30;
 /** Time after which a series of steps ends, s. */
 export const SETTLED = 0.6;
+
+declare module "../store/runtime" {
+  interface Runtime {
+    /** The change in progress, until the server has accepted or refused it. */
+    moving?: Moving | undefined;
+  }
+}
 
 /** A change in progress. */
 export class Moving {
@@ -28,32 +36,39 @@ export class Moving {
   private ended = false;
   private stored: Pose | null = null;
   private model: ObjectModel | null = null;
-  private told = 0;
-  private telling: ReturnType<typeof setTimeout> | undefined;
-  private settling: ReturnType<typeof setTimeout> | undefined;
+  private previewed = 0;
+  private previewTimer: ReturnType<typeof setTimeout> | undefined;
+  private settleTimer: ReturnType<typeof setTimeout> | undefined;
   private held = false;
 
-  constructor(readonly target: Target) {
+  /** `before`: end of the previous change, which would release the lock of this one. */
+  constructor(
+    readonly target: Target,
+    before: Promise<void> = Promise.resolve(),
+  ) {
     const decided = new Promise<boolean>((resolve) => (this.end = resolve));
     const work = async () => {
       this.held = true;
-      if (!this.finishing) this.notify(); // otherwise the edit itself notifies the users
+      if (!this.finishing) this.preview(); // otherwise the edit itself notifies the users
       return !(await decided) || (await this.store());
     };
-    const before = latest;
-    // Wait for the previous change, which would release the lock of this one.
+    const unsubscribe = store.subscribe(({ ui }, { ui: { selection } }) => {
+      // Selecting another item finishes the change.
+      if (ui.selection?.id !== selection?.id && ui.selection?.id !== target.id) this.finish();
+    });
     this.over = before
       .then(() => holding(target.id, work, target.kind === "point"))
       .then((done) => {
         this.ended = true;
-        clearTimeout(this.telling);
-        clearTimeout(this.settling);
-        if (current === this) current = null;
+        clearTimeout(this.previewTimer);
+        clearTimeout(this.settleTimer);
+        unsubscribe();
+        const { runtime } = now();
+        if (runtime.moving === this) runtime.moving = undefined;
         if (done) return;
         this.failed = true;
         this.forget();
       });
-    latest = this.over;
   }
 
   /** Show the item at a pose in the world. */
@@ -64,20 +79,24 @@ export class Moving {
     if (model) this.model = model;
     const state = now();
     const type = this.model && target.type ? { model: this.model, type: state.types.byName[target.type] } : {};
-    setUi({ draft: { id: target.id, of: known(state, target.id), pose: this.stored, ...type } });
-    this.notify();
+    setUi({ draft: { id: target.id, of: itemOf(state.doc, target.id), pose: this.stored, continues: true, ...type } });
+    this.preview();
   }
 
   /** End the change and send the edit. */
   finish(): void {
+    if (this.finishing) return;
     this.finishing = true;
+    clearTimeout(this.settleTimer);
+    const { draft } = now().ui;
+    if (draft?.id === this.target.id) setUi({ draft: { ...draft, continues: false } });
     this.end(true);
   }
 
   /** Like `finish`, if nothing follows within a moment. */
   settle(): void {
-    clearTimeout(this.settling);
-    this.settling = setTimeout(() => this.finish(), SETTLED * 1000);
+    clearTimeout(this.settleTimer);
+    this.settleTimer = setTimeout(() => this.finish(), SETTLED * 1000);
   }
 
   /** Restore the previous pose; nothing is sent. */
@@ -92,13 +111,13 @@ export class Moving {
   }
 
   /** Send the current pose to the other users; older ones are dropped. */
-  private notify(): void {
-    if (!this.held || !this.stored || this.failed || this.telling !== undefined || !serves("PreviewMove")) return;
-    const wait = Math.max(0, this.told + PREVIEW * 1000 - performance.now());
-    this.telling = setTimeout(() => {
-      this.telling = undefined;
+  private preview(): void {
+    if (!this.held || !this.stored || this.failed || this.previewTimer !== undefined || !serves("PreviewMove")) return;
+    const wait = Math.max(0, this.previewed + PREVIEW * 1000 - performance.now());
+    this.previewTimer = setTimeout(() => {
+      this.previewTimer = undefined;
       if (!this.stored || this.failed || this.ended) return;
-      this.told = performance.now();
+      this.previewed = performance.now();
       const { kind, id } = this.target;
       const { position, orientation } = this.stored;
       const shown = { ...(kind === "orientation" ? {} : { position }), ...(kind === "point" ? {} : { orientation }) };
@@ -133,15 +152,14 @@ function asked({ kind, id }: Target, { position, orientation }: Pose) {
   }
 }
 
-let current: Moving | null = null;
-let latest: Promise<void> = Promise.resolve();
-
 /** Start to move an item, or continue. A previous change of another item is finished. */
 export function moving(target: Target): Moving {
-  if (current && !current.finishing && !current.failed && current.target.id === target.id) return current;
-  current?.finish();
-  current = new Moving(target);
-  return current;
+  const { runtime } = now();
+  const running = runtime.moving;
+  if (running && !running.finishing && !running.failed && running.target.id === target.id) return running;
+  running?.finish();
+  runtime.moving = new Moving(target, running?.over);
+  return runtime.moving;
 }
 
 /** Move the item to a pose in the world by one edit. */
@@ -158,20 +176,4 @@ export function step(target: Target, pose: Pose): void {
   const one = moving(target);
   one.to(pose);
   one.settle();
-}
-
-store.subscribe((state, before) => {
-  // Selecting another item finishes the change.
-  const { selection, draft } = state.ui;
-  if (current && selection?.id !== before.ui.selection?.id && selection?.id !== current.target.id) current.finish();
-  if (!draft || state.doc === before.doc) return;
-  const thing = known(state, draft.id);
-  if (thing === draft.of) return;
-  // The event of the edit has arrived: end the preview, unless the next change has started.
-  const goesOn = thing !== undefined && current?.target.id === draft.id && !current.finishing;
-  setUi({ draft: goesOn ? { ...draft, of: thing } : undefined });
-});
-
-function known({ doc }: ReturnType<typeof now>, id: string): unknown {
-  return doc?.objects[id] ?? doc?.points[id] ?? doc?.orientations[id];
 }

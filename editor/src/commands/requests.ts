@@ -4,7 +4,7 @@ import type { CallOptions } from "../protocol/client";
 import { ConnectionLost, Refused } from "../protocol/errors";
 import type { Requests } from "../protocol/types";
 import { call } from "../session/connection";
-import { notify } from "../store/store";
+import { notify, now } from "../store/store";
 
 /** Send a request. Return undefined after notifying the user if it was refused, lost or too late. */
 export async function ask<N extends keyof Requests>(
@@ -31,23 +31,21 @@ export async function whyNot<N extends keyof Requests>(request: N, args?: Reques
   }
 }
 
-/** Locks held by this page, with the number of users of each; the last one releases the lock. */
-const locked = new Map<string, { times: number; taken: Promise<unknown> }>();
-
 /** Lock an item for writing, unless this page has locked it. Return the function that releases it. */
 async function take(id: string, tree: boolean): Promise<() => Promise<void>> {
   const key = tree ? `${id}/tree` : id;
-  const mine = locked.get(key) ?? { times: 0, taken: call("WriteLock", { object_id: id, lock_tree: tree }) };
-  locked.set(key, mine);
-  mine.times++;
+  const { locks } = now().runtime;
+  const lock = locks.get(key) ?? { users: 0, granted: call("WriteLock", { object_id: id, lock_tree: tree }) };
+  locks.set(key, lock);
+  lock.users++;
   const last = () => {
-    mine.times--;
-    if (mine.times > 0) return false;
-    if (locked.get(key) === mine) locked.delete(key);
+    lock.users--;
+    if (lock.users > 0) return false;
+    if (locks.get(key) === lock) locks.delete(key);
     return true;
   };
   try {
-    await mine.taken;
+    await lock.granted;
   } catch (error) {
     last();
     throw error;

@@ -6,9 +6,10 @@ import { call } from "../session/connection";
 import { robotsOf } from "../session/streams";
 import { stable } from "../store/memo";
 import { whyUnavailable } from "../store/permissions";
-import type { Arm, Ghost, State } from "../store/state";
+import type { Arm, State } from "../store/state";
 import { now, setUi } from "../store/store";
 import { telemetry } from "../store/telemetry";
+import type { Ghost, MotionOptions } from "../store/ui";
 import { held, refusal, sentence } from "./requests";
 import { storeViewState } from "./viewstate";
 
@@ -17,13 +18,6 @@ export interface Chosen {
   robotId: string;
   armId: string;
   effector: string;
-}
-
-/** Options of a motion; `speed` is relative to the maximum of the robot. */
-export interface MotionOptions {
-  speed: number;
-  safe: boolean;
-  linear: boolean;
 }
 
 /** Return the active robot: the one that the user chose last, else the first; null without a robot. */
@@ -104,21 +98,21 @@ export interface Step {
 export function stepEffector(
   { robotId, armId, effector }: Chosen,
   { pose, ...step }: Step,
-  manner: MotionOptions,
+  options: MotionOptions,
 ): Promise<string> {
   const args = {
     robot_id: robotId,
     end_effector_id: effector,
     ...step,
     ...(pose ? { pose } : {}),
-    ...manner,
+    ...options,
     ...ofArm(armId),
   };
   return refusal(() => held(robotId, () => call("StepRobotEef", args, { deadline: 30 })));
 }
 
-export function alignDown({ robotId, armId, effector }: Chosen, manner: MotionOptions): Promise<string> {
-  const args = { robot_id: robotId, end_effector_id: effector, ...manner, ...ofArm(armId) };
+export function alignDown({ robotId, armId, effector }: Chosen, options: MotionOptions): Promise<string> {
+  const args = { robot_id: robotId, end_effector_id: effector, ...options, ...ofArm(armId) };
   return refusal(() => held(robotId, () => call("SetEefPerpendicularToWorld", args, { deadline: 30 })));
 }
 
@@ -126,12 +120,12 @@ export function alignDown({ robotId, armId, effector }: Chosen, manner: MotionOp
 export function moveToPose(
   { robotId, armId, effector }: Chosen,
   pose: Partial<Pose>,
-  manner: MotionOptions,
+  options: MotionOptions,
 ): Promise<string> {
   return refusal(() =>
     call(
       "MoveToPose",
-      { robot_id: robotId, end_effector_id: effector, ...pose, ...manner, ...ofArm(armId) },
+      { robot_id: robotId, end_effector_id: effector, ...pose, ...options, ...ofArm(armId) },
       { deadline: 30 },
     ),
   );
@@ -151,11 +145,11 @@ export function moveToJoints(
 export function moveToTaught(
   { robotId, armId, effector }: Chosen,
   goal: { orientation_id: string } | { joints_id: string },
-  manner: MotionOptions,
+  options: MotionOptions,
 ): Promise<string> {
   const to = "orientation_id" in goal ? { ...goal, end_effector_id: effector } : goal;
   return refusal(() =>
-    call("MoveToActionPoint", { robot_id: robotId, ...to, ...manner, ...ofArm(armId) }, { deadline: 30 }),
+    call("MoveToActionPoint", { robot_id: robotId, ...to, ...options, ...ofArm(armId) }, { deadline: 30 }),
   );
 }
 

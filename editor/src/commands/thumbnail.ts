@@ -1,12 +1,13 @@
 /** A thumbnail of the workplace for all users: taken from the view when the document is saved, shown on its tile. */
 
 import { t } from "@lingui/core/macro";
-import { create } from "zustand";
 import { call, serves } from "../session/connection";
 import { theEngine } from "../session/engine";
 import { whyUnavailable } from "../store/permissions";
+import { put } from "../store/records";
 import { openId } from "../store/selectors";
-import { now } from "../store/store";
+import type { Thumbnail } from "../store/state";
+import { now, store } from "../store/store";
 import { refusal } from "./requests";
 
 /** Size in pixels, and largest number of characters. */
@@ -18,8 +19,9 @@ const QUALITIES = [0.75, 0.5, 0.25];
 /** Part of the view that is cut out, since its borders are mostly empty. */
 const CLOSER = 1.5;
 
-/** Thumbnails by document, as data URLs; empty if there is none. */
-export const useThumbnails = create<Record<string, string>>(() => ({}));
+function setThumbnail(document: string, thumbnail: Thumbnail): void {
+  store.setState(({ thumbnails }) => ({ thumbnails: put(thumbnails, document, thumbnail) }));
+}
 
 /** Take a thumbnail of the open document and store it, even if the document is closed meanwhile. */
 export async function keepThumbnail(): Promise<void> {
@@ -28,12 +30,9 @@ export async function keepThumbnail(): Promise<void> {
   if (!blob) return;
   const thumbnail = await smaller(blob);
   if (!thumbnail) return;
-  if (!useOwn.getState()[document]) useThumbnails.setState({ [document]: thumbnail });
+  if (!now().thumbnails[document]?.own) setThumbnail(document, { picture: thumbnail, own: false });
   await call("SetViewState", { scope: "shared", document, values: { thumbnail } });
 }
-
-/** Documents with a picture chosen by a user, which saving does not replace. */
-export const useOwn = create<Record<string, boolean>>(() => ({}));
 
 /** Store a picture chosen by the user for a document; null: use the view again. Return why it failed. */
 export function keepOwnPicture(document: string, file: Blob | null): Promise<string> {
@@ -41,20 +40,27 @@ export function keepOwnPicture(document: string, file: Blob | null): Promise<str
     const picture = file && (await smaller(file, 1));
     if (picture === "") throw new Error(t`The picture is too large.`);
     await call("SetViewState", { scope: "shared", document, values: { picture } });
-    await readThumbnail(document);
+    await loadThumbnail(document);
   });
 }
 
-/** Request the thumbnail of a document. */
-export async function readThumbnail(document: string): Promise<void> {
+/** Request the thumbnail of a document that was saved at `time`, unless it was requested before. */
+export function loadThumbnailOnce(document: string, time: string): void {
+  const { thumbnailTimes } = now().runtime;
+  if (thumbnailTimes.get(document) === time) return;
+  thumbnailTimes.set(document, time);
+  // The tile shows the old picture, or none.
+  loadThumbnail(document).catch(() => thumbnailTimes.delete(document));
+}
+
+async function loadThumbnail(document: string): Promise<void> {
   if (!serves("GetViewState")) return;
   const { values } = await call("GetViewState", { scope: "shared", document });
   const { thumbnail, picture } = values as { thumbnail?: unknown; picture?: unknown };
   const [own, taken] = [picture, thumbnail].map((each) =>
     typeof each === "string" && each.startsWith("data:image/") ? each : "",
   );
-  useOwn.setState({ [document]: !!own });
-  useThumbnails.setState({ [document]: own || taken || "" });
+  setThumbnail(document, { picture: own || taken || "", own: !!own });
 }
 
 /**

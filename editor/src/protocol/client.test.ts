@@ -50,7 +50,7 @@ afterEach(() => {
 });
 
 describe("requests", () => {
-  test("are answered by id, in any order", async () => {
+  test("are matched to answers by id, in any order", async () => {
     client.start();
     last().opens();
     const one = client.call("GetScene", { id: "a" });
@@ -67,7 +67,7 @@ describe("requests", () => {
     expect(error).toMatchObject({ message: "No such scene.", code: "not_found", request: "GetScene" });
   });
 
-  test("that get no answer end at their deadline, and a late answer answers nothing", async () => {
+  test("fail at their deadline, and a late answer is ignored", async () => {
     client.start();
     last().opens();
     const late = client.call("ListScenes", undefined, { deadline: 2 }).catch((e: unknown) => e);
@@ -79,7 +79,7 @@ describe("requests", () => {
     await expect(next).resolves.toEqual([]);
   });
 
-  test("can be given up", async () => {
+  test("can be cancelled", async () => {
     client.start();
     last().opens();
     const abort = new AbortController();
@@ -88,7 +88,7 @@ describe("requests", () => {
     expect(await given).toMatchObject({ message: "another question" });
   });
 
-  test("are never sent later: without a connection they fail, and after it came back nothing is repeated", async () => {
+  test("fail without a connection and are not repeated after a reconnect", async () => {
     client.start();
     const early = await client.call("StepAction").catch((e: unknown) => e);
     expect(early).toBeInstanceOf(ConnectionLost);
@@ -107,7 +107,7 @@ describe("requests", () => {
 });
 
 describe("the connection", () => {
-  test("comes back after pauses that grow to their limit", async () => {
+  test("is restored after increasing delays, up to a limit", async () => {
     const states: string[] = [];
     client.onState = (state) => states.push(state);
     client.start();
@@ -123,11 +123,11 @@ describe("the connection", () => {
     expect(states.slice(0, 4)).toEqual(["connecting", "open", "waiting", "connecting"]);
     expect(client.state).toBe("open");
     last().breaks();
-    client.hurry();
+    client.reconnectNow();
     expect(client.state).toBe("connecting");
   });
 
-  test("is given up when the server is silent and does not answer the question whether it is there", async () => {
+  test("is closed if the server is silent and does not answer a ping", async () => {
     client.start();
     last().opens();
     await vi.advanceTimersByTimeAsync(4000);
@@ -138,7 +138,7 @@ describe("the connection", () => {
     expect(client.state).toBe("waiting");
   });
 
-  test("stays while events come", async () => {
+  test("is kept while events arrive", async () => {
     client.start();
     last().opens();
     for (let i = 0; i < 5; i++) {
@@ -149,7 +149,7 @@ describe("the connection", () => {
     expect(client.state).toBe("open");
   });
 
-  test("is not tried again with a token that is not valid", async () => {
+  test("is not retried with an invalid token", async () => {
     client.start();
     last().opens();
     last().breaks(4401);
@@ -158,7 +158,7 @@ describe("the connection", () => {
     expect(sockets.length).toBe(1);
   });
 
-  test("ends when it is left", async () => {
+  test("is closed by stop", async () => {
     client.start();
     last().opens();
     client.stop();
@@ -168,11 +168,11 @@ describe("the connection", () => {
   });
 });
 
-test("events are handed on, nonsense is told and harms nothing", () => {
+test("events are passed on, and invalid messages are reported", () => {
   const events: unknown[] = [];
   const oddities: string[] = [];
   client.onEvent = (event) => events.push(event);
-  client.onOddity = (text) => oddities.push(text);
+  client.onInvalidMessage = (text) => oddities.push(text);
   client.start();
   last().opens();
   last().says("{half");

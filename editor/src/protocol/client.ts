@@ -72,7 +72,7 @@ export class ProtocolClient {
   onState: (state: ConnectionState, reason: string, code: number) => void = () => {};
   onEvent: (event: ServerEvent) => void = () => {};
   /** Called with messages that are neither answers nor known events. */
-  onOddity: (text: string) => void = () => {};
+  onInvalidMessage: (text: string) => void = () => {};
 
   private socket: Socket | null = null;
   private number = 0;
@@ -105,7 +105,7 @@ export class ProtocolClient {
   }
 
   /** Reconnect at once, since the network or the user is back. */
-  hurry(): void {
+  reconnectNow(): void {
     if (this.state !== "waiting") return;
     clearTimeout(this.retry);
     this.connect();
@@ -209,7 +209,7 @@ export class ProtocolClient {
     try {
       message = JSON.parse(text) as Answer | ServerEvent;
     } catch {
-      this.onOddity(text.slice(0, 200));
+      this.onInvalidMessage(text.slice(0, 200));
       return;
     }
     if ("event" in message) {
@@ -218,7 +218,7 @@ export class ProtocolClient {
     }
     const waiting = this.waiting.get(message.id);
     if (!waiting) {
-      if (message.id === 0) this.onOddity(text.slice(0, 200));
+      if (message.id === 0) this.onInvalidMessage(text.slice(0, 200));
       return; // too late: the request has already failed
     }
     waiting.done();

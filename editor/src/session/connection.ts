@@ -5,7 +5,19 @@ import type { Requests } from "../protocol/types";
 import { now } from "../store/store";
 import { note } from "./log";
 
-export const client = new ProtocolClient({ open: () => new WebSocket(address()) as never });
+/** Create the client of this page. */
+export function createClient(): ProtocolClient {
+  const client = new ProtocolClient({ open: () => new WebSocket(address()) as never });
+  now().runtime.client = client;
+  return client;
+}
+
+/** Return the client of this page. */
+export function theClient(): ProtocolClient {
+  const { client } = now().runtime;
+  if (!client) throw new Error("The page has no client yet. main.tsx creates it.");
+  return client;
+}
 
 function address(): string {
   return `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`;
@@ -17,6 +29,7 @@ export function call<N extends keyof Requests>(
   args?: Requests[N]["args"],
   options?: CallOptions,
 ): Promise<Requests[N]["data"]> {
+  const client = theClient();
   const answer = (client.call as (...given: unknown[]) => Promise<Requests[N]["data"]>).call(
     client,
     request,

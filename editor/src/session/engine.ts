@@ -1,8 +1,13 @@
 /** The engine of the visible view, for panels and commands; null without a view. */
 
 import type { Engine } from "../engine/engine";
+import { now } from "../store/store";
 
-let engine: Engine | null = null;
+declare module "../store/runtime" {
+  interface Runtime {
+    engine?: Engine | null;
+  }
+}
 
 declare global {
   interface Window {
@@ -11,11 +16,11 @@ declare global {
   }
 }
 
-export function setEngine(of: Engine | null): void {
-  engine = of;
-  window.__engine = of;
+export function setEngine(engine: Engine | null): void {
+  now().runtime.engine = engine;
+  window.__engine = engine;
 }
 
 export function theEngine(): Engine | null {
-  return engine;
+  return now().runtime.engine ?? null;
 }

@@ -1,26 +1,20 @@
 /** What this page did recently, for the diagnosis file: events, refusals, faults. It is not sent anywhere. */
 
+import type { DiaryEntry } from "../store/runtime";
+import { now } from "../store/store";
+
 /** Number of entries, and characters of each. */
 const MOST = 400;
 const LONGEST = 400;
 
-export interface Entry {
-  time: string;
-  what: "event" | "refused" | "fault" | "connection";
-  text: string;
+export function note(what: DiaryEntry["what"], text: string): void {
+  const { diary } = now().runtime;
+  diary.push({ time: new Date().toISOString(), what, text: text.slice(0, LONGEST) });
+  if (diary.length > MOST) diary.splice(0, diary.length - MOST);
 }
 
-const entries: Entry[] = [];
-
-export function note(what: Entry["what"], text: string): void {
-  entries.push({ time: new Date().toISOString(), what, text: text.slice(0, LONGEST) });
-  if (entries.length > MOST) entries.splice(0, entries.length - MOST);
-}
-
-/** Oldest first. */
-export const diary = (): readonly Entry[] => entries;
-
-if (typeof window !== "undefined") {
+/** Record the errors of the page from now on. */
+export function recordErrors(): void {
   window.addEventListener("error", ({ message, filename, lineno }) =>
     note("fault", `${message} (${filename}:${lineno})`),
   );

@@ -4,14 +4,14 @@
  */
 
 import { t } from "@lingui/core/macro";
-import type { ConnectionState } from "../protocol/client";
+import type { ConnectionState, ProtocolClient } from "../protocol/client";
 import { Refused } from "../protocol/errors";
 import { ADDITIONAL_EVENTS, ROLES, type ServerEvent } from "../protocol/types";
 import { OFFLINE, type State } from "../store/state";
 import { applyEvent, notify, now, setConnection, store } from "../store/store";
 import { telemetry } from "../store/telemetry";
 import { RobotArms } from "./arms";
-import { call, client } from "./connection";
+import { call } from "./connection";
 import { DocumentDetails } from "./documentDetails";
 import type { Follower } from "./follower";
 import { loadLists, loadTypes } from "./lists";
@@ -22,40 +22,54 @@ import { RobotStreams } from "./streams";
 
 /** WebSocket close code of the server for a missing or invalid token. */
 const TOKEN_REFUSED = 4401;
+/** Code of the error if a request needs a token. */
+const TOKEN_NEEDED = "token_needed";
 
-class Session {
+declare module "../store/runtime" {
+  interface Runtime {
+    session?: Session;
+  }
+}
+
+export class Session {
   private token = "";
   /** Number of the connection, so that an answer that belongs to an earlier one changes nothing. */
   private epoch = 0;
   private readonly presence = new PresenceReporter();
+  /** Followers whose data contain texts of the server. */
+  private readonly details: readonly Follower[] = [new DocumentDetails(), new ProgramDetails()];
   private readonly followers: readonly Follower[] = [
-    new DocumentDetails(),
+    ...this.details,
     new RobotStreams(),
     new RobotArms(),
     this.presence,
     new ProgramDetails(),
   ];
 
-  constructor() {
+  constructor(private readonly client: ProtocolClient) {
     client.onEvent = (event) => this.onEvent(event);
     client.onState = (state, reason, code) => this.onState(state, reason, code);
-    client.onOddity = (text) => {
+    client.onInvalidMessage = (text) => {
       note("fault", `invalid message: ${text}`);
       console.warn("invalid message:", text);
     };
     store.subscribe((state, before) => this.follow(state, before));
+    window.addEventListener("online", () => client.reconnectNow());
+    document.addEventListener("visibilitychange", () => {
+      if (!document.hidden) client.reconnectNow();
+    });
   }
 
   /** Connect under a name. The token is needed if the server requires one. */
   join(user: string, token: string): void {
     this.token = token;
-    setConnection({ status: "connecting", user, reason: "", role: ROLES.programmer });
-    client.stop(t`Joining again.`);
-    client.start();
+    setConnection({ status: "connecting", user, reason: "", needsToken: false, role: ROLES.programmer });
+    this.client.stop(t`Joining again.`);
+    this.client.start();
   }
 
   leave(): void {
-    client.stop();
+    this.client.stop();
     setConnection({ status: "left", reason: "" });
   }
 
@@ -100,7 +114,7 @@ class Session {
       });
     } else if (state === "closed" && code === TOKEN_REFUSED) {
       const invalid = reason || t`The token is not valid.`;
-      setConnection({ status: "refused", reason: this.token ? invalid : t`A token is needed.` });
+      setConnection({ status: "refused", reason: this.token ? invalid : t`A token is needed.`, needsToken: true });
     }
   }
 
@@ -124,8 +138,10 @@ class Session {
     } catch (error) {
       if (!isCurrent()) return; // the connection is lost again, and the next one starts over
       if (error instanceof Refused) {
-        client.stop(t`The server refused the user.`);
-        setConnection({ status: "refused", reason: error.message });
+        this.client.stop(t`The server refused the user.`);
+        const needsToken = error.code === TOKEN_NEEDED || error.request === "Authenticate";
+        const reason = error.code === TOKEN_NEEDED ? t`A token is needed.` : error.message;
+        setConnection({ status: "refused", reason, needsToken });
       } else {
         notify("error", error instanceof Error ? error.message : String(error));
       }
@@ -159,11 +175,16 @@ async function subscribe(): Promise<void> {
   }
 }
 
-export const session = new Session();
+/** Create the session of this page. */
+export function createSession(client: ProtocolClient): Session {
+  const session = new Session(client);
+  now().runtime.session = session;
+  return session;
+}
 
-if (typeof window !== "undefined") {
-  window.addEventListener("online", () => client.hurry());
-  document.addEventListener("visibilitychange", () => {
-    if (!document.hidden) client.hurry();
-  });
+/** Return the session of this page. */
+export function theSession(): Session {
+  const { session } = now().runtime;
+  if (!session) throw new Error("The page has no session yet. main.tsx creates it.");
+  return session;
 }

@@ -1,21 +1,28 @@
-/** Who receives the next taps in the view instead of the selection: a tool that needs a position. */
+/** Taps in the view for a tool that needs a position. They do not change the selection. */
 
 import type { Vector3 } from "three";
 import type { Hit } from "../engine/picking";
+import { now } from "../store/store";
 
-/** Return whether it handled the tap; then nothing is selected. */
-export type TapTaker = (hits: Hit[], floor: Vector3 | null) => boolean;
+/** Handles a tap. Returns whether it did; then nothing is selected. */
+export type TapHandler = (hits: Hit[], floor: Vector3 | null) => boolean;
 
-let taker: TapTaker | null = null;
+declare module "../store/runtime" {
+  interface Runtime {
+    tapHandler?: TapHandler | undefined;
+  }
+}
 
-/** Receive taps from now on; return a function that ends it. */
-export function takeTaps(by: TapTaker): () => void {
-  taker = by;
+/** Pass the taps to a handler from now on. Return the function that ends it. */
+export function takeTaps(handler: TapHandler): () => void {
+  const { runtime } = now();
+  runtime.tapHandler = handler;
   return () => {
-    if (taker === by) taker = null;
+    if (runtime.tapHandler === handler) runtime.tapHandler = undefined;
   };
 }
 
+/** Pass a tap to the handler. Return whether it was handled. */
 export function tapTaken(hits: Hit[], floor: Vector3 | null): boolean {
-  return taker?.(hits, floor) ?? false;
+  return now().runtime.tapHandler?.(hits, floor) ?? false;
 }

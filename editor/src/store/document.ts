@@ -72,6 +72,11 @@ function onPoint<T extends { id: string }>(
   return put(record, item.id, { ...record[item.id], ...item, pointId });
 }
 
+/** Return an item that can be moved; undefined if it does not exist. */
+export function itemOf(doc: OpenDocument | null, id: string): unknown {
+  return doc?.objects[id] ?? doc?.points[id] ?? doc?.orientations[id];
+}
+
 /** Return the document after an event; the same object if the event concerns something else. */
 export function changed(doc: OpenDocument, event: ServerEvent): OpenDocument {
   const removed = event.change_type === "remove";

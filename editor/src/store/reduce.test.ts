@@ -81,7 +81,7 @@ describe("a draft", () => {
 });
 
 describe("the open document", () => {
-  test("is taken apart by ids", () => {
+  test("is split into records by id", () => {
     const { doc } = after(OPEN);
     expect(doc?.points.acp).toMatchObject({ name: "pick", parent: "obj" });
     expect(doc?.orientations.ori?.pointId).toBe("acp");
@@ -89,13 +89,13 @@ describe("the open document", () => {
     expect(doc?.unsaved).toBe(false);
   });
 
-  test("is not saved when it was changed after its last save, or never was", () => {
+  test("is unsaved if it was changed after its last save or never saved", () => {
     const changed = { ...PROJECT, int_modified: "2026-01-01T10:00:01+00:00" };
     expect(after({ event: "OpenProject", data: { scene: SCENE, project: changed } }).doc?.unsaved).toBe(true);
     expect(after({ event: "OpenScene", data: { scene: { ...SCENE, modified: undefined } } }).doc?.unsaved).toBe(true);
   });
 
-  test("follows what is added, changed and removed on a point", () => {
+  test("follows additions, changes and removals at a point", () => {
     const added = after(OPEN, {
       event: "ActionChanged",
       change_type: "add",
@@ -121,7 +121,7 @@ describe("the open document", () => {
     expect(gone.doc?.actions).toEqual({});
   });
 
-  test("a change of a point alone keeps what is on it, and its new parent is taken over", () => {
+  test("an update of a point alone keeps its items and applies its new parent", () => {
     const moved = after(OPEN, {
       event: "ActionPointChanged",
       change_type: "update_base",
@@ -132,7 +132,7 @@ describe("the open document", () => {
     expect(Object.keys(moved.doc?.orientations ?? {})).toEqual(["ori"]);
   });
 
-  test("saving and closing", () => {
+  test("is saved and closed", () => {
     const change: ServerEvent = { event: "LogicItemChanged", change_type: "remove", data: PROJECT.logic[0] as never };
     expect(after(OPEN, change).doc).toMatchObject({ unsaved: true, logic: {} });
     expect(after(OPEN, change, { event: "ProjectSaved", data: undefined }).doc?.unsaved).toBe(false);
@@ -141,7 +141,7 @@ describe("the open document", () => {
     expect(after(OPEN, closed, { event: "ShowMainScreen", data: { what: "ProjectsList" } }).doc).toBeNull();
   });
 
-  test("opened again, after the connection was lost, keeps the selection unless it is gone", () => {
+  test("keeps the selection after a reconnect if the item still exists", () => {
     const selected = (id: string): State => ({
       ...after(OPEN),
       ui: { ...initialState().ui, selection: { kind: "action", id } },
@@ -161,8 +161,8 @@ describe("the open document", () => {
   });
 });
 
-describe("what others do", () => {
-  test("locks are known by what they hold", () => {
+describe("events of other users", () => {
+  test("locks are stored by item", () => {
     const held = after(
       { event: "ObjectsLocked", data: { object_ids: ["a", "b"], owner: "Eva" } },
       { event: "ObjectsUnlocked", data: { object_ids: ["a"], owner: "Eva" } },
@@ -183,7 +183,7 @@ describe("what others do", () => {
     expect(after(drag, { event: "MovePreview", data: { id: "acp", user: "Eva" } }).previews).toEqual({});
   });
 
-  test("view state of others' documents and users is not ours", () => {
+  test("view states of other documents and users are ignored", () => {
     const change = (document: string, user: string): ServerEvent => ({
       event: "ViewStateChanged",
       data: { scope: "user", document, user, values: { stars: [1], gone: null }, revision: 2 },
@@ -199,7 +199,7 @@ describe("operation", () => {
   const online: ServerEvent = { event: "SceneState", data: { state: "started" } };
   const lost: ServerEvent = { event: "ObjectState", data: { object_id: "obj", state: "lost", reason: "cable" } };
 
-  test("going offline forgets how devices were, and keeps why", () => {
+  test("going offline clears the state of the devices and keeps the reason", () => {
     expect(after(OPEN, online, lost).live.objects.obj?.reason).toBe("cable");
     const off = after(
       OPEN,
@@ -211,7 +211,7 @@ describe("operation", () => {
     expect(off.live).toMatchObject({ state: "stopped", message: "no robot", objects: {} });
   });
 
-  test("devices whose process is frozen are told of once, and again when they answer", () => {
+  test("a frozen device process is reported once, and again when it answers", () => {
     const object = (object_id: string, answering?: boolean): ServerEvent => ({
       event: "ObjectState",
       data: { object_id, state: "online", ...(answering === undefined ? {} : { answering }) },
@@ -225,7 +225,7 @@ describe("operation", () => {
     ]);
   });
 
-  test("a motion that failed is told", () => {
+  test("a failed motion is reported", () => {
     const state = after({
       event: "RobotMoveToPose",
       data: {

@@ -2,10 +2,11 @@
 
 import { t } from "@lingui/core/macro";
 import type { Run, ServerEvent, TaskStateData } from "../protocol/types";
-import { changed, opened } from "./document";
+import { changed, itemOf, opened } from "./document";
 import { translatedType } from "./objectTypeTexts";
 import { put, without } from "./records";
-import { NO_PROGRAM, type Notice, OFFLINE, type State } from "./state";
+import { NO_PROGRAM, type Notice, OFFLINE, type OpenDocument, type State } from "./state";
+import type { Draft, Selection } from "./ui";
 
 /** Largest number of stored notices, entries of the trace, and results of single actions. */
 const NOTICES = 200;
@@ -40,7 +41,7 @@ const CLOSED = {
 export function reduce(state: State, event: ServerEvent, time: number): Partial<State> {
   if (state.doc) {
     const doc = changed(state.doc, event);
-    if (doc !== state.doc) return { doc, ...lists(state, event), ui: keepSelection(state, doc) };
+    if (doc !== state.doc) return { doc, ...lists(state, event), ui: screenOf(state, doc) };
   }
   switch (event.event) {
     case "OpenScene":
@@ -139,23 +140,36 @@ function over(
 
 function open(state: State, doc: NonNullable<State["doc"]>): Partial<State> {
   const same = state.doc?.scene.id === doc.scene.id && state.doc.project?.id === doc.project?.id;
-  if (same) return { doc, ui: keepSelection(state, doc) };
+  if (same) return { doc, ui: screenOf(state, doc) };
   return { ...CLOSED, doc, ui: shut(state) };
 }
 
 /** Return the screen state without what belonged to the open document. */
 function shut(state: State): State["ui"] {
-  return { ...state.ui, selection: null, connecting: null, ghost: null, mode: "3d", tool: "" };
+  const { draft: _, ...ui } = state.ui;
+  return { ...ui, selection: null, connecting: null, ghost: null, mode: "3d", tool: "" };
 }
 
-/** Return the screen state, without the selection if the selected item no longer exists. */
-function keepSelection(state: State, doc: NonNullable<State["doc"]>): State["ui"] {
-  const selection = state.ui.selection;
-  if (!selection) return state.ui;
+/** Return the screen state for a changed document. */
+function screenOf(state: State, doc: OpenDocument): State["ui"] {
+  const selection = keptSelection(state.ui.selection, doc);
+  const draft = keptDraft(state.ui.draft, doc);
+  return selection === state.ui.selection && draft === state.ui.draft ? state.ui : { ...state.ui, selection, draft };
+}
+
+/** Return the selection; null if the selected item no longer exists. */
+function keptSelection(selection: Selection | null, doc: OpenDocument): Selection | null {
+  if (!selection || (selection.kind === "terminal" && doc.project?.has_logic)) return selection;
   const { id } = selection;
-  if (selection.kind === "terminal" && doc.project?.has_logic) return state.ui;
-  const there = [doc.objects, doc.points, doc.orientations, doc.joints, doc.actions, doc.logic].some((of) => id in of);
-  return there ? state.ui : { ...state.ui, selection: null };
+  const exists = [doc.objects, doc.points, doc.orientations, doc.joints, doc.actions, doc.logic].some((of) => id in of);
+  return exists ? selection : null;
+}
+
+/** Return the draft; undefined if its item has changed, unless the user is still changing it. */
+function keptDraft(draft: Draft | undefined, doc: OpenDocument): Draft | undefined {
+  const item = draft && itemOf(doc, draft.id);
+  if (!draft || item === draft.of) return draft;
+  return draft.continues && item !== undefined ? { ...draft, of: item } : undefined;
 }
 
 /** Return the lists of the home screen after an event. */
@@ -249,9 +263,9 @@ function live(state: State, event: ServerEvent, time: number): Partial<State> | 
             ? event.data.joints_id
             : "";
       const motions = put(now.motions, robot_id, { phase, goal, message: message ?? "" });
-      const told =
+      const failure =
         phase === "failed" ? notice(state, "error", message || t`The robot did not reach its goal.`, time) : {};
-      return { ...become({ moving, motions }), ...told };
+      return { ...become({ moving, motions }), ...failure };
     }
     case "ActionExecution":
       return become({ executing: event.data.action_id, result: null });
@@ -265,8 +279,8 @@ function live(state: State, event: ServerEvent, time: number): Partial<State> | 
     case "ProcessState": {
       const { id, state: phase, message } = event.data;
       // The task reports the same; an older server has no tasks.
-      const told = Object.values(state.tasks).some((each) => each.kind === "calibration");
-      return phase === "failed" && !told ? notice(state, "error", message || t`${id} failed.`, time) : {};
+      const reported = Object.values(state.tasks).some((each) => each.kind === "calibration");
+      return phase === "failed" && !reported ? notice(state, "error", message || t`${id} failed.`, time) : {};
     }
     default:
       return null;

@@ -10,7 +10,6 @@ import type {
   BareProject,
   BareScene,
   HistoryChangedData,
-  Joint,
   ListProjectsData,
   ListScenesData,
   LogicItem,
@@ -18,14 +17,11 @@ import type {
   NamedOrientation,
   ObjectAction,
   ObjectHealthData,
-  ObjectModel,
   ObjectStateData,
   ObjectTypeMeta,
   PackageStateEnum,
   PackageSummary,
   Parameter,
-  Pose,
-  ProjectLogicIf,
   ProjectParameter,
   ProjectRobotJoints,
   ReachabilityData,
@@ -39,6 +35,8 @@ import type {
   TraceEntry,
   UserPresenceData,
 } from "../protocol/types";
+import { initialRuntime, type Runtime } from "./runtime";
+import { initialUi, type Ui } from "./ui";
 
 /** `joining`: connected and loading. `lost`: reconnecting. */
 export type ConnectionStatus = "left" | "connecting" | "joining" | "ready" | "lost" | "refused";
@@ -47,6 +45,8 @@ export interface Connection {
   status: ConnectionStatus;
   /** Why it is lost or refused, as a sentence. */
   reason: string;
+  /** The server refused the connection because of a missing or invalid token. */
+  needsToken: boolean;
   user: string;
   /** Role from 1 to 5, given by the token. */
   role: number;
@@ -148,73 +148,12 @@ export interface Notice {
   time: number;
 }
 
-/** `terminal`: START or END of the program. */
-export type Kind = "object" | "point" | "orientation" | "joints" | "action" | "logic" | "terminal";
-
-export interface Selection {
-  kind: Kind;
-  id: string;
-}
-
-/** View mode of the open project. */
-export type Mode = "3d" | "flow" | "split" | "code";
-
-/** A connection in progress: the next tap ends it. */
-export interface Connecting {
-  from: string;
-  /** Its condition; by default a free one. */
-  condition?: ProjectLogicIf;
-  /** The existing connection whose target is changed. */
-  item?: string;
-}
-
-/** The ghost: a robot shown at another pose. */
-export interface Ghost {
-  robotId: string;
-  joints: Joint[];
-  /** Pose of its base in the world; by default that of the robot. */
-  at?: Pose | undefined;
-  /** Why the robot cannot reach it, as a sentence; empty if it can. */
-  problem: string;
-}
-
-/** A change that has not been sent to the server: shown locally, and to others as a preview. */
-export interface Draft {
-  id: string;
-  /** The item before the change; the next event about it ends the draft. */
-  of: unknown;
-  /** Pose in the frame in which it is stored. */
-  pose: Pose;
-  /** Its previous type, and its new shape. */
-  type?: unknown;
-  model?: ObjectModel;
-}
-
-export interface Ui {
-  selection: Selection | null;
-  /** The item at the crosshair. */
-  aimed?: string | undefined;
-  draft?: Draft | undefined;
-  mode: Mode;
-  connecting: Connecting | null;
-  /** Whether the view follows the running action. */
-  follow: boolean;
-  ghost: Ghost | null;
-  /** The open tool of the rail. */
-  tool: string;
-  theme: "system" | "light" | "dark";
-  /** Whether the system uses a dark theme. */
-  systemDark: boolean;
-  leftHanded: boolean;
-  quality: "auto" | "low" | "high";
-  /** The dialog that is open over the screen. */
-  overlay: "" | "search" | "about" | "messages";
-  /** Tabs that were open last. */
-  robotTab: "tool" | "joints" | "hand" | "go";
-  programTab: "add" | "steps" | "problems" | "parameters";
-  /** Keys of the actions and commands used last, newest first. */
-  recentActions: readonly string[];
-  recentCommands: readonly string[];
+/** Thumbnail of a document. */
+export interface Thumbnail {
+  /** Data URL; empty if there is none. */
+  picture: string;
+  /** Whether a user chose it, so that saving does not replace it. */
+  own: boolean;
 }
 
 export interface State {
@@ -247,7 +186,10 @@ export interface State {
   notices: Notice[];
   /** All messages since the page was opened, including dismissed ones and finished tasks; newest last. */
   messageLog: Notice[];
+  /** By document, loaded when they are needed. */
+  thumbnails: Record<string, Thumbnail>;
   ui: Ui;
+  runtime: Runtime;
 }
 
 export const OFFLINE: Live = {
@@ -276,7 +218,7 @@ export const NO_PROGRAM: Program = {
 
 export function initialState(): State {
   return {
-    connection: { status: "left", reason: "", user: "", role: 5, server: null },
+    connection: { status: "left", reason: "", needsToken: false, user: "", role: 5, server: null },
     lists: { scenes: null, projects: null, packages: null, shown: "ProjectsList", highlight: "" },
     types: { byName: {}, robots: {}, actions: {} },
     doc: null,
@@ -295,22 +237,8 @@ export function initialState(): State {
     notices: [],
     messageLog: [],
     dynamicValues: {},
-    ui: {
-      selection: null,
-      mode: "3d",
-      connecting: null,
-      follow: false,
-      ghost: null,
-      tool: "",
-      theme: "system",
-      systemDark: false,
-      leftHanded: false,
-      quality: "auto",
-      overlay: "",
-      robotTab: "tool",
-      programTab: "add",
-      recentActions: [],
-      recentCommands: [],
-    },
+    thumbnails: {},
+    runtime: initialRuntime(),
+    ui: initialUi(),
   };
 }

@@ -4,7 +4,8 @@ import { useStore } from "zustand";
 import { createStore } from "zustand/vanilla";
 import type { ServerEvent } from "../protocol/types";
 import { notice, reduce } from "./reduce";
-import { type Connection, initialState, type Notice, type Selection, type State, type Ui } from "./state";
+import { type Connection, initialState, type Notice, type State } from "./state";
+import type { Selection, Ui } from "./ui";
 
 export const store = createStore<State>(initialState);
 

@@ -8,7 +8,7 @@ function at(): { telemetry: Telemetry; go: (seconds: number) => void } {
 const joints = (value: number) => ({ robot_id: "r", joints: [{ name: "j", value }] });
 
 describe("joints", () => {
-  test("are drawn between the last two samples, and settle on the last", () => {
+  test("are interpolated between the last two samples and settle at the last one", () => {
     const { telemetry, go } = at();
     telemetry.takeJoints(joints(0));
     go(0.1);
@@ -20,7 +20,7 @@ describe("joints", () => {
     expect(telemetry.interpolated("r")).toEqual({ joints: new Map([["j", 1]]), settled: true });
   });
 
-  test("take as long as between their readings, however late they come", () => {
+  test("are interpolated over the time between their measurements, also if they arrive late", () => {
     const { telemetry, go } = at();
     telemetry.takeJoints({ ...joints(0), time_ms: 5000 });
     go(0.002);
@@ -29,7 +29,7 @@ describe("joints", () => {
     expect(telemetry.interpolated("r")?.joints.get("j")).toBeCloseTo(0.25);
   });
 
-  test("after a pause are where they are, without a journey through the pause", () => {
+  test("are not interpolated after a pause", () => {
     const { telemetry, go } = at();
     telemetry.takeJoints(joints(0));
     go(5);
@@ -37,7 +37,7 @@ describe("joints", () => {
     expect(telemetry.interpolated("r")).toEqual({ joints: new Map([["j", 1]]), settled: true });
   });
 
-  test("of an arm at rest are settled, however often they come", () => {
+  test("of a robot at standstill are settled, at any rate of samples", () => {
     const { telemetry, go } = at();
     telemetry.takeJoints(joints(1));
     go(0.03);
@@ -48,7 +48,7 @@ describe("joints", () => {
     expect(telemetry.interpolated("r")?.settled).toBe(false);
   });
 
-  test("that come as often as is drawn are drawn at once", () => {
+  test("that arrive as often as frames are drawn are drawn at once", () => {
     const { telemetry, go } = at();
     telemetry.takeJoints(joints(0));
     go(1 / 30);
@@ -57,7 +57,7 @@ describe("joints", () => {
     expect(telemetry.interpolated("r", 1 / 60)?.settled).toBe(false);
   });
 
-  test("grow old, and are forgotten when the scene goes offline", () => {
+  test("become outdated, and are cleared when the scene goes offline", () => {
     const { telemetry, go } = at();
     expect(telemetry.age("r")).toBe(Infinity);
     telemetry.takeJoints(joints(0));

@@ -4,7 +4,8 @@ import { t } from "@lingui/core/macro";
 import type { ObjectModel, Pose } from "../protocol/types";
 import { whyUnavailable } from "../store/permissions";
 import { heldBy, isOnline, isRunning } from "../store/selectors";
-import type { Selection, State } from "../store/state";
+import type { State } from "../store/state";
+import type { Selection } from "../store/ui";
 import { composed, ORIGIN, worldOf } from "../viewmodel/frames";
 import type { FrameName } from "./placing";
 

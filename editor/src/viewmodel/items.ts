@@ -5,7 +5,8 @@ import type { Item, LinkItem, RobotItem, Shape } from "../engine/items";
 import { reachOfAction, worse } from "../program/reach";
 import type { LogicItem, ObjectTypeMeta, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
-import type { Draft, Ghost, OpenDocument, State } from "../store/state";
+import type { OpenDocument, State } from "../store/state";
+import type { Draft, Ghost } from "../store/ui";
 import { faintness } from "./visibility";
 
 export const START = "START";

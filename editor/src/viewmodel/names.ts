@@ -2,7 +2,8 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
-import type { Kind, Selection, State } from "../store/state";
+import type { State } from "../store/state";
+import type { Kind, Selection } from "../store/ui";
 
 const KINDS: Record<Kind, MessageDescriptor> = {
   object: msg`Object`,

@@ -2,7 +2,8 @@
 
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
-import type { Kind, State } from "../store/state";
+import type { State } from "../store/state";
+import type { Kind } from "../store/ui";
 import { GROUPS, type Group } from "./visibility";
 
 export interface Row {

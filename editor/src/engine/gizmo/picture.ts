@@ -36,6 +36,8 @@ export class Picture {
     string,
     { handle: Handle; group: Group; material: MeshBasicMaterial; color: Color }
   >();
+  /** Textures of the letters, drawn when they are needed. */
+  private readonly letters = new Map<Axis, CanvasTexture>();
 
   constructor(scene: Scene) {
     // Not pickable: the gizmo finds its handles itself.
@@ -64,7 +66,7 @@ export class Picture {
         side: DoubleSide,
       });
       if (handle.do === "plane") material.opacity = 0.55;
-      const group = shape(handle, material);
+      const group = shape(handle, material, (axis) => this.letter(axis));
       group.traverse((each) => {
         each.renderOrder = ABOVE_ALL;
       });
@@ -99,10 +101,18 @@ export class Picture {
     this.root.removeFromParent();
     for (const { group } of this.parts.values()) disposeTree(group);
     this.parts.clear();
+    for (const texture of this.letters.values()) texture.dispose();
+    this.letters.clear();
+  }
+
+  private letter(axis: Axis): CanvasTexture {
+    const texture = this.letters.get(axis) ?? letterOf(axis);
+    this.letters.set(axis, texture);
+    return texture;
   }
 }
 
-function shape(handle: Handle, material: MeshBasicMaterial): Group {
+function shape(handle: Handle, material: MeshBasicMaterial, letterOf: (axis: Axis) => CanvasTexture): Group {
   const group = new Group();
   const add = (geometry: BufferGeometry) => group.add(new Mesh(geometry, material));
   switch (handle.do) {
@@ -150,12 +160,8 @@ function towards(axis: Axis): Matrix4 {
   return new Matrix4();
 }
 
-const letters = new Map<Axis, CanvasTexture>();
-
-/** Textures of the letters, drawn once. */
+/** Return a texture with the letter of an axis. */
 function letterOf(axis: Axis): CanvasTexture {
-  const known = letters.get(axis);
-  if (known) return known;
   const canvas = document.createElement("canvas");
   canvas.width = canvas.height = 64;
   const context = canvas.getContext("2d");
@@ -172,6 +178,5 @@ function letterOf(axis: Axis): CanvasTexture {
   }
   const texture = new CanvasTexture(canvas);
   texture.colorSpace = SRGBColorSpace;
-  letters.set(axis, texture);
   return texture;
 }

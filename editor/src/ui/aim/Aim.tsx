@@ -6,7 +6,7 @@ import { useEffect, useRef } from "react";
 import { storeGeneralState } from "../../commands/viewstate";
 import { bearingOf } from "../../engine/bearing";
 import type { Engine } from "../../engine/engine";
-import { followCrosshair, nextCandidate, useAiming } from "../../session/aiming";
+import { followCrosshair, nextCandidate } from "../../session/aiming";
 import { now, useEditor } from "../../store/store";
 import { kindName, nameOf, selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
@@ -16,18 +16,18 @@ import { pick } from "../workplace/pick";
 const NOTHING = msg`Nothing at the crosshair. Turn the view.`;
 
 export function takeCandidate(): void {
-  const { chosen } = useAiming.getState();
+  const { chosen } = now().ui.crosshair;
   if (chosen) pick([chosen]);
 }
 
 export function Aim({ engine }: { engine: Engine }) {
-  const { candidates, chosen, listed } = useAiming();
+  const { candidates, chosen, listed } = useEditor((state) => state.ui.crosshair);
   const name = useEditor((state) => nameOf(state, chosen));
   const mark = useRef<HTMLSpanElement>(null);
   useEffect(
     () =>
       followCrosshair(engine, () => {
-        const { chosen: at } = useAiming.getState();
+        const { chosen: at } = now().ui.crosshair;
         const place = at ? bearingOf(engine, at) : null;
         if (!mark.current) return;
         mark.current.style.visibility = place?.inView ? "visible" : "hidden";

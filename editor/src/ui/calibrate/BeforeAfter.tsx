@@ -2,8 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
-import { useStore } from "zustand";
-import { before, keepPlace, placeAt } from "../../commands/calibrate";
+import { forgetOldPose, placeAt } from "../../commands/calibrate";
 import { hideGhost, showStanding } from "../../commands/robot";
 import { now, useEditor } from "../../store/store";
 import { notMovable } from "../../transform/target";
@@ -15,12 +14,12 @@ import { RefusedText, useRefusal } from "../points/Refusal";
 const NOTHING = 1e-6;
 
 export function BeforeAfter({ id }: { id: string }) {
-  const { id: of, pose: was } = useStore(before);
+  const was = useEditor(({ ui }) => (ui.beforeCalibration?.id === id ? ui.beforeCalibration.pose : null));
   const pose = useEditor((state) => state.doc?.objects[id]?.pose);
   const isRobot = useEditor((state) => (state.doc?.objects[id]?.type ?? "") in state.types.robots);
   const why = useEditor((state) => notMovable(state, { kind: "object", id }));
   const { refused, busy, ask } = useRefusal();
-  const moved = of === id && was && pose ? apart(was, pose) : null;
+  const moved = was && pose ? apart(was, pose) : null;
   const shown = moved !== null && (moved.distance > NOTHING || moved.degrees > NOTHING);
   useEffect(() => {
     if (!shown || !isRobot || !was) return;
@@ -37,13 +36,13 @@ export function BeforeAfter({ id }: { id: string }) {
         {isRobot && <span className="quiet small"> {t`Transparent: previous pose.`}</span>}
       </p>
       <div className="actions start">
-        <Button look="primary" onPress={keepPlace}>
+        <Button look="primary" onPress={forgetOldPose}>
           {t`Keep the new pose`}
         </Button>
         <Button
           why={why}
           isDisabled={busy}
-          onPress={() => void ask(placeAt(id, was)).then((done) => done && keepPlace())}
+          onPress={() => void ask(placeAt(id, was)).then((done) => done && forgetOldPose())}
         >
           {t`Restore the old pose`}
         </Button>

@@ -3,7 +3,8 @@
 import { msg } from "@lingui/core/macro";
 import type { SceneObject } from "../../protocol/types";
 import { derivesFrom } from "../../store/selectors";
-import type { Selection, State } from "../../store/state";
+import type { State } from "../../store/state";
+import type { Selection } from "../../store/ui";
 import { lazyComponent } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 

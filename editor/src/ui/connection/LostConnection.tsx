@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
-import { client } from "../../session/connection";
+import { theClient } from "../../session/connection";
 import { notify, now, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
@@ -33,7 +33,7 @@ export function LostConnection() {
               .join(" ")}
       </p>
       {status === "lost" && (
-        <Button look="plain" onPress={() => client.hurry()}>
+        <Button look="plain" onPress={() => theClient().reconnectNow()}>
           {t`Try now`}
         </Button>
       )}

@@ -5,7 +5,7 @@ import { useRef, useState } from "react";
 import * as documents from "../../commands/documents";
 import { downloadPackage } from "../../commands/packages";
 import { runPackage } from "../../commands/run";
-import { keepOwnPicture, useOwn } from "../../commands/thumbnail";
+import { keepOwnPicture } from "../../commands/thumbnail";
 import { storeGeneralState } from "../../commands/viewstate";
 import type { Entry } from "../../home/entries";
 import type { Requests, Run } from "../../protocol/types";
@@ -17,7 +17,6 @@ import { Button } from "../kit/kit";
 import { AskName, More } from "../kit/lazyControls";
 import type { Choice } from "../kit/props";
 import { endName } from "../run/History";
-import { ago } from "../times";
 import { Deleting } from "./Deleting";
 import { favoritesOf } from "./favorites";
 import { Inline } from "./Inline";
@@ -73,7 +72,7 @@ export function Card({ entry, marked, taken, onRelated, onProject }: CardProps) 
     kind === "package" ? state.program.runs.find((each) => each.package_id === id) : undefined,
   );
   const template = useEditor((state) => isTemplate(state, id));
-  const own = useOwn((all) => all[id] ?? false);
+  const own = useEditor((state) => state.thumbnails[id]?.own ?? false);
   const picture = useRef<HTMLInputElement>(null);
   const storePicture = (file: File | null) =>
     void keepOwnPicture(id, file).then((wrong) => wrong && notify("error", wrong));

@@ -1,22 +1,19 @@
 /** The thumbnail of a document; loaded when the tile becomes visible, and again after a save. */
 
 import { useEffect, useRef } from "react";
-import { readThumbnail, useThumbnails } from "../../commands/thumbnail";
-
-/** Save times of the documents whose thumbnail was requested. */
-const asked = new Map<string, string>();
+import { loadThumbnailOnce } from "../../commands/thumbnail";
+import { useEditor } from "../../store/store";
 
 export function Thumbnail({ id, time }: { id: string; time: string }) {
-  const picture = useThumbnails((all) => all[id]) ?? "";
+  const picture = useEditor((state) => state.thumbnails[id]?.picture) ?? "";
   const place = useRef<HTMLDivElement>(null);
   useEffect(() => {
     const element = place.current;
-    if (!element || asked.get(id) === time) return;
+    if (!element) return;
     const watch = new IntersectionObserver((seen) => {
       if (!seen.some((each) => each.isIntersecting)) return;
       watch.disconnect();
-      asked.set(id, time);
-      readThumbnail(id).catch(() => asked.delete(id)); // the tile keeps the old picture, or none
+      loadThumbnailOnce(id, time);
     });
     watch.observe(element);
     return () => watch.disconnect();

@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { peopleHere, remember, remembered } from "../../session/localStorage";
-import { session } from "../../session/session";
+import { theSession } from "../../session/session";
 import { useEditor } from "../../store/store";
 import { Button, Field, Waiting } from "../kit/kit";
 import "./join.css";
@@ -21,7 +21,7 @@ export function Join() {
     setName(clean);
     remember("name", clean);
     remember("token", token.trim());
-    session.join(clean, token.trim());
+    theSession().join(clean, token.trim());
   };
   const submit = (event: FormEvent) => {
     event.preventDefault();

@@ -8,7 +8,7 @@ import { useEffect, useState } from "react";
 import * as commands from "../../commands/run";
 import { storeGeneralState } from "../../commands/viewstate";
 import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
-import { session } from "../../session/session";
+import { theSession } from "../../session/session";
 import { usersOfDocument } from "../../store/absentUsers";
 import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
@@ -67,8 +67,8 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
   const { tone, word, icon } = shownState(state, starting, result);
   // The shown screen is not part of the state, so the session does not notice the change by itself.
   useEffect(() => {
-    session.reportPresence();
-    return () => session.reportPresence();
+    theSession().reportPresence();
+    return () => theSession().reportPresence();
   }, []);
   const opened = doc && !runs ? (doc.project?.name ?? doc.scene.name) : "";
   const users = usersOfDocument(state);
@@ -102,12 +102,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
           <Icon name={icon} size={56} />
           <div>
             <p className="operator-word">{word}</p>
-            {doing && (
-              <p>
-                {program.state === "paused" ? "before " : ""}
-                {doing}
-              </p>
-            )}
+            {doing && <p>{program.state === "paused" ? t`before ${doing}` : doing}</p>}
             {run && result && (
               <p>
                 {result.name}, {ago(run.ended ?? run.started)}

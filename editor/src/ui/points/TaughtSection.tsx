@@ -10,8 +10,8 @@ import {
 } from "../../commands/points";
 import { chosenRobot, notReady } from "../../commands/robot";
 import { theEngine } from "../../session/engine";
-import type { Kind } from "../../store/state";
 import { now, select, useEditor } from "../../store/store";
+import type { Kind } from "../../store/ui";
 import { relativeTo, worldOf } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";

@@ -1,7 +1,7 @@
 /** Sections of the panel about points, orientations and joints. */
 
 import { msg } from "@lingui/core/macro";
-import type { Kind } from "../../store/state";
+import type { Kind } from "../../store/ui";
 import { lazyComponent } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 

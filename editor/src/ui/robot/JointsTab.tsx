@@ -44,12 +44,12 @@ export function shownJoints(robotId: string, joints: readonly Joint[]): ShownJoi
 
 export function JointsTab({ chosen }: { chosen: Chosen }) {
   const { robotId, armId } = chosen;
-  const { way, angle, distance, speed } = useMotionOptions();
+  const { press, angle, distance, speed } = useMotionOptions();
   const features = useEditor((state) => featuresOf(state, robotId));
   const why = useEditor((state) => notReady(state, chosen, "MoveToJoints"));
   const joints = useTelemetry(robotId, () => telemetry.latest(robotId)?.joints);
   const [refused, setRefused] = useState("");
-  const hold = way === "hold" && features?.jog === true;
+  const hold = press === "hold" && features?.jog === true;
   const cannot = why || (hold || features?.move_to_joints ? "" : t`This robot cannot move to joint positions.`);
   if (!joints) return <p className="quiet">{t`The robot reports no joint positions.`}</p>;
   const shown = shownJoints(
@@ -77,7 +77,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
         label={t`Mode`}
         quiet
         value={hold ? "hold" : "step"}
-        onChange={(next) => setMotionOptions({ way: next })}
+        onChange={(next) => setMotionOptions({ press: next })}
         choices={
           features?.jog
             ? [
@@ -136,7 +136,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
                     <Button
                       key={sign}
                       aria-label={words}
-                      why={cannot || beyond(joint, joint.value + sign * step)}
+                      why={cannot || whyOutsideLimits(joint, joint.value + sign * step)}
                       onPress={() =>
                         go(joint.name, (telemetry.latest(robotId)?.joints.get(joint.name) ?? joint.value) + sign * step)
                       }
@@ -163,7 +163,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
   );
 }
 
-function beyond({ name, lower, upper, scale, unit }: ShownJoint, value: number): string {
+function whyOutsideLimits({ name, lower, upper, scale, unit }: ShownJoint, value: number): string {
   if (value >= lower && value <= upper) return "";
   const [shownName, least, most] = [name.replaceAll("_", " "), (lower * scale).toFixed(0), (upper * scale).toFixed(0)];
   return t`Limits of ${shownName}: ${least} to ${most} ${unit}.`;

@@ -15,20 +15,13 @@ import {
 } from "../../commands/robot";
 import type { Pose, Position, StepAxis } from "../../protocol/types";
 import { now, useEditor } from "../../store/store";
+import type { Jogging } from "../../store/ui";
 import { worldOf } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
 import { Amount, OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { HoldButton } from "./HoldButton";
-import {
-  ANGLES,
-  DISTANCES,
-  FASTEST,
-  type FrameName,
-  motionOptions,
-  setMotionOptions,
-  useMotionOptions,
-} from "./motionOptions";
+import { ANGLES, DISTANCES, FASTEST, motionOptions, setMotionOptions, useMotionOptions } from "./motionOptions";
 import { HOLD_HINT, PadDock } from "./PadDock";
 
 const AXES: readonly StepAxis[] = ["x", "y", "z"];
@@ -40,7 +33,7 @@ function framed(kind: string | undefined): boolean {
 }
 
 export function ToolTab({ chosen }: { chosen: Chosen }) {
-  const { frame, way, what, distance, angle, speed } = useMotionOptions();
+  const { frame, press: pressed, what, distance, angle, speed } = useMotionOptions();
   const selection = useEditor((state) => state.ui.selection);
   const selected = useEditor((state) =>
     framed(selection?.kind) && selection && selection.id !== chosen.robotId ? nameOf(state, selection.id) : "",
@@ -48,8 +41,8 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
   const features = useEditor((state) => featuresOf(state, chosen.robotId));
   const why = useEditor((state) => notReady(state, chosen, "StepRobotEef"));
   const [refused, setRefused] = useState("");
-  const hold = way === "hold" && features?.jog === true;
-  const used: FrameName = frame === "selected" && !selected ? "world" : frame;
+  const hold = pressed === "hold" && features?.jog === true;
+  const used: Jogging["frame"] = frame === "selected" && !selected ? "world" : frame;
   const turning = what === "orientation";
   const cannot = why || (hold || features?.move_to_pose ? "" : t`This robot cannot move to poses.`);
 
@@ -93,7 +86,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
         label={t`Mode`}
         quiet
         value={hold ? "hold" : "step"}
-        onChange={(next) => setMotionOptions({ way: next })}
+        onChange={(next) => setMotionOptions({ press: next })}
         choices={
           features?.jog
             ? [
@@ -186,7 +179,7 @@ export function ToolTab({ chosen }: { chosen: Chosen }) {
 }
 
 /** Return the pose in the world of the frame whose axes are used; undefined for frames that the server knows. */
-function poseOf(frame: FrameName, chosen: Chosen): Pose | undefined {
+function poseOf(frame: Jogging["frame"], chosen: Chosen): Pose | undefined {
   if (frame === "tool") return effectorPose(chosen);
   const { doc, ui } = now();
   return frame === "selected" && doc ? worldOf(doc, ui.selection?.id) : undefined;

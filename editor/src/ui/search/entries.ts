@@ -8,7 +8,7 @@ import { storeGeneralState } from "../../commands/viewstate";
 import { aimsAlways } from "../../session/aiming";
 import { theEngine } from "../../session/engine";
 import { remember } from "../../session/localStorage";
-import { session } from "../../session/session";
+import { theSession } from "../../session/session";
 import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
@@ -149,6 +149,6 @@ function everywhere(state: State): Entry[] {
       why: "",
       act: () => openOverlay("about"),
     },
-    { id: "leave", words: t`Leave`, detail: t`command`, why: "", act: () => session.leave() },
+    { id: "leave", words: t`Leave`, detail: t`command`, why: "", act: () => theSession().leave() },
   ];
 }

@@ -1,7 +1,7 @@
 /** Which dialog is open over the screen. */
 
-import type { Ui } from "../../store/state";
 import { setUi, useEditor } from "../../store/store";
+import type { Ui } from "../../store/ui";
 
 export type Overlay = Ui["overlay"];
 

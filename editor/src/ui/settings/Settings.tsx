@@ -4,9 +4,9 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { remember, remembered } from "../../session/localStorage";
-import { session } from "../../session/session";
-import type { Ui } from "../../store/state";
+import { theSession } from "../../session/session";
 import { setUi, useEditor } from "../../store/store";
+import type { Ui } from "../../store/ui";
 import { More } from "../kit/lazyControls";
 import type { Choice } from "../kit/props";
 import { openOverlay } from "../search/overlay";
@@ -68,7 +68,7 @@ export function Settings() {
     },
     { id: "messages", label: t`Messages`, icon: "list", act: () => openOverlay("messages") },
     { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
-    { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: () => session.leave() },
+    { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: () => theSession().leave() },
   ];
   return <More label={t`Settings`} icon="settings" choices={choices} />;
 }

@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { ListBox, ListBoxItem } from "react-aria-components";
 import { storeGeneralState } from "../../commands/viewstate";
-import { aimsAlways, listAimed, useAiming } from "../../session/aiming";
+import { aimsAlways, chooseCandidate, listAimed } from "../../session/aiming";
 import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
 import { kindName, nameOf, selectionOf } from "../../viewmodel/names";
@@ -14,7 +14,7 @@ import { pick } from "../workplace/pick";
 import { ICONS } from "./ThingTree";
 
 export function AtCrosshair() {
-  const { candidates, chosen } = useAiming();
+  const { candidates, chosen } = useEditor((state) => state.ui.crosshair);
   const always = useEditor(aimsAlways);
   useEffect(listAimed, []);
   return (
@@ -36,7 +36,7 @@ export function AtCrosshair() {
               textValue={nameOf(state, id)}
               className="thing"
               data-chosen={id === chosen}
-              onHoverStart={() => useAiming.setState({ chosen: id })}
+              onHoverStart={() => chooseCandidate(id)}
             >
               <Icon name={ICONS[kind]} />
               <span className="thing-name">{nameOf(state, id)}</span>

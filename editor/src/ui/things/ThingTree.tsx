@@ -5,8 +5,8 @@ import { Button, Collection, Tree, TreeItem, TreeItemContent } from "react-aria-
 import { storeViewState } from "../../commands/viewstate";
 import { theEngine } from "../../session/engine";
 import { heldBy } from "../../store/selectors";
-import type { Kind } from "../../store/state";
 import { now, select, setUi, useEditor } from "../../store/store";
+import type { Kind } from "../../store/ui";
 import { selectionOf } from "../../viewmodel/names";
 import { flat, type Row } from "../../viewmodel/things";
 import { Icon, type IconName } from "../kit/icons";

@@ -8,8 +8,9 @@ import { storeGeneralState } from "../../commands/viewstate";
 import type { GizmoMode } from "../../engine/gizmo/handles";
 import { translated } from "../../i18n/choices";
 import type { ObjectModel, Pose } from "../../protocol/types";
-import type { Selection, State } from "../../store/state";
+import type { State } from "../../store/state";
 import { notify, now, useEditor } from "../../store/store";
+import type { Selection } from "../../store/ui";
 import {
   ANGLE_STEPS,
   type AngleUnit,

@@ -7,7 +7,7 @@ import { followItemRequests } from "../../commands/handover";
 import { storeGeneralState, storeViewState } from "../../commands/viewstate";
 import type { ViewMode, ViewName, Viewpoint } from "../../engine/camera";
 import type { Engine } from "../../engine/engine";
-import { aimsAlways, useAiming } from "../../session/aiming";
+import { aimsAlways } from "../../session/aiming";
 import { now, useEditor } from "../../store/store";
 import { Aim } from "../aim/Aim";
 import { OffScreen } from "../aim/OffScreen";
@@ -56,7 +56,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
   const [naming, setNaming] = useState(false);
   const bookmarks = bookmarksOf(stored);
   const always = useEditor(aimsAlways);
-  const listed = useAiming((state) => state.listed);
+  const listed = useEditor((state) => state.ui.crosshair.listed);
   useCrosshairKey();
   useEffect(followItemRequests, []);
   const change = (next: ViewMode) => {

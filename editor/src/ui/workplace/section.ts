@@ -2,7 +2,8 @@
 
 import type { MessageDescriptor } from "@lingui/core";
 import type { ComponentType } from "react";
-import type { Selection, State } from "../../store/state";
+import type { State } from "../../store/state";
+import type { Selection } from "../../store/ui";
 
 export interface Section {
   id: string;

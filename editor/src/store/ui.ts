@@ -1,0 +1,173 @@
+/** The state of the screen: what the user selects, changes and sees. Other users and the server do not share it. */
+
+import type { Joint, ObjectModel, Pose, Position, ProjectLogicIf } from "../protocol/types";
+
+/** `terminal`: START or END of the program. */
+export type Kind = "object" | "point" | "orientation" | "joints" | "action" | "logic" | "terminal";
+
+export interface Selection {
+  kind: Kind;
+  id: string;
+}
+
+/** View mode of the open project. */
+export type Mode = "3d" | "flow" | "split" | "code";
+
+/** A connection in progress: the next tap ends it. */
+export interface Connecting {
+  from: string;
+  /** Its condition; by default a free one. */
+  condition?: ProjectLogicIf;
+  /** The existing connection whose target is changed. */
+  item?: string;
+}
+
+/** The ghost: a robot shown at another pose. */
+export interface Ghost {
+  robotId: string;
+  joints: Joint[];
+  /** Pose of its base in the world; by default that of the robot. */
+  at?: Pose | undefined;
+  /** Why the robot cannot reach it, as a sentence; empty if it can. */
+  problem: string;
+}
+
+/** A change that has not been sent to the server: shown locally, and to others as a preview. */
+export interface Draft {
+  id: string;
+  /** The item before the change; the next event about it ends the draft. */
+  of: unknown;
+  /** Pose in the frame in which it is stored. */
+  pose: Pose;
+  /** Its previous type, and its new shape. */
+  type?: unknown;
+  model?: ObjectModel;
+  /** The user is still changing it: events about the item do not end the draft. */
+  continues?: boolean;
+}
+
+/** The crosshair in the middle of the view. */
+export interface Crosshair {
+  /** Whether a list of the candidates is open. */
+  listed: boolean;
+  /** Ids, most likely first. */
+  candidates: string[];
+  chosen: string;
+}
+
+/** Options of a motion; `speed` is relative to the maximum of the robot. */
+export interface MotionOptions {
+  speed: number;
+  safe: boolean;
+  linear: boolean;
+}
+
+/** How the user moves robots. */
+export interface Jogging extends MotionOptions {
+  /** `selected`: the frame of the selected item. */
+  frame: "world" | "robot" | "tool" | "selected";
+  /** Step per press, or hold to move. */
+  press: "step" | "hold";
+  what: "position" | "orientation";
+  /** Step sizes, m and rad. */
+  distance: number;
+  angle: number;
+}
+
+/** A running measurement of an object by its focus points. It continues while other panels are open. */
+export interface Measurement {
+  objectId: string;
+  /** Numbers of the recorded points. */
+  recorded: readonly number[];
+  /** Tool positions at the recorded points, for the preview of the fit. */
+  touched: Record<number, Position>;
+  /** Null until there are enough points. */
+  fit: Fit | null;
+}
+
+/** How well the touched points fit to the known ones. */
+export interface Fit {
+  /** Whether there are enough points for the errors to be meaningful. */
+  checked: boolean;
+  /** Root mean square of the errors, and the largest one, m. */
+  rms: number;
+  worst: number;
+  worstPoint: number;
+}
+
+/** A form that is not saved: name of the new object, and JSON of each setting that differs from its default. */
+export interface FormDraft {
+  name?: string;
+  values: Record<string, string>;
+}
+
+export interface Ui {
+  selection: Selection | null;
+  /** The item at the crosshair. */
+  aimed?: string | undefined;
+  draft?: Draft | undefined;
+  mode: Mode;
+  connecting: Connecting | null;
+  /** Whether the view follows the running action. */
+  follow: boolean;
+  ghost: Ghost | null;
+  /** The open tool of the rail. */
+  tool: string;
+  theme: "system" | "light" | "dark";
+  /** Whether the system uses a dark theme. */
+  systemDark: boolean;
+  leftHanded: boolean;
+  quality: "auto" | "low" | "high";
+  /** Step of the guided tour; null while it is closed. */
+  tour: number | null;
+  /** The dialog that is open over the screen. */
+  overlay: "" | "search" | "about" | "messages";
+  /** Settings as typed, by the id of the object or, for a new device, by the name of its type. */
+  forms: Record<string, FormDraft>;
+  /** Tabs that were open last. */
+  robotTab: "tool" | "joints" | "hand" | "go";
+  programTab: "add" | "steps" | "problems" | "parameters";
+  crosshair: Crosshair;
+  jogging: Jogging;
+  measurement: Measurement | null;
+  /** Pose of the last calibrated object before the calibration, until the user accepts or reverts the new one. */
+  beforeCalibration: { id: string; pose: Pose } | null;
+  /** Keys of the actions and commands used last, newest first. */
+  recentActions: readonly string[];
+  recentCommands: readonly string[];
+}
+
+export function initialUi(): Ui {
+  return {
+    selection: null,
+    mode: "3d",
+    connecting: null,
+    follow: false,
+    ghost: null,
+    tool: "",
+    theme: "system",
+    systemDark: false,
+    leftHanded: false,
+    quality: "auto",
+    overlay: "",
+    tour: null,
+    forms: {},
+    robotTab: "tool",
+    programTab: "add",
+    recentActions: [],
+    recentCommands: [],
+    crosshair: { listed: false, candidates: [], chosen: "" },
+    jogging: {
+      frame: "world",
+      press: "step",
+      what: "position",
+      distance: 0.01,
+      angle: 5 * (Math.PI / 180),
+      speed: 0.25,
+      safe: true,
+      linear: true,
+    },
+    measurement: null,
+    beforeCalibration: null,
+  };
+}
