@@ -2,9 +2,8 @@
 
 import { t } from "@lingui/core/macro";
 import type { Pivot, Pose, Position } from "../protocol/types";
-import { refusedWith } from "../session/assets";
 import { call } from "../session/connection";
-import { remembered } from "../session/localStorage";
+import { rest } from "../session/rest";
 import { now, setUi, store } from "../store/store";
 import { FLIPPED, pivotOffset } from "../transform/pivots";
 import { composed, ORIGIN } from "../viewmodel/frames";
@@ -148,20 +147,13 @@ export interface CalibrationRecord {
   residual_unit?: string;
 }
 
-async function rest<T>(path: string, options: RequestInit = {}): Promise<T> {
-  const token = remembered("token");
-  const headers: Record<string, string> = {
-    "Content-Type": "application/json",
-    ...(token ? { Authorization: `Bearer ${token}` } : {}),
-  };
-  const response = await fetch(path, { ...options, headers });
-  if (!response.ok) throw new Error(await refusedWith(response, t`The server refused the request`));
-  return (await response.json()) as T;
+async function json<T>(...request: Parameters<typeof rest>): Promise<T> {
+  return (await (await rest(...request)).json()) as T;
 }
 
 /** Return the newest calibrations of an object. */
 export const recordsOf = (object: string) =>
-  rest<CalibrationRecord[]>(`/api/calibrations?object_id=${encodeURIComponent(object)}&limit=3`);
+  json<CalibrationRecord[]>(`/api/calibrations?object_id=${encodeURIComponent(object)}&limit=3`);
 
 export interface TouchedFrame {
   pose: Pose;
@@ -178,9 +170,9 @@ export interface TouchedFrame {
 
 /** Return the frame of points with known coordinates that were touched in the same order. Nothing is stored. */
 export const frameByPoints = (known: Position[], touched: Position[]) =>
-  rest<TouchedFrame>("/api/calibration/touch/frame-by-points", {
+  json<TouchedFrame>("/api/calibration/touch/frame-by-points", {
     method: "PUT",
-    body: JSON.stringify({ known, touched }),
+    json: { known, touched },
   });
 
 /** Return the frame of three touched points: origin, a point on the x axis, a point in the xy plane. */
@@ -190,9 +182,9 @@ export const frameByAxes = (
   in_plane: Position[],
   record: { object_id: string; object_name: string },
 ) =>
-  rest<TouchedFrame>("/api/calibration/touch/frame-by-axes", {
+  json<TouchedFrame>("/api/calibration/touch/frame-by-axes", {
     method: "PUT",
-    body: JSON.stringify({ origin, on_x, in_plane, record }),
+    json: { origin, on_x, in_plane, record },
   });
 
 export const placeAt = (object_id: string, pose: Pose) =>

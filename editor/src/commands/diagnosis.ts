@@ -2,8 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { version } from "../../package.json";
-import { refusedWith } from "../session/assets";
-import { remembered } from "../session/localStorage";
+import { FILE_DEADLINE, rest } from "../session/rest";
 import { now } from "../store/store";
 import { saveAs } from "./files";
 import { refusal } from "./requests";
@@ -11,14 +10,9 @@ import { refusal } from "./requests";
 /** Save the file on this device. Return why it failed, or an empty string. */
 export function saveDiagnosis(): Promise<string> {
   return refusal(async () => {
-    const token = remembered("token");
-    const headers = { "Content-Type": "application/json", ...(token ? { Authorization: `Bearer ${token}` } : {}) };
-    const response = await fetch("/api/diagnosis", {
-      method: "POST",
-      headers,
-      body: JSON.stringify({ client: recorded() }),
-    });
-    if (!response.ok) throw new Error(await refusedWith(response, t`The diagnosis file is not available`));
+    const failure = t`The diagnosis file is not available`;
+    const given = { method: "POST", json: { client: recorded() }, failure, deadline: FILE_DEADLINE };
+    const response = await rest("/api/diagnosis", given);
     saveAs(await response.blob(), `diagnosis-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.zip`);
   });
 }

@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import { isHere } from "./invitation";
 
 test.each(["localhost", "cell.localhost", "127.0.0.1", "127.83.1.7", "[::1]", "0.0.0.0"])(
-  "%s leads others nowhere",
+  "%s is not an address for other devices",
   (host) => {
     expect(isHere(host)).toBe(true);
   },
@@ -15,6 +15,6 @@ test.each([
   "192.0.2.7",
   "cell-3",
   "[2001:db8::1]",
-])("%s may be told to others", (host) => {
+])("%s can be an address for other devices", (host) => {
   expect(isHere(host)).toBe(false);
 });

@@ -1,6 +1,6 @@
 /** How other users can join this server. */
 
-import { remembered } from "../session/localStorage";
+import { rest } from "../session/rest";
 
 export interface Joining {
   /** Addresses, best first; empty if only this computer can reach the server. */
@@ -11,11 +11,9 @@ export interface Joining {
 
 /** Request it from the server; an older server does not know it, so the address of this page is returned. */
 export async function loadInvitation(): Promise<Joining> {
-  const token = remembered("token");
   const here = isHere(location.hostname) ? [] : [location.origin];
   try {
-    const response = await fetch("/api/joining", { headers: token ? { Authorization: `Bearer ${token}` } : {} });
-    if (!response.ok) throw new Error(`${response.status}`);
+    const response = await rest("/api/joining");
     const { addresses, fingerprint } = (await response.json()) as Partial<Joining>;
     // The address of this page is known to work.
     return { addresses: [...new Set([...here, ...(addresses ?? [])])], fingerprint: fingerprint ?? "" };

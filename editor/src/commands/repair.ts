@@ -1,10 +1,9 @@
 /** Repair scenes that the server refuses to open because of problems. */
 
 import { t } from "@lingui/core/macro";
-import { refusedWith } from "../session/assets";
 import { call } from "../session/connection";
 import { loadLists } from "../session/lists";
-import { remembered } from "../session/localStorage";
+import { rest } from "../session/rest";
 import { now } from "../store/store";
 import { refusal } from "./requests";
 
@@ -16,15 +15,9 @@ interface StoredScene {
   objects: { name: string }[];
 }
 
-async function stored(path: string, options: RequestInit = {}): Promise<unknown> {
-  const token = remembered("token");
-  const headers = { "Content-Type": "application/json", ...(token ? { Authorization: `Bearer ${token}` } : {}) };
-  const response = await fetch(path, { ...options, headers });
-  if (!response.ok) throw new Error(await refusedWith(response, t`The server refused the request`));
-  return response.json();
+async function read(id: string): Promise<StoredScene> {
+  return (await (await rest(`/scenes/${encodeURIComponent(id)}`)).json()) as StoredScene;
 }
-
-const read = async (id: string) => (await stored(`/scenes/${encodeURIComponent(id)}`)) as StoredScene;
 
 /** Return the names of faulty objects of a scene; reject if no object is named. */
 export async function faultyObjects(id: string, problems: readonly string[]): Promise<string[]> {
@@ -43,7 +36,7 @@ export function removeObjects(id: string, name: string, objects: readonly string
     const scene = await read(id);
     await call("CopyScene", { source_id: id, target_name: copy });
     const remaining = { ...scene, objects: scene.objects.filter((each) => !objects.includes(each.name)) };
-    await stored("/scenes", { method: "PUT", body: JSON.stringify(remaining) });
+    await rest("/scenes", { method: "PUT", json: remaining });
     await loadLists(); // no event reports problems
   });
 }

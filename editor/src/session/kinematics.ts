@@ -1,6 +1,6 @@
 /** Kinematics used for a robot (docs/protocol.md). */
 
-import { remembered } from "./localStorage";
+import { rest } from "./rest";
 
 export interface RobotKinematics {
   object_id: string;
@@ -10,10 +10,7 @@ export interface RobotKinematics {
 }
 
 /** Request the kinematics of a robot of the open scene; reject without an answer. */
-export async function readKinematics(robotId: string, signal: AbortSignal): Promise<RobotKinematics> {
-  const token = remembered("token");
-  const headers: HeadersInit = token ? { Authorization: `Bearer ${token}` } : {};
-  const response = await fetch(`/api/robots/${encodeURIComponent(robotId)}/kinematics`, { headers, signal });
-  if (!response.ok) throw new Error(`no kinematics of ${robotId} (${response.status})`);
+export async function readKinematics(robotId: string): Promise<RobotKinematics> {
+  const response = await rest(`/api/robots/${encodeURIComponent(robotId)}/kinematics`);
   return (await response.json()) as RobotKinematics;
 }

@@ -2,22 +2,15 @@
 
 import { t } from "@lingui/core/macro";
 import type { Position } from "../protocol/types";
-import { refusedWith } from "./assets";
-import { remembered } from "./localStorage";
+import { rest } from "./rest";
 
 /** Return the id of the first obstacle on a straight path; null if it is free. Reject with a sentence. */
-export async function metBy(from: Position, to: Position): Promise<string | null> {
-  const token = remembered("token");
-  const headers: HeadersInit = {
-    "Content-Type": "application/json",
-    ...(token ? { Authorization: `Bearer ${token}` } : {}),
-  };
-  const response = await fetch("/utils/line-safe", {
+export async function obstacleOn(from: Position, to: Position): Promise<string | null> {
+  const response = await rest("/utils/line-safe", {
     method: "PUT",
-    headers,
-    body: JSON.stringify({ pt1: from, pt2: to }),
+    json: { pt1: from, pt2: to },
+    failure: t`The path cannot be checked`,
   });
-  if (!response.ok) throw new Error(await refusedWith(response, t`The path cannot be checked`));
   const { safe, object_id } = (await response.json()) as { safe: boolean; object_id?: string };
   return safe ? null : (object_id ?? "");
 }

@@ -3,8 +3,8 @@
 import { t } from "@lingui/core/macro";
 import { useCallback, useEffect, useMemo, useState } from "react";
 import * as documents from "../../commands/documents";
-import { refusedWith } from "../../session/assets";
-import { remembered } from "../../session/localStorage";
+import { sentence } from "../../commands/requests";
+import { FILE_DEADLINE, rest } from "../../session/rest";
 import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import { notify, select, useEditor } from "../../store/store";
@@ -16,10 +16,9 @@ import "./code.css";
 type Code = { source: string } | { problem: string };
 
 async function scriptOf(projectId: string): Promise<Code> {
-  const token = remembered("token");
-  const headers: HeadersInit = token ? { Authorization: `Bearer ${token}` } : {};
-  const response = await fetch(`/project/publish?projectId=${encodeURIComponent(projectId)}`, { headers });
-  if (!response.ok) return { problem: await refusedWith(response, t`The program cannot be loaded`) };
+  const failure = t`The program cannot be loaded`;
+  const path = `/project/publish?projectId=${encodeURIComponent(projectId)}`;
+  const response = await rest(path, { failure, deadline: FILE_DEADLINE });
   const source = await textOfZip(await response.arrayBuffer(), "script.py");
   return source === undefined ? { problem: t`The package has no script.` } : { source };
 }
@@ -41,7 +40,7 @@ export default function CodeView() {
     let ended = false;
     scriptOf(id).then(
       (found) => ended || setCode(found),
-      (error: unknown) => ended || setCode({ problem: String(error) }),
+      (error: unknown) => ended || setCode({ problem: sentence(error) }),
     );
     return () => {
       ended = true;

@@ -163,12 +163,12 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
 /** Describe the straight path to the target. */
 function WayWords({ answer }: { answer: GoalAnswer | null }) {
   const { linear } = useMotionOptions();
-  const name = useEditor((state) => (answer?.met ? nameOf(state, answer.met) : ""));
+  const name = useEditor((state) => (answer?.obstacle ? nameOf(state, answer.obstacle) : ""));
   if (!answer || answer.problem) return null;
   if (!linear)
     return <p className="quiet small">{t`The robot does not move in a straight line. The path is not shown.`}</p>;
-  if (answer.way === "unknown") return <p className="quiet small">{t`The straight path was not checked.`}</p>;
-  if (answer.way === "free") return <p className="small good">{t`The straight path of the tool is free.`}</p>;
+  if (answer.path === "unknown") return <p className="quiet small">{t`The straight path was not checked.`}</p>;
+  if (answer.path === "free") return <p className="small good">{t`The straight path of the tool is free.`}</p>;
   return (
     <p className="small warn">
       {name ? t`The straight path of the tool is blocked by ${name}.` : t`The straight path of the tool is blocked.`}
@@ -180,7 +180,7 @@ function WayWords({ answer }: { answer: GoalAnswer | null }) {
 function useWay(chosen: Chosen, goal: Pose | null, answer: GoalAnswer | null): void {
   const { linear } = useMotionOptions();
   const tool = useTelemetry(chosen.robotId, () => effectorPose(chosen));
-  const state: PathState = !answer ? "unknown" : linear || answer.problem ? answer.way : "unknown";
+  const state: PathState = !answer ? "unknown" : linear || answer.problem ? answer.path : "unknown";
   useEffect(() => {
     theEngine()?.showPath(goal && answer && tool ? { from: tool.position, to: goal.position, state } : null);
   }, [goal, tool, answer, state]);

@@ -5,7 +5,7 @@ import { dragged } from "./useGoalGizmo";
 const START = { position: { x: 0.1, y: 0.2, z: 0.3 }, orientation: { x: 1, y: 0, z: 0, w: 0 } };
 const NO_WAY = new Vector3();
 
-test("a goal that is pulled keeps how it is turned", () => {
+test("dragging a target along an axis keeps its orientation", () => {
   const goal = dragged(START, {
     handle: { do: "axis", axis: "z" },
     translation: new Vector3(0, 0, 0.05),
@@ -16,7 +16,7 @@ test("a goal that is pulled keeps how it is turned", () => {
   expect(goal.orientation).toEqual(START.orientation);
 });
 
-test("a goal that is turned by a ring stays where it is", () => {
+test("turning a target with a ring keeps its position", () => {
   const { position, orientation } = dragged(START, {
     handle: { do: "ring", axis: "z" },
     translation: NO_WAY,

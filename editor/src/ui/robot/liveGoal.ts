@@ -3,7 +3,7 @@
 import { type Chosen, effectorPose, showAt } from "../../commands/robot";
 import type { PathState } from "../../engine/pathLine";
 import type { Pose } from "../../protocol/types";
-import { metBy } from "../../session/paths";
+import { obstacleOn } from "../../session/paths";
 
 /** Time between two requests, ms. */
 export const PAUSE = 100;
@@ -14,8 +14,8 @@ export interface GoalAnswer {
   /** Why the target cannot be reached; empty if it can. */
   problem: string;
   /** State of the straight path, and the id of the obstacle. */
-  way: PathState;
-  met: string;
+  path: PathState;
+  obstacle: string;
 }
 
 export class LiveGoal {
@@ -64,14 +64,14 @@ export class LiveGoal {
     const current = () => !this.ended;
     const problem = await showAt(this.chosen, goal, { current, keep: true });
     const from = effectorPose(this.chosen);
-    let way: PathState = "unknown";
-    let met = "";
+    let path: PathState = "unknown";
+    let obstacle = "";
     if (from && this.straight() && current()) {
-      const found = await metBy(from.position, goal.position).catch(() => undefined);
-      if (found !== undefined) [way, met] = [found === null ? "free" : "blocked", found ?? ""];
+      const found = await obstacleOn(from.position, goal.position).catch(() => undefined);
+      if (found !== undefined) [path, obstacle] = [found === null ? "free" : "blocked", found ?? ""];
     }
     this.busy = false;
-    if (current()) this.onAnswer({ goal, problem, way: problem ? "blocked" : way, met });
+    if (current()) this.onAnswer({ goal, problem, path: problem ? "blocked" : path, obstacle });
     this.next();
   }
 }
