@@ -155,6 +155,16 @@ async function json<T>(...request: Parameters<typeof rest>): Promise<T> {
 export const recordsOf = (object: string) =>
   json<CalibrationRecord[]>(`/api/calibrations?object_id=${encodeURIComponent(object)}&limit=3`);
 
+/** Compare the focal length of a camera with the markers in a picture. Return the verdict; reject with the reason. */
+export async function checkLens(id: string): Promise<string> {
+  const picture = await takePicture(id);
+  const camera_parameters = await held(id, () => call("CameraColorParameters", { id }));
+  const body = new FormData();
+  body.append("image", picture, "picture.jpg");
+  body.append("args", JSON.stringify({ camera_parameters }));
+  return (await json<{ verdict: string }>("/api/calibration/lens", { method: "PUT", body })).verdict;
+}
+
 export interface TouchedFrame {
   pose: Pose;
   grade: string;

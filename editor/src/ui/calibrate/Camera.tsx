@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { calibrateCamera, takePicture } from "../../commands/calibrate";
+import { calibrateCamera, checkLens, takePicture } from "../../commands/calibrate";
 import { sentence } from "../../commands/requests";
 import { notReady } from "../../commands/robot";
 import { useEditor } from "../../store/store";
@@ -23,13 +23,20 @@ const Camera: Section["Body"] = ({ selection: { id } }) => {
   const [picture, setPicture] = useState("");
   const [follow, setFollow] = useState(false);
   const [failed, setFailed] = useState("");
+  const [lens, setLens] = useState({ verdict: "", busy: false });
   const { refused, busy, ask } = useRefusal();
   useEffect(() => () => URL.revokeObjectURL(picture), [picture]);
   useEffect(() => {
     setPicture("");
     setFollow(false);
     setFailed("");
+    setLens({ verdict: "", busy: false });
   }, [id]);
+  const check = async () => {
+    setLens({ verdict: "", busy: true });
+    const verdict = await checkLens(id).catch(sentence);
+    setLens({ verdict, busy: false });
+  };
   const take = async () => {
     try {
       setPicture(URL.createObjectURL(await takePicture(id)));
@@ -77,6 +84,10 @@ const Camera: Section["Body"] = ({ selection: { id } }) => {
         {t`Calibrate with markers`}
       </Button>
       <RefusedText>{refused}</RefusedText>
+      <Button className="wraps" why={offline} isDisabled={busy || lens.busy} onPress={() => void check()}>
+        {t`Check lens with markers`}
+      </Button>
+      {lens.verdict && <p role="status">{lens.verdict}</p>}
       <Records id={id} />
     </>
   );
