@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { call, serves } from "../session/connection";
 import { whyUnavailable } from "../store/permissions";
-import { isRunning } from "../store/selectors";
+import { isClosed } from "../store/selectors";
 import type { State } from "../store/state";
 import { notify, now } from "../store/store";
 import { ask, sentence } from "./requests";
@@ -14,7 +14,7 @@ const BUILT_WITHIN = 120;
 /** Return why the open project cannot be run now; an empty string if it can. */
 export function notRunnable(state: State): string {
   if (!state.doc?.project) return t`Open a project first. A scene cannot be run.`;
-  if (isRunning(state)) return t`The program is already running.`;
+  if (isClosed(state)) return t`The program is already running.`;
   if (state.live.state === "starting" || state.live.state === "stopping")
     return t`Wait until the devices are online or offline.`;
   if (state.live.executing) return t`An action is running. Wait until it ends, or press Stop motion.`;

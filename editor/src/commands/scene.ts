@@ -9,7 +9,7 @@ import type { ObjectModel, ObjectTypeMeta, Parameter, Pose, SceneObject } from "
 import { uploadAsset } from "../session/assets";
 import { call } from "../session/connection";
 import { whyUnavailable } from "../store/permissions";
-import { isRunning } from "../store/selectors";
+import { isClosed } from "../store/selectors";
 import type { State } from "../store/state";
 import { notify, now, select, setUi } from "../store/store";
 import { lifted } from "../transform/sizes";
@@ -21,9 +21,13 @@ import { ask, held, refusal } from "./requests";
 /** Return why objects cannot be added, removed or configured now; an empty string if they can. */
 export function notBuildable(state: State, request: Parameters<typeof whyUnavailable>[1] = "AddObjectToScene"): string {
   if (!state.doc) return t`No scene or project is open.`;
-  if (state.doc.project) return t`Objects belong to the scene. Close the project and open the scene.`;
-  if (isRunning(state)) return t`Stop the program first.`;
-  if (state.live.state !== "stopped") return t`Go offline first. Devices can only be changed offline.`;
+  if (state.doc.project && SCENE_ALONE.has(request))
+    return t`Other projects may use this object. Close the project and open the scene.`;
+  if (isClosed(state)) return t`Stop the program first.`;
+  if (state.live.state === "starting" || state.live.state === "stopping")
+    return t`Wait until the devices are online or offline.`;
+  if (state.live.state !== "stopped" && !ONLINE.has(request))
+    return t`Go offline first. Devices can only be changed offline.`;
   return whyUnavailable(state, request);
 }
 

@@ -11,6 +11,7 @@ export function opened(scene: Scene, project: Project | null): OpenDocument {
     scene: bareScene,
     project: null,
     unsaved: isUnsaved(project ?? scene),
+    closed: false,
     objects: byId(objects),
     points: {},
     orientations: {},

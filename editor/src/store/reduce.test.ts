@@ -1,6 +1,7 @@
 import { describe, expect, test } from "vitest";
 import type { Project, Scene, ServerEvent } from "../protocol/types";
 import { reduce } from "./reduce";
+import { isClosed } from "./selectors";
 import { initialState, type State } from "./state";
 
 const POSE = { position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } };
@@ -256,7 +257,25 @@ describe("operation", () => {
   });
 });
 
-test("a type that is gone takes its actions along", () => {
+describe("a document that a program closes", () => {
+  const CLOSED: ServerEvent = { event: "ProjectClosed", data: undefined };
+  const stopped: ServerEvent = { event: "PackageState", data: { state: "stopped" } };
+
+  test("can be edited only when the server has opened it again", () => {
+    expect(isClosed(after(OPEN))).toBe(false);
+    const info = { scene: SCENE, project: PROJECT, package_id: "pkg", package_name: "sort" };
+    for (const end of [[CLOSED], [CLOSED, stopped], [{ event: "PackageInfo", data: info } as ServerEvent, stopped]]) {
+      expect(isClosed(after(OPEN, ...end))).toBe(true);
+      expect(isClosed(after(OPEN, ...end, OPEN))).toBe(false);
+    }
+  });
+
+  test("leaves the screen when the server shows a list instead", () => {
+    expect(isClosed(after(OPEN, CLOSED, { event: "ShowMainScreen", data: { what: "ProjectsList" } }))).toBe(false);
+  });
+});
+
+test("removing a type removes its actions", () => {
   const type = { type: "UR5e", settings: [] } as never;
   let state = after({ event: "ChangedObjectTypes", change_type: "add", data: [type] });
   state = { ...state, types: { ...state.types, actions: { UR5e: [] } } };

@@ -51,7 +51,7 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
     case "SceneClosed":
     case "ProjectClosed":
       // The document leaves the screen with ShowMainScreen; a project that is about to run stays.
-      return { live: OFFLINE };
+      return { live: OFFLINE, doc: state.doc && { ...state.doc, closed: true } };
     case "ShowMainScreen":
       return {
         ...CLOSED,
@@ -313,7 +313,7 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
     }
     case "PackageInfo":
       return {
-        ...open(state, { ...opened(event.data.scene, event.data.project), unsaved: false }),
+        ...open(state, { ...opened(event.data.scene, event.data.project), unsaved: false, closed: true }),
         ...become({ packageId: event.data.package_id, packageName: event.data.package_name }),
         live: OFFLINE,
       };

@@ -14,6 +14,8 @@ export const RUNNING: ReadonlySet<PackageStateEnum> = new Set([
 ]);
 
 export const isRunning = (state: State): boolean => RUNNING.has(state.program.state);
+/** Return whether the document cannot be edited: from before a program starts until the server has opened it again. */
+export const isClosed = (state: State): boolean => isRunning(state) || state.doc?.closed === true;
 /** Return whether something may move: the scene is online, or a program is running. */
 export const isLive = (state: State): boolean =>
   state.live.state === "started" || state.live.state === "stopping" || isRunning(state);

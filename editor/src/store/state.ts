@@ -60,6 +60,8 @@ export interface OpenDocument {
   scene: BareScene;
   project: BareProject | null;
   unsaved: boolean;
+  /** Whether the server has closed it for a program and opens it again afterwards. */
+  closed: boolean;
   objects: Record<string, SceneObject>;
   points: Record<string, BareActionPoint>;
   orientations: Record<string, Of<NamedOrientation>>;

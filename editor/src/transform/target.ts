@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import type { ObjectModel, Pose } from "../protocol/types";
 import { whyUnavailable } from "../store/permissions";
-import { heldBy, isOnline, isRunning } from "../store/selectors";
+import { heldBy, isClosed, isOnline } from "../store/selectors";
 import type { State } from "../store/state";
 import type { Selection } from "../store/ui";
 import { composed, ORIGIN, worldOf } from "../viewmodel/frames";
@@ -80,8 +80,7 @@ const REQUESTS = {
 /** Return why it cannot be moved now, as a sentence; an empty string if it can. */
 export function notMovable(state: State, { kind, id }: Pick<Target, "kind" | "id">): string {
   const { doc } = state;
-  if (isRunning(state)) return t`Stop the program first.`;
-  if (kind === "object" && doc?.project) return t`Objects belong to the scene. Close the project and open the scene.`;
+  if (isClosed(state)) return t`Stop the program first.`;
   const type = doc?.objects[id]?.type ?? "";
   if (kind === "object" && type in state.types.robots && isOnline(state))
     return t`A robot cannot be moved in the scene while it is online.`;

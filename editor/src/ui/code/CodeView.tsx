@@ -6,7 +6,7 @@ import * as documents from "../../commands/documents";
 import { sentence } from "../../commands/requests";
 import { FILE_DEADLINE, rest } from "../../session/rest";
 import { whyUnavailable } from "../../store/permissions";
-import { isRunning } from "../../store/selectors";
+import { isClosed } from "../../store/selectors";
 import { notify, select, useEditor } from "../../store/store";
 import { Button, Waiting } from "../kit/kit";
 import { textOfZip } from "./package";
@@ -28,12 +28,12 @@ export default function CodeView() {
   const unsaved = useEditor((state) => state.doc?.unsaved ?? false);
   const actions = useEditor((state) => state.doc?.actions);
   const selected = useEditor((state) => state.doc?.actions[state.ui.selection?.id ?? ""]?.name ?? "");
-  const running = useEditor(isRunning);
+  const running = useEditor(isClosed);
   const runningNames = useEditor((state) =>
     state.program.running.map((each) => state.doc?.actions[each]?.name ?? "").join("\n"),
   );
   const cannotSave = useEditor(
-    (state) => whyUnavailable(state, "SaveProject") || (isRunning(state) ? t`The program is running.` : ""),
+    (state) => whyUnavailable(state, "SaveProject") || (isClosed(state) ? t`The program is running.` : ""),
   );
   const [code, setCode] = useState<Code | null>(null);
   const load = useCallback(() => {

@@ -10,7 +10,7 @@ import { storeGeneralState } from "../../commands/viewstate";
 import type { Position } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
 import { whyUnavailable } from "../../store/permissions";
-import { isRunning } from "../../store/selectors";
+import { isClosed } from "../../store/selectors";
 import { notify, now, setUi, useEditor } from "../../store/store";
 import { composed, ORIGIN, worldOf } from "../../viewmodel/frames";
 import { pointSize } from "../../viewmodel/items";
@@ -40,7 +40,7 @@ export default function PointsPanel() {
   const candidate = selected === undefined ? "" : parentOfSelection();
   const parentName = useEditor((state) => (candidate ? nameOf(state, candidate) : ""));
   const why = useEditor((state) =>
-    isRunning(state) ? t`A program is running.` : whyUnavailable(state, "AddActionPoint"),
+    isClosed(state) ? t`A program is running.` : whyUnavailable(state, "AddActionPoint"),
   );
   const noRobot = useEditor((state) => notReady(state, chosen, "AddApUsingRobot"));
   const [on, setOn] = useState<"parent" | "world">("parent");

@@ -3,12 +3,12 @@
 import { t } from "@lingui/core/macro";
 import type { Requests } from "../../protocol/types";
 import { whyUnavailable } from "../../store/permissions";
-import { heldBy, isRunning } from "../../store/selectors";
+import { heldBy, isClosed } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
 
 export function whyNotNow(state: State, id: string, request: keyof Requests): string {
-  if (isRunning(state)) return t`A program is running.`;
+  if (isClosed(state)) return t`A program is running.`;
   const holder = heldBy(state, id);
   if (holder) return t`In use by ${holder}.`;
   return whyUnavailable(state, request);

@@ -10,7 +10,7 @@ import { theEngine } from "../../session/engine";
 import { remember } from "../../session/localStorage";
 import { theSession } from "../../session/session";
 import { whyUnavailable } from "../../store/permissions";
-import { isRunning } from "../../store/selectors";
+import { isClosed } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { now, select, setUi } from "../../store/store";
 import { kindName, selectionOf } from "../../viewmodel/names";
@@ -36,7 +36,7 @@ function ofWorkplace(state: State): Entry[] {
     whyUnavailable(state, state.doc?.project ? "SaveProject" : "SaveScene") ||
     (state.doc?.unsaved ? "" : t`No unsaved changes.`);
   const cannotUndo = whyUnavailable(state, "Undo");
-  const cannotSwitch = whyUnavailable(state, "StartScene") || (isRunning(state) ? t`A program is running.` : "");
+  const cannotSwitch = whyUnavailable(state, "StartScene") || (isClosed(state) ? t`A program is running.` : "");
   const online = live.state === "started";
   return [
     ...(online ? [entry("stop", t`Stop motion`, "", stopMotion, t`command, not an emergency stop`)] : []),

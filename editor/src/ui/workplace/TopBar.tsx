@@ -6,7 +6,7 @@ import { useState } from "react";
 import * as documents from "../../commands/documents";
 import { goOffline, goOnline } from "../../commands/operation";
 import { whyUnavailable } from "../../store/permissions";
-import { isRunning } from "../../store/selectors";
+import { isClosed } from "../../store/selectors";
 import { notify, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
@@ -18,7 +18,7 @@ export function TopBar() {
   const doc = useEditor((state) => state.doc);
   const history = useEditor((state) => state.history);
   const live = useEditor((state) => state.live.state);
-  const running = useEditor(isRunning);
+  const running = useEditor(isClosed);
   const cannotSave = useEditor((state) => whyUnavailable(state, state.doc?.project ? "SaveProject" : "SaveScene"));
   const cannotUndo = useEditor((state) => whyUnavailable(state, "Undo"));
   const [asking, setAsking] = useState(false);
@@ -95,7 +95,7 @@ const WORDS = {
 
 function LiveSwitch() {
   const live = useEditor((state) => state.live.state);
-  const running = useEditor(isRunning);
+  const running = useEditor(isClosed);
   const cannot = useEditor((state) => whyUnavailable(state, "StartScene"));
   const objects = useEditor((state) => state.live.objects);
   const wrong = Object.values(objects).filter(
