@@ -1,7 +1,8 @@
 /** Entries of the home screen. Pure functions. */
 
-import { i18n, type MessageDescriptor } from "@lingui/core";
+import type { MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
+import { byName } from "../formats";
 import type { Lists } from "../store/state";
 
 export interface Entry {
@@ -106,8 +107,8 @@ export function chosen(
     recent: (a, b) => last(a) - last(b) || b.time.localeCompare(a.time),
     oldest: (a, b) => a.time.localeCompare(b.time),
     created: (a, b) => b.created.localeCompare(a.created),
-    name: (a, b) => a.name.localeCompare(b.name, i18n.locale, { numeric: true }),
-    "name down": (a, b) => b.name.localeCompare(a.name, i18n.locale, { numeric: true }),
+    name: byName,
+    "name down": (a, b) => byName(b, a),
   };
   return found.sort(by[sort]);
 }

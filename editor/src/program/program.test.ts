@@ -8,10 +8,10 @@ import { freeName, newOutputs } from "./naming";
 import { problemsOf, usersOf } from "./problems";
 import { reachOfAction } from "./reach";
 import { program, TYPES } from "./testing";
-import { double, extraOf, initial, rangeWords, read, textOf } from "./values";
+import { double, extraOf, initial, rangeWords, read, textOf, withoutUnit } from "./values";
 
 describe("steps", () => {
-  test("the first way on asks for nothing, the second makes a branch of both", () => {
+  test("the first next step is unconditional, a second one makes both conditional", () => {
     const doc = program({ a: "ask", b: "act", c: "act" }, [
       ["START", "a"],
       ["a", "b"],
@@ -30,7 +30,7 @@ describe("steps", () => {
     expect(freeStep(doc, TYPES, "START")).toMatch("one first action");
   });
 
-  test("numbers that are not asked for yet are offered, and the way without a condition stays the rest", () => {
+  test("unused numbers are offered, and the unconditional step stays the default", () => {
     const doc = program({ a: "count", b: "act", c: "act", d: "act" }, [
       ["a", "b"],
       ["a", "c", "0"],
@@ -42,7 +42,7 @@ describe("steps", () => {
     expect(freeStep(plain, TYPES, "a")).toMatch("no result to branch on");
   });
 
-  test("what would be refused is told before", () => {
+  test("connections that the server would refuse have a reason", () => {
     const doc = program({ a: "act", b: "act", c: "act" }, [
       ["a", "b"],
       ["b", "c"],
@@ -55,7 +55,7 @@ describe("steps", () => {
     expect(cannotLead(doc, "a", "c")).toBe("");
   });
 
-  test("only results that can be there are offered", () => {
+  test("only results of earlier actions are offered", () => {
     const doc = program({ a: "count", b: "count", c: "count", d: "count" }, [
       ["a", "b"],
       ["b", "c"],
@@ -68,10 +68,10 @@ describe("steps", () => {
   });
 });
 
-describe("faults", () => {
+describe("problems", () => {
   const texts = (doc: OpenDocument) => problemsOf(doc, TYPES).map((each) => `${each.level} ${each.id}: ${each.text}`);
 
-  test("a sound program has none", () => {
+  test("a valid program has none", () => {
     expect(
       texts(
         program({ a: "ask", b: "act" }, [
@@ -96,7 +96,7 @@ describe("faults", () => {
     ).toEqual([]);
   });
 
-  test("dead ends, halves of branches and what is never run are named where they are", () => {
+  test("dead ends, incomplete branches and unreachable actions are reported at their items", () => {
     expect(texts(program({ a: "act" }))).toEqual([
       "error START: Start has no next step. Connect it to the first action.",
       "warn a: a is never run: no step leads to it.",
@@ -122,7 +122,7 @@ describe("faults", () => {
     ).toEqual(["error a: a: no next step if none of the conditions is met."]);
   });
 
-  test("values that are gone, and results of what comes later", () => {
+  test("missing values and results of later actions are reported", () => {
     const gone = program(
       { a: "count" },
       [
@@ -148,7 +148,7 @@ describe("faults", () => {
 });
 
 describe("values", () => {
-  test("a double keeps its fraction, limits hold, and what is no number is said", () => {
+  test("a double keeps its decimal point, limits are checked, and invalid numbers are reported", () => {
     expect(read("double", "1")).toEqual({ json: "1.0" });
     expect(read("double", "0,5")).toEqual({ json: "0.5" });
     expect(double(1e21)).toBe("1e+21");
@@ -157,11 +157,24 @@ describe("values", () => {
     expect(read("integer", "")).toEqual({ problem: "Enter a number." });
     expect(read("string", ' "x" ')).toEqual({ json: JSON.stringify(' "x" ') });
     expect(textOf("string", JSON.stringify(' "x" '))).toBe(' "x" ');
-    expect(rangeWords(extraOf({ extra: '{"minimum":0,"maximum":2,"unit":"m/s"}' }))).toBe("0 to 2 m/s");
+    const speed = extraOf({ extra: '{"minimum":0,"maximum":2,"unit":"m/s"}' });
+    expect(rangeWords("double", speed)).toBe("0 to 2000 mm/s");
+    expect(textOf("double", "0.25", speed)).toBe("250");
+    expect(read("double", "250", speed)).toEqual({ json: "0.25" });
+    expect(read("double", "2001", speed)).toEqual({ problem: "At most 2000." });
+    expect(withoutUnit("highest speed, m/s; the arm slows down", "double", speed)).toBe(
+      "highest speed; the arm slows down",
+    );
+    const ratio = { minimum: 0, maximum: 1 };
+    expect([textOf("double", "0.29", ratio), rangeWords("double", ratio)]).toEqual(["29", "0 to 100 %"]);
+    expect(rangeWords("double", { minimum: 0.01, maximum: 1 })).toBe("1 to 100 %");
+    expect(textOf("double", "1.5707963267948966", { unit: "rad" })).toBe("90");
+    expect(read("double", "90", { unit: "rad" })).toEqual({ json: "1.5707963267949" });
+    expect(textOf("integer", "2000", { unit: "ms" })).toBe("2000");
     expect(extraOf({ extra: "no json" })).toEqual({});
   });
 
-  test("what nobody has said is the least that is allowed", () => {
+  test("the default of a number is the smallest allowed value", () => {
     const of = (type: string, extra?: object) =>
       initial({ name: "x", type, dynamic_value: false, ...(extra ? { extra: JSON.stringify(extra) } : {}) });
     expect([of("integer", { minimum: 3 }), of("double", { maximum: -2 }), of("boolean"), of("string")]).toEqual([
@@ -174,14 +187,14 @@ describe("values", () => {
     expect(of("pose")).toBeUndefined();
   });
 
-  test("names that are free", () => {
+  test("free names", () => {
     expect(freeName("move", ["move", "move_2"])).toBe("move_3");
     expect(newOutputs(program({ ask: "ask" }), "ask", 2)).toEqual(["ask_result_1", "ask_result_2"]);
     expect(newOutputs(program({ ask: "ask" }), "ask", 1)).toEqual(["ask_result_2"]);
   });
 });
 
-describe("whether a robot gets there", () => {
+describe("reachability of an action", () => {
   const action = (...parameters: [string, string][]) => ({
     type: "ur/move",
     parameters: parameters.map(([type, id], n) => ({ name: `p${n}`, type, value: JSON.stringify(id) })),
@@ -195,7 +208,7 @@ describe("whether a robot gets there", () => {
     },
   });
 
-  test("of each goal the end effector counts that gets there best, of all goals the worst", () => {
+  test("is that of the best end effector for each target, and of the worst target", () => {
     const reach = {
       ...reachability("ur", "grip", ["a", "out_of_reach", "too far"], ["b", "in_collision", "table"]),
       ...reachability("ur", "cup", ["a", "reachable"], ["b", "out_of_reach", "too far"]),
@@ -208,7 +221,7 @@ describe("whether a robot gets there", () => {
     });
   });
 
-  test("another robot does not count, nor what is no goal or not known", () => {
+  test("ignores other robots, and items that are unknown or no targets", () => {
     const reach = reachability("other", "grip", ["a", "out_of_reach"]);
     expect(reachOfAction(action(["pose", "a"]), reach)).toBeNull();
     expect(reachOfAction(action(["position", "a"]), reachability("ur", "grip", ["a", "reachable"]))).toBeNull();

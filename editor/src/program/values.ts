@@ -2,6 +2,7 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
+import { decimal, numberFrom } from "../formats";
 import type { ActionParameter, ParameterMeta } from "../protocol/types";
 
 /** Additional data of a parameter. */
@@ -10,6 +11,33 @@ export interface Extra {
   maximum?: number;
   allowed_values?: (number | string)[];
   unit?: string;
+}
+
+/** Units as users see them, and the factor from the stored unit: millimetres, degrees and seconds everywhere. */
+const SHOWN: Record<string, readonly [unit: string, factor: number]> = {
+  m: ["mm", 1000],
+  "m/s": ["mm/s", 1000],
+  "m/s²": ["mm/s²", 1000],
+  rad: ["°", 180 / Math.PI],
+  "rad/s": ["°/s", 180 / Math.PI],
+  "rad/s²": ["°/s²", 180 / Math.PI],
+};
+
+/** Return the unit that users see for a number, and the factor from the stored value. A ratio is a percentage. */
+export function shownUnit(type: string, { unit = "", minimum, maximum }: Extra): readonly [string, number] {
+  if (type !== "double") return [unit, 1];
+  if (!unit && minimum !== undefined && minimum >= 0 && maximum === 1) return ["%", 100];
+  return SHOWN[unit] ?? [unit, 1];
+}
+
+/** Return a number without the noise of a conversion. */
+const exact = (value: number): number => Number(value.toPrecision(12));
+
+/** Return a description without the stored unit at its end, since the field shows another one. */
+export function withoutUnit(description: string, type: string, extra: Extra): string {
+  const { unit } = extra;
+  if (!unit || shownUnit(type, extra)[0] === unit) return description;
+  return description.replace(new RegExp(`,? \\[?${unit.replace("/", "\\/")}\\]?(?=[;.,]|$)`), "");
 }
 
 export type Source = "value" | "link" | "project_parameter";
@@ -62,11 +90,12 @@ export function decoded(json: string | undefined): unknown {
 }
 
 /** Return a value as the text of a field. */
-export function textOf(type: string, json: string | undefined): string {
+export function textOf(type: string, json: string | undefined, extra: Extra = {}): string {
   const value = decoded(json);
   if (value === undefined || value === null) return "";
   if (typeof value === "string") return value;
   if (typeof value === "boolean") return value ? t`yes` : t`no`;
+  if (typeof value === "number") return decimal(exact(value * shownUnit(type, extra)[1]));
   return type.endsWith("pose") || typeof value === "object" ? JSON.stringify(value) : String(value);
 }
 
@@ -79,7 +108,7 @@ export function read(type: string, text: string, extra: Extra = {}): Read {
     case "string":
       return { json: JSON.stringify(text) };
     case "boolean":
-      return { json: /^(yes|true|1|on)$/i.test(clean) ? "true" : "false" };
+      return { json: ["yes", "true", "1", "on", t`yes`].includes(clean.toLowerCase()) ? "true" : "false" };
     case "integer":
     case "double":
       return readNumber(type, clean, extra);
@@ -92,12 +121,14 @@ export function read(type: string, text: string, extra: Extra = {}): Read {
   }
 }
 
-function readNumber(type: "integer" | "double", text: string, { minimum, maximum }: Extra): Read {
-  const value = Number(text.replace(",", "."));
-  if (text === "" || !Number.isFinite(value)) return { problem: t`Enter a number.` };
+function readNumber(type: "integer" | "double", text: string, extra: Extra): Read {
+  const { minimum, maximum } = extra;
+  const [, factor] = shownUnit(type, extra);
+  const value = Number((numberFrom(text) / factor).toPrecision(15));
+  if (!Number.isFinite(value)) return { problem: t`Enter a number.` };
   if (type === "integer" && !Number.isInteger(value)) return { problem: t`Enter a whole number.` };
-  if (minimum !== undefined && value < minimum) return { problem: t`At least ${minimum}.` };
-  if (maximum !== undefined && value > maximum) return { problem: t`At most ${maximum}.` };
+  if (minimum !== undefined && value < minimum) return { problem: t`At least ${decimal(exact(minimum * factor))}.` };
+  if (maximum !== undefined && value > maximum) return { problem: t`At most ${decimal(exact(maximum * factor))}.` };
   return { json: type === "double" ? double(value) : String(value) };
 }
 
@@ -130,10 +161,13 @@ export function initial(meta: ParameterMeta): string | undefined {
 }
 
 /** Return the range with its unit as text; an empty string without one. */
-export function rangeWords({ minimum, maximum, unit = "" }: Extra): string {
+export function rangeWords(type: string, extra: Extra): string {
+  const { minimum, maximum } = extra;
+  const [unit, factor] = shownUnit(type, extra);
   const tail = unit ? ` ${unit}` : "";
-  if (minimum !== undefined && maximum !== undefined) return t`${minimum} to ${maximum}${tail}`;
-  if (minimum !== undefined) return t`at least ${minimum}${tail}`;
-  if (maximum !== undefined) return t`at most ${maximum}${tail}`;
+  const shown = (value: number) => decimal(Number((value * factor).toPrecision(5)));
+  if (minimum !== undefined && maximum !== undefined) return t`${shown(minimum)} to ${shown(maximum)}${tail}`;
+  if (minimum !== undefined) return t`at least ${shown(minimum)}${tail}`;
+  if (maximum !== undefined) return t`at most ${shown(maximum)}${tail}`;
   return "";
 }

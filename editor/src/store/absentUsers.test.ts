@@ -16,14 +16,14 @@ const user = (name: string, role: string, document?: string) => ({
   },
 });
 
-test("a user who is not connected and holds locks is gone", () => {
+test("a disconnected user who holds locks is absent", () => {
   const users = user("Eva", "programmer");
   expect(absentLockHolders(state(users, { arm: "Eva", box: "Adam", lid: "Adam", tip: "Olga" }))).toEqual(["Adam"]);
   const joining = state(users, { box: "Adam" });
   expect(absentLockHolders({ ...joining, connection: { ...joining.connection, status: "joining" } })).toEqual([]);
 });
 
-test("who has the document open: whoever says so, holds a lock, or does not say and may edit", () => {
+test("users have the document open if they report it, hold a lock, or report nothing and may edit", () => {
   const users = {
     ...user("Eva", "programmer", "pro"),
     ...user("Ada", "operator", "scn"),

@@ -27,12 +27,12 @@ describe("an amount", () => {
     ["+10-2", 0.108],
   ])("%s changes what is there", (text, value) => expect(amount(text, 0.1, "mm")).toBeCloseTo(value, 12));
 
-  it("is a change when that is meant", () => {
+  it("is relative with a sign or by option", () => {
     expect(amount("-3mm", 0.1, "m", true)).toBeCloseTo(0.097, 12);
     expect(amount("5", 0.1, "cm", true)).toBeCloseTo(0.15, 12);
   });
 
-  it("of an angle has minutes and seconds", () => {
+  it("of an angle can have minutes and seconds", () => {
     expect(amount("90", 0, "°")).toBeCloseTo(Math.PI / 2, 12);
     expect(amount("90°", 0, "rad")).toBeCloseTo(Math.PI / 2, 12);
     expect(amount("+1′", DEGREE, "°")).toBeCloseTo(DEGREE * (1 + 1 / 60), 12);
@@ -40,11 +40,11 @@ describe("an amount", () => {
     expect(amount("1.5rad", 0, "°")).toBeCloseTo(1.5, 12);
   });
 
-  it.each(["", " ", "abc", "1..2", "3kg", "5°", "1/0", "--2", "2+", "1e3"])("%j is none", (text) => {
+  it.each(["", " ", "abc", "1..2", "3kg", "5°", "1/0", "--2", "2+", "1e3"])("%j is invalid", (text) => {
     expect(amount(text, 0, "mm")).toBeNull();
   });
 
-  it("is shown short", () => {
+  it("is shown without trailing zeros", () => {
     expect(show(0.0125, "mm")).toBe("12.5");
     expect(show(-0, "mm")).toBe("0");
     expect(show(-1e-9, "mm")).toBe("0");

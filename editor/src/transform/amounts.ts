@@ -1,5 +1,6 @@
 /** Lengths and angles as users type them: with units, sums and relative changes. All values are in m and rad. */
 
+import { decimal, normalised } from "../formats";
 export type LengthUnit = "m" | "cm" | "mm" | "in";
 export type AngleUnit = "°" | "rad";
 export type Unit = LengthUnit | AngleUnit;
@@ -20,8 +21,7 @@ const MINUTE = "′";
 const SECOND = "″";
 
 export function show(value: number, unit: Unit): string {
-  const text = (value / WORTH[unit]).toFixed(DIGITS[unit]).replace(/\.?0+$/, "");
-  return text === "-0" ? "0" : text;
+  return decimal(value / WORTH[unit], DIGITS[unit]);
 }
 
 /**
@@ -29,7 +29,7 @@ export function show(value: number, unit: Unit): string {
  * added to the present value. Return null if it is invalid.
  */
 export function amount(text: string, now: number, unit: Unit, by = false): number | null {
-  const clean = text.trim().replaceAll(",", ".").replaceAll("−", "-");
+  const clean = normalised(text);
   const change = /^(\+=?|-=)/.exec(clean);
   const value = sum(change ? clean.slice(change[0].length) : clean, unit);
   if (value === null) return null;
@@ -76,25 +76,26 @@ export function isAngle(unit: Unit): unit is AngleUnit {
   return unit === "°" || unit === "rad";
 }
 
-/** Steps of the wheel, m and rad, with their names. */
-export const LENGTH_STEPS: readonly (readonly [number, string])[] = [
-  [0.1, "10 cm"],
-  [0.05, "5 cm"],
-  [0.01, "1 cm"],
-  [0.001, "1 mm"],
-  [0.0001, "0.1 mm"],
+/** Steps of the wheel: m or rad, and the number and unit that name them. */
+export const LENGTH_STEPS: readonly (readonly [number, number, string])[] = [
+  [0.1, 10, " cm"],
+  [0.05, 5, " cm"],
+  [0.01, 1, " cm"],
+  [0.001, 1, " mm"],
+  [0.0001, 0.1, " mm"],
 ];
-export const ANGLE_STEPS: readonly (readonly [number, string])[] = [
-  [Math.PI / 4, "45°"],
-  [Math.PI / 18, "10°"],
-  [Math.PI / 180, "1°"],
-  [Math.PI / 180 / 60, "1′"],
-  [Math.PI / 180 / 3600, "1″"],
+export const ANGLE_STEPS: readonly (readonly [number, number, string])[] = [
+  [Math.PI / 4, 45, "°"],
+  [Math.PI / 18, 10, "°"],
+  [Math.PI / 180, 1, "°"],
+  [Math.PI / 180 / 60, 1, MINUTE],
+  [Math.PI / 180 / 3600, 1, SECOND],
 ];
 
 /** Return the name of a step. */
 export function stepWords(step: number, quantity: Quantity): string {
   const steps = quantity === "length" ? LENGTH_STEPS : ANGLE_STEPS;
   const known = steps.find(([value]) => Math.abs(value - step) < 1e-12);
-  return known?.[1] ?? (quantity === "length" ? `${show(step, "mm")} mm` : `${show(step, "°")}°`);
+  if (known) return `${decimal(known[1])}${known[2]}`;
+  return quantity === "length" ? `${show(step, "mm")} mm` : `${show(step, "°")}°`;
 }

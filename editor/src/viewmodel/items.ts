@@ -2,6 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import type { Item, LinkItem, RobotItem, Shape } from "../engine/items";
+import { decimal } from "../formats";
 import { reachOfAction, worse } from "../program/reach";
 import type { LogicItem, ObjectTypeMeta, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
@@ -247,7 +248,7 @@ function link(item: LogicItem, base: Omit<LinkItem, "kind" | "from" | "to" | "co
 export function plain(json: string): string {
   try {
     const value: unknown = JSON.parse(json);
-    return typeof value === "string" ? value : JSON.stringify(value);
+    return typeof value === "string" ? value : typeof value === "number" ? decimal(value) : JSON.stringify(value);
   } catch {
     return json;
   }

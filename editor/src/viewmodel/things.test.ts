@@ -55,7 +55,7 @@ function workplace(): State {
 }
 const names = (rows: { name: string }[]) => rows.map((each) => each.name);
 
-test("each stands below what it hangs on; what has no place, and the program, stand apart", () => {
+test("items are below their parents; items without a pose and the program are separate", () => {
   const things = thingsOf(workplace());
   expect(names(things.placed)).toEqual(["arm", "table", "home"]);
   expect(names(flat(things.placed))).toEqual(["arm", "table", "grid", "pick", "grip", "down", "home"]);
@@ -65,7 +65,7 @@ test("each stands below what it hangs on; what has no place, and the program, st
   expect(thingsOf(initialState())).toEqual({ placed: [], unplaced: [], program: [] });
 });
 
-test("what fits is shown with what it hangs on", () => {
+test("matching items are shown with their ancestors", () => {
   const { placed } = thingsOf(workplace());
   const shown = (groups: string[], words: string) => names(flat(narrowed(placed, fitting(new Set(groups), words))));
   expect(shown(["actions"], "")).toEqual(["table", "grid", "pick", "grip"]);
@@ -75,7 +75,7 @@ test("what fits is shown with what it hangs on", () => {
   expect(shown([], "")).toHaveLength(7);
 });
 
-test("from one to the next, and round", () => {
+test("the next and previous item are found cyclically", () => {
   const rows = flat(thingsOf(workplace()).placed);
   expect(neighbour(rows, "pick", 1)?.name).toBe("grip");
   expect(neighbour(rows, "pick", -1)?.name).toBe("grid");
@@ -85,7 +85,7 @@ test("from one to the next, and round", () => {
   expect([neighbour(rows.slice(0, 1), "arm", 1), neighbour([], "arm", 1)]).toEqual([null, null]);
 });
 
-test("what is hidden, seen through by itself or with all others, and what fades beside what is looked for", () => {
+test("hidden, transparent and faded items have their transparency", () => {
   const state = workplace();
   const seen = (user: Record<string, unknown>, ids: string[]) => {
     const of = faintness({ ...state, view: { ...state.view, user } });

@@ -2,6 +2,7 @@
 
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
+import { byName } from "../formats";
 import type { State } from "../store/state";
 import type { Kind } from "../store/ui";
 import { GROUPS, type Group } from "./visibility";
@@ -62,13 +63,13 @@ export function thingsOf({ doc, types }: Pick<State, "doc" | "types">): Things {
           ...on(id),
         ]);
       });
-  const objects = Object.values(doc.objects).sort((a, b) => a.name.localeCompare(b.name));
+  const objects = Object.values(doc.objects).sort(byName);
   const object = ({ id, name, type }: (typeof objects)[number]): Row => ({
     id,
     kind: "object",
     group: type in types.robots ? "robots" : "objects",
     name,
-    detail: type,
+    detail: types.byName[type]?.display_name ?? type,
     below: on(id),
   });
   const hasPlace = (each: (typeof objects)[number]) => each.pose !== undefined || each.type in types.robots;

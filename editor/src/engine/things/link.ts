@@ -84,12 +84,17 @@ export class LinkThing extends Thing<LinkItem> {
     if (!start || !end) return;
     start.anchor(this.from);
     end.anchor(this.to);
-    const drawn = [...this.from.toArray(), ...this.to.toArray()].map((one) => one.toFixed(4)).join() + this.item.branch;
-    if (drawn === this.drawn) return;
-    this.drawn = drawn;
-    this.line.geometry.dispose();
-    this.line.geometry = this.bow();
-    this.label?.position.copy(this.middle);
+    const drawn =
+      [...this.from.toArray(), ...this.to.toArray()].map((one) => one.toFixed(4)).join() +
+      this.item.branch +
+      this.radius;
+    if (drawn !== this.drawn) {
+      this.drawn = drawn;
+      this.line.geometry.dispose();
+      this.line.geometry = this.bow();
+      this.label?.position.copy(this.middle);
+    }
+    this.context.batches.links.set(this.item.id, this.line.geometry, this.color);
   }
 
   override resized(): boolean {

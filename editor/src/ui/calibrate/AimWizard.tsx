@@ -5,6 +5,7 @@ import { useState } from "react";
 import { cancelMeasurement, finishMeasurement, recordFocusPoint, startMeasurement } from "../../commands/calibrate";
 import { sentence } from "../../commands/requests";
 import { chosenRobot, notReady } from "../../commands/robot";
+import { fixed } from "../../formats";
 import { theEngine } from "../../session/engine";
 import { useEditor } from "../../store/store";
 import type { Fit } from "../../store/ui";
@@ -122,4 +123,4 @@ function FitSoFar({ checked, rms, worst, worstPoint }: Fit) {
   );
 }
 
-const millimetres = (metres: number) => t`${(metres * 1000).toFixed(1)} mm`;
+const millimetres = (metres: number) => `${fixed(metres * 1000, 1)} mm`;

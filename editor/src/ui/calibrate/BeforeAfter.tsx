@@ -4,6 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
 import { forgetOldPose, placeAt } from "../../commands/calibrate";
 import { hideGhost, showStanding } from "../../commands/robot";
+import { fixed } from "../../formats";
 import { now, useEditor } from "../../store/store";
 import { notMovable } from "../../transform/target";
 import { apart } from "../../viewmodel/frames";
@@ -32,7 +33,7 @@ export function BeforeAfter({ id }: { id: string }) {
   return (
     <div className="before-after" role="group" aria-label={t`Before and after`}>
       <p role="status">
-        {t`Moved by ${(moved.distance * 1000).toFixed(1)} mm and ${moved.degrees.toFixed(2)}°.`}
+        {t`Moved by ${fixed(moved.distance * 1000, 1)} mm and ${fixed(moved.degrees, 2)}°.`}
         {isRobot && <span className="quiet small"> {t`Transparent: previous pose.`}</span>}
       </p>
       <div className="actions start">

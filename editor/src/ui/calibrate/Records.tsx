@@ -1,9 +1,9 @@
 /** Calibrations of an object, newest first, and the running one. */
 
-import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { type CalibrationRecord, recordsOf } from "../../commands/calibrate";
+import { dateAndTime, fixed } from "../../formats";
 import { useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { BeforeAfter } from "./BeforeAfter";
@@ -44,8 +44,8 @@ export function Records({ id }: { id: string }) {
             <li key={each.id}>
               <span>{each.verdict}</span>
               <span className="quiet small">
-                {new Date(each.date).toLocaleString(i18n.locale)} · {each.person}
-                {each.residual !== undefined && ` · ${each.residual.toFixed(2)} ${each.residual_unit ?? ""}`}
+                {dateAndTime(each.date)} · {each.person}
+                {each.residual !== undefined && ` · ${fixed(each.residual, 2)} ${each.residual_unit ?? ""}`}
               </span>
             </li>
           ))}

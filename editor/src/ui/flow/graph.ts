@@ -75,14 +75,19 @@ export function graphOf(
     },
     ...Object.values(doc.actions)
       .filter((action) => !into.has(action.id))
-      .map((action) => ({
-        id: action.id,
-        kind: "action" as const,
-        name: action.name,
-        detail: detailOf(doc, action.type, action.pointId),
-        run: [],
-        ...sized(waysOf(doc, types, action.id)),
-      })),
+      .map((action) => {
+        const values = valuesOf(doc, types, action);
+        return {
+          id: action.id,
+          kind: "action" as const,
+          name: action.name,
+          detail: detailOf(doc, action.type, action.pointId),
+          values,
+          icon: types.byName[doc.objects[action.type.split("/")[0] ?? ""]?.type ?? ""]?.icon,
+          run: [],
+          ...sized(branchesOf(doc, types, action.id), values !== ""),
+        };
+      }),
     ...folded.map((run) => ({
       id: foldOf(run),
       kind: "fold" as const,

@@ -7,6 +7,7 @@ import { downloadPackage } from "../../commands/packages";
 import { runPackage } from "../../commands/run";
 import { keepOwnPicture } from "../../commands/thumbnail";
 import { storeGeneralState } from "../../commands/viewstate";
+import { ago } from "../../formats";
 import type { Entry } from "../../home/entries";
 import type { Requests, Run } from "../../protocol/types";
 import { whyUnavailable } from "../../store/permissions";

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { parsed } from "./fields";
 
-test("numbers as people write them, and changes of the one that is there", () => {
+test("typed numbers and relative changes are parsed", () => {
   expect(parsed("12.5", 3)).toBe(12.5);
   expect(parsed(" 12,5 ", 3)).toBe(12.5);
   expect(parsed("-4", 3)).toBe(-4);

@@ -3,6 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { type KeyboardEvent, type ReactNode, useId, useState } from "react";
 import { Switch, ToggleButton, ToggleButtonGroup } from "react-aria-components";
+import { fixed, normalised } from "../../formats";
 import "./fields.css";
 
 interface OneOfProps<T extends string> {
@@ -95,12 +96,12 @@ export function Amount({
   isDisabled = false,
 }: AmountProps) {
   const id = useId();
-  const shown = round(value, digits);
+  const shown = fixed(value, digits);
   const [text, setText] = useState<string | null>(null);
   const [wrong, setWrong] = useState("");
   const give = (next: number) => {
     if (next < least || next > most) {
-      setWrong(t`From ${round(least, digits)} to ${round(most, digits)} ${unit}.`);
+      setWrong(t`From ${fixed(least, digits)} to ${fixed(most, digits)} ${unit}.`);
       return;
     }
     setWrong("");
@@ -150,14 +151,9 @@ export function Amount({
   );
 }
 
-function round(value: number, digits: number): string {
-  const text = value.toFixed(digits);
-  return Number(text) === 0 ? (0).toFixed(digits) : text;
-}
-
 /** Return a typed number, or the present value with a typed change; null if it is invalid. */
 export function parsed(text: string, value: number): number | null {
-  const clean = text.trim().replace(",", ".");
+  const clean = normalised(text);
   const change = /^([+-])=?\s*(\d*\.?\d+)$/.exec(clean);
   if (change && (clean.startsWith("+") || clean.includes("=")))
     return value + (change[1] === "-" ? -1 : 1) * Number(change[2]);

@@ -2,11 +2,11 @@
 
 import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
+import { clock } from "../../formats";
 import { useEditor } from "../../store/store";
 import { Window } from "../kit/dialogs";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { clock } from "../times";
 import "./messages.css";
 
 const WORDS = { info: msg`note`, warn: msg`warning`, error: msg`error` };

@@ -7,6 +7,7 @@ import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import * as commands from "../../commands/run";
 import { storeGeneralState } from "../../commands/viewstate";
+import { ago } from "../../formats";
 import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
 import { theSession } from "../../session/session";
 import { usersOfDocument } from "../../store/absentUsers";
@@ -23,7 +24,7 @@ import { endName, History } from "../run/History";
 import { ICONS } from "../run/Result";
 import { phaseName, RunButtons } from "../run/RunBar";
 import { Settings } from "../settings/Settings";
-import { ago, useTicking } from "../times";
+import { useTicking } from "../times";
 import "../run/run.css";
 import "./operator.css";
 

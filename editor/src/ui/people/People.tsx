@@ -2,6 +2,7 @@
 
 import { plural, t } from "@lingui/core/macro";
 import { Suspense, useState } from "react";
+import { compared } from "../../formats";
 import { serves } from "../../session/connection";
 import { absentLockHolders } from "../../store/absentUsers";
 import { now, useEditor } from "../../store/store";
@@ -28,7 +29,7 @@ export function People() {
     me,
     ...Object.keys(users)
       .filter((name) => name !== me)
-      .sort(),
+      .sort(compared),
   ];
   const shown = names.slice(0, 4);
   return (

@@ -3,12 +3,12 @@
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { ask } from "../../commands/requests";
+import { ago, clock } from "../../formats";
 import type { LockHolder } from "../../protocol/types";
 import { whyUnavailable } from "../../store/permissions";
 import { notify, now, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Confirm } from "../kit/dialogs";
-import { ago, clock } from "../times";
 
 export default function TakeOver({ user, onClose }: { user: string; onClose: () => void }) {
   const [holder, setHolder] = useState<LockHolder | null>(null);
@@ -63,9 +63,7 @@ export default function TakeOver({ user, onClose }: { user: string; onClose: () 
               <li key={lock.object_id}>{t`${called(lock)}, since ${when(lock.since)}`}</li>
             ))}
           </ul>
-          <p>
-            {t`Everybody can edit these afterwards. Changes made by ${user} stay. ${user} is notified on returning.`}
-          </p>
+          <p>{t`Everybody can then edit these. Changes made by ${user} are kept. ${user} is notified on returning.`}</p>
         </>
       )}
     </Confirm>

@@ -4,6 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useMemo } from "react";
 import { type DropItem, isTextDropItem, ListBox, ListBoxItem, useDragAndDrop } from "react-aria-components";
 import { possibleParents, setParent } from "../../commands/points";
+import { byName } from "../../formats";
 import { theEngine } from "../../session/engine";
 import type { OpenDocument } from "../../store/state";
 import { notify, now, select, setUi, useEditor } from "../../store/store";
@@ -39,7 +40,7 @@ function rowsOf(doc: OpenDocument): Row[] {
       ]);
   const objects = Object.values(doc.objects)
     .filter((each) => each.pose && points.some((point) => point.parent === each.id))
-    .sort((a, b) => a.name.localeCompare(b.name));
+    .sort(byName);
   return [
     ...objects.flatMap((object) => [
       { id: object.id, name: object.name, kind: "object" as const, depth: 0, orientations: [] },

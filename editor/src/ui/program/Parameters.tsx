@@ -4,6 +4,7 @@ import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { Button as AriaButton } from "react-aria-components";
 import { addParameter, notEditable, override, removeParameter, updateParameter } from "../../commands/program";
+import { byName } from "../../formats";
 import { words } from "../../program/naming";
 import { usersOf } from "../../program/problems";
 import { extraOf, read, SIMPLE, type Simple, textOf, typeName } from "../../program/values";
@@ -19,7 +20,7 @@ export function Parameters() {
       <p className="quiet small">{t`Variables are shared by all actions of the project.`}</p>
       {Object.values(parameters ?? {})
         .filter((each) => !OWN.has(each.name))
-        .sort((a, b) => a.name.localeCompare(b.name))
+        .sort(byName)
         .map((each) => (
           <One key={each.id} id={each.id} />
         ))}
@@ -30,7 +31,7 @@ export function Parameters() {
 }
 
 /** The server maintains these for scripts. */
-const OWN = new Set(["scene_id", "project_id"]);
+const OWN: ReadonlySet<string> = new Set(["scene_id", "project_id"]);
 
 function One({ id }: { id: string }) {
   const state = useEditor((each) => each);

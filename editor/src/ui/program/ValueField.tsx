@@ -6,7 +6,10 @@
 import { t } from "@lingui/core/macro";
 import type { ReactNode } from "react";
 import { useEffect, useId, useState } from "react";
-import { type Extra, rangeWords, read, textOf } from "../../program/values";
+import { decimal } from "../../formats";
+import { words } from "../../program/naming";
+import { type Extra, rangeWords, read, shownUnit, textOf, withoutUnit } from "../../program/values";
+import "./value.css";
 
 export interface Choice {
   /** JSON of the value. */
@@ -28,6 +31,11 @@ interface ValueFieldProps {
   secret?: boolean;
   /** Why it cannot be changed; empty if it can. */
   why?: string;
+  /** It must be entered: marked, and empty while it has its default value, which means "not set". */
+  required?: boolean;
+  autoFocus?: boolean;
+  /** Called for each typed text that is a valid value, so that it is not lost when the form is closed. */
+  onTyped?: (json: string) => void;
   /** Send the value; return why it was refused. */
   onSet: (json: string) => Promise<string>;
   children?: ReactNode;
@@ -43,17 +51,23 @@ export function ValueField({
   hint,
   secret = false,
   why = "",
+  required = false,
+  autoFocus = false,
+  onTyped,
   onSet,
   children,
 }: ValueFieldProps) {
   const stored = secret && (json ?? "").startsWith('"***');
-  const known = stored ? "" : textOf(type, json);
+  const known = stored ? "" : textOf(type, json, extra);
   const [text, setText] = useState(known);
   const [problem, setProblem] = useState("");
   const id = useId();
-  // The value was changed by another user, or accepted.
+  // The value was changed by another user, or accepted. A text that means the same stays as it is typed.
   useEffect(() => {
-    setText(known);
+    setText((typed) => {
+      const found = read(type, typed, extra);
+      return "json" in found && found.json === json ? typed : known;
+    });
     setProblem("");
   }, [known]);
 
@@ -67,23 +81,29 @@ export function ValueField({
     if ("problem" in found) setProblem(found.problem);
     else void set(found.json);
   };
-  const range = rangeWords(extra);
-  const about = [hint, range].filter(Boolean).join(" · ");
+  const range = rangeWords(type, extra);
+  const [unit] = shownUnit(type, extra);
+  const about = [hint && withoutUnit(hint, type, extra), range].filter(Boolean).join(" · ");
   const described = {
     id,
     "aria-invalid": problem !== "" || undefined,
     "aria-describedby": `${id}-about`,
+    "aria-required": required || undefined,
     disabled: why !== "",
   };
   const listed =
     choices ??
     (type === "boolean"
       ? booleans()
-      : extra.allowed_values?.map((each) => ({ json: JSON.stringify(each), label: String(each) })));
+      : extra.allowed_values?.map((each) => ({
+          json: JSON.stringify(each),
+          label: typeof each === "string" ? words(each) : decimal(each),
+        })));
   return (
     <div className="field value-field">
       <div className="value-head">
         <label htmlFor={id}>{label}</label>
+        {required && <span className="tag" aria-hidden="true">{t`required`}</span>}
         {children}
       </div>
       {listed && listed.length <= 3 && listed.every((each) => each.label.length <= 9) ? (
@@ -122,7 +142,12 @@ export function ValueField({
             type={secret ? "password" : undefined}
             placeholder={stored ? t`Stored. Type to replace it.` : undefined}
             autoComplete={secret ? "new-password" : "off"}
-            onChange={(event) => setText(event.target.value)}
+            autoFocus={autoFocus}
+            onChange={(event) => {
+              setText(event.target.value);
+              const found = onTyped && read(type, event.target.value, extra);
+              if (found && "json" in found) onTyped(found.json);
+            }}
             onBlur={leave}
             onKeyDown={(event) => {
               if (event.key === "Enter") leave();
@@ -133,7 +158,7 @@ export function ValueField({
               }
             }}
           />
-          {extra.unit && <span className="unit quiet">{extra.unit}</span>}
+          {unit && <span className="unit quiet">{unit}</span>}
         </span>
       )}
       <span id={`${id}-about`} className="quiet small about-value">

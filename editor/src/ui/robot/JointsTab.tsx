@@ -5,6 +5,7 @@ import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { holdJog } from "../../commands/holdToRun";
 import { type Chosen, featuresOf, moveToJoints, notReady } from "../../commands/robot";
+import { fixed } from "../../formats";
 import type { Joint } from "../../protocol/types";
 import { theEngine } from "../../session/engine";
 import { useEditor } from "../../store/store";
@@ -165,7 +166,7 @@ export function JointsTab({ chosen }: { chosen: Chosen }) {
 
 function whyOutsideLimits({ name, lower, upper, scale, unit }: ShownJoint, value: number): string {
   if (value >= lower && value <= upper) return "";
-  const [shownName, least, most] = [name.replaceAll("_", " "), (lower * scale).toFixed(0), (upper * scale).toFixed(0)];
+  const [shownName, least, most] = [name.replaceAll("_", " "), fixed(lower * scale, 0), fixed(upper * scale, 0)];
   return t`Limits of ${shownName}: ${least} to ${most} ${unit}.`;
 }
 
@@ -178,7 +179,7 @@ export function Limits({ joint: { value, lower, upper, scale, unit } }: { joint:
     <span
       className="joint-limits"
       data-near={near}
-      title={t`from ${(lower * scale).toFixed(0)} to ${(upper * scale).toFixed(0)} ${unit}`}
+      title={t`from ${fixed(lower * scale, 0)} to ${fixed(upper * scale, 0)} ${unit}`}
     >
       <span style={{ left: `${part * 100}%` }} />
       {near && <span className="hidden-but-read">{t`near its limit`}</span>}

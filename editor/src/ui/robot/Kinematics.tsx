@@ -3,9 +3,9 @@
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { featuresOf } from "../../commands/robot";
+import { ago } from "../../formats";
 import { type RobotKinematics, readKinematics } from "../../session/kinematics";
 import { useEditor } from "../../store/store";
-import { ago } from "../times";
 
 export function Kinematics({ robotId }: { robotId: string }) {
   const reports = useEditor((state) => featuresOf(state, robotId)?.kinematic_calibration ?? false);

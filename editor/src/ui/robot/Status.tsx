@@ -3,6 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { acknowledgeStop, armOf, type Chosen, effectorPose, featuresOf, notReady } from "../../commands/robot";
+import { fixed } from "../../formats";
 import { useEditor } from "../../store/store";
 import { rollPitchYaw } from "../../viewmodel/rotations";
 import { Button } from "../kit/kit";
@@ -55,8 +56,8 @@ function Pose({ chosen }: { chosen: Chosen }) {
       {(["x", "y", "z"] as const).map((axis, n) => (
         <div key={axis}>
           <dt>{axis}</dt>
-          <dd>{(([x, y, z][n] ?? 0) * 1000).toFixed(1)} mm</dd>
-          <dd>{(angles[n] ?? 0).toFixed(1)}°</dd>
+          <dd>{fixed(([x, y, z][n] ?? 0) * 1000, 1)} mm</dd>
+          <dd>{fixed(angles[n] ?? 0, 1)}°</dd>
         </div>
       ))}
     </dl>

@@ -13,6 +13,7 @@ import {
   notReady,
   stepEffector,
 } from "../../commands/robot";
+import { decimal } from "../../formats";
 import type { Pose, Position, StepAxis } from "../../protocol/types";
 import { now, useEditor } from "../../store/store";
 import type { Jogging } from "../../store/ui";
@@ -192,7 +193,7 @@ function Distances({ distance }: { distance: number }) {
         label={t`Step, mm`}
         value={String(distance)}
         onChange={(next) => setMotionOptions({ distance: Number(next) })}
-        choices={DISTANCES.map((each) => [String(each), String(each * 1000)] as const)}
+        choices={DISTANCES.map((each) => [String(each), decimal(each * 1000, 3)] as const)}
       />
       <Amount
         label={t`Or`}
@@ -214,7 +215,7 @@ function Angles({ angle }: { angle: number }) {
         label={t`Step, °`}
         value={String(angle)}
         onChange={(next) => setMotionOptions({ angle: Number(next) })}
-        choices={ANGLES.map((each) => [String(each), String(Math.round(each * DEGREES * 10) / 10)] as const)}
+        choices={ANGLES.map((each) => [String(each), decimal(each * DEGREES, 1)] as const)}
       />
       <Amount
         label={t`Or`}

@@ -2,10 +2,10 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, plural, t } from "@lingui/core/macro";
+import { ago, duration } from "../../formats";
 import type { Run, RunEnd } from "../../protocol/types";
 import { useEditor } from "../../store/store";
-import { ago, useTicking } from "../times";
-import { seconds } from "./Trace";
+import { useTicking } from "../times";
 
 const WORDS: Record<RunEnd, MessageDescriptor> = {
   running: msg`running`,
@@ -48,7 +48,7 @@ function summary(run: Run): string {
   const took = run.ended ? (Date.parse(run.ended) - Date.parse(run.started)) / 1000 : undefined;
   if (run.end === "running") return run.start_paused ? t`started paused` : "";
   const parts = [plural(run.actions, { one: "# action", other: "# actions" })];
-  if (took !== undefined) parts.push(seconds(took));
+  if (took !== undefined) parts.push(duration(took));
   if (run.stopped_by) parts.push(t`stopped by ${run.stopped_by}`);
   if (run.error) parts.push(run.last_action?.name ? `${run.last_action.name}: ${run.error}` : run.error);
   return parts.join(" · ");

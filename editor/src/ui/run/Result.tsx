@@ -1,13 +1,14 @@
-/** The result of the last run of a project, with its error and a way to the action that failed. */
+/** The result of the last run of a project, with its error and a button that shows the failed action. */
 
 import { t } from "@lingui/core/macro";
+import { ago } from "../../formats";
 import { lastRun, type Result, resultOf } from "../../program/results";
 import { theEngine } from "../../session/engine";
 import { now, select, setUi, useEditor } from "../../store/store";
 import { nameOf, selectionOf, withNames } from "../../viewmodel/names";
 import { Icon, type IconName } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { ago, useTicking } from "../times";
+import { useTicking } from "../times";
 
 export const ICONS: Record<Result["tone"], IconName> = { good: "check", bad: "warn", warn: "warn", "": "stop" };
 

@@ -2,12 +2,13 @@
 
 import { t } from "@lingui/core/macro";
 import { storeGeneralState } from "../../commands/viewstate";
+import { ago } from "../../formats";
 import { dismissal, resultOf, undismissedRun } from "../../program/results";
 import { now, useEditor } from "../../store/store";
 import { withNames } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
-import { ago, useTicking } from "../times";
+import { useTicking } from "../times";
 import { ICONS, ShowAction } from "./Result";
 import "./banner.css";
 

@@ -3,12 +3,13 @@
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { Button as AriaButton } from "react-aria-components";
+import { clock, duration } from "../../formats";
 import { metaOf } from "../../program/logic";
+import { words } from "../../program/naming";
 import type { TraceEntry } from "../../protocol/types";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { Values } from "../program/Values";
-import { clock } from "../times";
 import "../program/program.css";
 
 /** Number of entries shown at first. */
@@ -36,12 +37,12 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
               <span className="trace-name">{entry.name || t`an action`}</span>
               <span className="quiet small">
                 {entry.error !== undefined
-                  ? "failed"
+                  ? t`failed`
                   : entry.duration === undefined
                     ? paused
                       ? t`waiting`
                       : t`running`
-                    : seconds(entry.duration)}
+                    : duration(entry.duration)}
               </span>
             </AriaButton>
             {open === entry.number && <Detail entry={entry} onChoose={onChoose} />}
@@ -56,7 +57,7 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
 function Detail({ entry, onChoose }: { entry: TraceEntry; onChoose: (actionId: string) => void }) {
   const action = useEditor((state) => state.doc?.actions[entry.action_id]);
   const meta = useEditor((state) => (action && state.doc ? metaOf(state.types, state.doc, action) : undefined));
-  const names = meta?.parameters.map((each) => each.name) ?? [];
+  const names = meta?.parameters.map((each) => words(each.name)) ?? [];
   return (
     <div className="trace-detail">
       {entry.error !== undefined && <p className="error">{entry.error}</p>}
@@ -71,12 +72,4 @@ function Detail({ entry, onChoose }: { entry: TraceEntry; onChoose: (actionId: s
       {action && <Button onPress={() => onChoose(entry.action_id)}>{t`Show it`}</Button>}
     </div>
   );
-}
-
-export function seconds(duration: number): string {
-  return duration < 0.995
-    ? t`${Math.round(duration * 1000)} ms`
-    : duration < 59.5
-      ? t`${duration.toFixed(1)} s`
-      : t`${Math.floor(duration / 60)} min ${Math.round(duration % 60)} s`;
 }

@@ -6,7 +6,7 @@ import type { Tool } from "../workplace/tool";
 
 export const run: Tool = {
   id: "run",
-  label: msg`Run`,
+  label: msg({ message: "Run", context: "tool" }),
   icon: "play",
   shown: (state) => state.doc?.project != null,
   Panel: lazyComponent(() => import("./RunPanel")),

@@ -5,6 +5,8 @@ import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { Input, Label, SearchField } from "react-aria-components";
 import { addShape, notBuildable, type ShapeKind } from "../../commands/scene";
+import { compared } from "../../formats";
+import { words } from "../../program/naming";
 import type { ObjectTypeMeta } from "../../protocol/types";
 import { notify, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
@@ -35,8 +37,8 @@ export default function AddPanel() {
       `${each.type} ${each.display_name} ${each.category ?? ""} ${each.description}`.toLowerCase().includes(wanted),
   );
   const groups = new Map<string, ObjectTypeMeta[]>();
-  for (const each of found.sort((a, b) => shownName(a).localeCompare(shownName(b)))) {
-    const group = each.category ?? t`Other`;
+  for (const each of found.sort((a, b) => compared(shownName(a), shownName(b)))) {
+    const group = each.category ? words(each.category) : t`Other`;
     groups.set(group, [...(groups.get(group) ?? []), each]);
   }
   return (
@@ -57,7 +59,7 @@ export default function AddPanel() {
         <Input placeholder={t`Search devices`} />
       </SearchField>
       {[...groups]
-        .sort(([a], [b]) => a.localeCompare(b))
+        .sort(([a], [b]) => compared(a, b))
         .map(([group, members]) => (
           <section key={group} aria-label={group}>
             <h3 className="quiet small">{group}</h3>

@@ -12,7 +12,7 @@ import { missing, parametersOf, SettingsFields, type Values } from "./Settings";
 
 const Body: Section["Body"] = ({ selection: { id } }) => {
   const object = useEditor((state) => state.doc?.objects[id]);
-  const settings = useEditor((state) => state.types.byName[object?.type ?? ""]?.settings);
+  const type = useEditor((state) => state.types.byName[object?.type ?? ""]);
   const holder = useEditor((state) => heldBy(state, id));
   const cannot = useEditor((state) => notBuildable(state, "UpdateObjectParameters"));
   const overlaid = useEditor((state) => state.live.objects[id]?.overlaid);

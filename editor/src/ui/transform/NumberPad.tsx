@@ -2,6 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useId, useState } from "react";
+import { decimalPoint } from "../../formats";
 import { ANGLE_UNITS, amount, isAngle, LENGTH_UNITS, show, type Unit } from "../../transform/amounts";
 import { Button } from "../kit/kit";
 
@@ -67,10 +68,10 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
             key={key}
             className="pad-key"
             excludeFromTabOrder
-            aria-label={key === "−" ? "minus" : key === "." ? "point" : key}
-            onPress={() => setText(text + (key === "−" ? "-" : key))}
+            aria-label={key === "−" ? t`minus` : key === "." ? t`decimal point` : key}
+            onPress={() => setText(text + (key === "−" ? "-" : key === "." ? decimalPoint() : key))}
           >
-            {key}
+            {key === "." ? decimalPoint() : key}
           </Button>
         ))}
         <Button className="pad-key" excludeFromTabOrder aria-label={t`plus`} onPress={() => setText(`${text}+`)}>

@@ -1,4 +1,4 @@
-/** Pose of the selected item, and the ways to change it: drag in the view, steps, numbers. */
+/** Pose of the selected item, and its controls: drag in the view, steps, numbers. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -52,7 +52,7 @@ const SNAPS: readonly (readonly [Snap, MessageDescriptor])[] = [
   ["point", msg`other objects`],
 ];
 const keep = (change: Partial<ToolSettings>) => storeGeneralState({ [TOOL]: { ...toolSettings(now()), ...change } });
-/** Stands for a custom step. */
+/** Choice of a custom step. */
 const FREE = "free";
 
 export default function Place({ selection }: { selection: Selection }) {
@@ -281,7 +281,7 @@ function Steps({ settings, turn }: { settings: ToolSettings; turn: boolean }) {
   const value = turn ? settings.angleStep : settings.lengthStep;
   const put = (next: number) => keep(turn ? { angleStep: next } : { lengthStep: next });
   const known = steps.find(([each]) => Math.abs(each - value) < 1e-12);
-  const choices: [string, string][] = steps.map(([each, words]) => [String(each), words]);
+  const choices: [string, string][] = steps.map(([each]) => [String(each), stepWords(each, turn ? "angle" : "length")]);
   choices.push([FREE, known ? t`other…` : stepWords(value, turn ? "angle" : "length")]);
   const worth = turn ? Math.PI / 180 : 0.001;
   return (

@@ -3,6 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useState } from "react";
 import { requestItem, withdrawRequest } from "../../../commands/handover";
+import { ago, clock } from "../../../formats";
 import { serves } from "../../../session/connection";
 import { hasRequested } from "../../../store/handover";
 import { heldBy } from "../../../store/selectors";
@@ -10,7 +11,6 @@ import { useEditor } from "../../../store/store";
 import { Icon } from "../../kit/icons";
 import { Button } from "../../kit/kit";
 import { lazyComponent } from "../../kit/lazy";
-import { ago, clock } from "../../times";
 
 const TakeOver = lazyComponent(() => import("../../people/TakeOver"));
 

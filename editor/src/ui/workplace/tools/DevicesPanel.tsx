@@ -3,6 +3,7 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { retryObject } from "../../../commands/operation";
+import { byName } from "../../../formats";
 import { serves } from "../../../session/connection";
 import { whyUnavailable } from "../../../store/permissions";
 import { derivesFrom } from "../../../store/selectors";
@@ -40,9 +41,7 @@ export default function Panel() {
     (each) => troubled(each.id) || !inert.split(",").includes(each.id),
   );
   // Faulty devices first.
-  const objects = devices.sort(
-    (a, b) => Number(troubled(b.id)) - Number(troubled(a.id)) || a.name.localeCompare(b.name),
-  );
+  const objects = devices.sort((a, b) => Number(isFaulty(b.id)) - Number(isFaulty(a.id)) || byName(a, b));
   return (
     <>
       {live.state === "stopped" && (
