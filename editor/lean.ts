@@ -48,6 +48,15 @@ const NEVER = new RegExp(
 );
 const NONE = /^NUM_(CLIPPING_PLANES|SUN_LIGHT\w*|SPOT_LIGHT\w*|POINT_LIGHT\w*|RECT_AREA_LIGHTS|LIGHT_PROBE_GRIDS) > 0$/;
 
+/** The locale of react-aria: the language of the page. */
+const LOCALE = `
+  export const getDefaultLocale = () => ({ locale: document.documentElement.lang, direction: "ltr" });
+  export const useDefaultLocale = getDefaultLocale;
+`;
+
+/** Languages of react-aria's texts. */
+const TEXTS = /\b(en-US|cs-CZ|de-DE)\b/;
+
 /** Return whether a term of a condition is always false. */
 function isFalse(term: string): boolean {
   const bare = term
@@ -110,6 +119,14 @@ function hasElif(lines: readonly string[], from: number): boolean {
   return false;
 }
 
+/** Return the texts of react-aria in the languages of the editor: a module that imports one file per language. */
+export function leanTexts(code: string): string {
+  return code
+    .split("\n")
+    .filter((line) => !/[a-z]{2}-[A-Z]{2}/.test(line) || TEXTS.test(line))
+    .join("\n");
+}
+
 /** The Vite plugin. It also drops the texts of react-aria in languages that the editor does not have. */
 export function lean(): Plugin {
   return {
@@ -130,7 +147,8 @@ export function lean(): Plugin {
         return part.includes("/ShaderLib/") ? "export const vertex = '', fragment = '';" : "export default '';";
       }
       if (part.startsWith("renderers/shaders/")) return leanShader(code);
-      if (/\/intl\/.*\/[a-z]{2}-[A-Z]{2}\.m?js$/.test(id) && !id.includes("en-US")) return "export default {};";
+      if (/\/intlStrings\.m?js$/.test(id)) return leanTexts(code);
+      if (/\/i18n\/useDefaultLocale\.m?js$/.test(id)) return LOCALE;
       return null;
     },
   };

@@ -34,12 +34,7 @@ function compressed(): Plugin {
 
 export default defineConfig({
   base: "/editor/",
-  plugins: [
-    lingui({ macroTransform: true, failOnMissing: true, failOnCompileError: true }),
-    react(),
-    lean(),
-    compressed(),
-  ],
+  plugins: [lingui({ macroTransform: true, failOnCompileError: true }), react(), lean(), compressed()],
   // From its sources, so that unused parts are left out.
   resolve: { alias: [{ find: /^three$/, replacement: "three/src/Three.js" }] },
   build: {

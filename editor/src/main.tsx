@@ -5,7 +5,7 @@
 
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
-import { loadCatalogue, preferredLanguage } from "./i18n/catalogue";
+import { isLanguage, loadCatalogue, preferredLanguage } from "./i18n/catalogue";
 import { createClient } from "./session/connection";
 import { remembered, takeTokenFromAddress } from "./session/localStorage";
 import { recordErrors } from "./session/log";
@@ -20,9 +20,10 @@ async function start(): Promise<void> {
   const session = createSession(createClient());
   takeTokenFromAddress();
   const name = remembered("name");
-  // A document is probably open: load the view at the same time.
-  if (name) import("./engine/engine").catch(() => {});
-  await persistently(() => loadCatalogue(preferredLanguage()));
+  // Load at the same time what is shown next: probably the view of an open document, or the form for the name.
+  (name ? import("./engine/engine") : import("./ui/join/Join")).catch(() => {});
+  const language = remembered("language");
+  await persistently(() => loadCatalogue(isLanguage(language) ? language : preferredLanguage()));
   if (name) session.join(name, remembered("token"));
   const root = document.getElementById("root");
   if (!root) return;
@@ -34,7 +35,7 @@ async function start(): Promise<void> {
   // Load the parts that the first tap may open after the page is shown.
   setTimeout(() => {
     for (const load of [
-      () => import("./ui/kit/menu"),
+      () => import("./ui/settings/SettingsMenu"),
       () => import("./ui/kit/dialogs"),
       () => import("./ui/workplace/Panel"),
       () => import("./ui/things/ThingsPanel"),

@@ -1,4 +1,5 @@
 import { beforeEach, expect, test, vi } from "vitest";
+import { setTranslations } from "../i18n/testing";
 
 const call = vi.fn();
 vi.mock("../session/connection", () => ({ call, serves: () => true }));
@@ -21,7 +22,7 @@ test("Stop sends one request, ends holds at once, and reports nothing if everyth
   expect(notify).not.toHaveBeenCalled();
 });
 
-test("What was not stopped is named, with what to do", async () => {
+test("devices that were not stopped are named with advice", async () => {
   const reason = "press: run cannot be stopped from here";
   call.mockResolvedValue({
     outcomes: [
@@ -33,7 +34,16 @@ test("What was not stopped is named, with what to do", async () => {
   expect(notify).toHaveBeenCalledWith("error", `Not stopped: ${reason}. Use the emergency stop.`);
 });
 
-test("A stop that could not be sent is told", async () => {
+test("Reasons are shown in the user's language", async () => {
+  setTranslations({ "{device}: stop() returned": "{device}: stop() skončil" });
+  const reason = { reason: "ur5e: stop() returned", key: "{device}: stop() returned", values: { device: "ur5e" } };
+  call.mockResolvedValue({ outcomes: [{ kind: "device", id: "obj_1", name: "ur5e", stopped: false, ...reason }] });
+  await stopMotion();
+  setTranslations({});
+  expect(notify).toHaveBeenCalledWith("error", "Not stopped: ur5e: stop() skončil. Use the emergency stop.");
+});
+
+test("a stop that could not be sent is reported", async () => {
   call.mockRejectedValue(new Error("The connection is lost."));
   await stopMotion();
   expect(notify).toHaveBeenCalledWith("error", "Not stopped: The connection is lost. Use the emergency stop.");

@@ -1,6 +1,7 @@
 /** The online scene: go online, go offline, stop. */
 
 import { t } from "@lingui/core/macro";
+import { inUserLanguage } from "../i18n/serverMessages";
 import { call, serves } from "../session/connection";
 import { notify } from "../store/store";
 import { endHolds } from "./holdToRun";
@@ -23,7 +24,8 @@ export async function stopMotion(): Promise<void> {
   endHolds();
   let reasons: string[];
   try {
-    reasons = (await answer).outcomes.filter((each) => !each.stopped).map((each) => each.reason ?? each.name);
+    const missed = (await answer).outcomes.filter((each) => !each.stopped);
+    reasons = missed.map((each) => inUserLanguage(each).reason ?? each.name);
   } catch (error) {
     reasons = [sentence(error)];
   }

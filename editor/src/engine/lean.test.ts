@@ -5,7 +5,7 @@ import { join } from "node:path";
 import { expect, test } from "vitest";
 import { leanShader } from "../../lean";
 
-test("blocks of what is never defined go, their else stays, and all others stay as they are", () => {
+test("blocks of undefined macros are removed, except for their else part; other blocks are unchanged", () => {
   const text = [
     "a",
     "#ifdef USE_SKINNING",
@@ -41,7 +41,7 @@ test("blocks of what is never defined go, their else stays, and all others stay 
   ]);
 });
 
-test("every shader of three.js stays balanced", () => {
+test("every shader of three.js keeps balanced conditions", () => {
   const root = join(import.meta.dirname, "../../node_modules/three/src/renderers/shaders");
   const files = readdirSync(root, { recursive: true, encoding: "utf8" }).filter((name) => name.endsWith(".glsl.js"));
   expect(files.length).toBeGreaterThan(100);

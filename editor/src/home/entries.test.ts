@@ -1,4 +1,5 @@
-import { describe, expect, it } from "vitest";
+import { afterEach, describe, expect, it } from "vitest";
+import { setTranslations } from "../i18n/testing";
 import type { Lists } from "../store/state";
 import { chosen, entriesOf } from "./entries";
 
@@ -26,8 +27,20 @@ const LISTS: Lists = {
   highlight: "",
 };
 
+afterEach(() => setTranslations({}));
+
 describe("the lists of the home screen", () => {
-  it("tell what belongs to what, and what is gone", () => {
+  it("show problems in the user's language, and keep the English text for the repair", () => {
+    setTranslations({ "{name}: {type} needs a pose.": "{name}: {type} potřebuje polohu." });
+    const text = "lamp: Lamp needs a pose.";
+    const message = { text, key: "{name}: {type} needs a pose.", values: { name: "lamp", type: "Lamp" } };
+    const faulty = { ...scene("s3", "cell 3", "2026-05-01T00:00:00Z"), problems: [text], problem_messages: [message] };
+    const [entry] = entriesOf({ ...LISTS, scenes: [faulty] }, "scene") ?? [];
+    expect(entry).toMatchObject({ problems: [text], explanations: ["lamp: Lamp potřebuje polohu."] });
+    expect(entriesOf(LISTS, "project")?.map((each) => each.explanations)).toEqual([["no end"], []]);
+  });
+
+  it("name related entries, also deleted ones", () => {
     expect(entriesOf(LISTS, "scene")?.map((each) => each.projects)).toEqual([1, 0]);
     expect(entriesOf(LISTS, "project")?.map((each) => each.from)).toEqual([
       { id: "s1", name: "cell 10", gone: false },
@@ -37,7 +50,7 @@ describe("the lists of the home screen", () => {
     expect(entriesOf({ ...LISTS, scenes: null }, "scene")).toBeNull();
   });
 
-  it("are sorted as people sort, and searched by name, description and where they belong", () => {
+  it("are sorted naturally, and searched by name, description and related entry", () => {
     const scenes = entriesOf(LISTS, "scene") ?? [];
     expect(chosen(scenes, "", "name", null).map((each) => each.name)).toEqual(["cell 2", "cell 10"]);
     expect(chosen(scenes, "", "name down", null).map((each) => each.name)).toEqual(["cell 10", "cell 2"]);

@@ -3,6 +3,7 @@
 import type { MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { byName } from "../formats";
+import { type ServerMessage, translate } from "../i18n/serverMessages";
 import type { Lists } from "../store/state";
 
 export interface Entry {
@@ -13,7 +14,10 @@ export interface Entry {
   /** When it was changed or built, and created; RFC 3339, empty if unknown. */
   time: string;
   created: string;
+  /** Problems in English, which name the faulty objects. */
   problems: string[];
+  /** The problems in the user's language. */
+  explanations: string[];
   /** Scene of a project, project of a package. */
   from?: { id: string; name: string; gone: boolean };
   /** Number of projects of a scene. */
@@ -44,7 +48,7 @@ export function entriesOf(lists: Lists, kind: Entry["kind"]): Entry[] | null {
           description: scene.description ?? "",
           time: scene.modified ?? "",
           created: scene.created ?? "",
-          problems: scene.problems ?? [],
+          ...explained(scene),
           projects: projects?.filter((each) => each.scene_id === scene.id).length ?? 0,
         })) ?? null
       );
@@ -57,7 +61,7 @@ export function entriesOf(lists: Lists, kind: Entry["kind"]): Entry[] | null {
           description: project.description,
           time: project.modified ?? "",
           created: project.created ?? "",
-          problems: project.problems ?? [],
+          ...explained(project),
           from: from(project.scene_id, scenes),
         })) ?? null
       );
@@ -70,7 +74,7 @@ export function entriesOf(lists: Lists, kind: Entry["kind"]): Entry[] | null {
           description: project?.description ?? "",
           time: meta.built,
           created: meta.built,
-          problems: [],
+          ...explained({}),
           executed: meta.executed ?? "",
           ...(project
             ? { from: { id: project.id, name: project.name, gone: !projects?.some((each) => each.id === project.id) } }
@@ -78,6 +82,16 @@ export function entriesOf(lists: Lists, kind: Entry["kind"]): Entry[] | null {
         })) ?? null
       );
   }
+}
+
+interface Checked {
+  problems?: string[];
+  problem_messages?: ServerMessage[];
+}
+
+function explained({ problems = [], problem_messages }: Checked): Pick<Entry, "problems" | "explanations"> {
+  const messages = problem_messages ?? problems.map((text) => ({ text }));
+  return { problems, explanations: messages.map(translate) };
 }
 
 function from(id: string, of: { id: string; name: string }[] | null): Entry["from"] {

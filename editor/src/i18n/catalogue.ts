@@ -1,28 +1,58 @@
 /**
- * The texts of the interface in the user's language: one catalogue per language, loaded before the page is shown.
- * Constants of modules use descriptors (`msg`), since modules are evaluated before the catalogue is loaded; `i18n._()`
- * turns them into text.
+ * The texts of the interface in the user's language: a catalogue per language, loaded when it is needed. Constants of
+ * modules use descriptors (`msg`), since modules are evaluated before the catalogue is loaded; `i18n._()` turns them
+ * into text.
  */
 
 import { i18n, type Messages } from "@lingui/core";
-import { loadTranslations } from "./serverMessages";
+import { useSyncExternalStore } from "react";
+import { rest } from "../session/rest";
+import { serverCatalogue } from "./serverMessages";
 
-const CATALOGUES: Readonly<Record<string, () => Promise<{ messages: Messages }>>> = {
+/** The languages by their own names. */
+export const LANGUAGES = { en: "English", cs: "Čeština", de: "Deutsch" } as const;
+export type Language = keyof typeof LANGUAGES;
+
+const CATALOGUES: Readonly<Record<Language, () => Promise<{ messages: Messages }>>> = {
   en: () => import("./en.po"),
+  cs: () => import("./cs.po"),
+  de: () => import("./de.po"),
 };
-const FALLBACK = "en";
+/** The language of the source code, which the server needs not translate. */
+const FALLBACK: Language = "en";
+/** Time limit, s. The page is shown after it, with the server's texts in English. */
+const TRANSLATIONS_DEADLINE = 5;
 
-/** Return the first language of the browser that has a catalogue, else English. */
-export function preferredLanguage(languages: readonly string[] = navigator.languages): string {
-  const short = languages.map((each) => each.split("-")[0] ?? "");
-  return short.find((each) => each in CATALOGUES) ?? FALLBACK;
+export function isLanguage(name: unknown): name is Language {
+  return typeof name === "string" && name in LANGUAGES;
 }
 
-/** Load the texts of a language and use them. To change the language, reload the page. */
-export async function loadCatalogue(language: string): Promise<void> {
-  const load = CATALOGUES[language] ?? CATALOGUES[FALLBACK];
-  if (!load) return;
-  const [{ messages }] = await Promise.all([load(), loadTranslations(language).catch(() => {})]);
-  i18n.loadAndActivate({ locale: language, messages });
+/** Return the first language of the browser that has a catalogue, else English. */
+export function preferredLanguage(languages: readonly string[] = navigator.languages): Language {
+  return languages.map((each) => each.split("-")[0]).find(isLanguage) ?? FALLBACK;
+}
+
+/** Load the translations of the server and its drivers as part of a catalogue. */
+async function loadTranslations(language: Language): Promise<Messages> {
+  if (language === FALLBACK) return {};
+  const response = await rest(`/api/translations/${language}`, { deadline: TRANSLATIONS_DEADLINE });
+  return serverCatalogue((await response.json()) as Record<string, string>);
+}
+
+/** Load the texts of a language and use them. */
+export async function loadCatalogue(language: Language): Promise<void> {
+  const [{ messages }, server] = await Promise.all([
+    CATALOGUES[language](),
+    loadTranslations(language).catch(() => ({})),
+  ]);
   document.documentElement.lang = language;
+  i18n.loadAndActivate({ locale: language, messages: { ...messages, ...server } });
+}
+
+/** Return the language in use; the component is drawn again when it changes. */
+export function useLanguage(): Language {
+  return useSyncExternalStore(
+    (changed) => i18n.on("change", changed),
+    () => i18n.locale as Language,
+  );
 }

@@ -6,7 +6,7 @@ import { expect, test } from "vitest";
 
 const SOURCES = join(import.meta.dirname, "..");
 
-test("no constant of a module is a text: it would be looked up before the catalogue is loaded", () => {
+test("constants of modules are not translated before the catalogue is loaded", () => {
   const offending: string[] = [];
   for (const name of readdirSync(SOURCES, { recursive: true, encoding: "utf8" })) {
     if (!/\.tsx?$/.test(name) || name.includes(".test.")) continue;

@@ -1,5 +1,8 @@
 /** Texts of the server in the user's language: its messages, and the texts of object types. */
 
+import { i18n, type Messages } from "@lingui/core";
+import { decimalPoint } from "../formats";
+
 /** A message of the server: the English text and what is needed to translate it. */
 export interface ServerMessage {
   text: string;
@@ -9,37 +12,64 @@ export interface ServerMessage {
   values?: Readonly<Record<string, string | ServerMessage>> | undefined;
 }
 
-const SOURCE_LANGUAGE = "en";
-/** Fields of events that contain a message. */
-const FIELDS = ["message", "reason", "error"] as const;
-let translations: Readonly<Record<string, string>> = {};
-
-/** Use these translations, by English text or template. */
-export function setTranslations(found: Readonly<Record<string, string>>): void {
-  translations = found;
+/** An alarm of a device. */
+interface TranslatableAlarm {
+  text: string;
+  remedy: string;
+  text_message?: ServerMessage;
+  remedy_message?: ServerMessage;
 }
 
-/** Load the translations of the server and its drivers. */
-export async function loadTranslations(language: string): Promise<void> {
-  if (language === SOURCE_LANGUAGE) return setTranslations({});
-  const response = await fetch(`/api/translations/${language}`);
-  setTranslations(response.ok ? ((await response.json()) as Record<string, string>) : {});
+/** Fields of events that contain a message. */
+const FIELDS = ["message", "reason", "error"] as const;
+/** Prefix of the server's texts in the catalogue. */
+const SERVER = "server:";
+/** A value that is a decimal number, with or without a unit or a sign of percent: the server writes a decimal point. */
+const DECIMAL = /^([-+]?\d+)\.(\d+)(?=(?: ?[%°\p{L}/²³]*)?$)/u;
+/** Names of fields whose values are shown as text, also if they look like numbers. */
+const VERSION = /version|firmware/;
+
+/** Return translations of the server, by English text or template, as part of a catalogue. */
+export function serverCatalogue(translations: Readonly<Record<string, string>>): Messages {
+  return Object.fromEntries(Object.entries(translations).map(([text, translated]) => [SERVER + text, translated]));
+}
+
+function translated(text: string): string {
+  const found = i18n.messages[SERVER + text];
+  return typeof found === "string" ? found : text;
 }
 
 /** Return a message in the user's language as far as it is translated, else in English. */
 export function translate({ text, key, values }: ServerMessage): string {
-  if (key === undefined || values === undefined) return translations[text] ?? text;
-  return (translations[key] ?? key).replace(/\{\{|\}\}|\{(\w+)\}/g, (found, name?: string) => {
+  if (key === undefined || values === undefined) return translated(text);
+  return translated(key).replace(/\{\{|\}\}|\{(\w+)\}/g, (found, name?: string) => {
     if (name === undefined) return found.charAt(0);
     const value = values[name] ?? found;
-    return typeof value === "string" ? value : translate(value);
+    if (typeof value !== "string") return translate(value);
+    return VERSION.test(name) ? value : value.replace(DECIMAL, `$1${decimalPoint()}$2`);
   });
+}
+
+/** Return an alarm with its text and remedy in the user's language. */
+export function translatedAlarm<Alarm extends TranslatableAlarm>(alarm: Alarm): Alarm {
+  const { text, remedy, text_message, remedy_message } = alarm;
+  return { ...alarm, text: translate(text_message ?? { text }), remedy: translate(remedy_message ?? { text: remedy }) };
+}
+
+/** The data of an event. */
+interface Translatable extends Omit<ServerMessage, "text"> {
+  /** The title of a task. */
+  title_message?: ServerMessage;
+  [field: string]: unknown;
 }
 
 /** Return the data of an event with its message in the user's language. */
 export function inUserLanguage<Data>(data: Data): Data {
   if (typeof data !== "object" || data === null) return data;
-  const { key, values, ...texts } = data as Omit<ServerMessage, "text"> & Partial<Record<string, unknown>>;
+  const { key, values, title_message, ...texts } = data as Translatable;
   const field = FIELDS.find((each) => typeof texts[each] === "string");
-  return field ? { ...data, [field]: translate({ text: texts[field] as string, key, values }) } : data;
+  const title = title_message && { title: translate(title_message) };
+  return field || title
+    ? { ...data, ...title, ...(field && { [field]: translate({ text: texts[field] as string, key, values }) }) }
+    : data;
 }

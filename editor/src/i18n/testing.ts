@@ -1,5 +1,11 @@
 /** Set-up of the unit tests: use the English texts of the source code. */
 
 import { i18n } from "@lingui/core";
+import { serverCatalogue } from "./serverMessages";
 
-i18n.loadAndActivate({ locale: "en", messages: {} });
+/** Use these translations of the server's texts, by English text or template. */
+export function setTranslations(translations: Record<string, string>, locale = "en"): void {
+  i18n.loadAndActivate({ locale, messages: serverCatalogue(translations) });
+}
+
+setTranslations({});

@@ -1,5 +1,6 @@
 /** Request the data of the open document that no event brings at first: breakpoints, view state, reachability. */
 
+import { inUserLanguage } from "../i18n/serverMessages";
 import type { State } from "../store/state";
 import { now, store } from "../store/store";
 import { call, serves } from "./connection";
@@ -60,7 +61,10 @@ async function loadDetails(document: string, project: boolean, isCurrent: () => 
     void ask(
       call("Reachability").then((all) => ({
         reach: Object.fromEntries(
-          all.map((one) => [[one.robot_id, one.arm_id ?? "", one.end_effector_id].join("/"), one]),
+          all.map((one) => [
+            [one.robot_id, one.arm_id ?? "", one.end_effector_id].join("/"),
+            { ...one, items: one.items.map(inUserLanguage) },
+          ]),
         ),
       })),
     );

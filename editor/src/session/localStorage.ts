@@ -1,4 +1,4 @@
-/** What this browser stores: user, token and display settings. Everything else is stored on the server. */
+/** What this browser stores: user, token, language and display settings. Everything else is stored on the server. */
 
 const KEYS = {
   name: "arcor2-hw.name",
@@ -6,6 +6,7 @@ const KEYS = {
   names: "arcor2-hw.names",
   theme: "arcor2-hw.theme",
   hand: "arcor2-hw.left-handed",
+  language: "arcor2-hw.language",
 };
 
 export function remembered(key: keyof typeof KEYS): string {

@@ -1,5 +1,6 @@
 /** Request the data of programs that events only update: actions, run history, trace of the running program. */
 
+import { inUserLanguage } from "../i18n/serverMessages";
 import { withRuns } from "../store/reduce";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
@@ -41,7 +42,7 @@ export class ProgramDetails implements Follower {
       this.runs.add(project_id);
       const wanted = project_id ? { limit: 20, project_id } : { limit: 100 };
       void call("ListRuns", wanted).then(
-        ({ runs }) => store.setState(({ program }) => ({ program: withRuns(program, runs) })),
+        ({ runs }) => store.setState(({ program }) => ({ program: withRuns(program, runs.map(inUserLanguage)) })),
         () => {},
       );
     }
@@ -64,6 +65,7 @@ export class ProgramDetails implements Follower {
 function takeTrace({ run, entries }: { run: number; entries: State["program"]["trace"] }): void {
   const known = now().program.trace.filter((each) => each.run === run);
   const newer = new Set(known.map((each) => each.number));
-  const trace = [...entries.filter((each) => !newer.has(each.number)), ...known].sort((a, b) => a.number - b.number);
+  const older = entries.filter((each) => !newer.has(each.number)).map(inUserLanguage);
+  const trace = [...older, ...known].sort((a, b) => a.number - b.number);
   store.setState(({ program }) => ({ program: { ...program, trace } }));
 }

@@ -7,6 +7,7 @@ import { t } from "@lingui/core/macro";
 import type { ConnectionState, ProtocolClient } from "../protocol/client";
 import { Refused } from "../protocol/errors";
 import { ADDITIONAL_EVENTS, ROLES, type ServerEvent } from "../protocol/types";
+import { isRunning } from "../store/selectors";
 import { OFFLINE, type State } from "../store/state";
 import { applyEvent, notify, now, setConnection, store } from "../store/store";
 import { telemetry } from "../store/telemetry";
@@ -14,6 +15,7 @@ import { RobotArms } from "./arms";
 import { call } from "./connection";
 import { DocumentDetails } from "./documentDetails";
 import type { Follower } from "./follower";
+import { LanguageFollower } from "./language";
 import { loadLists, loadTypes } from "./lists";
 import { note } from "./log";
 import { PresenceReporter } from "./presence";
@@ -43,7 +45,7 @@ export class Session {
     new RobotStreams(),
     new RobotArms(),
     this.presence,
-    new ProgramDetails(),
+    new LanguageFollower(() => this.retranslate()),
   ];
 
   constructor(private readonly client: ProtocolClient) {
@@ -76,6 +78,14 @@ export class Session {
   /** Report the presence after a change that is not part of the state: another screen is shown. */
   reportPresence(): void {
     this.presence.follow(now());
+  }
+
+  /** Request the data again that contain texts of the server, which are translated when they arrive. */
+  private retranslate(): void {
+    if (now().connection.status !== "ready") return;
+    for (const each of this.details) each.reset();
+    store.setState(({ program }) => ({ program: isRunning(now()) ? { ...program, trace: [] } : program }));
+    Promise.all([subscribe(), loadTypes(), loadLists()]).catch(() => {}); // offline: requested after the reconnect
   }
 
   private onEvent(event: ServerEvent): void {

@@ -1,4 +1,5 @@
 import { describe, expect, test } from "vitest";
+import { setTranslations } from "../i18n/testing";
 import type { Project, Scene, ServerEvent } from "../protocol/types";
 import { reduce } from "./reduce";
 import { isClosed } from "./selectors";
@@ -283,4 +284,28 @@ test("removing a type removes its actions", () => {
   expect(state.types.actions).toEqual({}); // they have to be requested again
   state = { ...state, ...reduce(state, { event: "ChangedObjectTypes", change_type: "remove", data: [type] }, NOW) };
   expect(state.types.byName).toEqual({});
+});
+
+test("the problem of a type is in the user's language", () => {
+  setTranslations({ "{path}:{line}: {problem}": "{path}, řádek {line}: {problem}", "No {name}.": "Chybí {name}." });
+  const problem = { text: "No Arm.", key: "No {name}.", values: { name: "Arm" } };
+  const message = { key: "{path}:{line}: {problem}", values: { path: "arm.py", line: "3", problem } };
+  const type = { type: "Arm", settings: [], problem: "arm.py:3: No Arm.", ...message } as never;
+  const state = after({ event: "ChangedObjectTypes", change_type: "add", data: [type] });
+  setTranslations({});
+  expect(state.types.byName.Arm?.problem).toBe("arm.py, řádek 3: Chybí Arm.");
+});
+
+test("reasons of reachability are in the user's language", () => {
+  setTranslations({ "{joint} would be near its limit.": "{joint} by byl blízko meze." });
+  const message = {
+    reason: "j1 would be near its limit.",
+    key: "{joint} would be near its limit.",
+    values: { joint: "j1" },
+  };
+  const items = [{ id: "ori", reach: "near_limit" as const, ...message }];
+  const data = { robot_id: "obj", end_effector_id: "tcp", revision: 1, items };
+  const [row] = Object.values(after(OPEN, { event: "ReachabilityChanged", data }).reach);
+  setTranslations({});
+  expect(row?.items[0]?.reason).toBe("j1 by byl blízko meze.");
 });

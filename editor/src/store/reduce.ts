@@ -1,7 +1,9 @@
 /** The reducer: return the changes that an event makes to the state. A pure function of state, event and time. */
 
-import { t } from "@lingui/core/macro";
-import type { Run, ServerEvent, TaskStateData } from "../protocol/types";
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
+import { inUserLanguage } from "../i18n/serverMessages";
+import type { Run, ServerEvent, TaskProgress, TaskStateData } from "../protocol/types";
 import { changed, itemOf, opened } from "./document";
 import { translatedType } from "./objectTypeTexts";
 import { put, without } from "./records";
@@ -106,7 +108,7 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
     case "ReachabilityChanged": {
       const key = [event.data.robot_id, event.data.arm_id ?? "", event.data.end_effector_id].join("/");
       const known = Object.fromEntries((state.reach[key]?.items ?? []).map((item) => [item.id, item]));
-      for (const item of event.data.items) known[item.id] = item;
+      for (const item of event.data.items) known[item.id] = inUserLanguage(item);
       return { reach: put(state.reach, key, { ...event.data, items: Object.values(known) }) };
     }
     case "ViewStateChanged":
@@ -122,6 +124,13 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
   }
 }
 
+const OUTCOMES: Record<TaskProgress, MessageDescriptor> = {
+  running: msg`running`,
+  finished: msg`finished`,
+  failed: msg`failed`,
+  cancelled: msg`cancelled`,
+};
+
 /** Add a finished task to the stored messages. */
 function over(
   state: State,
@@ -132,7 +141,7 @@ function over(
   const { messageLog } = notice(
     state,
     how === "failed" ? "error" : "info",
-    message ? t`${title}: ${how}. ${message}` : t`${title}: ${how}.`,
+    [t`${title}: ${i18n._(OUTCOMES[how])}.`, message].filter(Boolean).join(" "),
     time,
   );
   return { messageLog };

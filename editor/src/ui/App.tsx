@@ -2,6 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useState, useSyncExternalStore } from "react";
+import { useLanguage } from "../i18n/catalogue";
 import { rememberPerson } from "../session/localStorage";
 import { isLive, isRunning, openId } from "../store/selectors";
 import { now, useEditor } from "../store/store";
@@ -33,6 +34,7 @@ function useHash(): string {
 
 export function App() {
   const hash = useHash();
+  const language = useLanguage();
   useScreenSettings();
   const status = useEditor((state) => state.connection.status);
   const open = useEditor((state) => state.doc !== null);
@@ -69,18 +71,18 @@ export function App() {
       <div className="screen">
         {operator ? (
           <Suspense fallback={<Waiting>{t`Loading…`}</Waiting>}>
-            <Operator kiosk={hash.includes("kiosk")} />
+            <Operator key={language} kiosk={hash.includes("kiosk")} />
           </Suspense>
         ) : open ? (
           <Workplace />
         ) : (
           <Suspense fallback={<Waiting>{t`Loading…`}</Waiting>}>
-            <Home />
+            <Home key={language} />
           </Suspense>
         )}
       </div>
       {live && <Dock />}
-      <Overlays />
+      <Overlays key={language} />
     </>
   );
 }

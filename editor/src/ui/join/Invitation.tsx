@@ -27,10 +27,9 @@ export function Invitation() {
       <h3>{t`Others join at`}</h3>
       {best === undefined ? (
         <p className="small">
-          {t`The server accepts connections from this computer only. To let others join, start it with:`}
-          <code>arcor2-hw serve --host 0.0.0.0</code>
-          {t`It then requires TLS and a token per user. Create a token with:`}
-          <code>arcor2-hw token add</code>
+          {t`The server accepts connections from this computer only. To let others join, start it with:`}{" "}
+          <code>arcor2-hw serve --host 0.0.0.0</code>{" "}
+          {t`It then requires TLS and a token per user. Create a token with:`} <code>arcor2-hw token add</code>
         </p>
       ) : (
         <>
@@ -48,8 +47,7 @@ export function Invitation() {
       )}
       {fingerprint && (
         <p className="small fingerprint">
-          {t`If the browser warns about the certificate, compare its SHA-256 fingerprint:`}
-          <code>{fingerprint}</code>
+          {t`If the browser warns about the certificate, compare its SHA-256 fingerprint:`} <code>{fingerprint}</code>
         </p>
       )}
     </section>

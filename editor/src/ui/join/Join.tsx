@@ -2,17 +2,19 @@
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
+import { LANGUAGES, type Language, useLanguage } from "../../i18n/catalogue";
+import { displayIn } from "../../session/language";
 import { peopleHere, remember, remembered } from "../../session/localStorage";
 import { theSession } from "../../session/session";
 import { useEditor } from "../../store/store";
-import { Button, Field, Waiting } from "../kit/kit";
+import { Field } from "../kit/Field";
+import { Button, Waiting } from "../kit/kit";
 import "./join.css";
 
-export function Join() {
-  const { status, reason } = useEditor((state) => state.connection);
+export default function Join() {
+  const { status, reason, needsToken } = useEditor((state) => state.connection);
   const [name, setName] = useState(() => remembered("name"));
   const [token, setToken] = useState(() => remembered("token"));
-  const asksForToken = status === "refused" && /token/i.test(reason);
   const trying = status === "connecting" || status === "joining";
   const [people] = useState(peopleHere);
   const enter = (who: string) => {
@@ -55,7 +57,7 @@ export function Join() {
             ))}
           </div>
         )}
-        {(asksForToken || token) && (
+        {(needsToken || token) && (
           <Field
             label={t`Token`}
             type="password"
@@ -74,7 +76,28 @@ export function Join() {
         <Button look="primary" type="submit" isDisabled={!name.trim() || status === "joining"}>
           {t`Join`}
         </Button>
+        <LanguageChoice />
       </form>
     </main>
+  );
+}
+
+/** The language before login. A user who has chosen one sees that after joining. */
+function LanguageChoice() {
+  const language = useLanguage();
+  return (
+    <div className="field">
+      <select
+        aria-label={t`Language`}
+        value={language}
+        onChange={(event) => void displayIn(event.target.value as Language).catch(() => {})} // offline: it stays
+      >
+        {Object.entries(LANGUAGES).map(([each, name]) => (
+          <option key={each} value={each} lang={each}>
+            {name}
+          </option>
+        ))}
+      </select>
+    </div>
   );
 }

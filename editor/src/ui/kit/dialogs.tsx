@@ -3,7 +3,8 @@
 import { t } from "@lingui/core/macro";
 import { type FormEvent, type ReactNode, useState } from "react";
 import { Dialog, Heading, Modal, ModalOverlay } from "react-aria-components";
-import { Button, Field } from "./kit";
+import { Field } from "./Field";
+import { Button } from "./kit";
 import type { AskNameProps, ConfirmProps } from "./props";
 
 interface WindowProps {

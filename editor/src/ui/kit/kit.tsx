@@ -2,15 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import type { ReactNode } from "react";
-import {
-  Button as AriaButton,
-  type ButtonProps,
-  FieldError,
-  Input,
-  Label,
-  TextField,
-  type TextFieldProps,
-} from "react-aria-components";
+import { Button as AriaButton, type ButtonProps } from "react-aria-components";
 import { notify } from "../../store/store";
 import { Icon, type IconName } from "./icons";
 import type { Look } from "./props";
@@ -37,23 +29,6 @@ export function Button({ look = "", icon, children, className, why = "", onPress
       {children}
       {why && <span className="hidden-but-read">{t`, not available: ${why}`}</span>}
     </AriaButton>
-  );
-}
-
-export function Field({
-  label,
-  hint,
-  placeholder,
-  type,
-  ...rest
-}: TextFieldProps & { label: string; hint?: string; placeholder?: string }) {
-  return (
-    <TextField {...rest} className="field">
-      <Label>{label}</Label>
-      <Input placeholder={placeholder} type={type} />
-      {hint && <span className="quiet small">{hint}</span>}
-      <FieldError className="error" />
-    </TextField>
   );
 }
 

@@ -10,7 +10,8 @@ import { usersOf } from "../../program/problems";
 import { extraOf, read, SIMPLE, type Simple, textOf, typeName } from "../../program/values";
 import type { ParameterMeta } from "../../protocol/types";
 import { select, useEditor } from "../../store/store";
-import { Button, Field } from "../kit/kit";
+import { Field } from "../kit/Field";
+import { Button } from "../kit/kit";
 import { ValueField } from "./ValueField";
 
 export function Parameters() {

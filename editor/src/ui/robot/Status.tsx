@@ -4,6 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { acknowledgeStop, armOf, type Chosen, effectorPose, featuresOf, notReady } from "../../commands/robot";
 import { fixed } from "../../formats";
+import { translatedAlarm } from "../../i18n/serverMessages";
 import { useEditor } from "../../store/store";
 import { rollPitchYaw } from "../../viewmodel/rotations";
 import { Button } from "../kit/kit";
@@ -27,7 +28,7 @@ export function Status({ chosen }: { chosen: Chosen }) {
         ([what, names]) =>
           names.length > 0 && <p key={what} className="quiet small">{`${what}: ${names.join(", ")}`}</p>,
       )}
-      {alarms?.map((alarm) => (
+      {alarms?.map(translatedAlarm).map((alarm) => (
         <p key={alarm.code} className="small alarm" role="alert">
           {alarm.text} {alarm.remedy && <span className="quiet">{alarm.remedy}</span>}
         </p>

@@ -5,8 +5,9 @@ import { type FormEvent, useState } from "react";
 import { addMesh, freeObjectName } from "../../commands/scene";
 import type { MeshFile } from "../../scene/meshes";
 import { LENGTH_UNITS, type LengthUnit, show, WORTH } from "../../transform/amounts";
+import { Field } from "../kit/Field";
 import { OneOf } from "../kit/fields";
-import { Button, Field } from "../kit/kit";
+import { Button } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { MeshPreview } from "./MeshPreview";
 

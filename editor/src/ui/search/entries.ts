@@ -3,8 +3,10 @@
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import * as documents from "../../commands/documents";
+import { chooseLanguage } from "../../commands/language";
 import { goOffline, goOnline, stopMotion } from "../../commands/operation";
 import { storeGeneralState } from "../../commands/viewstate";
+import { LANGUAGES, type Language } from "../../i18n/catalogue";
 import { aimsAlways } from "../../session/aiming";
 import { theEngine } from "../../session/engine";
 import { remember } from "../../session/localStorage";
@@ -46,7 +48,7 @@ function ofWorkplace(state: State): Entry[] {
         i18n._(tool.label),
         tool.whyUnavailable?.(state) ?? "",
         () => setUi({ tool: tool.id }),
-        "tool",
+        t`tool`,
       ),
     ),
     entry("save", t`Save`, cannotSave, documents.save),
@@ -85,7 +87,7 @@ function things(state: State): Entry[] {
   return rows.map(({ id, name, kind, detail }) => ({
     id,
     words: name,
-    detail: kind === "object" ? detail : kindName(kind).toLowerCase(),
+    detail: kind === "object" ? detail : kindName(kind),
     why: "",
     act: () => {
       select(selectionOf(now(), id));
@@ -124,6 +126,15 @@ function everywhere(state: State): Entry[] {
           setUi({ theme: each });
           remember("theme", each === "system" ? "" : each);
         },
+      })),
+    ...(Object.entries(LANGUAGES) as [Language, string][])
+      .filter(([each]) => each !== i18n.locale)
+      .map(([each, words]) => ({
+        id: `language/${each}`,
+        words,
+        detail: t`language`,
+        why: "",
+        act: () => chooseLanguage(each),
       })),
     {
       id: "hand",

@@ -12,18 +12,18 @@ const ALL = [
 ];
 const ids = (search: string, recent: string[] = []) => found(ALL, search, recent).map((each) => each.id);
 
-test("what begins with the words comes first, every word must fit, also in what kind it is", () => {
+test("every word has to match the name or kind, and prefix matches come first", () => {
   expect(ids("pick")).toEqual(["pick", "undo"]);
   expect(ids("ur5")).toEqual(["robot"]);
   expect(ids("ONLINE go")).toEqual(["go"]);
   expect(ids("pick online")).toEqual([]);
 });
 
-test("where nothing is typed, what was used last comes first, and what is gone is not shown", () => {
+test("without a text, recently used entries come first, and missing ones are left out", () => {
   expect(ids(" ", ["go", "deleted"])).toEqual(["go", "undo", "pick", "robot"]);
 });
 
-test("a large cell does not make a list without end", () => {
+test("the number of results is limited", () => {
   const many = Array.from({ length: 500 }, (_, number) => entry(`${number}`, `point ${number}`));
   expect(found(many, "point", []).length).toBeLessThan(50);
 });

@@ -1,21 +1,14 @@
-/** Display settings of this device, and Leave. */
+/** The settings button, and the display settings of this device. */
 
-import { i18n, type MessageDescriptor } from "@lingui/core";
-import { msg, t } from "@lingui/core/macro";
-import { useEffect } from "react";
-import { remember, remembered } from "../../session/localStorage";
-import { theSession } from "../../session/session";
+import { t } from "@lingui/core/macro";
+import { Suspense, useEffect, useState } from "react";
+import { remembered } from "../../session/localStorage";
 import { setUi, useEditor } from "../../store/store";
 import type { Ui } from "../../store/ui";
-import { More } from "../kit/lazyControls";
-import type { Choice } from "../kit/props";
-import { openOverlay } from "../search/overlay";
+import { Button } from "../kit/kit";
+import { lazyComponent } from "../kit/lazy";
 
-const THEMES: Record<Ui["theme"], MessageDescriptor> = {
-  system: msg`System theme`,
-  light: msg`Light`,
-  dark: msg`Dark`,
-};
+const SettingsMenu = lazyComponent(() => import("./SettingsMenu"));
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
 
 export function useTheme(): "light" | "dark" {
@@ -44,31 +37,14 @@ export function useScreenSettings(): void {
   }, [theme, left]);
 }
 
+/** A button that opens the menu; if it is pressed before the menu is loaded, the menu opens as soon as it is. */
 export function Settings() {
-  const { theme, leftHanded } = useEditor((state) => state.ui);
-  const user = useEditor((state) => state.connection.user);
-  const choices: Choice[] = [
-    { id: "find", label: t`Find a command or an object ( / )`, icon: "search", act: () => openOverlay("search") },
-    ...(Object.keys(THEMES) as Ui["theme"][]).map((each) => ({
-      id: each,
-      label: i18n._(THEMES[each]),
-      icon: each === theme ? ("check" as const) : undefined,
-      act: () => {
-        setUi({ theme: each });
-        remember("theme", each === "system" ? "" : each);
-      },
-    })),
-    {
-      id: "hand",
-      label: leftHanded ? t`Right-handed controls` : t`Left-handed controls`,
-      act: () => {
-        setUi({ leftHanded: !leftHanded });
-        remember("hand", leftHanded ? "" : "left");
-      },
-    },
-    { id: "messages", label: t`Messages`, icon: "list", act: () => openOverlay("messages") },
-    { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
-    { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: () => theSession().leave() },
-  ];
-  return <More label={t`Settings`} icon="settings" choices={choices} />;
+  const [pressed, setPressed] = useState(false);
+  return (
+    <Suspense
+      fallback={<Button look="plain" icon="settings" aria-label={t`Settings`} onPressStart={() => setPressed(true)} />}
+    >
+      <SettingsMenu defaultOpen={pressed} />
+    </Suspense>
+  );
 }

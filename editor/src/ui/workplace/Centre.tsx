@@ -4,6 +4,7 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { Suspense } from "react";
 import { ToggleButton, ToggleButtonGroup } from "react-aria-components";
+import { useLanguage } from "../../i18n/catalogue";
 import { isRunning } from "../../store/selectors";
 import { setUi, useEditor } from "../../store/store";
 import type { Mode } from "../../store/ui";
@@ -21,6 +22,7 @@ const CodeView = lazyComponent(() => import("../code/CodeView"));
 const WORDS: Record<Mode, MessageDescriptor> = { "3d": msg`3D`, flow: msg`Flow`, split: msg`Split`, code: msg`Code` };
 
 export function Centre() {
+  const language = useLanguage();
   const project = useEditor((state) => state.doc?.project);
   const running = useEditor(isRunning);
   const connecting = useEditor((state) => state.ui.connecting !== null);
@@ -32,12 +34,12 @@ export function Centre() {
       <View3D />
       {(mode === "flow" || mode === "split") && (
         <Suspense fallback={<Waiting>{t`Loading the program…`}</Waiting>}>
-          <FlowView />
+          <FlowView key={language} />
         </Suspense>
       )}
       {mode === "code" && (
         <Suspense fallback={<Waiting>{t`Loading the program…`}</Waiting>}>
-          <CodeView />
+          <CodeView key={language} />
         </Suspense>
       )}
       <div className="centre-top">

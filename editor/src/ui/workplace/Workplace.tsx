@@ -1,6 +1,7 @@
 /** The frame of the open workplace: top bar, tools on the left, view, panel on the right. */
 
 import { Suspense } from "react";
+import { useLanguage } from "../../i18n/catalogue";
 import { useEditor } from "../../store/store";
 import { lazyComponent } from "../kit/lazy";
 import { Notices } from "../notices/Notices";
@@ -13,6 +14,7 @@ import "./workplace.css";
 const Panel = lazyComponent(() => import("./Panel"));
 
 export function Workplace() {
+  const language = useLanguage();
   const panel = useEditor((state) => state.ui.tool !== "" || state.ui.selection !== null);
   return (
     <div className="workplace" data-panel={panel}>
@@ -21,7 +23,7 @@ export function Workplace() {
       <Centre />
       {panel && (
         <Suspense fallback={<aside className="panel" aria-busy="true" />}>
-          <Panel />
+          <Panel key={language} />
         </Suspense>
       )}
       <Notices />

@@ -4,6 +4,8 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { retryObject } from "../../../commands/operation";
 import { byName } from "../../../formats";
+import { translatedAlarm } from "../../../i18n/serverMessages";
+import { words } from "../../../program/naming";
 import { serves } from "../../../session/connection";
 import { whyUnavailable } from "../../../store/permissions";
 import { derivesFrom } from "../../../store/selectors";
@@ -67,7 +69,12 @@ export default function Panel() {
                 )}
               </div>
               {state?.reason && <p className="small">{state.reason}</p>}
-              {health?.alarms.map((alarm) => (
+              {lacking && (
+                <p className="small">
+                  {t`Cannot be controlled: ${lacking.settings.map(words).join(", ")} is not set.`}
+                </p>
+              )}
+              {health?.alarms.map(translatedAlarm).map((alarm) => (
                 <p key={alarm.code} className="small alarm">
                   {alarm.text}
                   {alarm.remedy && <span className="quiet"> {alarm.remedy}</span>}

@@ -1,0 +1,55 @@
+/** The menu of the settings: language of the user, display settings of this device, and Leave; a separate chunk. */
+
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
+import { chooseLanguage } from "../../commands/language";
+import { LANGUAGES, type Language, useLanguage } from "../../i18n/catalogue";
+import { remember } from "../../session/localStorage";
+import { theSession } from "../../session/session";
+import { setUi, useEditor } from "../../store/store";
+import type { Ui } from "../../store/ui";
+import MoreMenu from "../kit/menu";
+import type { Choice } from "../kit/props";
+import { openOverlay } from "../search/overlay";
+
+const THEMES: Record<Ui["theme"], MessageDescriptor> = {
+  system: msg`System theme`,
+  light: msg`Light`,
+  dark: msg`Dark`,
+};
+
+export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) {
+  const { theme, leftHanded } = useEditor((state) => state.ui);
+  const user = useEditor((state) => state.connection.user);
+  const language = useLanguage();
+  const choices: Choice[] = [
+    { id: "find", label: t`Find a command or an object ( / )`, icon: "search", act: () => openOverlay("search") },
+    ...(Object.keys(THEMES) as Ui["theme"][]).map((each) => ({
+      id: each,
+      label: i18n._(THEMES[each]),
+      icon: each === theme ? ("check" as const) : undefined,
+      act: () => {
+        setUi({ theme: each });
+        remember("theme", each === "system" ? "" : each);
+      },
+    })),
+    ...(Object.keys(LANGUAGES) as Language[]).map((each) => ({
+      id: each,
+      label: LANGUAGES[each],
+      icon: each === language ? ("check" as const) : undefined,
+      act: () => chooseLanguage(each),
+    })),
+    {
+      id: "hand",
+      label: leftHanded ? t`Right-handed controls` : t`Left-handed controls`,
+      act: () => {
+        setUi({ leftHanded: !leftHanded });
+        remember("hand", leftHanded ? "" : "left");
+      },
+    },
+    { id: "messages", label: t`Messages`, icon: "list", act: () => openOverlay("messages") },
+    { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
+    { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: () => theSession().leave() },
+  ];
+  return <MoreMenu label={t`Settings`} icon="settings" choices={choices} defaultOpen={defaultOpen} />;
+}
