@@ -27,7 +27,7 @@ from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, in_view, o
 from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 async def _unlocked_and_saved(client: Client) -> bool:
@@ -87,7 +87,7 @@ async def test_object_is_placed_at_the_tool(cell: Cell, colleague: Client, brows
         for name in ("Origin", "On the x axis", "In the xy plane"):
             await page.get_by_role("button", name=re.compile(name)).click()
         await page.get_by_role("button", name=texts.PUT_IT_THERE, exact=True).click()
-        await expect(page.get_by_role("complementary").get_by_role("alert")).to_be_visible(timeout=15_000)
+        await expect(page.get_by_role("complementary").get_by_role("alert")).to_be_visible()
         assert await there()
         await client.call("StopScene")
         await scene_state(client, SceneStateEnum.STOPPED, 30)
@@ -177,15 +177,13 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         page = screen.page
         await screen.join("Eva")
         await screen.item(ids["arm"])
-        panel, tray = page.get_by_role("complementary"), page.get_by_role("region", name=texts.TRAY)
+        panel, bar = page.get_by_role("complementary"), page.get_by_role("region", name=texts.MESSAGE_BAR)
         await page.get_by_role("button", name=texts.GO_ONLINE).click()
-        await tray.locator(".task").filter(has_text="Starting the scene by pictures · Eva").wait_for()
+        await bar.locator(".task").filter(has_text="Starting the scene by pictures · Eva").wait_for()
         await scene_state(client, SceneStateEnum.STARTED, 60)
         # The server's notification about the robot is shown.
         await (
-            tray.locator(".notice.info")
-            .filter(has_text="arm: The calibration in the controller is now used")
-            .wait_for()
+            bar.locator(".notice.info").filter(has_text="arm: The calibration in the controller is now used").wait_for()
         )
 
         await _choose(screen, "eye")
@@ -194,14 +192,14 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         await picture.wait_for()
         assert await picture.evaluate("image => image.decode().then(() => image.naturalWidth)") == 1280
         await screen.press(texts.FIND_BY_MARKERS)
-        # The tray and the panel show the server's reason.
-        failed = tray.locator(".task[data-state=failed]")
+        # The message bar and the panel show the server's reason.
+        failed = bar.locator(".task[data-state=failed]")
         await failed.filter(has_text="No markers are configured").wait_for()
         await panel.get_by_text("Failed: No markers are configured").wait_for()
-        assert await tray.get_by_text("No markers are configured").count() == 1
+        assert await bar.get_by_text("No markers are configured").count() == 1
         markers = [{"marker_id": n, "pose": {"position": {"x": x, "y": y}}} for n, (x, y) in MARKERS.items()]
         configured = {"marker_size": SIZE, "markers": markers}
-        async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as rest:
+        async with httpx.AsyncClient(timeout=60, base_url=cell.url.replace("ws", "http", 1)) as rest:
             assert (await rest.put("/api/calibration/markers", json=configured)).status_code == 200
         before = await _stands(screen, ids["eye"])
         # The failed attempt does not hide the running one.
@@ -214,6 +212,8 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         moved = re.search(r"Moved by ([\d.]+) mm and [\d.]+°", await change.inner_text())
         assert moved is not None
         assert abs(float(moved[1]) - off(before, CAMERA)[0]) < 3.0
+        await screen.press("Check lens with markers")
+        await panel.get_by_role("status").get_by_text("focal length").wait_for()
         assert await screen.faults() == []
         await screen.picture("calibrated camera")
         # Undo the calibration, and repeat it.
@@ -228,7 +228,7 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         before = await _stands(screen, ids["arm"])
         assert off(before, ROBOT)[0] > 20.0
         await screen.press("Calibrate with eye")
-        await tray.locator(".task").filter(has_text="Calibration of arm · Eva").wait_for()
+        await bar.locator(".task").filter(has_text="Calibration of arm · Eva").wait_for()
         await change.wait_for()
         millimetres, degrees = off(await _stands(screen, ids["arm"]), ROBOT)
         assert millimetres < 2.5
@@ -258,7 +258,7 @@ async def test_aiming_wizard_shows_how_well_the_points_fit(
     part_from_world = np.linalg.inv(PART.matrix())
     known = [Pose.from_matrix(part_from_world @ Pose(each).matrix()) for each in touched]
     known[-1] = Pose(known[-1].position + Position(0, 0, BESIDE))
-    async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as rest:
+    async with httpx.AsyncClient(timeout=60, base_url=cell.url.replace("ws", "http", 1)) as rest:
         stored = await rest.post(
             "/assets", files={"assetData": ("part.stl", f"solid part\n{STL}endsolid part\n".encode())}
         )

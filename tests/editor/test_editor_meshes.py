@@ -15,9 +15,10 @@ from playwright.async_api import Browser
 from arcor2_hw.data import rpc
 from arcor2_hw.data.geometry import Pose, Position
 from tests.e2e.harness import Cell
+from tests.editor import texts
 from tests.editor.screen import screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 OBJECT = '''
 from arcor2_hw.objects import CollisionObject
@@ -94,7 +95,7 @@ async def place(module_cell: Cell) -> AsyncIterator[Place]:
     """A scene of uploaded meshes and robots, of which two cannot be shown and one only in part."""
     cell = module_cell
     client = await cell.client("maker")
-    async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as http:
+    async with httpx.AsyncClient(timeout=60, base_url=cell.url.replace("ws", "http", 1)) as http:
         stl = exported(trimesh.creation.box((0.2, 0.1, 0.05)), "stl")
         for key, content in {
             "vise.ply": vise(), "block.stl": stl, "broken.stl": b"solid nothing",
@@ -118,7 +119,7 @@ async def place(module_cell: Cell) -> AsyncIterator[Place]:
     for number, kind in enumerate(("Vise", "Block", "Broken", "Turner", "Ruin")):
         pose = Pose(Position(0.45 * number - 0.9, 0.0, 0.1 if number < 3 else 0.0))
         await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs(kind.lower(), kind, pose))
-        ids[kind] = (await client.next_event("SceneObjectChanged", timeout=10)).data.id
+        ids[kind] = (await client.next_event("SceneObjectChanged")).data.id
     yield Place(cell, ids)
 
 
@@ -156,6 +157,14 @@ async def test_broken_meshes_are_replaced_with_the_reason(browser: Browser, plac
             assert words in item["problem"]
             assert item["badge"] == badge
             assert item["triangles"] > 0, "something stands for it"
-        await screen.sees("The model of broken cannot be shown. The mesh broken.stl has no triangles")
-        await screen.sees("The model of ruin cannot be shown.")
-        await screen.sees("Part of turner cannot be shown.")
+        # The screen shows the newest message; a tap on it lists all.
+        newest = screen.page.get_by_role("region", name=texts.MESSAGE_BAR).get_by_role("alert")
+        await newest.get_by_text("+2", exact=True).wait_for()
+        await newest.get_by_title("Show all messages").click()
+        messages = screen.page.get_by_role("dialog", name="Messages").get_by_role("listitem")
+        for text in (
+            "The model of broken cannot be shown. The mesh broken.stl has no triangles",
+            "The model of ruin cannot be shown.",
+            "Part of turner cannot be shown.",
+        ):
+            await messages.filter(has_text=text).wait_for()

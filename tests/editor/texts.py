@@ -14,6 +14,8 @@ CREATE: Final = "Create"
 CLOSE_DOCUMENT: Final = "Close"
 DISCARD_CHANGES: Final = "Discard changes"
 HOME_HEADING: Final = "Workplace"
+AGO: Final = r"(just now|\d+ (second|minute)s? ago)"
+"""Pattern of a recent time; on a busy machine some seconds pass until it is shown."""
 
 # ------------------------------------------------------------------------------------------------ tools of the rail
 OBJECTS: Final = "Objects"
@@ -37,7 +39,7 @@ STEP: Final = "Step"
 RESUME: Final = "Resume"
 START_PAUSED: Final = "Start paused"
 PROGRAM_STATE: Final = "The program"
-TRAY: Final = "Tasks and messages"
+MESSAGE_BAR: Final = "Tasks and messages"
 NO_CONNECTION: Final = "No connection to the server."
 
 # ------------------------------------------------------------------------------------------------ panel
@@ -79,3 +81,6 @@ def open_document(name: str) -> str:
 
 def undo(edit: str) -> str:
     return f"Undo {edit}"
+
+
+WHOLE_PROGRAM: Final = "Show the whole program"

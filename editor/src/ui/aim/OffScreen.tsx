@@ -9,7 +9,7 @@ import { nameOf } from "../../viewmodel/names";
 import { atEdge, type Rect } from "./edge";
 
 /** Controls at the edge of the view. */
-const OTHERS = ".view-controls, .centre-top > *, .stop, .aim-bar, .fly-pad, .tray";
+const OTHERS = ".view-controls, .centre-top > *, .stop, .aim-bar, .fly-pad";
 
 export function OffScreen({ engine }: { engine: Engine }) {
   const id = useEditor((state) => state.ui.selection?.id ?? "");

@@ -1,6 +1,6 @@
 /**
  * The Stop dock: the lower edge of the page while something may move. Its size never changes and no other control is
- * placed in it, so Stop never covers anything. Messages appear next to Stop instead of above the screen.
+ * placed in it, so Stop never covers anything. Messages appear next to Stop.
  */
 
 import { Notices } from "../notices/Notices";

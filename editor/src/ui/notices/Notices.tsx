@@ -1,8 +1,8 @@
 /**
- * Running tasks and messages. Errors stay until they are dismissed, other messages disappear by themselves.
+ * The newest message and the newest task. Errors stay until they are dismissed, other messages disappear by themselves.
  *
- * While nothing can move, they float above the screen. Otherwise they are shown in the Stop dock, where they cannot
- * cover a control: the newest message and the newest task, each in a fixed space. A tap shows all messages.
+ * They have a space of their own, so that they never cover a control: a row of the screen, or a part of the Stop dock
+ * while something may move. A tap shows all messages.
  */
 
 import { t } from "@lingui/core/macro";
@@ -18,8 +18,6 @@ import "./notices.css";
 
 /** How long a message that is not an error stays, s. */
 const STAY = 6;
-/** Number of messages above the screen, newest first. */
-const SHOWN = 3;
 
 export function Notices({ docked = false }: { docked?: boolean }) {
   const notices = useEditor((state) => state.notices);
@@ -32,37 +30,28 @@ export function Notices({ docked = false }: { docked?: boolean }) {
     return () => clearTimeout(timer);
   }, [passing]);
   if (live !== docked) return null;
-  const shown = current(Object.values(tasks)).filter((each) => each.state !== "cancelled");
-  const number = docked ? 1 : SHOWN;
-  const more = notices.length - number;
+  const newest = notices.at(-1);
+  const more = notices.length - 1;
+  const task = current(Object.values(tasks))
+    .filter((each) => each.state !== "cancelled")
+    .at(-1);
   return (
-    <section className={docked ? "docked-notices" : "tray"} aria-label={t`Tasks and messages`} aria-live="polite">
-      {shown.slice(docked ? -1 : 0).map((each) => (
-        <Task key={each.id} task={each} />
-      ))}
-      {notices.slice(-number).map((each) => (
-        <div key={each.id} className={`notice ${each.level}`} role={each.level === "error" ? "alert" : undefined}>
-          <Icon name={each.level === "info" ? "info" : "warn"} />
-          {docked ? (
-            <button
-              type="button"
-              className="notice-text"
-              title={t`Show all messages`}
-              onClick={() => openOverlay("messages")}
-            >
-              <span>{each.text}</span>
-              {more > 0 && <span className="tag">+{more}</span>}
-            </button>
-          ) : (
-            <p>{each.text}</p>
-          )}
-          <Button look="plain" icon="close" aria-label={t`Dismiss`} onPress={() => dismiss(each.id)} />
+    <section className={docked ? "notices docked" : "notices"} aria-label={t`Tasks and messages`} aria-live="polite">
+      {task && <Task key={task.id} task={task} />}
+      {newest && (
+        <div key={newest.id} className={`notice ${newest.level}`} role={newest.level === "error" ? "alert" : undefined}>
+          <Icon name={newest.level === "info" ? "info" : "warn"} />
+          <button
+            type="button"
+            className="notice-text"
+            title={t`Show all messages`}
+            onClick={() => openOverlay("messages")}
+          >
+            <span>{newest.text}</span>
+            {more > 0 && <span className="tag">+{more}</span>}
+          </button>
+          <Button look="plain" icon="close" aria-label={t`Dismiss`} onPress={() => dismiss(newest.id)} />
         </div>
-      ))}
-      {!docked && more > 0 && (
-        <Button className="notices-before" onPress={() => openOverlay("messages")}>
-          {t`${more} more`}
-        </Button>
       )}
     </section>
   );

@@ -9,6 +9,7 @@ import { Centre } from "./Centre";
 import { Rail } from "./Rail";
 import { TopBar } from "./TopBar";
 import "./workplace.css";
+import "./panel.css";
 
 /** Loaded soon after the view, before a user can open it. */
 const Panel = lazyComponent(() => import("./Panel"));
