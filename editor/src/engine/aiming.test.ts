@@ -19,20 +19,20 @@ const box = (id: string, size: [number, number, number], place: [number, number,
 };
 const ids = (targets: Target[], before = "") => aimed(targets, RAY, CONE, before).map((each) => each.id);
 
-test("a small thing beside the cross comes before the table below it, one at the edge of the cone after", () => {
+test("a small item near the crosshair precedes the table behind it, one at the edge of the cone follows it", () => {
   const table = box("table", [2, 2, 0.1], [0, 0, -0.05]);
   expect(ids([table, ball("near", 0.03)])).toEqual(["near", "table"]);
   expect(ids([table, ball("edge", 0.07)])).toEqual(["table", "edge"]);
   expect(ids([table, ball("out", 0.2)])).toEqual(["table"]);
 });
 
-test("what stands in front does not hide what is behind, but comes first of two alike", () => {
+test("occluded items are candidates too, after an equal one in front", () => {
   const wall = box("wall", [2, 2, 0.02], [0, 0, 0.6]);
   expect(ids([wall, ball("behind", 0)])).toEqual(["behind", "wall"]);
   expect(ids([ball("low", 0, -1), ball("high", 0, 0.5)])).toEqual(["high", "low"]);
 });
 
-test("the angle is that of the closest point of a rotated box, and of the closest part of an item", () => {
+test("the angle is that of the closest point of the closest part, also for a rotated box", () => {
   // A corner 0.03 m from the ray, at a distance of 1 m.
   const [turned] = aimed([box("turned", [0.1, 0.1, 0.001], [0.03 + 0.05 * Math.SQRT2, 0, 0], Math.PI / 4)], RAY, CONE);
   expect(turned?.off).toBeCloseTo(Math.atan(0.03), 3);
@@ -42,7 +42,7 @@ test("the angle is that of the closest point of a rotated box, and of the closes
   expect(aimed(arm, RAY, CONE)).toHaveLength(1);
 });
 
-test("behind the eye is nothing, in doubt it stays with what it was, and the list has an end", () => {
+test("items behind the camera are left out, the previous best wins ties, and the list is limited", () => {
   expect(ids([ball("behind me", 0, 3), box("too", [0.1, 0.1, 0.1], [0, 0, 2])])).toEqual([]);
   const two = [ball("a", 0.02), ball("b", -0.0201)];
   expect(ids(two)).toEqual(["a", "b"]);
@@ -57,13 +57,13 @@ function camera(): PerspectiveCamera {
   return made;
 }
 
-test("the cone is as wide as its pixels", () => {
+test("the cone has the width of its pixels", () => {
   const { ray, cone } = middle(camera(), 800, 400);
   expect(cone).toBeCloseTo((25 * Math.PI) / 180);
   expect(ray.direction.x).toBeCloseTo(1);
 });
 
-test("what is not in view is where one has to turn to", () => {
+test("an item outside the view has the direction in which to turn", () => {
   const seen = (x: number, y: number, z: number) => bearing(new Vector3(x, y, z), camera(), 800, 400);
   expect(seen(2, 0, 0)).toMatchObject({ inView: true, x: expect.closeTo(400), y: expect.closeTo(200) });
   expect(seen(1, 3, 0)).toMatchObject({ inView: false });

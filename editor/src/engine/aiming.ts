@@ -3,8 +3,8 @@
  * a tap, it also finds hidden items and small items next to it.
  */
 
-import { type Box3, Matrix4, type Mesh, type Object3D, type PerspectiveCamera, Ray, Vector3 } from "three";
-import type { Thing } from "./thing";
+import { type Box3, Matrix4, type PerspectiveCamera, Ray, Vector3 } from "three";
+import { meshesOf, type Thing } from "./thing";
 
 /** Radius of the search around the crosshair, pixels. */
 export const CONE = 56;
@@ -107,17 +107,6 @@ export function* targetsOf(things: Iterable<Thing>): Generator<Target> {
     }
     if (meshes.length === 0) yield { id, centre: thing.anchor(new Vector3()), radius: SMALL };
   }
-}
-
-/** Return the meshes of an item, without those of its children. */
-function meshesOf(root: Object3D, id: string, found: Mesh[] = []): Mesh[] {
-  for (const child of root.children) {
-    const owner = child.userData.item as string | undefined;
-    if (!child.visible || (owner !== undefined && owner !== id)) continue;
-    if (owner === id && (child as Mesh).isMesh) found.push(child as Mesh);
-    meshesOf(child, id, found);
-  }
-  return found;
 }
 
 /** Return the ray through the middle of the view, and the half angle of a cone with a radius in pixels, rad. */

@@ -1,7 +1,8 @@
 /** The camera: orbit around a point, or fly. z is up. It reports when a frame has to be drawn. */
 
-import { type Box3, PerspectiveCamera, Vector3 } from "three";
+import { PerspectiveCamera, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { bestDirection, fitted, marginsOf } from "./framing";
 
 const START = new Vector3(1.5, -1.5, 1.25);
 const KEYS: Record<string, [number, number, number]> = {
@@ -12,9 +13,6 @@ const KEYS: Record<string, [number, number, number]> = {
   KeyE: [0, 1, 0],
   KeyQ: [0, -1, 0],
 };
-/** Part of the view that the shown items fill, and smallest distance of the camera, m. */
-const MARGIN = 0.88;
-const CLOSEST = 0.35;
 /** Speed, m/s. */
 const FLY_SPEED = 0.8;
 
@@ -37,6 +35,9 @@ export class View {
   readonly camera = new PerspectiveCamera(50, 1, 0.01, 100);
   private readonly controls: OrbitControls;
   private readonly pressed = new Set<string>();
+  private width = 1;
+  private height = 1;
+  private fittedTo = { width: 1, height: 1 };
   private readonly forget = new AbortController();
 
   constructor(
@@ -60,6 +61,8 @@ export class View {
   }
 
   resize(width: number, height: number): void {
+    this.width = width;
+    this.height = height;
     this.camera.aspect = width / Math.max(1, height);
     this.camera.updateProjectionMatrix();
   }
@@ -82,31 +85,24 @@ export class View {
     return true;
   }
 
-  /** Show a whole box as large as possible, from the current direction. */
-  fit(box: Box3): void {
-    if (box.isEmpty()) return;
+  /** Show all points as large as possible, from the current direction or from the one in which they fill the view. */
+  fit(points: readonly Vector3[], best = false): void {
+    if (points.length === 0) return;
     this.setMode("orbit");
-    const centre = box.getCenter(new Vector3());
-    const back = new Vector3().subVectors(this.camera.position, this.controls.target).normalize();
-    const right = new Vector3().crossVectors(this.camera.up, back).normalize();
-    const above = new Vector3().crossVectors(back, right);
-    const tall = Math.tan((this.camera.fov * Math.PI) / 360) * MARGIN;
-    const wide = tall * this.camera.aspect;
-    let distance = CLOSEST;
-    const corner = new Vector3();
-    for (const x of [box.min.x, box.max.x]) {
-      for (const y of [box.min.y, box.max.y]) {
-        for (const z of [box.min.z, box.max.z]) {
-          corner.set(x, y, z).sub(centre);
-          const sideways = Math.max(Math.abs(corner.dot(right)) / wide, Math.abs(corner.dot(above)) / tall);
-          distance = Math.max(distance, corner.dot(back) + sideways);
-        }
-      }
-    }
-    this.controls.target.copy(centre);
-    this.camera.position.copy(centre).addScaledVector(back, distance);
-    this.controls.update();
-    this.changed();
+    const { width, height } = this;
+    const opening = { width, height, fov: this.camera.fov, margins: marginsOf(width, height) };
+    const back = best
+      ? bestDirection(points, opening)
+      : new Vector3().subVectors(this.camera.position, this.controls.target);
+    const { position, target } = fitted(points, back, opening);
+    this.set(position.toArray(), target.toArray());
+    this.fittedTo = { width, height };
+  }
+
+  /** Whether the size differs from that of the last fit as it does after a panel opens, not after a message appears. */
+  get resizedSinceFit(): boolean {
+    const { width, height } = this.fittedTo;
+    return Math.abs(Math.log(this.width / width)) > 0.1 || Math.abs(Math.log(this.height / height)) > 0.2;
   }
 
   get mode(): ViewMode {

@@ -1,10 +1,12 @@
 /** The 3D view: shows items, follows robots, reports taps. It does not use React, and draws only after changes. */
 
-import { Box3, Fog, GridHelper, PCFShadowMap, Scene, SRGBColorSpace, Vector3, WebGLRenderer } from "three";
+import { Fog, Scene, Vector3, type WebGLRenderer } from "three";
 import type { Telemetry } from "../store/telemetry";
 import { Batches } from "./batches";
 import { View } from "./camera";
 import { DropLine, heightWords } from "./dropLine";
+import { Floor, lowest } from "./floor";
+import { corners } from "./framing";
 import { Gizmo } from "./gizmo/gizmo";
 import type { Item } from "./items";
 import { labelsOf } from "./labelling";
@@ -16,8 +18,9 @@ import { PathLine, type Way } from "./pathLine";
 import { type Hit, onFloor, pick } from "./picking";
 import { followPointer } from "./pointer";
 import { type Probe, probe } from "./probe";
+import { rendererOf } from "./renderer";
 import type { Quality } from "./surface";
-import type { Context, Thing } from "./thing";
+import { boundsOf, type Context, type Thing } from "./thing";
 import { make } from "./things/make";
 import { type JointLimit, RobotThing } from "./things/robot";
 
@@ -33,7 +36,7 @@ export interface EngineOptions {
   dark: boolean;
 }
 
-const SMALL = new Set<Item["kind"]>(["point", "orientation", "action", "logic"]);
+const SMALL: ReadonlySet<Item["kind"]> = new Set(["point", "orientation", "action", "logic"]);
 /** Time between two frames, s. */
 const PERIODS: Record<Quality, number> = { low: 1 / 30, high: 1 / 60 };
 
@@ -52,7 +55,7 @@ export class Engine {
   private readonly batches: Batches;
   private readonly labels: Labels;
   private readonly context: Context;
-  private grid: GridHelper | null = null;
+  private readonly floorGrid: Floor;
   private palette: Palette = LIGHT;
   private scheduled = 0;
   private last = 0;
@@ -78,18 +81,7 @@ export class Engine {
 
   constructor(private readonly options: EngineOptions) {
     const { canvas, quality } = options;
-    // An opaque canvas saves blending with the page.
-    const context = canvas.getContext("webgl2", {
-      alpha: false,
-      antialias: quality !== "low",
-      powerPreference: "low-power",
-    });
-    this.renderer = new WebGLRenderer({ canvas, ...(context && { context }) });
-    this.renderer.outputColorSpace = SRGBColorSpace;
-    this.renderer.setPixelRatio(quality === "low" ? 1 : Math.min(2, window.devicePixelRatio));
-    this.renderer.shadowMap.enabled = quality === "high";
-    this.renderer.shadowMap.type = PCFShadowMap;
-    this.renderer.shadowMap.autoUpdate = false;
+    this.renderer = rendererOf(canvas, quality);
     this.view = new View(canvas, () => this.draw());
     this.batches = new Batches(this.scene, quality === "low");
     this.labels = new Labels(options.labels);
@@ -105,7 +97,7 @@ export class Engine {
       metresPerPixel: (at) =>
         (2 * this.view.camera.position.distanceTo(at) * Math.tan((this.view.camera.fov * Math.PI) / 360)) / this.height,
       invalidate: () => this.invalidate(),
-      loaded: () => this.loaded(),
+      loaded: (id) => this.loaded(id),
     };
     this.drop = new DropLine(this.scene);
     this.parentLines = new ParentLines(this.scene);
@@ -117,8 +109,10 @@ export class Engine {
       size: () => ({ width: this.width, height: this.height }),
       draw: () => this.draw(),
     });
-    this.ends.push(light(this.scene, quality === "high"));
+    this.ends.push(light(this.scene));
+    this.floorGrid = new Floor(this.scene, quality === "high");
     this.setDark(options.dark);
+    this.floorGrid.number(() => this.draw()).catch(() => {});
     this.ends.push(options.telemetry.subscribe((id) => this.reported(id)));
     const ageTimer = setInterval(() => this.checkAges(), 250);
     this.ends.push(() => clearInterval(ageTimer));
@@ -189,13 +183,8 @@ export class Engine {
     this.palette = dark ? DARK : LIGHT;
     this.context.palette = this.palette;
     this.scene.background = this.palette.background;
-    this.scene.fog = new Fog(this.palette.background, 9, 26);
-    this.grid?.removeFromParent();
-    this.grid?.dispose();
-    this.grid = new GridHelper(20, 40, this.palette.gridStrong, this.palette.grid);
-    this.grid.rotateX(Math.PI / 2);
-    this.grid.position.z = -0.001;
-    this.scene.add(this.grid);
+    this.scene.fog = new Fog(this.palette.background, 4, 13);
+    this.floorGrid.paint(this.palette);
     for (const thing of this.things.values()) thing.update(thing.item);
     this.invalidate();
   }
@@ -203,7 +192,7 @@ export class Engine {
   /** Return the items at a position in the view, pixels, best first. */
   pick(x: number, y: number, slack = 12): Hit[] {
     this.place();
-    const roots = this.scene.children.filter((each) => each !== this.grid && !each.userData.ground);
+    const roots = this.scene.children.filter((each) => !each.userData.ground);
     return pick(x, y, { width: this.width, height: this.height }, this.view.camera, roots, slack, (id) => {
       const kind = this.things.get(id)?.item.kind;
       return kind !== undefined && SMALL.has(kind);
@@ -230,15 +219,10 @@ export class Engine {
   /** Bring an item, or all items, into the view. */
   focus(id?: string): void {
     this.place();
-    const box = new Box3();
-    const spot = new Vector3();
-    for (const [key, thing] of this.things) {
-      if (id !== undefined && key !== id) continue;
-      box.expandByObject(thing.root);
-      box.expandByPoint(thing.anchor(spot));
-    }
-    if (id !== undefined) box.expandByScalar(0.12);
-    this.view.fit(box);
+    const boxes = [...this.things.values()]
+      .filter(({ item }) => (id === undefined ? item.faint < 1 : item.id === id))
+      .map((thing) => boundsOf(thing).expandByScalar(id === undefined ? 0.01 : 0.12));
+    this.view.fit(corners(boxes), best);
     this.fitted = id === undefined ? this.view.camera.position.clone() : null;
   }
 
@@ -287,7 +271,7 @@ export class Engine {
     this.drop.dispose();
     this.parentLines.dispose();
     this.pathLine.dispose();
-    this.grid?.dispose();
+    this.floorGrid.dispose();
     this.view.dispose();
     this.renderer.dispose();
   }
@@ -324,6 +308,7 @@ export class Engine {
     this.height = Math.max(1, host.clientHeight);
     this.renderer.setSize(this.width, this.height, false);
     this.view.resize(this.width, this.height);
+    if (this.view.resizedSinceFit) this.refit();
     this.draw();
   }
 
@@ -367,6 +352,7 @@ export class Engine {
     for (const thing of this.things.values()) if (thing.item.kind === "logic") thing.placed();
     this.scene.updateMatrixWorld();
     this.batches.refresh();
+    this.floorGrid.lower(lowest(this.things.values()));
     this.parentLines.show(this.things, this.palette);
     this.renderer.shadowMap.needsUpdate = true;
   }

@@ -4,8 +4,12 @@ import { Color } from "three";
 
 export interface Palette {
   background: Color;
+  /** Lines of the floor: each 50 cm, each 10 cm; and strong ones for edges and numbers. */
   grid: Color;
+  gridFine: Color;
   gridStrong: Color;
+  axisX: Color;
+  axisY: Color;
   object: Color;
   robot: Color;
   selected: Color;
@@ -49,8 +53,11 @@ const COMMON = {
 export const LIGHT: Palette = {
   ...COMMON,
   background: color(0xeef1f4),
-  grid: color(0xd3d9df),
-  gridStrong: color(0xaab4be),
+  grid: color(0xc9d1d9),
+  gridFine: color(0xdde2e7),
+  gridStrong: color(0x8b98a5),
+  axisX: color(0xc8524a),
+  axisY: color(0x4c9a5a),
   object: color(0x9fb3c4),
   robot: color(0xdfe4ea),
   point: color(0x1d5f8a),
@@ -60,8 +67,11 @@ export const LIGHT: Palette = {
 export const DARK: Palette = {
   ...COMMON,
   background: color(0x14181d),
-  grid: color(0x252c34),
-  gridStrong: color(0x3a4550),
+  grid: color(0x2e3741),
+  gridFine: color(0x1f262d),
+  gridStrong: color(0x5b6875),
+  axisX: color(0xb34d47),
+  axisY: color(0x3f8a50),
   object: color(0x5c7186),
   robot: color(0xb9c2cc),
   point: color(0x6fbcec),

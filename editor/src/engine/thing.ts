@@ -1,6 +1,6 @@
 /** The model of an item in the view, and what the engine provides for it. */
 
-import type { Material, Mesh, Object3D, Vector3 } from "three";
+import { Box3, type Material, type Mesh, type Object3D, Vector3 } from "three";
 import type { Telemetry } from "../store/telemetry";
 import type { Batches } from "./batches";
 import type { Item } from "./items";
@@ -24,8 +24,8 @@ export interface Context {
   metresPerPixel: (at: Vector3) => number;
   /** Request a new frame. */
   invalidate: () => void;
-  /** Report that a model was loaded. */
-  loaded: () => void;
+  /** Report that the model of an item was loaded. */
+  loaded: (id: string) => void;
 }
 
 export abstract class Thing<I extends Item = Item> {
@@ -79,13 +79,35 @@ export function ownedBy(root: Object3D, id: string): void {
   });
 }
 
+/** Return the visible meshes of an item, without those of its children. */
+export function meshesOf(root: Object3D, id: string, found: Mesh[] = []): Mesh[] {
+  for (const child of root.children) {
+    const owner = child.userData.item as string | undefined;
+    if (!child.visible || (owner !== undefined && owner !== id)) continue;
+    if (owner === id && (child as Mesh).isMesh) found.push(child as Mesh);
+    meshesOf(child, id, found);
+  }
+  return found;
+}
+
+/** Return the box around an item in the world, without its children; frames have to be up to date. */
+export function boundsOf(thing: Thing): Box3 {
+  const box = new Box3();
+  const part = new Box3();
+  for (const mesh of meshesOf(thing.root, thing.item.id)) {
+    if (!mesh.geometry.boundingBox) mesh.geometry.computeBoundingBox();
+    if (mesh.geometry.boundingBox) box.union(part.copy(mesh.geometry.boundingBox).applyMatrix4(mesh.matrixWorld));
+  }
+  return thing.item.kind === "logic" ? box : box.expandByPoint(thing.anchor(new Vector3()));
+}
+
 /** Return the number of triangles of an item's model, without children and ghosts. */
 export function trianglesOf(root: Object3D, id: string): number {
   let count = 0;
   root.traverse((each) => {
     const mesh = each as Mesh;
     if (!mesh.isMesh || each.userData.item !== id) return;
-    count += (mesh.geometry.index?.count ?? mesh.geometry.getAttribute("position").count) / 3;
+    count += (mesh.geometry.index?.count ?? mesh.geometry.attributes.position?.count ?? 0) / 3;
   });
   return count;
 }

@@ -1,5 +1,6 @@
 /** The 3D view: passes the items to the engine, and handles taps. The engine is loaded when it is needed. */
 
+import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useRef, useState } from "react";
 import type { Engine, Quality } from "../../engine/engine";
@@ -28,11 +29,11 @@ export function View3D() {
   useEffect(() => {
     let ended = false;
     let made: Engine | null = null;
-    const maker = new ItemMaker();
-    const reportedTroubles = new Set<string>();
+    let maker = new ItemMaker();
+    const reportedFaults = new Set<string>();
     const once = (sentence: string) => {
-      if (!reportedTroubles.has(sentence)) notify("error", sentence);
-      reportedTroubles.add(sentence);
+      if (!reportedFaults.has(sentence)) notify("error", sentence);
+      reportedFaults.add(sentence);
     };
     let stop = () => {};
     const begin = async () => {
@@ -43,7 +44,7 @@ export function View3D() {
         labels: labels.current,
         telemetry,
         asset: readShown,
-        trouble: once,
+        reportFault: once,
         quality: chosen(quality),
         dark: themeAtStart.current === "dark",
       });
@@ -52,7 +53,7 @@ export function View3D() {
         if (!tapTaken(hits, floor)) pick(hits.map((hit) => hit.id));
       };
       shown.show(maker.items(now()));
-      shown.focus();
+      shown.focus(undefined, true);
       let noDrags = () => {};
       const pane = canvas.current;
       void persistently(() => import("./dragPucks")).then(({ dragPucks }) => {
@@ -60,13 +61,19 @@ export function View3D() {
       });
       const unsubscribe = store.subscribe((state, before) => {
         shown.show(maker.items(state));
-        if (state.doc && state.doc.scene.id !== before.doc?.scene.id) shown.focus();
+        if (state.doc && state.doc.scene.id !== before.doc?.scene.id) shown.focus(undefined, true);
         const at = state.program.running.at(-1);
         if (state.ui.follow && at !== undefined && at !== before.program.running.at(-1)) shown.focus(at);
+      });
+      // The labels contain words.
+      const unlisten = i18n.on("change", () => {
+        maker = new ItemMaker();
+        shown.show(maker.items(now()));
       });
       stop = () => {
         noDrags();
         unsubscribe();
+        unlisten();
       };
       setEngine(shown);
       setMine(shown);
