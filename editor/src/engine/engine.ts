@@ -7,14 +7,15 @@ import { View } from "./camera";
 import { DropLine, heightWords } from "./dropLine";
 import { Floor, lowest } from "./floor";
 import { corners } from "./framing";
-import { Gizmo } from "./gizmo/gizmo";
 import type { Item } from "./items";
 import { labelsOf } from "./labelling";
 import { Labels } from "./labels";
+import { LazyGizmo } from "./lazyGizmo";
+import { LazyPath } from "./lazyPath";
 import { light } from "./light";
 import { DARK, LIGHT, type Palette } from "./palette";
 import { ParentLines } from "./parentLines";
-import { PathLine, type Way } from "./pathLine";
+import type { StraightPath } from "./pathLine";
 import { type Hit, onFloor, pick } from "./picking";
 import { followPointer } from "./pointer";
 import { type Probe, probe } from "./probe";
@@ -44,7 +45,7 @@ export class Engine {
   readonly view: View;
   readonly scene = new Scene();
   /** The gizmo of the transform tool: moves, turns and resizes an item. */
-  readonly gizmo: Gizmo;
+  readonly gizmo: LazyGizmo;
   /** Number of drawn frames. */
   frames = 0;
   onTap: (hits: Hit[], floor: Vector3 | null) => void = () => {};
@@ -76,7 +77,7 @@ export class Engine {
   private readonly drop: DropLine;
   /** Lines from points to their parents. */
   readonly parentLines: ParentLines;
-  private readonly pathLine: PathLine;
+  private readonly pathLine: LazyPath;
   private readonly ends: (() => void)[] = [];
 
   constructor(private readonly options: EngineOptions) {
@@ -101,8 +102,8 @@ export class Engine {
     };
     this.drop = new DropLine(this.scene);
     this.parentLines = new ParentLines(this.scene);
-    this.pathLine = new PathLine(this.scene);
-    this.gizmo = new Gizmo({
+    this.pathLine = new LazyPath(this.scene, () => this.draw());
+    this.gizmo = new LazyGizmo({
       canvas,
       scene: this.scene,
       camera: () => this.view.camera,
@@ -164,11 +165,11 @@ export class Engine {
   }
 
   /** Show the straight path of the tool instead of the previous one; null hides it. */
-  showPath(way: Way | null): void {
-    if (this.pathLine.show(way, this.palette)) this.draw();
+  showPath(path: StraightPath | null): void {
+    void this.pathLine.show(path, this.palette);
   }
 
-  get way(): Way | null {
+  get straightPath(): StraightPath | null {
     return this.pathLine.shown;
   }
 

@@ -16,7 +16,7 @@ import type { Palette } from "./palette";
 /** `unknown`: not checked, or the motion is not straight. */
 export type PathState = "free" | "blocked" | "unknown";
 
-export interface Way {
+export interface StraightPath {
   from: Position;
   to: Position;
   state: PathState;
@@ -34,8 +34,8 @@ const MOST_DASHES = 60;
 const up = new Vector3(0, 1, 0);
 
 export class PathLine {
-  shown: Way | null = null;
-  private wanted: Way | null = null;
+  shown: StraightPath | null = null;
+  private wanted: StraightPath | null = null;
   private readonly material = new MeshBasicMaterial({ transparent: true, opacity: 0.85 });
   private readonly mesh = new Mesh<BufferGeometry, MeshBasicMaterial>(undefined, this.material);
 
@@ -46,13 +46,13 @@ export class PathLine {
   }
 
   /** Return whether it looks different now. */
-  show(way: Way | null, palette: Palette): boolean {
-    if (same(way, this.wanted)) return false;
-    this.wanted = way;
-    const from = way && new Vector3(way.from.x, way.from.y, way.from.z);
-    const to = way && new Vector3(way.to.x, way.to.y, way.to.z);
+  show(path: StraightPath | null, palette: Palette): boolean {
+    if (same(path, this.wanted)) return false;
+    this.wanted = path;
+    const from = path && new Vector3(path.from.x, path.from.y, path.from.z);
+    const to = path && new Vector3(path.to.x, path.to.y, path.to.z);
     const length = from && to ? from.distanceTo(to) : 0;
-    this.shown = length > SHORTEST ? way : null;
+    this.shown = length > SHORTEST ? path : null;
     this.mesh.visible = this.shown !== null;
     if (!this.shown || !from || !to) return true;
     const { state } = this.shown;
@@ -76,7 +76,7 @@ export class PathLine {
 /** Tolerance, m: the pose reported by a robot at standstill varies a little. */
 const STILL = 2e-4;
 
-function same(a: Way | null, b: Way | null): boolean {
+function same(a: StraightPath | null, b: StraightPath | null): boolean {
   if (!a || !b) return a === b;
   const apart = (p: Position, q: Position) => Math.hypot(p.x - q.x, p.y - q.y, p.z - q.z);
   return a.state === b.state && apart(a.from, b.from) < STILL && apart(a.to, b.to) < STILL;

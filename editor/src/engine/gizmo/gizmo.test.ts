@@ -6,19 +6,19 @@ import { apart, handlesOf, keyOf, outline } from "./handles";
 const HALF = { x: 1, y: 1, z: 1 };
 
 describe("a pointer's ray", () => {
-  it("gives a place along an axis, exact when it meets the axis", () => {
+  it("returns the position along an axis, exactly if it meets the axis", () => {
     const target = new Vector3(0.3, 0, 0);
     const eye = new Vector3(1, -2, 1.5);
     const ray = new Ray(eye, target.clone().sub(eye).normalize());
     expect(alongAxis(ray, new Vector3(), new Vector3(1, 0, 0))).toBeCloseTo(0.3, 9);
   });
 
-  it("gives nothing along an axis that points at the viewer", () => {
+  it("returns nothing along an axis that points at the camera", () => {
     const ray = new Ray(new Vector3(0, 0, 5), new Vector3(0, 0, -1));
     expect(alongAxis(ray, new Vector3(), new Vector3(0, 0, 1))).toBeNull();
   });
 
-  it("meets a plane before it, not behind it or edge-on", () => {
+  it("meets a plane in front, but not one behind or seen edge-on", () => {
     const down = new Ray(new Vector3(0.2, 0.1, 1), new Vector3(0, 0, -1));
     expect(onPlane(down, new Vector3(0, 0, 0.4), new Vector3(0, 0, 1))).toEqual(new Vector3(0.2, 0.1, 0.4));
     expect(onPlane(down, new Vector3(0, 0, 2), new Vector3(0, 0, 1))).toBeNull();
@@ -27,7 +27,7 @@ describe("a pointer's ray", () => {
 });
 
 describe("turning", () => {
-  it("counts on past half a turn, both ways", () => {
+  it("continues past half a turn in both directions", () => {
     const axis = new Vector3(0, 0, 1);
     const start = new Vector3(1, 0, 0.5);
     let last = 0;
@@ -41,7 +41,7 @@ describe("turning", () => {
 });
 
 describe("handles", () => {
-  it("are named apart", () => {
+  it("have distinct names", () => {
     for (const mode of ["move", "turn", "size"] as const) {
       const names = handlesOf(mode, ["x", "y", "z"]).map(keyOf);
       expect(new Set(names).size).toBe(names.length);
@@ -49,7 +49,7 @@ describe("handles", () => {
     expect(handlesOf("turn", ["z"]).map(keyOf)).toEqual(["ring z"]);
   });
 
-  it("are hit by the distance to their line; a ring rather in front than behind", () => {
+  it("are hit by the distance to their line; of a ring, the front part precedes the rear one", () => {
     expect(toSegment(5, 3, { x: 0, y: 0 }, { x: 10, y: 0 })).toBe(3);
     expect(toSegment(13, 4, { x: 0, y: 0 }, { x: 10, y: 0 })).toBe(5);
     const ring = outline({ do: "ring", axis: "z" }, HALF).map(({ x, y }) => ({
@@ -62,7 +62,7 @@ describe("handles", () => {
     expect(apart(0, 17, ring, centre)).toBeGreaterThan(7);
   });
 
-  it("that are behind the viewer cannot be hit", () => {
+  it("behind the camera cannot be hit", () => {
     expect(apart(0, 0, [{ x: 0, y: 0, depth: 1.2 }], { x: 0, y: 0, depth: 1.2 })).toBe(Infinity);
   });
 });

@@ -48,7 +48,7 @@ export interface Drag {
   y: number;
 }
 
-interface Surroundings {
+export interface Surroundings {
   canvas: HTMLCanvasElement;
   scene: Scene;
   camera: () => Camera;

@@ -1,7 +1,7 @@
 /** Tree of items; which are collapsed is stored on the server for the user. */
 
 import { t } from "@lingui/core/macro";
-import { Button, Collection, Tree, TreeItem, TreeItemContent } from "react-aria-components";
+import { Button, Collection, ListLayout, Tree, TreeItem, TreeItemContent, Virtualizer } from "react-aria-components";
 import { storeViewState } from "../../commands/viewstate";
 import { theEngine } from "../../session/engine";
 import { heldBy } from "../../store/selectors";
@@ -22,9 +22,12 @@ export const ICONS: Record<Kind, IconName> = {
   terminal: "play",
 };
 
-const NOTHING: string[] = [];
+/** Longer lists scroll by themselves and render only the visible rows; height of a row, pixels. */
+const MANY = 60;
+const ROW = 44;
+const NOTHING: readonly string[] = [];
 
-function foldedOf(stored: unknown): string[] {
+function foldedOf(stored: unknown): readonly string[] {
   return Array.isArray(stored) ? stored.filter((each) => typeof each === "string") : NOTHING;
 }
 
@@ -101,10 +104,12 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
       </TreeItem>
     );
   };
-  return (
+  const visible = shownRows(rows, open);
+  const tree = (
     <Tree
       aria-label={label}
       className="things"
+      style={visible > MANY ? { height: `min(${visible * ROW}px, 60dvh)`, overflow: "auto" } : {}}
       items={rows}
       dependencies={[locks, hidden, unfolded]}
       expandedKeys={open}
@@ -114,4 +119,16 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
       {item}
     </Tree>
   );
+  return visible > MANY ? (
+    <Virtualizer layout={ListLayout} layoutOptions={{ rowSize: ROW }}>
+      {tree}
+    </Virtualizer>
+  ) : (
+    tree
+  );
+}
+
+/** Return the number of rows whose parents are all unfolded. */
+export function shownRows(rows: readonly Row[], open: ReadonlySet<string>): number {
+  return rows.reduce((sum, row) => sum + 1 + (open.has(row.id) ? shownRows(row.below, open) : 0), 0);
 }

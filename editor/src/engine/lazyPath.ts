@@ -1,0 +1,31 @@
+/** The straight path of the tool; what draws it is loaded for the first one. */
+
+import type { Scene } from "three";
+import type { Palette } from "./palette";
+import type { PathLine, StraightPath } from "./pathLine";
+
+export class LazyPath {
+  private line: PathLine | null = null;
+  private wanted: StraightPath | null = null;
+
+  constructor(
+    private readonly scene: Scene,
+    private readonly draw: () => void,
+  ) {}
+
+  async show(path: StraightPath | null, palette: Palette): Promise<void> {
+    this.wanted = path;
+    if (!path && !this.line) return;
+    const { PathLine } = await import("./pathLine");
+    this.line ??= new PathLine(this.scene);
+    if (this.line.show(this.wanted, palette)) this.draw();
+  }
+
+  get shown(): StraightPath | null {
+    return this.line?.shown ?? null;
+  }
+
+  dispose(): void {
+    this.line?.dispose();
+  }
+}
